@@ -1,8 +1,8 @@
-"""The one bootstrap and the one interval: scatter of the realisations, and errors of the numbers themselves beside it.
+"""Bootstrap intervals from the scatter of the realisations and from the errors of the numbers themselves.
 
-A *stack* has a mean in its first row, `RESAMPLES` means of resampled realisations behind it, and perhaps means moved by
-their errors behind those. What is computed from a stack row by row is a stack, too, and `interval` joins all of it.
-A resample is NaN where it draws nothing but lost realisations: it says nothing, and is left out of all that follows.
+A *stack* is an array whose first row is a mean. `RESAMPLES` rows with means of resampled realisations follow, and then
+rows in which the mean is moved by its errors. A function applied row by row turns a stack into another stack, and
+`interval` makes an interval from all rows. A resample that contains only failed realisations is NaN and does not count.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from mdr_dask.arrays import FloatArray
 
 CONFIDENCE = 0.95
 RESAMPLES = 400
-#: Sets of values that are moved by their errors one after the other; the errors within one have one sign.
+#: Number of groups of values that are moved by their errors one after the other; within a group errors have one sign.
 GROUPS = 32
 #: Probabilities of the ends of an interval.
 TAILS = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
-#: Fewest resamples that reach into the tails.
+#: Least number of resamples for the tails.
 FEWEST = round(1 / TAILS[0])
-#: Logarithm of what is not positive: its exponential is 0.
+#: Logarithm that stands for values that are not positive; its exponential is 0.
 NOTHING = -1000.0
 
 
 @lru_cache(maxsize=8)
 def weights(count: int) -> FloatArray:
-    """Return how often each realisation is drawn, shape (1 + RESAMPLES, count): each once first, then the resamples.
+    """Return how often each realisation is drawn, shape (1 + RESAMPLES, count); in the first row each is drawn once.
 
-    All cases are resampled alike, because they share their lines: differences between them keep that pairing.
+    All cases are resampled alike, because they share their lines; so differences between cases are paired.
     """
     generator = np.random.Generator(np.random.Philox(0))
     drawn = generator.multinomial(count, np.full(count, 1 / count), RESAMPLES)
@@ -42,7 +42,7 @@ def weights(count: int) -> FloatArray:
 def means(values: FloatArray) -> FloatArray:
     """Return the stack of means over the first axis, realisations.
 
-    What is not finite is left out. NaN where nothing is left, and in all resamples where one realisation is left.
+    Values that are not finite are left out. The mean is NaN if none is left, its resamples also if only one is left.
     """
     flat = values.reshape(values.shape[0], -1)
     known = np.isfinite(flat)
@@ -56,7 +56,7 @@ def means(values: FloatArray) -> FloatArray:
 
 
 def complete(values: FloatArray) -> FloatArray:
-    """Return values without the realisations, along the first axis, that are not finite somewhere."""
+    """Return values in which realisations (first axis) that are not finite everywhere are NaN."""
     known = np.all(np.isfinite(values.reshape(values.shape[0], -1)), axis=1)
     return np.where(known.reshape(-1, *(1 for _ in values.shape[1:])), values, np.nan)
 
@@ -64,7 +64,7 @@ def complete(values: FloatArray) -> FloatArray:
 def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
     """Return values moved up and down by errors, one group of neighbours after the other, shape (2 groups, ...).
 
-    An infinite error, which knows nothing of its value, moves it by its own size.
+    An infinite error moves a value by its own size.
     """
     size = np.where(np.isinf(errors), values, errors)
     flat = np.abs(np.where(np.isfinite(size), size, 0.0)).ravel()
@@ -85,21 +85,21 @@ def difference(one: FloatArray, other: FloatArray) -> FloatArray:
 
 
 def logarithms(stack: FloatArray) -> FloatArray:
-    """Return logarithms of what is positive by nature: scatter and errors that take it to zero or below lie lowest."""
+    """Return logarithms of a stack of a positive quantity; rows that are not positive get the lowest value."""
     with np.errstate(invalid="ignore", divide="ignore"):
         logs: FloatArray = np.where(stack <= 0, NOTHING, np.log(stack))
     return logs
 
 
 def _reach(shifts: FloatArray) -> FloatArray:
-    """Return how far errors reach up together, from the shifts of every group up and down; NaN is none."""
+    """Return the sum of the upward shifts of all groups, from the shifts by errors of both signs; NaN counts as 0."""
     known = np.where(np.isnan(shifts), 0.0, shifts)
     reach: FloatArray = np.maximum(np.maximum(known[0::2], known[1::2]), 0.0).sum(axis=0)
     return reach
 
 
 def regrouped(stack: FloatArray) -> FloatArray:
-    """Return a stack of cases, each with errors of its own, as a stack in which neighbouring cases err together."""
+    """Return a stack of cases with separate errors as a stack in which the errors of neighbours have one sign."""
     shifts = stack[1 + RESAMPLES :] - stack[0]
     own = np.maximum(_reach(shifts), _reach(-shifts))
     return np.concatenate([stack[: 1 + RESAMPLES], moved(stack[0], own)]) if np.any(own > 0) else stack[: 1 + RESAMPLES]
@@ -108,9 +108,9 @@ def regrouped(stack: FloatArray) -> FloatArray:
 def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tuple[FloatArray, FloatArray]:
     """Return 95 % intervals from a stack, along its first axis.
 
-    The percentiles of a bootstrap over a few realisations are too near: their distances from the value are widened by
-    sqrt(n / (n - 1)) t / z, Student's t over the normal z. The errors of the numbers are added to that: the same error
-    in every realisation does not average out, and a root of squares would hold too few truths.
+    The percentiles of a bootstrap over few realisations are too narrow, so their distances from the value are
+    multiplied by sqrt(n / (n - 1)) t / z, with Student's t and the normal z. The shifts by errors are added linearly,
+    because the same error in every realisation does not average out.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tup
     count : int or array
         Realisations n that were resampled.
     positive : bool
-        Whether to widen in logarithms, for what is positive.
+        Whether to compute the interval in logarithms, for positive quantities.
     """
     values = logarithms(stack) if positive else stack
     enough = np.count_nonzero(np.isfinite(values[1 : 1 + RESAMPLES]), axis=0) >= FEWEST
@@ -135,7 +135,7 @@ def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tup
 
 
 def widening(count: ArrayLike) -> FloatArray:
-    """Return sqrt(n / (n - 1)) t / z, by which deviations of resamples are too small for n realisations."""
+    """Return sqrt(n / (n - 1)) t / z, the factor by which deviations of resamples of n realisations are too small."""
     from scipy.special import ndtri, stdtrit
 
     number = np.maximum(np.asarray(count, dtype=np.float64), 2.0)
@@ -144,18 +144,18 @@ def widening(count: ArrayLike) -> FloatArray:
 
 
 def chance(residuals: FloatArray, count: int, draws: int = RESAMPLES) -> float:
-    """Return how often scatter and errors alone leave residuals as large as those of the first row.
+    """Return the probability that scatter and errors alone cause residuals as large as those of the first row.
 
-    NaN where too few resamples know the scatter, as of one realisation.
+    It is NaN if there are too few resamples, as with one realisation.
 
     Parameters
     ----------
     residuals : array, shape (1 + RESAMPLES + 2 groups, ...)
-        Stack of data less law. If the law holds, the first row is to the truth as the resamples are to the first row.
+        Stack of data minus law. If the law holds, the first row differs from the truth as the resamples differ from it.
     count : int
         Realisations that were resampled.
     draws : int
-        Resamples among the rows.
+        Number of resamples among the rows.
     """
     flat = residuals.reshape(residuals.shape[0], -1)
     size = np.sqrt(np.sum(flat[0] ** 2))

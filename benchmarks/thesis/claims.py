@@ -48,7 +48,7 @@ METHOD = (
         "",
         "no: exact for bodies of revolution; for rough ones the stiffness is within 15 % of a half-space (25 % at "
         "light loads), and the area is not given at all",
-        "The length in contact only repeats the stiffness (Lyashenko et al., Tribol. Lett. 52, 223, 2013; validity.md).",
+        "The length in contact only repeats the stiffness (Lyashenko et al., Tribol. Lett. 52, 223, 2013).",
     ),
     Claim(
         "(2.1), (2.2)",
@@ -181,7 +181,7 @@ STEADY = (
         run("friction_force"),
         measures.last_level,
         "The last contact is one parabolic tip: mu = 2/sqrt 3 of the slope in contact and falls as v^(-1/2). The "
-        "constant level is the slope beside the one node that is left in contact on the grid of the thesis (friction.md).",
+        "constant level is the slope beside the one node that is left in contact on the grid of the thesis.",
     ),
     Claim("3.2.2", "Region II is a decade wide, and mu doubles in it", run("friction_force"), measures.transition),
     Claim(

@@ -1,4 +1,4 @@
-"""Stopping at the answer: whether a fitted constant is known well enough, and which cases it follows from."""
+"""Realisations until a fitted constant is known: is its interval narrow enough, and which cases does it depend on?"""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from mdr_dask.errors import CampaignError, FitError, did_you_mean
 from mdr_dask.fits import available
 from mdr_dask.fits.base import Fit
 
-#: Part of its standard error that a mean is moved by, to see what follows: little, so that a fit keeps its cases.
+#: Means are moved by this part of their standard error to find what depends on them; a fit then keeps its cases.
 STEP = 1e-3
-#: Most groups of neighbours along a dimension that are moved one after the other.
+#: Largest number of groups of neighbouring values along a dimension that are moved one after the other.
 GROUPS = 32
-#: Part of the standard error of a constant below which a group of cases counts for nothing.
+#: A group of cases is left out if it changes the constant by less than this part of its standard error.
 NEGLIGIBLE = 0.01
-#: Change of the scatter by which it is seen how much of an interval comes from it.
+#: Relative change of the scatter by which its part of an interval is found.
 LESS = 0.01
 
 
 def require_known(campaign: Campaign) -> None:
-    """Refuse realisations until constants are known that no fit of the model finds.
+    """Refuse a campaign whose realisations go on until a constant is known that no fit of the model gives.
 
     Raises
     ------
     CampaignError
-        With one sentence for each.
+        With one sentence for each such constant.
     """
     known = available(campaign.model) if campaign.replication.answers else {}
     is_adaptive = any(axis.refinement for one in campaign.series for axis in one.axes)
@@ -57,7 +57,7 @@ def half_widths(
     Raises
     ------
     FitError
-        If the fit cannot be made, or does not find this constant.
+        If the fit cannot be made, or does not give this constant.
     """
     found = {}
     for name, result in fit.results(groups).items():
@@ -68,7 +68,7 @@ def half_widths(
 
 
 def is_wide(value: xr.DataArray, half: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
-    """Return where an interval is too wide; not where it has no ends, as of a law that does not hold."""
+    """Return where an interval is too wide. Without ends, as of a law that does not hold, it is not."""
     return (half > _allowed(value, tolerance)) & np.isfinite(half)
 
 
@@ -78,11 +78,11 @@ def _allowed(value: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
 
 
 def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.DataArray]:
-    """Return what would be left of half of an interval if realisations did not scatter, by series.
+    """Return the half width that an interval would have without scatter of the realisations, by series.
 
-    That comes from errors of the grid and from what a law misses; more realisations do not narrow it. It is seen by
-    making the scatter a little less and a little more. The smaller result counts: one of both may be where the law
-    begins to be doubted.
+    It comes from errors of the grid and from the misfit of the law, and more realisations do not reduce it. It is found
+    by extrapolation from a slightly smaller and a slightly larger scatter. The smaller result is taken, because at one
+    of both the verdict about the law may change.
     """
     now = half_widths(fit, constant, groups)
 
@@ -106,10 +106,10 @@ def _scattered(data: xr.Dataset, scale: float) -> xr.Dataset:
 def still_wide(
     fit: Fit, constant: str, groups: Mapping[str, xr.Dataset], tolerance: Tolerance, at_most: int
 ) -> dict[str, xr.DataArray]:
-    """Return where an interval is too wide and so many realisations may narrow it enough, by series.
+    """Return where an interval is too wide and more realisations may narrow it enough, by series.
 
-    They are in vain where scatter alone is within the tolerance, and falling with the root of their number leaves too
-    much with what is left without it.
+    They cannot if the part of the scatter is already within the tolerance and would, divided by the root of the
+    increase of realisations, still be too large together with the other part.
 
     Raises
     ------
@@ -132,11 +132,11 @@ def still_wide(
 def cases_behind(
     fit: Fit, constant: str, groups: Mapping[str, xr.Dataset], name: str, wide: xr.DataArray
 ) -> xr.DataArray:
-    """Return the cases of a series that a constant follows from, where it is not known well enough.
+    """Return the cases of a series on which a constant depends, where it is not known well enough.
 
-    The values of every dimension, apart from those that the constant has itself, are moved by a small part of their
-    standard error. Cases take part if the constant follows each of their coordinates, so they are whole rows and
-    columns: what a fit compares has the same lines. Values that hardly count do not.
+    The results of the cases are moved by a small part of their standard error, group by group along every dimension
+    that the constant does not have itself. A case is chosen if the constant depends on the group of each of its
+    coordinates; so whole rows and columns are chosen, and all cases that a fit compares get the same lines.
 
     Parameters
     ----------
@@ -186,22 +186,22 @@ def cases_behind(
 
 
 def _is_own(data: xr.Dataset, wide: xr.DataArray, dim: str) -> bool:
-    """Return whether a result has the values of a dimension of its study, and not a row for all of them beside."""
+    """Return whether a result has a dimension of its study with the same values, without a further row for all."""
     if dim in data.coords and dim in wide.coords:
         return data[dim].equals(wide[dim])
     return data.sizes[dim] == wide.sizes[dim]
 
 
 def _over(dims: list[str], flags: xr.DataArray) -> xr.DataArray:
-    """Return where any flag is set, over some of their dimensions."""
+    """Return where any flag is set along the other dimensions."""
     bare = flags.drop_vars(flags.coords)
     return bare.any([dim for dim in bare.dims if dim not in dims])
 
 
 def _steps(data: xr.Dataset, inner: list[str]) -> dict[str, xr.DataArray]:
-    """Return by how much the results of every case are moved, all of its realisations alike: some up, some down.
+    """Return by how much the results of every case are moved, all realisations alike.
 
-    No two by the same: in sums and differences of cases moves of one size would cancel.
+    Signs and sizes are random, because equal moves would cancel in sums and differences of cases.
     """
     generator, shape = np.random.Generator(np.random.Philox(0)), [data.sizes[dim] for dim in inner]
     found = {}

@@ -156,7 +156,14 @@ def fitted(
     return Fitted(constants, residuals, count)
 
 
-def verdict(residuals: FloatArray, count: int, constants: int = 0, where: Callable[[int], str] | None = None) -> str:
+def verdict(
+    residuals: FloatArray,
+    count: int,
+    constants: int = 0,
+    where: Callable[[int], str] | None = None,
+    *,
+    excluded: bool = False,
+) -> str:
     """Say whether a law holds.
 
     Parameters
@@ -169,11 +176,24 @@ def verdict(residuals: FloatArray, count: int, constants: int = 0, where: Callab
         Number of constants fitted to these data.
     where : callable, int -> str, optional
         Returns a description of a case, for that of the largest departure.
+    excluded : bool
+        Whether the interval of a fitted constant excludes the stated value; scatter is then no explanation.
     """
     if residuals.shape[1] <= constants:
         return law_holds(residuals[0], np.nan, constants)
     place = where(int(np.argmax(np.abs(residuals[0])))) if where else ""
-    return law_holds(residuals[0], bootstrap.chance(residuals, count), constants, place)
+    return law_holds(residuals[0], None if excluded else bootstrap.chance(residuals, count), constants, place)
+
+
+def excludes(stack: FloatArray, count: int, stated: float) -> bool:
+    """Return whether the interval of a constant excludes a stated value."""
+    low, high = bootstrap.interval(stack, count)
+    return bool(stated < low or stated > high)
+
+
+def short(number: float) -> str:
+    """Return a number with two digits: ``550``, ``0.023``."""
+    return f"{float(f'{number:.2g}'):g}"
 
 
 def law_holds(departures: FloatArray, chance: float | None, constants: int = 0, where: str = "") -> str:
@@ -198,7 +218,7 @@ def law_holds(departures: FloatArray, chance: float | None, constants: int = 0, 
     pairs = distinguishable(rms, limit, digits=2), distinguishable(largest, 2 * limit, digits=2)
     (mean, of_mean), (most, of_most) = ((_plain(one), _plain(other)) for one, other in pairs)
     if departures.size == 1:
-        departs, limits = f"departs by {'-' if departures.flat[0] < 0 else '+'}{mean} %", f"limit {of_mean} %"
+        departs, limits = f"departs by {_signed(float(departures.flat[0]), mean)} %", f"limit {of_mean} %"
     else:
         departs = f"departs by {mean} % rms, at most {most} %{f' at {where}' if where else ''}"
         limits = f"limits {of_mean} % and {of_most} %"
@@ -214,6 +234,10 @@ def law_holds(departures: FloatArray, chance: float | None, constants: int = 0, 
         return f"not tested: too few realisations to know the scatter; {departs}"
     likely = f"{chance:.2g}" if chance else f"below {1 / bootstrap.RESAMPLES:g}"
     return f"no: {departs}; scatter alone would cause this with probability {likely}"
+
+
+def _signed(number: float, digits: str) -> str:
+    return digits if digits == "0" else f"{'-' if number < 0 else '+'}{digits}"
 
 
 def _plain(number: str) -> str:

@@ -15,7 +15,7 @@ from mdr_dask.aggregation import companion
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
 from mdr_dask.fits import top
-from mdr_dask.fits.base import FITTED_LAW_HOLDS, LAW_HOLDS, Fit, Fitted, fitted, require, verdict
+from mdr_dask.fits.base import FITTED_LAW_HOLDS, LAW_HOLDS, Fit, Fitted, excludes, fitted, require, short, verdict
 from mdr_dask.physics.sliding import laws
 from mdr_dask.physics.surfaces import roughness
 
@@ -221,12 +221,14 @@ def power_law(x: FloatArray, logs: FloatArray, count: int) -> Fitted:
 def stated_power(x: FloatArray, logs: FloatArray, power: float, count: int, where: Callable[[int], str]) -> str:
     """Say whether a stack of logarithms follows a power law with a stated power and any factor."""
     rest = logs - power * x
-    return verdict(rest - rest.mean(axis=1, keepdims=True), count, 1, where)
+    free = power_law(x, logs, count).constants[:, 0]
+    excluded = excludes(free, count, power)
+    return verdict(rest - rest.mean(axis=1, keepdims=True), count, 1, where, excluded=excluded)
 
 
 def at_load(force: FloatArray) -> Callable[[int], str]:
     """Return a function that names the load of a case."""
-    return lambda k: f"F_N / (G h L) = {force[k]:.2g}"
+    return lambda k: f"F_N / (G h L) = {short(force[k])}"
 
 
 def _first_linear(friction: FloatArray, velocity: FloatArray) -> int | None:
@@ -432,9 +434,10 @@ def _interpolation(data: xr.Dataset) -> Variables:
     stack = table.logarithms(used)
     found = fitted(lambda rows: least_squares(model, start, rows), lambda rows, best: rows - model(best), stack, count)
     of_stated = stack - model(np.array([start]))
+    excluded = excludes(found.constants[:, 0], count, stated)
 
     def where(k: int) -> str:
-        return f"{at_load(force)(k)}, v tau slope / (sqrt 2 h) = {velocity[k]:.2g}"
+        return f"{at_load(force)(k)}, v tau slope / (sqrt 2 h) = {short(velocity[k])}"
 
     return {
         **constant("alpha", found.constants[:, 0], count, "exponent of the force in the interpolation law"),
@@ -443,7 +446,7 @@ def _interpolation(data: xr.Dataset) -> Variables:
         **law_error(found.residuals[0], "", "constants fitted"),
         **law_error(of_stated[0], "_stated", f"with H / (1 + H) and {laws.BETA}"),
         **measure("cases", int(used.sum()), "number of cases fitted"),
-        **holds(verdict(of_stated, count, 0, where), found.holds(where)),
+        **holds(verdict(of_stated, count, 0, where, excluded=excluded), found.holds(where)),
     }
 
 

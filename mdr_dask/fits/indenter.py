@@ -10,7 +10,7 @@ import xarray as xr
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import Fit, fitted, require, verdict
+from mdr_dask.fits.base import Fit, excludes, fitted, require, short, verdict
 from mdr_dask.fits.friction import (
     KELVIN,
     MODELS,
@@ -107,17 +107,18 @@ def _indenter(data: xr.Dataset) -> Variables:
         return law
 
     def where(k: int) -> str:
-        return f"xi = {xi[k]:.2g}"
+        return f"xi = {short(xi[k])}"
 
     start = (math.log(laws.INDENTER_EXPONENT),)
     found = fitted(lambda rows: least_squares(model, start, rows), lambda rows, best: rows - model(best), logs, count)
     stated = logs - model(np.array([start]))
+    excluded = excludes(found.constants[:, 0], count, start[0])
     return {
         **constant("exponent", np.exp(found.constants[:, 0]), count, "exponent of the law of rough indenters", True),
         **law_error(found.residuals[0], "", "exponent fitted"),
         **law_error(stated[0], "_stated", "exponent 1.5"),
         **measured,
-        **holds(verdict(stated, count, 0, where), found.holds(where)),
+        **holds(verdict(stated, count, 0, where, excluded=excluded), found.holds(where)),
     }
 
 

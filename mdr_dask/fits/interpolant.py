@@ -1,4 +1,4 @@
-"""The law of a study as a table that any program can interpolate linearly, with its error beside it."""
+"""The law of a study: a dense table of an output for linear interpolation in any program, with its error."""
 
 from __future__ import annotations
 
@@ -18,42 +18,42 @@ from mdr_dask.models.base import Status
 from mdr_dask.questions.selection import written_apart
 from mdr_dask.refinement import departure
 
-#: Numbers that a table holds at most, and pieces into which it cuts a cell of the study at most.
+#: Largest size of a table, and largest number of its intervals per interval of the study.
 LARGEST, PIECES = 2_000_000, 16
 
 
 def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     """Return an output as a dense table over the axes of its study, with its error.
 
-    The mean over realisations is interpolated by monotone cubics (PCHIP), axis by axis, on the natural scale of each
-    axis and of the output: logarithmic where that is what the values are spread evenly on. The table is dense enough
-    to be interpolated linearly, as ``Dataset.interp`` does.
+    The mean over realisations is interpolated by monotone cubics (PCHIP), axis by axis. The scale of each axis is
+    logarithmic if its values are more even there, that of the output if its values differ by more than a factor of ten.
+    The table is dense enough to be interpolated linearly, as ``Dataset.interp`` does.
 
     Parameters
     ----------
     dataset : Dataset
-        A group of a study that is a grid. Axes of one value become fixed parameters; axes of words stay as they are.
+        A group of a study that is a grid. Axes of one value become fixed parameters; axes of words are kept.
     output : str
         One of its outputs.
 
     Returns
     -------
     Dataset
-        ``<output>`` and ``<output>_error``: half of the 95 % interval of the mean (scatter and grid) and the error of
-        interpolation, added.
+        ``<output>`` and ``<output>_error``: the sum of half of the 95 % interval of the mean (scatter and grid) and of
+        the error of interpolation.
 
     Raises
     ------
     FitError
-        If the study is no grid, has no axis of at least four numbers, or has cases without a value.
+        If the study is not a grid, has no axis of at least four numbers, or has cases without a value.
 
     Notes
     -----
-    The error of interpolation is found by leaving out every second value of each axis, those of odd and those of even
-    number, and predicting them.
+    For the error of interpolation every second value of each axis is left out and predicted from the others, once the
+    odd and once the even ones.
     """
     if "case" in dataset.dims:
-        raise FitError("expected a grid, this is a sampled study: its cases lie along no axes")
+        raise FitError("expected a grid, this is a sampled study: its cases have no axes")
     mean, half = (array.squeeze() for array in _means(dataset, output))
     scale = Scale.of(mean.to_numpy()[mean.notnull().to_numpy()], spread=True)
     mean, half = _filled(mean, half, scale)
@@ -89,16 +89,16 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
 
 
 def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray]:
-    """Return the mean of an output and half of its interval; 0 where one realisation knows none."""
+    """Return the mean of an output and half of its interval; with one realisation, its discretisation error."""
     if "realisation" not in dataset[output].dims:
         return dataset[output], xr.zeros_like(dataset[output])
     kept = [name for name in (output, dataset[output].attrs.get("ancillary_variables")) if name in dataset]
     reduced = aggregate(dataset[kept], ("mean", "interval", "grid_error"))
     mean, ends = reduced[f"{output}_mean"].load(), reduced[f"{output}_interval"].load()
-    lost = int((mean.isnull() & ~_spared(dataset)).sum())
-    if lost:
+    missing = int((mean.isnull() & ~_spared(dataset)).sum())
+    if missing:
         raise FitError(
-            f"{output}: {lost} of {mean.size} cases have no value; finish the run, or keep a part that is whole by "
+            f"{output}: {missing} of {mean.size} cases have no value; finish the run, or select a complete part by "
             "--select"
         )
     half = (ends.sel(bound="high", drop=True) - ends.sel(bound="low", drop=True)) / 2
@@ -107,17 +107,17 @@ def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray
 
 
 def _spared(dataset: xr.Dataset) -> xr.DataArray:
-    """Return which cases were not needed: those that adaptive axes left to interpolation."""
+    """Return the cases that adaptive axes left to interpolation."""
     if "status" not in dataset:
         return xr.DataArray(False)
     return (dataset["status"] == Status.NOT_NEEDED).all("realisation")
 
 
 def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.DataArray, xr.DataArray]:
-    """Interpolate cases that were not needed between those that were, with the error of that added to theirs."""
+    """Interpolate the cases that adaptive axes left out, and add the error of this interpolation."""
     axes = [k for k, dim in enumerate(mean.dims) if _is_numeric(mean, str(dim))]
     table, error = scale.of_values(mean.to_numpy()).copy(), half.to_numpy().copy()
-    for axis in axes * 2:  # what one axis leaves, the other one fills
+    for axis in axes * 2:  # along one axis, then along the others
         places = mean[mean.dims[axis]].to_numpy()
         lines, errors = (np.moveaxis(array, axis, -1) for array in (table, error))
         for case in np.ndindex(lines.shape[:-1]):
@@ -128,7 +128,7 @@ def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.Da
 
 
 def _between(scale: Scale, places: FloatArray, line: FloatArray, error: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a line with what lies between its known values, and its errors."""
+    """Return a line with interpolated values between the known ones, and its errors."""
     known = np.isfinite(line)
     filled = cubic(places[known], line[known], places, 0, Scale.of(places))
     places = Scale.of(places).of_values(places)
@@ -145,7 +145,7 @@ def _is_numeric(mean: xr.DataArray, dim: str) -> bool:
 
 
 def _pieces(mean: xr.DataArray, axes: list[str]) -> int:
-    """Return into how many pieces the cells of each axis are cut."""
+    """Return the number of intervals of the table per interval of the study."""
     room = (LARGEST / mean.size) ** (1 / len(axes))
     return int(np.clip(room, 1, PIECES))
 
@@ -165,7 +165,7 @@ def _provenance(dataset: xr.Dataset) -> dict[str, str]:
 
 
 class Law:
-    """A law that was written by ``mdr-dask law``, to be evaluated at many points.
+    """A law that was written by ``mdr-dask law``, for evaluation at many points.
 
     Parameters
     ----------
@@ -182,7 +182,9 @@ class Law:
         value = self.table[self.output]
         words = [str(dim) for dim in value.dims if value[dim].dtype.kind not in "fiu"]
         if words:
-            raise DataError(f"{path}: the axis {words[0]} has words; write a law of one of them by --select")
+            raise DataError(
+                f"{path}: the axis {words[0]} has words; select one of them when the law is written (--select)"
+            )
         self.axes = {str(dim): value[dim].to_numpy().astype(np.float64) for dim in value.dims}
         both = np.stack([value.to_numpy(), self.table[f"{self.output}_error"].to_numpy()], axis=-1)
         self._interpolate = RegularGridInterpolator(tuple(self.axes.values()), both)
@@ -214,6 +216,6 @@ class Law:
             outside = values[~((values >= ends[0]) & (values <= ends[1]))]
             if outside.size:
                 unit = str(self.table[axis].attrs.get("units", "1"))
-                told, low, high = written_apart(unit, outside.flat[0], *ends)
-                raise DataError(f"expected {axis} from {low} to {high}, got {told}")
+                outlier, low, high = written_apart(unit, outside.flat[0], *ends)
+                raise DataError(f"expected {axis} from {low} to {high}, got {outlier}")
         return found

@@ -1,4 +1,4 @@
-"""Interpolation on natural scales: monotone cubics, straight lines, and what both miss."""
+"""Interpolation on linear or logarithmic scales: monotone cubics, straight lines, and the errors of both."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 
-#: Fewest values of an axis: every second one left out has to leave a curve.
+#: Least number of values of an axis: with every second one left out a curve must remain.
 FEWEST = 4
-#: What is left of the error of every second value when all are used: a quarter at second order, half at kinks.
+#: Error of interpolation over its error with every second value left out: 1/4 at second order (1/2 at kinks).
 LEFT = 0.25
 
 
 class Scale:
-    """A scale on which numbers are interpolated: as they are, or their logarithms."""
+    """A scale on which numbers are interpolated: linear or logarithmic."""
 
     def __init__(self, logarithmic: bool) -> None:
         self.logarithmic = logarithmic
 
     @classmethod
     def of(cls, numbers: FloatArray, spread: bool = False) -> Scale:
-        """Return the scale on which sorted numbers are more even; of values that are spread, over a decade or more."""
+        """Return the scale on which sorted numbers are more even; for `spread` values, logarithmic beyond a decade."""
         if numbers.min() <= 0:
             return cls(False)
         if spread:
@@ -32,16 +32,16 @@ class Scale:
         return cls(bool(even[1] < even[0]))
 
     def of_values(self, values: FloatArray) -> FloatArray:
-        """Return numbers as they are interpolated."""
+        """Return numbers on the scale."""
         return np.log(values) if self.logarithmic else np.asarray(values, dtype=np.float64)
 
     def back(self, values: FloatArray) -> FloatArray:
-        """Return what was interpolated as numbers."""
+        """Return numbers from their values on the scale."""
         return np.exp(values) if self.logarithmic else values
 
 
 def dense(places: FloatArray, pieces: int) -> FloatArray:
-    """Return places with each step cut into equal pieces on their natural scale; the places themselves stay."""
+    """Return places with each interval divided into equal pieces on their scale; the places themselves are kept."""
     scale = Scale.of(places)
     cut = [np.linspace(a, b, pieces, endpoint=False) for a, b in pairwise(scale.of_values(places))]
     grid = scale.back(np.concatenate([*cut, scale.of_values(places[-1:])]))
@@ -52,7 +52,7 @@ def dense(places: FloatArray, pieces: int) -> FloatArray:
 def cubic(
     places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int, scale: Scale | None = None
 ) -> FloatArray:
-    """Return monotone cubics through values along an axis, at other places, on the scale of the axis or another."""
+    """Return monotone cubics through values along an axis, at other places; by default on the scale of the axis."""
     from scipy.interpolate import PchipInterpolator
 
     scale = scale or Scale.of(places)
@@ -71,7 +71,7 @@ def linear(
 
 
 def missed(scale: Scale, table: FloatArray, places: FloatArray, axis: int) -> FloatArray:
-    """Return the error of interpolation along an axis at every place, from predicting the values left out."""
+    """Return the error of interpolation along an axis at every place, from predictions of values that are left out."""
     values, truth = np.moveaxis(table, axis, -1), np.moveaxis(scale.back(table), axis, -1)
     most = np.zeros_like(truth)
     number = len(places)
@@ -84,7 +84,7 @@ def missed(scale: Scale, table: FloatArray, places: FloatArray, axis: int) -> Fl
 
 
 def bent(table: FloatArray, grid: FloatArray, axis: int) -> FloatArray:
-    """Return by how much straight lines between the values of a table miss a curve: its second derivative h^2 / 8."""
+    """Return the error of straight lines between the values of a table: second derivative times h^2 / 8."""
     values, steps = np.moveaxis(table, axis, -1), np.diff(grid)
     bend = np.abs(np.diff(np.diff(values) / steps)) / (steps[1:] + steps[:-1])
     inside = bend * np.maximum(steps[1:], steps[:-1]) ** 2 / 4

@@ -107,7 +107,7 @@ def _constant(before: FloatArray, jump: FloatArray, count: int) -> dict[str, flo
         "deviation": found.rms,
         "deviation_of_thesis": float(np.sqrt(np.mean(stated[0] ** 2))),
         "fitted_law_holds": found.holds(where),
-        "law_holds": verdict(stated, count, 0, where),
+        "law_holds": verdict(stated, count, 0, where, excluded=not low <= LAW <= high),
     }
 
 

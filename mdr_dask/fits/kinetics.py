@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import FITTED_LAW_HOLDS, LAW_HOLDS, Fit, fitted, law_holds, require, verdict
+from mdr_dask.fits.base import FITTED_LAW_HOLDS, LAW_HOLDS, Fit, fitted, law_holds, require, short, verdict
 from mdr_dask.fits.jumps import LAW, jump_law
 from mdr_dask.fits.kinetic_cases import LEAST, LEVELS, Cases, jump_numbers, law_rate
 from mdr_dask.fits.relaxation import RATE_FIELDS, Relaxation, relaxation_of, window
@@ -267,9 +267,9 @@ def _power(
     numbers = [power[0], low, high, law, np.exp(level[0] - power[0] * centre), found.rms, x.size]
 
     def where(k: int) -> str:
-        return f"v_1 tau q_max = {np.exp(x[k]):.2g}"
+        return f"v_1 tau q_max = {short(np.exp(x[k]))}"
 
-    stated = verdict(rest - (rest @ weights)[:, None], count, 1, where)
+    stated = verdict(rest - (rest @ weights)[:, None], count, 1, where, excluded=not low <= law <= high)
     return [float(number) for number in numbers], (found.holds(where), stated)
 
 

@@ -1,4 +1,4 @@
-"""The posterior density of a few unknowns on cells that become smaller where it is high."""
+"""The posterior density of a few unknowns, on cells that are refined where the density is high."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.prediction import Predicted, Prediction
 
-#: Cells along each unknown to begin with, by the number of unknowns.
+#: Cells along each unknown at the start, by the number of unknowns.
 START = {1: 64, 2: 24, 3: 12, 4: 8}
-#: Fewest cells that are cut again, by the number of unknowns, and most pieces that they are cut into.
+#: Least number of cells that are refined, by the number of unknowns, and largest number of cells after refinement.
 BEST, MOST = {1: 32, 2: 256, 3: 768, 4: 1536}, 160_000
-#: Cells whose logarithmic density is lower than the highest by more are left out.
+#: Cells with ln(density) further below the maximum are dropped: together they hold less than 1e-5 of the posterior.
 REACH = 14.0
-#: Cells are small enough where the logarithmic density differs by less among the pieces of one, on average.
+#: Refinement ends if ln(density) differs by less within the cells, on average.
 SMOOTH = 0.6
-#: Halvings of a cell at most.
+#: Largest number of refinements.
 LEVELS = 16
-#: Standard deviations of the measurement that are tried where none is given.
+#: Number of sizes of the error of measurement that are considered if none is given.
 DEVIATIONS = 14
-#: Numbers that one step of the likelihood holds.
+#: Largest number of elements of an array in one step of the likelihood.
 _STEP = 2**21
 
 
 class Noise(NamedTuple):
-    """Errors of measurement: known, or in sizes that are all tried.
+    """Errors of measurement: one known size, or several sizes that are all considered.
 
     Attributes
     ----------
     sizes : array, shape (sizes,)
-        Factors of the pattern; 1 alone where the errors are known.
+        Factors of the pattern; only 1 if the errors are known.
     pattern : array, shape (points,), or None
-        Standard deviations of the points for the factor 1; None for shares of what is predicted.
+        Standard deviations of the points for the factor 1; None for shares of the predicted values.
     """
 
     sizes: FloatArray
@@ -55,9 +55,9 @@ class Likelihood:
     ----------
     prediction : Prediction
     values : array, shape (points,)
-        What was measured.
+        Measured values.
     noises : sequence of Noise
-        Held to be equally likely beforehand, and so are the sizes of each.
+        Equally likely a priori, and so are the sizes of each.
     """
 
     def __init__(self, prediction: Prediction, values: FloatArray, noises: list[Noise]) -> None:
@@ -88,7 +88,7 @@ def of_errors(values: FloatArray, predicted: Predicted, noise: FloatArray) -> Fl
 def distance(values: FloatArray, predicted: Predicted, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return chi squared, and the logarithm of the determinant of the covariance, shape (sets,).
 
-    The covariance is diagonal but for the few errors that points share, which are taken in by Woodbury's identity.
+    The covariance is diagonal except for the few errors that the points share, which Woodbury's identity adds.
     """
     variance = np.maximum(predicted.alone + noise, np.finfo(float).tiny)
     residual = values - predicted.mean
@@ -102,20 +102,20 @@ def distance(values: FloatArray, predicted: Predicted, noise: FloatArray) -> tup
 
 
 class Posterior(NamedTuple):
-    """Cells of the unit cube with their shares of the posterior.
+    """Cells of the unit cube with their weights.
 
     Attributes
     ----------
     places : array, shape (cells, unknowns)
-        Centres; 0 and 1 are the ends of the axes on their natural scales.
+        Centres; 0 and 1 are the ends of the axes, linear or logarithmic.
     weights : array, shape (cells,)
         Their sum is 1.
     density : array, shape (cells,)
         Logarithm, up to a constant.
     noise : array, shape (cells, sizes)
-        Share of each error of measurement in each cell.
+        Probability of each size of the error of measurement in each cell.
     width : float
-        Of a cell.
+        Width of a cell.
     """
 
     places: FloatArray
@@ -126,12 +126,12 @@ class Posterior(NamedTuple):
 
     @property
     def best(self) -> int:
-        """The cell of the highest density."""
+        """Index of the cell with the highest density."""
         return int(np.argmax(self.density))
 
 
 def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> Posterior:
-    """Refine cells of the unit cube, over which the unknowns are evenly likely beforehand.
+    """Refine cells of the unit cube, over which the prior is uniform.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> 
 
 
 def _kept(density: FloatArray, fewest: int, most: int) -> NDArray[np.intp]:
-    """Return which cells are cut: all that matter, and never few; of very many a fair part."""
+    """Return the cells to refine: all that matter, at least a few, and a random part if there are too many."""
     order = np.argsort(density)[::-1]
     number = max(int((density > density.max() - REACH).sum()), min(fewest, density.size))
     if number <= most:

@@ -1,4 +1,4 @@
-"""What a study predicts at measured points, as a function of the parameters that nobody measured."""
+"""The prediction of a study at measured points, as a function of the unknown parameters."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.interpolation import FEWEST, Scale, cubic, dense, linear, missed
 from mdr_dask.questions.selection import written_apart
 
-#: Most unknowns, and most numbers of the dense table between whose values straight lines are drawn.
+#: Largest number of unknowns, and largest size of the dense table that is interpolated linearly.
 MOST, LARGEST = 4, 4e6
-#: Pieces into which a cell of the study is cut at most.
+#: Largest number of intervals of the table per interval of the study.
 PIECES = 16
-#: Measured and computed values of a parameter that agree to this part are the same.
+#: Relative difference up to which a measured and a computed value of a parameter are the same.
 SAME = 1e-6
-#: Directions in which the lines of a study scatter together that are told apart, and share of the scatter in them.
+#: Largest number of common modes of the scatter of the lines, and the share of the variance that they must contain.
 MODES, SHARE = 6, 0.999
 
 
@@ -35,9 +35,9 @@ class Predicted(NamedTuple):
     ----------
     mean : array, shape (sets, points)
     together : array, shape (sets, points, modes)
-        Standard deviations of errors that all points share: scatter of lines, grid and interpolation.
+        Errors that all points share, one standard deviation each: scatter of lines, grid and interpolation.
     alone : array, shape (sets, points)
-        Variance of what errs at each point by itself.
+        Variance of the errors that are independent for each point.
     """
 
     mean: FloatArray
@@ -47,12 +47,12 @@ class Predicted(NamedTuple):
 
 @dataclass(frozen=True)
 class Prediction:
-    """Means at the measured points and their errors, interpolated between the unknowns of a study.
+    """Means at the measured points and their errors, interpolated over the unknowns of a study.
 
     Parameters
     ----------
     unknowns : dict of str to array
-        Values computed, ascending.
+        Computed values, ascending.
     realisations : int
         Number of lines.
     logarithmic : bool
@@ -67,11 +67,11 @@ class Prediction:
 
     @property
     def scales(self) -> list[Scale]:
-        """The natural scale of each unknown."""
+        """Scale of each unknown, linear or logarithmic."""
         return [Scale.of(values) for values in self.unknowns.values()]
 
     def values(self, places: FloatArray) -> FloatArray:
-        """Return the unknowns at places in the unit cube, 0 and 1 the ends of their axes on natural scales."""
+        """Return the unknowns at places in the unit cube; 0 and 1 are the ends of their axes."""
         return np.stack([self._of(k, places[:, k]) for k in range(places.shape[1])], axis=1)
 
     def _of(self, k: int, place: FloatArray) -> FloatArray:
@@ -90,7 +90,7 @@ class Prediction:
 
 
 def prediction(dataset: xr.Dataset, measured: Measured) -> Prediction:
-    """Prepare what a study predicts at measured points.
+    """Return the prediction of a study at measured points.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def prediction(dataset: xr.Dataset, measured: Measured) -> Prediction:
     """
     output = dataset[measured.output]
     if "case" in output.dims:
-        raise FitError("calibration needs a grid, this is a sampled study: its cases lie along no axes")
+        raise FitError("calibration needs a grid, this is a sampled study: its cases have no axes")
     dataset = _at_fixed(dataset, measured)
     unknowns = _unknowns(dataset, measured)
     along = [str(dim) for dim in dataset[measured.output].dims if dim in measured.conditions]
@@ -120,7 +120,7 @@ def prediction(dataset: xr.Dataset, measured: Measured) -> Prediction:
 
 
 def _at_fixed(dataset: xr.Dataset, measured: Measured) -> xr.Dataset:
-    """Return a study without the axes of one value; what is measured elsewhere is refused."""
+    """Return a study without axes of one value; refuse points that were measured outside of the study."""
     array = dataset[measured.output]
     single = [str(dim) for dim in array.dims if dim in array.coords and array.sizes[dim] == 1 and dim != "realisation"]
     dataset = dataset.squeeze(single)
@@ -143,7 +143,7 @@ def _at_fixed(dataset: xr.Dataset, measured: Measured) -> xr.Dataset:
 
 
 def _unknowns(dataset: xr.Dataset, measured: Measured) -> dict[str, FloatArray]:
-    """Return the axes of a study that the table does not name."""
+    """Return the axes of a study that are not columns of the table."""
     free = [str(d) for d in dataset[measured.output].dims if d != "realisation" and d not in measured.conditions]
     for name in free:
         if name not in dataset.coords or dataset[name].dtype.kind not in "fiu":
@@ -168,10 +168,10 @@ def _is_computed(axis: FloatArray, wanted: FloatArray) -> bool:
 def _fields(
     dataset: xr.Dataset, output: str, along: Sequence[str], unknowns: Sequence[str], between: Mapping[str, bool]
 ) -> tuple[FloatArray, bool]:
-    """Return what is interpolated, and whether the mean is in logarithms.
+    """Return the fields that are interpolated, and whether the mean is in logarithms.
 
-    Shape (conditions ..., unknowns ..., fields): the mean, whether it is absent, the rest of the scatter, errors of
-    grid and interpolation, and the directions in which the lines scatter together.
+    The shape is (conditions ..., unknowns ..., fields). The fields are the mean, whether it is missing, the independent
+    scatter, the error of grid and interpolation, and the common modes of the scatter.
     """
     order = [*along, *unknowns]
     array = dataset[output]
@@ -192,16 +192,18 @@ def _fields(
         absent = _and_neighbours(absent, k) if between[axis] else absent
     scale = Scale.of(mean, spread=True)
     table = scale.of_values(mean)
-    lost = np.zeros_like(mean)
+    between_values = np.zeros_like(mean)
     for k, axis in enumerate(order):
         if axis in unknowns or between[axis]:
-            lost += missed(scale, table, _long_enough(dataset, axis), k)
+            between_values += missed(scale, table, _long_enough(dataset, axis), k)
     alone, modes = _scatter(values - mean[..., None], number, mean)
-    return np.concatenate([np.stack([table, absent, alone, grid + lost], axis=-1), modes], axis=-1), scale.logarithmic
+    return np.concatenate(
+        [np.stack([table, absent, alone, grid + between_values], axis=-1), modes], axis=-1
+    ), scale.logarithmic
 
 
 def _and_neighbours(absent: NDArray[np.bool_], axis: int) -> NDArray[np.bool_]:
-    """Return what is absent, and what lies beside it: slopes of cubics there depend on it."""
+    """Return missing cases and their neighbours, at which the slopes of cubics depend on them."""
     along = np.moveaxis(absent, axis, 0).copy()
     before = along.copy()
     along[1:] |= before[:-1]
@@ -220,10 +222,10 @@ def _long_enough(dataset: xr.Dataset, axis: str) -> FloatArray:
 
 
 def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the standard error that stays alone, and the directions in which the lines scatter together.
+    """Return the independent standard error, and the common modes of the scatter.
 
-    All cases share their lines, so their means err together. Of few lines the scatter is known badly: it is widened as
-    intervals are.
+    All cases share their lines, so the errors of their means are correlated. The scatter of a few lines is not known
+    well, so it is widened like intervals.
     """
     count = deviations.shape[-1]
     if count < 2:
@@ -241,21 +243,21 @@ def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray)
 
 
 def _widened(number: NDArray[np.intp]) -> FloatArray:
-    """Return by how much a standard error of so many lines is too small: Student's t over z."""
+    """Return Student's t over the normal z for a number of lines."""
     few = np.maximum(number, 2)
     widened: FloatArray = bootstrap.widening(few) * np.sqrt((few - 1) / few)
     return widened
 
 
 def _at_point(fields: FloatArray, axes: Sequence[FloatArray], place: Sequence[float]) -> FloatArray:
-    """Interpolate along the conditions, which come first, one after the other."""
+    """Interpolate along the conditions, which are the first dimensions, one after the other."""
     for axis, wanted in zip(axes, place, strict=True):
         nearest = int(np.argmin(np.abs(axis - wanted)))
         if _is_computed(axis, np.array([wanted])):
             fields = fields[nearest]
             continue
         cell = int(np.clip(np.searchsorted(axis, wanted) - 1, 0, axis.size - 2))
-        near = slice(max(cell - 1, 0), min(cell + 3, axis.size))  # a monotone cubic depends on no more
+        near = slice(max(cell - 1, 0), min(cell + 3, axis.size))  # a monotone cubic depends on four values
         at = np.clip(np.array([wanted]), axis[0], axis[-1])
         scale = Scale.of(axis)
         mean = cubic(axis[near], fields[near, ..., :1], at, 0, scale)
@@ -265,18 +267,19 @@ def _at_point(fields: FloatArray, axes: Sequence[FloatArray], place: Sequence[fl
 
 
 def _require_whole(at_points: FloatArray, measured: Measured, unknowns: Mapping[str, FloatArray]) -> None:
-    lost = at_points[..., 1] > 0
-    if lost.any():
+    missing = at_points[..., 1] > 0
+    if missing.any():
         raise FitError(
-            f"{measured.output}: of the {lost.size} values that {measured.source} is compared with, {int(lost.sum())} "
-            f"are not in the study; finish the run, or keep a part that is whole by --select {next(iter(unknowns))}=..."
+            f"{measured.output}: of the {missing.size} values that {measured.source} is compared with, "
+            f"{int(missing.sum())} "
+            f"are not in the study; finish the run, or select a complete part by --select {next(iter(unknowns))}=..."
         )
 
 
 def _interpolators(
     at_points: FloatArray, unknowns: Mapping[str, FloatArray], count: int, logarithmic: bool
 ) -> Prediction:
-    """Return means on a table so dense that straight lines between its values will do, and their errors as they are."""
+    """Return linear interpolators: of the means on a dense table, and of the errors on the grid of the study."""
     scales = [Scale.of(values) for values in unknowns.values()]
     places = [scale.of_values(values) for scale, values in zip(scales, unknowns.values(), strict=True)]
     unit = [(place - place[0]) / (place[-1] - place[0]) for place in places]

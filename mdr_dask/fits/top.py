@@ -1,4 +1,4 @@
-"""The top of friction against velocity: how high it is, and where; curves come as stacks of `mdr_dask.bootstrap`."""
+"""Height and place of the maximum of friction against velocity, from stacks of `mdr_dask.bootstrap`."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import DOUBTFUL
 from mdr_dask.fits.interpolation import Scale, cubic
 
-TOPS = (0.3, 0.2, 0.1, 0.05)  # drops below the largest friction; tests/fits/test_friction_coverage.py chose them
-FLAT = 0.05  # of the largest friction that still counts as plateau
-UPPER = 0.5  # of the largest friction, above which a cubic tells where the top lies
-PLACES = 96  # even on the logarithm of velocity, at which it is fitted
+TOPS = (0.3, 0.2, 0.1, 0.05)  # parts below the maximum to which a parabola is fitted: the first that fits is taken
+FLAT = 0.05  # part below the maximum that still counts as plateau
+UPPER = 0.5  # part of the maximum above which a cubic is fitted for its place
+PLACES = 96  # number of points, even in the logarithm of velocity, to which it is fitted
 
 
 def smoothed(mean: FloatArray) -> FloatArray:
-    """Return a course with less scatter, by which it is chosen what is fitted: not by the scatter itself."""
+    """Return a curve with less scatter, for choosing the points that are fitted."""
     smooth = mean.copy()
     for _ in range(2):
         smooth[1:-1] = (smooth[:-2] + 2 * smooth[1:-1] + smooth[2:]) / 4
@@ -26,14 +26,14 @@ def smoothed(mean: FloatArray) -> FloatArray:
 
 
 class Top(NamedTuple):
-    """The top of a parabola through the points about the largest friction.
+    """The maximum of a parabola through the points about the largest friction.
 
     Attributes
     ----------
     height : array, shape (rows,)
-        Stack without the bias of a maximum, with what the parabola leaves as an error.
+        Stack without the bias of a maximum; residuals of the parabola count as an error.
     place, rise : array, shape (rows,)
-        Logarithm of velocity, and the logarithmic slope there: not 0 at the ends.
+        Logarithm of velocity, and the logarithmic slope there, which is not 0 at an end of the velocities.
     """
 
     height: FloatArray
@@ -42,7 +42,7 @@ class Top(NamedTuple):
 
 
 def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
-    """Fit a parabola to as many points about the largest friction as scatter and errors explain the departures of.
+    """Fit a parabola to as many points about the largest friction as possible within scatter and errors.
 
     Parameters
     ----------
@@ -59,17 +59,17 @@ def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
         if left.shape[1] > 3 and not bootstrap.chance(left, count) >= DOUBTFUL:
             continue
         break
-    resamples = top[1 : 1 + bootstrap.RESAMPLES]  # NaN of those that draw nothing but lost lines
+    resamples = top[1 : 1 + bootstrap.RESAMPLES]  # NaN for resamples that contain only failed lines
     unbiased = top[0] + np.nanmean(top[0] - resamples) if count > 1 else top[0]
     if left.shape[1] > 3:
         errors = _parabola(x[near], bootstrap.moved(stack[0, near], left[0]))[0]
-    else:  # three points leave nothing: what lies between them is known to what the parabola adds to the highest
+    else:  # three points have no residuals: the error is what the parabola adds to the highest point
         errors = bootstrap.moved(top[:1], top[:1] - stack[0, near].max()).ravel()
     return Top(np.concatenate([top, errors]) + (unbiased - top[0]), at, rise)
 
 
 def _about_the_top(mean: FloatArray, drop: float) -> slice:
-    """Return the points about the largest friction that lie less than a part of it below, three at least."""
+    """Return the points about the maximum that lie within a part of it, at least three."""
     smooth = smoothed(mean)
     at = int(np.argmax(smooth))
     low = np.flatnonzero(smooth[at:] <= (1 - drop) * smooth[at])
@@ -81,7 +81,7 @@ def _about_the_top(mean: FloatArray, drop: float) -> slice:
 
 
 def _parabola(x: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return the top of the parabola through every row, its place, its logarithmic slope there, and what is left."""
+    """Return maximum, place, logarithmic slope there, and residuals of the parabola through every row."""
     centre, half = x.mean(), np.ptp(x) / 2
     u = (x - centre) / half
     design = np.vstack([np.ones_like(u), u, u**2])
@@ -96,11 +96,11 @@ def _parabola(x: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, 
 
 
 def place(x: FloatArray, stack: FloatArray) -> FloatArray:
-    """Return the stack of the logarithm of the velocity of the largest friction; infinite where it may lie beyond.
+    """Return the stack of the logarithm of the velocity of the maximum; infinite if it lies outside the velocities.
 
-    It is the top of a cubic through the logarithm of the upper half of the curve. The curve is a monotone cubic
-    through its points, and the fit is to even places on it, so that the top does not depend on where the points lie.
-    How far a polynomial of degree four puts it elsewhere is the error of that, in the last two rows.
+    It is the maximum of a cubic polynomial through ln(friction) in the upper half of the curve. The polynomial is
+    fitted at evenly spaced places on a monotone cubic through the points, so that the result does not
+    depend on their spacing. The difference to a polynomial of degree four is the error, in the last two rows.
 
     Parameters
     ----------
@@ -130,14 +130,14 @@ def place(x: FloatArray, stack: FloatArray) -> FloatArray:
 
 
 def _joined(x: FloatArray, stack: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a stack with the mean of what lies at the same place: v tau of other v and other tau."""
+    """Return a stack with the mean of all points at the same place, such as equal v tau with different v and tau."""
     places, group = np.unique(np.round(x, 9), return_inverse=True)
     member = np.equal.outer(group, np.arange(places.size)).astype(np.float64)
     return places, stack @ (member / member.sum(axis=0))
 
 
 def _maximum(near: FloatArray, rows: FloatArray, degree: int, own: float) -> FloatArray:
-    """Return the maximum of the polynomial through every row that is next to a place; infinite where it has none."""
+    """Return the maximum next to a place of the polynomial through every row; infinite if it has none."""
     even, fine = np.linspace(-1.0, 1.0, near.size), np.linspace(-1.0, 1.0, 24 * near.size + 1)
     curves = rows @ np.linalg.pinv(np.vander(even, degree + 1)).T @ np.vander(fine, degree + 1).T
     left, middle, right = curves[:, :-2], curves[:, 1:-1], curves[:, 2:]
