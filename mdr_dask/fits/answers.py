@@ -1,4 +1,4 @@
-"""Realisations until a fitted constant is known: is its interval narrow enough, and which cases does it depend on?"""
+"""Realisations until a fitted constant is known well enough, and the cases on which it depends."""
 
 from __future__ import annotations
 
