@@ -307,11 +307,10 @@ def _of_output(output: str, over: str | Sequence[str], **view: Any) -> Plot:
 def master_curve(
     study: Study | pd.DataFrame,
     over: str | None = None,
-    of: str | None = None,
+    of: str | Sequence[str] | None = None,
     by: str | None = None,
-    vertical: bool = False,
+    vertical: Literal["none", "modulus", "compliance", "free"] | None = None,
     reference: float | None = None,
-    bootstrap: int = 0,
 ) -> xr.Dataset:
     """Shift curves into one master curve, like ``mdr-dask master-curve``.
 
@@ -319,7 +318,7 @@ def master_curve(
     ----------
     study : Dataset, DataTree, DataFrame, str or Path
         A study, a table of curves, or the path of either.
-    over, of, by, vertical, reference, bootstrap
+    over, of, by, vertical, reference
         As the options of the command.
 
     Returns
@@ -336,7 +335,7 @@ def master_curve(
     if not isinstance(study, DataFrame):
         groups = _groups(study)
         study = master_curve.friction_of_roughness(groups) if len(groups) > 1 else _group(study, None)
-    return master_curve.master_curve(study, over, of, by, vertical, reference, bootstrap)
+    return master_curve.master_curve(study, over, of, by, vertical, reference)
 
 
 @xr.register_dataset_accessor("mdr")  # type: ignore[no-untyped-call]

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from mdr_dask.physics.superposition.master_curve import Vertical
+
 
 PARTS = ("factors", "curve", "points")
 """What is printed: the factors, the merged curve with its error, or all points after shifting."""
@@ -36,16 +38,21 @@ KEPT = (".json", ".csv")
 @series_option
 @select_option
 @click.option("--over", help="What curves are drawn against: a column such as normal_force or time.")
-@click.option("--of", "ordinate", help="Their values: a column such as friction_coefficient or modulus.")
-@click.option("--by", help="What curves differ in: a column such as velocity or temperature.")
-@click.option("--vertical", is_flag=True, help="Let curves shift along the ordinate too.")
-@click.option("--reference", type=float, help="Where the factors are zero, in the units of --by; interpolated.")
 @click.option(
-    "--bootstrap",
-    type=click.IntRange(min=0),
-    default=0,
-    show_default=True,
-    help="Bootstrap samples, for a second opinion on the errors.",
+    "--of",
+    "ordinates",
+    multiple=True,
+    help="Their values: a column such as friction_coefficient or modulus; twice for storage and loss modulus together.",
+)
+@click.option("--by", help="What curves differ in: a column such as velocity or temperature.")
+@click.option(
+    "--vertical",
+    type=click.Choice(["none", "modulus", "compliance", "free"]),
+    help="Factors along the ordinate: b_T and offsets of a few per cent of a modulus or compliance (the default of "
+    "those), unknown ones, or none.",
+)
+@click.option(
+    "--reference", type=float, help="Where the factors are zero, in the units of --by; also between the groups."
 )
 @click.option(
     "--keep", "-o", type=click.Path(path_type=Path), help="Keep all in FILE.json, a later SOURCE; FILE.csv: the table."
@@ -59,11 +66,10 @@ def master_curve(
     series: str | None,
     selections: tuple[str, ...],
     over: str | None,
-    ordinate: str | None,
+    ordinates: tuple[str, ...],
     by: str | None,
-    vertical: bool,
+    vertical: Vertical | None,
     reference: float | None,
-    bootstrap: int,
     keep: Path | None,
     figure: Path | None,
     part: str,
@@ -73,7 +79,7 @@ def master_curve(
 
     SOURCE is a store, a table (CSV with a row of names, perhaps one of units; - for standard input) or a result kept by
     --keep, of which only the reference may change. A source that varies in velocity and in temperature gives a shift of
-    each.
+    each. Storage and loss modulus of one test are shifted together, unless --of names one of them.
 
     \b
     mdr-dask master-curve results/force_master_curve.zarr --plot master.png
@@ -87,8 +93,8 @@ def master_curve(
 
     kept = _kept(source)
     if kept is None:
-        curve = superpose(_open(source, series, selections), over, ordinate, by, vertical, reference, bootstrap)
-    elif vertical or bootstrap or over or ordinate or by or selections or series:
+        curve = superpose(_open(source, series, selections), over, ordinates or None, by, vertical, reference)
+    elif vertical or over or ordinates or by or selections or series:
         raise click.UsageError(
             f"{source} is a kept result, of which only --reference may change: give the table itself"
         )
@@ -168,12 +174,13 @@ def _kept(source: str) -> xr.Dataset | None:
 
 def _print_table(curve: xr.Dataset, part: str, form: str) -> None:
     """Print a part of the result; two groups have a table of factors each."""
-    shown = [curve[[f"{part}_abscissa", f"{part}_ordinate", "curve_error"]]] if part == "curve" else []
-    if part == "points":
-        shown = [curve[[name for name in curve.data_vars if curve[name].dims == ("point",)]]]
+    shown = []
+    if part != "factors":
+        dims = (part.removesuffix("s"),)
+        shown = [curve[[name for name in curve.data_vars if curve[name].dims == dims]]]
     if part == "factors":
         kept = ("shift_factor", "vertical_factor") if curve["vertical_factor"].any() else ("shift_factor",)
-        columns = ("", "_error", "_low", "_high", "_bootstrap")
+        columns = ("", "_error", "_low", "_high")
         for names in (kept, ("second_factor", "second_vertical_factor")):
             found = [f"{name}{column}" for name in names for column in columns if f"{name}{column}" in curve]
             shown.extend([curve[found]] if found else [])
@@ -195,6 +202,8 @@ def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
             f"probability {curve.attrs['probability']:.2g}",
             err=True,
         )
+    moved = " and ".join(str(curve.attrs[name]) for name in ("ordinate", "companion") if curve.attrs.get(name))
+    click.echo(f"shifted: {moved}; {curve.attrs['vertical']}", err=True)
     low, high = (float(curve["curve_abscissa"].attrs[f"measured_{end}"]) for end in ("low", "high"))
     ends = curve["curve_abscissa"].to_numpy()
     click.echo(
@@ -225,7 +234,7 @@ def _print_outliers(curve: xr.Dataset) -> None:
 
     x, y = np.log10(curve["point_abscissa"].to_numpy()), np.log10(curve["point_ordinate"].to_numpy())
     merged = np.log10(curve["curve_abscissa"].to_numpy()), np.log10(curve["curve_ordinate"].to_numpy())
-    off, scatter = y - np.interp(x, *merged), float(curve.attrs["noise"])
+    off, scatter = y - np.interp(x, *merged), float(curve.attrs["ordinate_noise"])
     far = np.abs(off) > max(FAR * scatter, LEAST)
     if not far.any():
         return
@@ -235,6 +244,6 @@ def _print_outliers(curve: xr.Dataset) -> None:
     click.echo(
         f"{far.sum()} of {far.size} points lie off the curve by more than {FAR:g} times the scatter, the farthest "
         f"{off[worst]:+.2g} decades at {by} = {group:.6g}, {over} = {10 ** (x[worst] - shift):.4g}: "
-        "bars know of scatter only, look at the figure",
+        "error bars include scatter only, so inspect the figure",
         err=True,
     )

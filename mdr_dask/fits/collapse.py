@@ -12,44 +12,76 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
 from mdr_dask.fits.base import LAW_HOLDS, law_holds
 from mdr_dask.physics.superposition import laws as shift_laws
+from mdr_dask.physics.superposition.laws import ShiftLaw
 from mdr_dask.physics.superposition.master_curve import Superposition
+from mdr_dask.units import conversion
 
-ABSOLUTE_ZERO = -273.15
 DEGREES = range(1, 7)  # of the polynomials that tell the scatter within curves
 LOG = float(np.log(10.0))  # a departure in decades, times this, is a relative one
 
 
 def laws_of(
-    result: Superposition, over: str, unit: str, *, is_temperature: bool
-) -> tuple[dict[str, xr.Variable], dict[str, str]]:
+    result: Superposition, over: str, unit: str, reference: float, *, is_temperature: bool
+) -> tuple[list[ShiftLaw], dict[str, str]]:
     """Fit the laws that suit the groups: a power of velocities, Arrhenius and WLF for temperatures.
+
+    They are fitted about the middle group, whatever the reference, so that they do not depend on it; the constants are
+    those at the reference.
 
     Returns
     -------
-    constants : dict of str to Variable
+    laws : list of ShiftLaw
+        Of log10 a_T for temperatures, of the shift factor itself for velocities.
     verdicts : dict of str to str
         Of each law, in words.
     """
-    size = result.groups.size
-    covariance = result.covariance[:size, :size]
-    fits = []
+    size, anchor = result.groups.size, result.groups.size // 2
+    groups, factors = result.groups, result.horizontal - result.horizontal[anchor]
+    covariance = np.cov(result.draws[:, :size] - result.draws[:, [anchor]], rowvar=False)
+    fits: list[ShiftLaw] = []
     try:
         if is_temperature:
-            sign = -1 if over == "t" or over.lower() == "time" else 1
-            kelvin = 0.0 if unit.upper() in ("K", "KELVIN", "") and np.all(result.groups > 0) else -ABSOLUTE_ZERO
-            temperatures = result.groups + kelvin, sign * result.horizontal, covariance, result.reference + kelvin
-            fits = [shift_laws.fit_arrhenius(*temperatures), shift_laws.fit_wlf(*temperatures)]
-        elif np.all(result.groups > 0):
-            fits = [shift_laws.fit_power(result.groups, result.horizontal, covariance, result.reference)]
+            groups, sign = kelvins(groups, unit), sign_of(over)
+            kelvin = float(kelvins(np.array([reference]), unit, groups=result.groups)[0])
+            about = groups, sign * factors, covariance, anchor, kelvin
+            fits = [shift_laws.fit_arrhenius(*about), shift_laws.fit_wlf(*about)]
+        elif np.all(groups > 0):
+            fits = [shift_laws.fit_power(groups, factors, covariance, anchor)]
     except FitError as problem:
-        return {}, {"law of the shifts": f"not tested: {problem}"}
-    constants = {name: value for law in fits for name, value in _constants(law).items()}
+        return [], {"law of the shifts": f"not tested: {problem}"}
     verdicts = {}
     for law in fits:
         worst, free = int(np.argmax(np.abs(law.departures))), np.diag(covariance) > 0
         where = f"{result.groups[worst]:.4g}"
         verdicts[law.name] = law_holds(LOG * law.departures[free], law.chance, len(law.constants), where)
-    return constants, verdicts
+    return fits, verdicts
+
+
+def sign_of(over: str) -> int:
+    """Return the sign of log10 a_T in shift factors: 1 over frequency, -1 over time."""
+    return -1 if over == "t" or over.lower().startswith("time") else 1
+
+
+def kelvins(temperatures: FloatArray, unit: str, groups: FloatArray | None = None) -> FloatArray:
+    """Return temperatures in K; without a unit, those whose median is above 250 count as kelvins, others as degC.
+
+    Parameters
+    ----------
+    temperatures : array
+    unit : str
+        As a table has it.
+    groups : array, optional
+        All temperatures of the table, if there are others.
+    """
+    if unit in ("", "1", "-"):
+        unit = "K" if np.median(temperatures if groups is None else groups) > 250 else "degC"
+    factor, zero = conversion({"C": "degC", "F": "degF"}.get(unit.lstrip("°").upper(), unit), "K")
+    return np.asarray(factor * temperatures + zero, dtype=np.float64)
+
+
+def constants_of(laws: list[ShiftLaw]) -> dict[str, xr.Variable]:
+    """Return the constants of laws with their intervals, and the distance of the factors from each law."""
+    return {name: value for law in laws for name, value in _constants(law).items()}
 
 
 def _constants(law: shift_laws.ShiftLaw) -> dict[str, xr.Variable]:
@@ -64,8 +96,13 @@ def _constants(law: shift_laws.ShiftLaw) -> dict[str, xr.Variable]:
 
 
 def with_verdict(curve: xr.Dataset, verdicts: dict[str, str]) -> xr.Dataset:
-    """Return a master curve that says in words whether its curves collapse and which law its shifts follow."""
-    told = {"the curves collapse": _collapse(curve), **verdicts}
+    """Return a master curve that says in words whether its curves collapse and which law its shifts follow.
+
+    Curves collapse only where the shift factors are known: on a plateau, curves coincide wherever they lie.
+    """
+    open_steps = curve.attrs.get("undetermined", "")
+    collapse = f"not tested: shift factors are {open_steps.partition(':')[0]}" if open_steps else _collapse(curve)
+    told = {"the curves collapse": collapse, **verdicts}
     words = [sentence.partition(":")[0] for sentence in told.values()]
     described = words[1:] or ["yes"]
     if words[0] == "no" or all(word == "no" for word in described):
@@ -77,11 +114,24 @@ def with_verdict(curve: xr.Dataset, verdicts: dict[str, str]) -> xr.Dataset:
 
 
 def _collapse(curve: xr.Dataset) -> str:
-    """Compare the scatter about the merged curve with that within the curves, which polynomials tell."""
-    x, y = (np.log10(curve[f"point_{name}"].to_numpy()) for name in ("abscissa", "ordinate"))
-    merged = np.log10(curve["curve_abscissa"].to_numpy()), np.log10(curve["curve_ordinate"].to_numpy())
-    off = y - np.interp(x, *merged)
-    keys = [curve[name].to_numpy() for name in ("point_group", "point_second") if name in curve]
+    """Compare the scatter about the merged curve with that within the curves, about a polynomial of each.
+
+    Of two ordinates that were shifted together, the one that collapses less answers.
+    """
+    names = [name for name in ("ordinate", "companion") if f"point_{name}" in curve]
+    answers = [_collapse_of(curve, name) for name in names]
+    order = ("no", "not tested", "yes")
+    worst = min(range(len(names)), key=lambda i: order.index(answers[i].partition(":")[0]))
+    word, _, reason = answers[worst].partition(": ")
+    if len(names) > 1 and word != "yes":
+        reason = f"{curve.attrs[names[worst]]} {reason}"
+    return f"{word}: {reason}"
+
+
+def _collapse_of(curve: xr.Dataset, name: str) -> str:
+    x, y = np.log10(curve["point_abscissa"].to_numpy()), np.log10(curve[f"point_{name}"].to_numpy())
+    off = y - np.interp(x, np.log10(curve["curve_abscissa"].to_numpy()), np.log10(curve[f"curve_{name}"].to_numpy()))
+    keys = [curve[key].to_numpy() for key in ("point_group", "point_second") if key in curve]
     members = [
         np.all([key == one for key, one in zip(keys, row, strict=True)], axis=0) for row in set(zip(*keys, strict=True))
     ]
@@ -90,8 +140,9 @@ def _collapse(curve: xr.Dataset) -> str:
     chance = np.nan
     if found:
         within = min(found, key=lambda each: each.criterion(x.size))
-        more = max(float(curve.attrs["freedom"]) - within.freedom, 1.0)
-        excess = max(float(np.sum(off**2)) - within.squares, 0.0) / more
+        squares = float(np.sum(off**2))
+        more = max(min(squares / float(curve.attrs[f"{name}_noise"]) ** 2, x.size) - within.freedom, 1.0)
+        excess = max(squares - within.squares, 0.0) / more
         chance = float(fdtrc(more, within.freedom, excess * within.freedom / max(within.squares, 1e-300)))
     worst = int(np.argmax(np.abs(off)))
     return law_holds(LOG * off, chance, 0, f"{curve.attrs['abscissa']} = {10 ** x[worst]:.3g} of the merged curve")

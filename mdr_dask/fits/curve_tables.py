@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,9 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.headings import folded, meanings
+from mdr_dask.physics.superposition.master_curve import Vertical
 from mdr_dask.tables import decoded, numbers, read_sheet
+from mdr_dask.units import conversion
 
 ALIASES: dict[str, tuple[str, ...]] = {
     "friction_coefficient": ("coefficient", "coefficient_of_friction", "friction", "mu", "cof"),
@@ -21,7 +24,10 @@ ALIASES: dict[str, tuple[str, ...]] = {
     "temperature": ("T", "t_c", "t_k", "temp", "material_temperature"),
     "frequency": ("f", "freq", "omega"),
     "time": ("t",),
+    "storage_modulus": ("e_stor", "g_stor", "e'", "g'", "storage"),
+    "loss_modulus": ("e_loss", "g_loss", "e''", "g''", "loss"),
     "modulus": ("relaxation_modulus", "e_relax", "g_relax", "storage_modulus", "e_stor", "g_stor", "e'", "g'"),
+    "compliance": ("creep_compliance", "j"),
 }
 """Names of columns that are understood, beside the names themselves; case does not matter."""
 
@@ -84,35 +90,73 @@ def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
     return (exact + [found[0] for found in loose if len(found) == 1] + [None])[0]
 
 
-def columns_to_use(frame: pd.DataFrame, *given: str | None) -> tuple[str, str, str]:
+FAMILIES = (
+    ("normal_force", ("friction_coefficient",), "velocity"),
+    ("normal_force", ("friction_coefficient",), "temperature"),
+    ("frequency", ("storage_modulus", "loss_modulus"), "temperature"),
+    ("frequency", ("modulus",), "temperature"),
+    ("time", ("modulus",), "temperature"),
+    ("frequency", ("compliance",), "temperature"),
+    ("time", ("compliance",), "temperature"),
+)
+"""Abscissa, ordinates and group of the tables that are understood without options, the first one that fits."""
+
+
+def columns_to_use(
+    frame: pd.DataFrame, abscissa: str | None, ordinate: str | Sequence[str] | None, group: str | None
+) -> tuple[str, tuple[str, ...], str]:
     """Return the columns to use: those given, else the first family of which the table has all."""
-    families = [
-        ("normal_force", "friction_coefficient", "velocity"),
-        ("normal_force", "friction_coefficient", "temperature"),
-        ("frequency", "modulus", "temperature"),
-        ("time", "modulus", "temperature"),
-    ]
+    wished = None if ordinate is None else (ordinate,) if isinstance(ordinate, str) else tuple(ordinate)
     found = []
-    for family in families:
-        names = [
-            column_of(frame, name) if wish is None else column_of(frame, wish)
-            for wish, name in zip(given, family, strict=True)
-        ]
-        if None not in names:
-            found.append([str(name) for name in names])
-    varied = [names for names in found if all(frame[name].nunique() > 1 for name in (names[0], names[2]))]
+    for over, values, by in FAMILIES:
+        names = [abscissa or over, group or by, *(wished or values)]
+        columns = [column_of(frame, name) for name in names]
+        if None not in columns:
+            found.append([str(name) for name in columns])
+    varied = [names for names in found if all(frame[name].nunique() > 1 for name in names[:2])]
     if found and not varied:
-        constant = next(name for name in (found[0][2], found[0][0]) if frame[name].nunique() < 2)
+        constant = next(name for name in found[0][1::-1] if frame[name].nunique() < 2)
         raise DataError(
             f"expected curves at two or more values of {constant!r}, got one value: there is nothing to shift"
         )
     if not found:
-        wanted = ", ".join(repr(name) for name in given if name is not None) or (
-            "a coefficient over force by velocity or temperature, or a modulus over frequency or time by temperature"
+        wanted = ", ".join(repr(name) for name in (abscissa, *(wished or ()), group) if name is not None) or (
+            "a coefficient against force by velocity or temperature, or a modulus against frequency or time by "
+            "temperature"
         )
         got = [str(name) for name in frame.columns]
         raise DataError(f"expected columns for {wanted}, got {got!r}: name them by --over, --of and --by")
-    return varied[0][0], varied[0][1], varied[0][2]
+    over, by, *ordinates = varied[0]
+    return over, tuple(ordinates), by
+
+
+def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, str]) -> Vertical:
+    """Return which vertical factors suit the columns: those of a modulus or compliance of a polymer, or none.
+
+    The abscissa must be a time or a frequency, and the group a temperature. The ordinate is known by its name, or by a
+    unit of pressure.
+    """
+    if not (is_temperature(by) and (_is(over, "frequency") or _is(over, "time"))):
+        return "none"
+    for kind, names, unit in (
+        ("modulus", ("modulus", "storage_modulus", "loss_modulus"), "Pa"),
+        ("compliance", ("compliance",), "1/Pa"),
+    ):
+        if all(any(_is(each, name) for name in names) or _has_unit(units.get(each, ""), unit) for each in ordinates):
+            return kind  # type: ignore[return-value]
+    return "none"
+
+
+def _is(column: str, name: str) -> bool:
+    return column_of(pd.DataFrame(columns=[column]), name) is not None
+
+
+def _has_unit(unit: str, wanted: str) -> bool:
+    try:
+        conversion(unit, wanted)
+    except ValueError:
+        return False
+    return unit not in ("", "1")
 
 
 def second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
@@ -128,16 +172,39 @@ def second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
 
 
 def curves_of(
-    frame: pd.DataFrame, over: str, values: str, by: str
+    frame: pd.DataFrame, over: str, ordinates: Sequence[str], by: str
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
-    """Return what the curves are grouped by, and the logarithms to base 10 of every curve's points."""
-    rows = frame[[over, values, by]].to_numpy(dtype=np.float64)
-    if rows.size == 0 or np.any(rows[:, :2] <= 0):
-        raise DataError(f"{over!r} and {values!r} must be positive: curves are shifted along logarithmic axes")
-    labels = clusters(rows[:, 2])
-    parts = [rows[labels == label] for label in np.unique(labels)]
-    centres = np.array([np.median(part[:, 2]) for part in parts])
-    return centres, [(np.log10(part[:, 0]), np.log10(part[:, 1])) for part in parts]
+    """Return what the curves are grouped by, and the logarithms to base 10 of every curve's points.
+
+    Ordinates have the shape (channels, points).
+    """
+    rows = frame[[over, *ordinates]].to_numpy(dtype=np.float64)
+    if rows.size == 0 or np.any(rows <= 0):
+        names = " and ".join(repr(name) for name in (over, *ordinates))
+        raise DataError(f"{names} must be positive: curves are shifted along logarithmic axes")
+    groups = frame[by].to_numpy(dtype=np.float64)
+    labels = clusters(groups)
+    parts = [labels == label for label in np.unique(labels)]
+    centres = np.array([np.median(groups[part]) for part in parts])
+    return centres, [(np.log10(rows[part, 0]), np.log10(rows[part, 1:].T)) for part in parts]
+
+
+def pairs_of(
+    frame: pd.DataFrame, over: str, ordinates: Sequence[str], by: tuple[str, str]
+) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
+    """Return the values of both groups, shape (curves, 2), and the points of each curve."""
+    labels = np.array([clusters(frame[name].to_numpy(dtype=np.float64)) for name in by])
+    keys, curves = [], []
+    for pair in sorted(set(map(tuple, labels.T))):
+        part = frame[np.all(labels.T == pair, axis=1)]
+        centre = [float(frame[name].to_numpy()[row == label].mean()) for name, row, label in zip(by, labels, pair, strict=True)]
+        (_,), (curve,) = curves_of(part.assign(**{by[0]: centre[0]}), over, ordinates, by[0])
+        if np.ptp(curve[0]) == 0:
+            where = f"{by[0]} = {centre[0]:g}, {by[1]} = {centre[1]:g}"
+            raise DataError(f"the curve at {where} needs two or more distinct points")
+        keys.append(centre)
+        curves.append(curve)
+    return np.array(keys), curves
 
 
 def clusters(values: FloatArray) -> NDArray[np.intp]:

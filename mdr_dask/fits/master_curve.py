@@ -2,41 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import xarray as xr
-from scipy.special import stdtrit
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, distinguishable
 from mdr_dask.fits.base import Fit
-from mdr_dask.fits.collapse import laws_of, with_verdict
+from mdr_dask.fits.collapse import constants_of, kelvins, laws_of, sign_of, with_verdict
 from mdr_dask.fits.curve_tables import (
-    clusters,
     columns_to_use,
     curves_of,
     finite_rows,
     frame_of,
     is_temperature,
+    kind_of,
+    pairs_of,
     second_group,
 )
 from mdr_dask.physics.superposition import master_curve as superposition
 from mdr_dask.physics.superposition import two_factors as two_shifts
+from mdr_dask.physics.superposition.master_curve import EXPANSION, OFFSET, Superposition, Vertical
 
-SHARE_OF_BARS, CONFIDENCE = 0.6827, 0.95  # of Student's t: `_error`, and `_low` to `_high`
+SHARE_OF_BARS = 0.6827  # of the draws, within the bars `_error`
 
 
 def master_curve(
     table: xr.Dataset | pd.DataFrame,
     abscissa: str | None = None,
-    ordinate: str | None = None,
+    ordinate: str | Sequence[str] | None = None,
     group: str | None = None,
-    vertical: bool = False,
+    vertical: Vertical | None = None,
     reference: float | None = None,
-    draws: int = 0,
 ) -> xr.Dataset:
     """Shift curves of a table into one.
 
@@ -47,27 +47,28 @@ def master_curve(
     table : Dataset or DataFrame
         A series of a store (realisations are averaged) or columns of numbers.
     abscissa, ordinate, group : str, optional
-        Columns: what curves are drawn over, their values, and what they differ in. By default the coefficient of
-        friction over force by velocity (or temperature), or the modulus over frequency or time by temperature.
-    vertical : bool
-        Whether curves may shift along the ordinate too.
+        Columns: the abscissa, the values, and what the curves differ in. By default the coefficient of friction against
+        force by velocity (or temperature), or the moduli against frequency or time by temperature. Storage and loss
+        modulus of one test are two ordinates, which are shifted together.
+    vertical : {'none', 'modulus', 'compliance', 'free'}, optional
+        Factors along the ordinate, see `superpose`. By default those of a modulus or a compliance against time or
+        frequency by temperature, and none otherwise.
     reference : float, optional
-        Where the factors are zero, between two groups by linear interpolation; the middle group by default. Of two
-        groups, the nearest value of the first one.
-    draws : int
-        Bootstrap samples of the factors.
+        Where the factors are zero; the middle group by default. Between two groups by the law that holds, otherwise by
+        interpolation, whose error is in the intervals. With two kinds of groups, the nearest value of the first one.
 
     Returns
     -------
     Dataset
         ``shift_factor`` and ``vertical_factor`` (decades added to the logarithms of abscissa and ordinate) over the
-        group, with
-        ``_error`` (68 %), ``_low`` and ``_high`` (95 %) and ``covariance``; ``point_abscissa``, ``point_ordinate``,
-        ``point_group``: all
-        points after shifting; ``curve_abscissa``, ``curve_ordinate``, ``curve_error``: the merged curve (the error in
-        decades), with the range measured at the reference in its attrs; constants of the laws that apply. With two
-        groups also ``second_factor`` (and ``second_vertical_factor``) over the second one, the constants of its laws,
-        and in the attrs ``second``, ``second_reference``, ``chi_squared`` and ``probability`` of the sum.
+        group, with ``_error`` (68 %), ``_low`` and ``_high`` (95 %), ``covariance`` and ``draws``;
+        ``point_abscissa``, ``point_ordinate``, ``point_group``: all points after shifting; ``curve_abscissa``,
+        ``curve_ordinate``, ``curve_error``: the merged curve (the error in decades), with the range measured at the
+        reference in its attrs; ``point_companion``, ``curve_companion``, ``curve_companion_error`` of a second
+        ordinate; constants of the laws that apply. With two groups also ``second_factor`` (and
+        ``second_vertical_factor``) over the second one, the constants of its laws, and in the attrs ``second``,
+        ``second_reference``, ``chi_squared`` and ``probability`` of the sum. The attr ``vertical`` says in words which
+        vertical factors were used.
 
     Raises
     ------
@@ -75,21 +76,36 @@ def master_curve(
         If a column is missing, not positive, or the curves do not overlap.
     """
     frame = frame_of(table)
-    over, values, by = columns_to_use(frame, abscissa, ordinate, group)
-    second = second_group(frame, {over, values, by})
-    if isinstance(table, xr.Dataset):
-        _require_no_axis_beside(table[values], {over, by, second, "realisation"})
-    frame, left_out = finite_rows(frame, [over, values, by] + ([second] if second else []))
-    if second is not None:
-        found = _of_two_groups(frame, over, values, (by, second), vertical, reference, draws)
-        return found.assign_attrs(left_out=left_out)
-    groups, curves = curves_of(frame, over, values, by)
-    zero = groups[groups.size // 2] if reference is None else _inside(groups, reference)
-    free = superposition.superpose(groups, curves, vertical, None, draws)
-    result = superposition.rereference(free, float(zero), _is_logarithmic(by, groups))
+    over, ordinates, by = columns_to_use(frame, abscissa, ordinate, group)
     units = frame.attrs.get("units", {})
-    dataset = _dataset(result, over, values, by, units)
-    return _with_laws(dataset, (result, by, units.get(by, ""))).assign_attrs(left_out=left_out, **_untold(free))
+    second = second_group(frame, {over, *ordinates, by})
+    if isinstance(table, xr.Dataset):
+        _require_no_axis_beside(table[ordinates[0]], {over, by, second, "realisation"})
+    frame, left_out = finite_rows(frame, [over, *ordinates, by] + ([second] if second else []))
+    kind = kind_of(over, ordinates, by, units) if vertical is None else vertical
+    if second is not None:
+        kind = "none" if vertical is None else kind
+        dataset = _of_two_groups(frame, over, ordinates, (by, second), kind, reference)
+        return dataset.assign_attrs(left_out=left_out, vertical=_sentence(kind))
+    groups, curves = curves_of(frame, over, ordinates, by)
+    zero = float(groups[groups.size // 2]) if reference is None else _inside(groups, reference)
+    kelvin = kelvins(groups, units.get(by, "")) if kind in ("modulus", "compliance") else None
+    free = superposition.superpose(groups, curves, kind, kelvin=kelvin)
+    attrs = {"left_out": left_out, "vertical": _sentence(kind), "undetermined": _undetermined(free)}
+    return _with_laws(free, zero, over, ordinates, by, units, attrs)
+
+
+def _sentence(kind: Vertical) -> str:
+    if kind == "none":
+        return "horizontal factors only"
+    if kind == "free":
+        return "free vertical factors"
+    b_t = "b_T = rho0 T0 / (rho T)" if kind == "modulus" else "1 / b_T = rho T / (rho0 T0)"
+    offset = 100 * np.log(10) * OFFSET[0]
+    return (
+        f"a {kind}: {b_t} with an expansion of {EXPANSION:g} 1/K is taken out, and each temperature has an unknown "
+        f"offset of some {offset:.2g} % (--vertical none turns both off)"
+    )
 
 
 def _require_no_axis_beside(values: xr.DataArray, used: set[str | None]) -> None:
@@ -99,68 +115,51 @@ def _require_no_axis_beside(values: xr.DataArray, used: set[str | None]) -> None
             raise DataError(f"the study varies in {str(name)!r} too: keep one of its values, or group by it")
 
 
-def _untold(found: superposition.Superposition) -> dict[str, str]:
-    """Return a sentence about the steps that the curves do not tell, if there are any."""
+def _undetermined(found: Superposition) -> str:
+    """Return a sentence about steps that the curves do not determine, empty if there are none."""
     if not found.undetermined:
-        return {"undetermined": ""}
+        return ""
     runs = ", ".join(f"between {low:.6g} and {high:.6g}" for low, high in found.undetermined)
-    mean, scatter = found.usual
-    return {
-        "undetermined": f"not determined {runs}: the curves look alike wherever they lie there, so that steps are "
-        f"taken to be as others are, {mean:.2g} with a scatter of {scatter:.2g} decades"
-    }
+    return f"not determined {runs}: the curves look alike wherever they lie there, as on a plateau"
 
 
 def _of_two_groups(
     frame: pd.DataFrame,
     over: str,
-    values: str,
+    ordinates: Sequence[str],
     by: tuple[str, str],
-    vertical: bool,
+    vertical: Vertical,
     reference: float | None,
-    draws: int,
 ) -> xr.Dataset:
     """Shift curves that differ in two things; the reference is of the first."""
-    keys, curves = [], []
-    rows = frame[[over, values, *by]]
-    first, second = (clusters(rows[name].to_numpy(dtype=np.float64)) for name in by)
-    centres = [
-        {label: float(rows[name].to_numpy()[labels == label].mean()) for label in np.unique(labels)}
-        for name, labels in zip(by, (first, second), strict=True)
-    ]
-    for one, other in sorted(set(zip(first.tolist(), second.tolist(), strict=True))):
-        part = rows[(first == one) & (second == other)]
-        (_,), (curve,) = curves_of(part.assign(**{by[0]: centres[0][one]}), over, values, by[0])
-        if np.ptp(curve[0]) == 0:
-            where = f"{by[0]} = {centres[0][one]:g}, {by[1]} = {centres[1][other]:g}"
-            raise DataError(f"the curve at {where} needs two or more distinct points")
-        keys.append((centres[0][one], centres[1][other]))
-        curves.append(curve)
-    a, b = np.array(keys).T
-    zero = _nearest(np.unique(a), np.unique(a)[np.unique(a).size // 2] if reference is None else reference)
-    zeros = zero, float(np.unique(b)[np.unique(b).size // 2])
-    found = two_shifts.superpose_twice(a, b, curves, zeros, draws, vertical=vertical)
+    keys, curves = pairs_of(frame, over, ordinates, by)
+    a, b = keys.T
+    first = np.unique(a)
+    zero = float(first[first.size // 2]) if reference is None else _inside(first, reference)
+    zeros = float(first[np.argmin(np.abs(first - zero))]), float(np.unique(b)[np.unique(b).size // 2])
+    found = two_shifts.superpose_twice(a, b, curves, zeros, vertical)
     units = frame.attrs.get("units", {})
-    dataset = _dataset(found.first, over, values, by[0], units)
+    attrs = {"second": by[1], "second_reference": found.second.reference}
+    attrs |= {"chi_squared": found.chi_squared, "probability": found.probability}
+    dataset = _dataset(found.first, over, ordinates, by[0], units).assign_attrs(attrs)
     for name, along in (("point_shift", "horizontal"), ("point_rise", "vertical")):
         parts = [getattr(part, along)[part.member] for part in (found.first, found.second)]
         dataset[name] = ("point", parts[0] + parts[1], {"units": "1"})
     dataset["point_second"] = ("point", found.second.groups[found.second.member], {"units": units.get(by[1], "")})
-    extra = _dataset(found.second, over, values, by[1], units)
-    for part in ("", "_error", "_low", "_high", *(("_bootstrap",) if draws else ())):
+    extra = _dataset(found.second, over, ordinates, by[1], units)
+    for part in ("", "_error", "_low", "_high"):
         dataset[f"second_factor{part}"] = extra[f"shift_factor{part}"]
-        if vertical:
+        if vertical != "none":
             dataset[f"second_vertical_factor{part}"] = extra[f"vertical_factor{part}"]
-    if draws:
-        dataset["second_draws"] = extra["draws"]
-    about = {"second": by[1], "second_reference": found.second.reference}
-    parts = [(one, name, units.get(name, "")) for one, name in zip((found.first, found.second), by, strict=True)]
-    dataset = _with_laws(dataset, *parts)
-    return dataset.assign_attrs(about, chi_squared=found.chi_squared, probability=found.probability)
+    verdicts: dict[str, str] = {}
+    for part, name in zip((found.first, found.second), by, strict=True):
+        laws, said = laws_of(part, over, units.get(name, ""), part.reference, is_temperature=is_temperature(name))
+        dataset, verdicts = dataset.assign(constants_of(laws)), verdicts | said
+    return with_verdict(dataset, verdicts)
 
 
 def _inside(groups: FloatArray, reference: float) -> float:
-    """Return the reference, or the first or last group if it lies just outside: set points are met by so much."""
+    """Return the reference, or the first or last group if it lies just outside, as measured set points scatter."""
     margin = 0.1 * np.ptp(groups) / max(groups.size - 1, 1)
     if not groups.min() - margin <= reference <= groups.max() + margin:
         told, low, high = distinguishable(reference, groups.min(), groups.max(), digits=6)
@@ -168,65 +167,73 @@ def _inside(groups: FloatArray, reference: float) -> float:
     return float(np.clip(reference, groups.min(), groups.max()))
 
 
-def _is_logarithmic(by: str, groups: FloatArray) -> bool:
-    """Say whether factors are nearly linear in the logarithm of the group, as a power law of velocities is."""
-    return bool(np.all(groups > 0)) and not is_temperature(by)
-
-
-def _nearest(groups: FloatArray, reference: float) -> float:
-    return float(groups[np.argmin(np.abs(groups - _inside(groups, reference)))])
+def _with_laws(
+    found: Superposition,
+    zero: float,
+    over: str,
+    ordinates: Sequence[str],
+    by: str,
+    units: Mapping[str, str],
+    attrs: Mapping[str, Any],
+) -> xr.Dataset:
+    """Return a master curve at a reference, with the laws of its factors and a verdict."""
+    unit, warm = units.get(by, ""), is_temperature(by)
+    laws, verdicts = laws_of(found, over, unit, zero, is_temperature=warm)
+    holding = [law for law in laws if verdicts[law.name].startswith("yes")]
+    best = min(holding, key=lambda law: law.residual, default=None)
+    if best is None:
+        logarithmic = bool(np.all(found.groups > 0)) and not warm
+        moved = superposition.rereference(found, zero, logarithmic=logarithmic)
+    else:
+        places = np.append(found.groups, zero)
+        sign = sign_of(over) if warm else 1
+        law = sign * best.factors(kelvins(places, unit, found.groups) if warm else places)
+        moved = superposition.rereference(found, zero, law[:-1], float(law[-1]), logarithmic=not warm)
+    dataset = _dataset(moved, over, ordinates, by, units).assign(constants_of(laws)).assign_attrs(attrs)
+    return with_verdict(dataset, verdicts)
 
 
 def _dataset(
-    result: superposition.Superposition, over: str, values: str, by: str, units: Mapping[str, str]
+    result: Superposition, over: str, ordinates: Sequence[str], by: str, units: Mapping[str, str]
 ) -> xr.Dataset:
     size = result.groups.size
     attrs = {
         "abscissa": over,
-        "ordinate": values,
+        "ordinate": ordinates[0],
+        "companion": ordinates[1] if len(ordinates) > 1 else "",
         "group": by,
         "reference": result.reference,
-        "noise": result.noise,
-        "freedom": result.freedom,
     }
+    attrs |= {f"{name}_noise": float(each) for name, each in zip(("ordinate", "companion"), result.noise, strict=False)}
     found: dict[str, tuple[Any, ...]] = {}
-    narrow, wide = (float(stdtrit(result.freedom, 0.5 + share / 2)) for share in (SHARE_OF_BARS, CONFIDENCE))
-    factors = {"shift_factor": (result.horizontal, result.horizontal_error)}
-    factors["vertical_factor"] = (result.vertical, result.vertical_error)
-    for name, (factor, error) in factors.items():
-        meaning = f"decades added to log10 of {over if name == 'shift_factor' else values}"
+    narrow, wide = result.interval(SHARE_OF_BARS), result.interval()
+    for name, factor, own in (
+        ("shift_factor", result.horizontal, slice(size)),
+        ("vertical_factor", result.vertical, slice(size, None)),
+    ):
+        meaning = f"decades added to log10 of {over if name == 'shift_factor' else ordinates[0]}"
+        bar = (narrow[1, own] - narrow[0, own]) / 2
         found[name] = (by, factor, {"units": "1", "long_name": meaning})
-        found[f"{name}_error"] = (by, narrow * error, {"units": "1", "long_name": "half width of the 68 % interval"})
-        found[f"{name}_low"] = (by, factor - wide * error, {"units": "1"})
-        found[f"{name}_high"] = (by, factor + wide * error, {"units": "1"})
-    found["covariance"] = ((by, f"{by}_2"), result.covariance[:size, :size], {"units": "1"})
-    found["vertical_covariance"] = ((by, f"{by}_2"), result.covariance[size:, size:], {"units": "1"})
+        found[f"{name}_error"] = (by, bar, {"units": "1", "long_name": "half width of the 68 % interval"})
+        found[f"{name}_low"] = (by, wide[0, own], {"units": "1"})
+        found[f"{name}_high"] = (by, wide[1, own], {"units": "1"})
+    covariance = result.covariance
+    found["covariance"] = ((by, f"{by}_2"), covariance[:size, :size], {"units": "1"})
+    found["vertical_covariance"] = ((by, f"{by}_2"), covariance[size:, size:], {"units": "1"})
+    found["draws"] = (("draw", by), result.draws[:, :size], {"units": "1"})
+    found["vertical_draws"] = (("draw", by), result.draws[:, size:], {"units": "1"})
     found["point_abscissa"] = ("point", 10**result.x, {"units": units.get(over, "")})
-    found["point_ordinate"] = ("point", 10**result.y, {"units": units.get(values, "")})
     found["point_group"] = ("point", result.groups[result.member], {"units": units.get(by, "")})
     measured = {"measured_low": 10 ** result.measured[0], "measured_high": 10 ** result.measured[1]}
     found["curve_abscissa"] = ("curve", 10**result.curve_x, {"units": units.get(over, ""), **measured})
-    found["curve_ordinate"] = ("curve", 10**result.curve_y, {"units": units.get(values, "")})
-    found["curve_error"] = ("curve", result.curve_error, {"units": "1", "long_name": "standard error, decades"})
-    found["curve_covariance"] = (("curve", "factor"), result.curve_cross, {"units": "1"})
-    if result.draws.size:
-        for name, drawn in (("shift_factor", result.draws[:, :size]), ("vertical_factor", result.draws[:, size:])):
-            low, high = np.quantile(drawn, (0.5 - SHARE_OF_BARS / 2, 0.5 + SHARE_OF_BARS / 2), axis=0)
-            about = {"units": "1", "long_name": "half width of 68 % of the bootstrap samples"}
-            found[f"{name}_bootstrap"] = (by, (high - low) / 2, about)
-        found["draws"] = (("draw", by), result.draws[:, :size], {"units": "1"})
-        found["vertical_draws"] = (("draw", by), result.draws[:, size:], {"units": "1"})
+    about = {"units": "1", "long_name": "standard error, decades"}
+    for c, (name, values) in enumerate(zip(("ordinate", "companion"), ordinates, strict=False)):
+        unit = {"units": units.get(values, ""), "long_name": values}
+        found[f"point_{name}"] = ("point", 10 ** result.y[c], unit)
+        found[f"curve_{name}"] = ("curve", 10 ** result.curve_y[c], unit)
+        found["curve_error" if c == 0 else "curve_companion_error"] = ("curve", result.curve_error[c], about)
+    found["curve_covariance"] = (("channel", "curve", "factor"), result.curve_cross, {"units": "1"})
     return xr.Dataset(found, {by: (by, result.groups, {"units": units.get(by, "")})}, attrs)
-
-
-def _with_laws(dataset: xr.Dataset, *parts: tuple[superposition.Superposition, str, str]) -> xr.Dataset:
-    """Return a master curve with the laws of its parts (what was found, its group and unit), and a verdict."""
-    over = str(dataset.attrs["abscissa"])
-    told: dict[str, str] = {}
-    for found, by, unit in parts:
-        constants, verdicts = laws_of(found, over, unit, is_temperature=is_temperature(by))
-        dataset, told = dataset.assign(constants), told | verdicts
-    return with_verdict(dataset, told)
 
 
 def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
@@ -237,52 +244,36 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
     DataError
         If the value lies outside the groups.
     """
-    by = str(curve.attrs["group"])
-    over, values = str(curve.attrs["abscissa"]), str(curve.attrs["ordinate"])
+    by, over = str(curve.attrs["group"]), str(curve.attrs["abscissa"])
+    ordinates = [str(curve.attrs[name]) for name in ("ordinate", "companion") if curve.attrs.get(name)]
+    names, errors = ("ordinate", "companion")[: len(ordinates)], ("curve_error", "curve_companion_error")
     groups = curve[by].to_numpy()
-    size = groups.size
-    covariance = np.zeros((2 * size, 2 * size))
-    covariance[:size, :size], covariance[size:, size:] = curve["covariance"], curve["vertical_covariance"]
-    old = superposition.Superposition(
+    old = Superposition(
         groups=groups,
         horizontal=curve["shift_factor"].to_numpy(),
         vertical=curve["vertical_factor"].to_numpy(),
-        covariance=covariance,
+        draws=np.hstack([curve["draws"].to_numpy(), curve["vertical_draws"].to_numpy()]),
         reference=float(curve.attrs["reference"]),
-        noise=float(curve.attrs["noise"]),
-        freedom=float(curve.attrs["freedom"]),
+        noise=np.array([float(curve.attrs[f"{name}_noise"]) for name in names]),
         x=np.log10(curve["point_abscissa"].to_numpy()),
-        y=np.log10(curve["point_ordinate"].to_numpy()),
+        y=np.log10([curve[f"point_{name}"].to_numpy() for name in names]),
         member=np.searchsorted(groups, curve["point_group"].to_numpy()),
         curve_x=np.log10(curve["curve_abscissa"].to_numpy()),
-        curve_y=np.log10(curve["curve_ordinate"].to_numpy()),
-        curve_error=curve["curve_error"].to_numpy(),
+        curve_y=np.log10([curve[f"curve_{name}"].to_numpy() for name in names]),
+        curve_error=np.array([curve[name].to_numpy() for name in errors[: len(ordinates)]]),
         curve_cross=curve["curve_covariance"].to_numpy(),
         measured=(0.0, 0.0),
-        draws=_drawn(curve),
     )
-    units = {
-        by: curve[by].attrs.get("units", ""),
-        over: curve["curve_abscissa"].attrs.get("units", ""),
-        values: curve["curve_ordinate"].attrs.get("units", ""),
-    }
-    new = superposition.rereference(old, _inside(groups, reference), _is_logarithmic(by, groups))
-    dataset = _with_laws(_dataset(new, over, values, by, units), (new, by, units[by]))
+    units = {over: curve["curve_abscissa"].attrs.get("units", ""), by: curve[by].attrs.get("units", "")}
+    units |= {values: curve[f"curve_{name}"].attrs.get("units", "") for name, values in zip(names, ordinates, strict=True)}
+    kept = {name: value for name, value in curve.attrs.items() if name not in ("reference",)}
+    dataset = _with_laws(old, _inside(groups, reference), over, ordinates, by, units, {})
     for name in [name for name in curve.data_vars if name not in dataset or name == "law_holds"]:
         dataset[name] = curve[name]
     if "point_shift" in curve:
-        dataset["point_shift"] = curve["point_shift"] + float(new.horizontal[0] - old.horizontal[0])
-        dataset["point_rise"] = curve["point_rise"] + float(new.vertical[0] - old.vertical[0])
-    return dataset.assign_attrs({name: value for name, value in curve.attrs.items() if name not in dataset.attrs})
-
-
-def _drawn(curve: xr.Dataset) -> FloatArray:
-    """Return the bootstrap samples of a kept result, horizontal and vertical side by side."""
-    if "draws" not in curve:
-        return np.empty((0, 2 * curve["shift_factor"].size))
-    across = curve["draws"].to_numpy()
-    along = curve["vertical_draws"].to_numpy() if "vertical_draws" in curve else np.zeros_like(across)
-    return np.hstack([across, along])
+        for name, factor in (("point_shift", "shift_factor"), ("point_rise", "vertical_factor")):
+            dataset[name] = curve[name] + float(dataset[factor][0] - curve[factor][0])
+    return dataset.assign_attrs(kept)
 
 
 def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:

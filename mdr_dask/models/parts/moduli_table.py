@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
@@ -140,18 +141,35 @@ def _by_law(
 def _by_curves(
     reference: float, law: Law | None, rows: Rows, member: IntArray, levels: FloatArray, ends: tuple[float, float]
 ) -> Moduli:
-    """Shift every temperature to the reference by its storage modulus."""
-    from mdr_dask.physics.superposition.master_curve import superpose
-
+    """Shift every temperature to the reference by its own curves of both moduli."""
+    _require_overlap(rows[1], member, levels)
+    across, along, told = _superposed(reference, tuple(levels), member.tobytes(), *(each.tobytes() for each in rows))
     omega, storage, loss = rows
-    _require_overlap(storage, member, levels)
-    parts = [member == number for number in range(levels.size)]
-    curves = [(np.log10(omega[part]), np.log10(storage[part])) for part in parts]
-    found = superpose(levels, curves, reference=reference)
-    told = (
-        f"superposed at {shown(reference, 'K')} by its own curves{_compared(levels, found.horizontal, law, reference)}"
+    rise = 10 ** np.array(along)[member]
+    told = f"superposed at {shown(reference, 'K')} by both moduli{told}{_compared(levels, across, law, reference)}"
+    return Moduli(omega * 10 ** np.array(across)[member], storage * rise, loss * rise, reference, ends, told)
+
+
+@lru_cache(maxsize=16)
+def _superposed(
+    reference: float, levels: tuple[float, ...], member: bytes, *rows: bytes
+) -> tuple[FloatArray, FloatArray, str]:
+    """Return horizontal and vertical shift factors of each temperature, and a sentence about them."""
+    from mdr_dask.physics.superposition.master_curve import rereference, superpose
+
+    points, groups = np.log10([np.frombuffer(row) for row in rows]), np.frombuffer(member, dtype=np.intp)
+    parts = [groups == number for number in range(len(levels))]
+    free = superpose(levels, [(points[0, part], points[1:, part]) for part in parts], "modulus")
+    found = rereference(free, reference)
+    low, high = found.interval()[:, : len(levels)]
+    ends = ", ".join(
+        f"{found.horizontal[k]:.2f} ({low[k]:.2f}, {high[k]:.2f}) at {shown(levels[k], 'K')}" for k in (0, -1)
     )
-    return Moduli(omega * 10 ** found.horizontal[member], storage, loss, reference, ends, told)
+    told = f", log10 a_T (95 %) {ends}"
+    if found.undetermined:
+        runs = " and ".join(f"{shown(a, 'K')} to {shown(b, 'K')}" for a, b in found.undetermined)
+        told += f"; shift factors are not determined from {runs}: give wlf, arrhenius or shift_factors instead"
+    return found.horizontal, found.vertical, told
 
 
 def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, reference: float) -> str:

@@ -1,76 +1,78 @@
-"""Master curves: curves of one quantity in several groups, shifted along their logarithmic axes until they are one
-curve.
-"""
+"""Master curves: curves of one quantity in several groups, shifted along logarithmic axes until they are one curve."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtri
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import DataError, distinguishable
-from mdr_dask.physics.superposition.factors import Found, find_both, find_horizontal
-from mdr_dask.physics.superposition.least_squares import Points, extent, fit, rows, slopes
-from mdr_dask.physics.superposition.problem import ShiftProblem
+from mdr_dask.errors import DataError, apart
+from mdr_dask.physics.superposition.posterior import STEP_SCATTER, Curves, solve
+from mdr_dask.physics.superposition.sampling import draws
 
 CURVE_POINTS = 201
-TOUCHING = 1e-9
-"""Gap between curves, over the whole range, that is rounding."""
+CONFIDENCE = 0.95
 
-DRAW_ITERATIONS = 3
-"""A bootstrap sample starts from the solution, where Gauss-Newton steps converge at once."""
+EXPANSION = 6e-4
+"""Volume expansion of melts and rubbers, 1/K, in b_T; typical values are 5e-4 to 7e-4."""
 
-HARDLY_TOLD = 0.5
-"""Part of the scatter of all steps that curves take away from a step that they tell, at least."""
+OFFSET = (0.02 / np.log(10), np.log(2))
+"""Prior of the offset of all moduli of one temperature: 2 % within a factor of two, as specimens are clamped anew and
+their size is known to a per cent or so."""
+
+FREE = (0.03, 1.5)
+"""Prior of the steps of free vertical factors about their mean: 0.03 decades within a factor of five."""
+
+DETERMINED = 0.5
+"""Standard deviation of a step, over that of the prior about its mean, above which it counts as not determined."""
+
+Vertical = Literal["none", "modulus", "compliance", "free"]
 
 
 @dataclass(frozen=True)
 class Superposition:
-    """Shift factors and the curve they make; abscissa and ordinate as logarithms to the base 10.
+    """Shift factors and the curve they make; abscissa and ordinates are logarithms to the base 10.
 
     Parameters
     ----------
     groups : array, shape (groups,)
         What the curves differ in (velocity, temperature), ascending.
     horizontal, vertical : array, shape (groups,)
-        What is added to log10 x and to log10 y of each curve; zero for the reference.
-    covariance : array, shape (2 groups, 2 groups)
-        Of horizontal and vertical factors together, for independent scatter of the ordinates.
+        What is added to log10 x and to log10 y of each curve; zero at the reference.
+    draws : array, shape (draws, 2 groups)
+        Draws of horizontal and vertical factors from their probability density.
     reference : float
         The group's value at which the factors are zero.
-    noise : float
+    noise : array, shape (channels,)
         Scatter of log10 y about the curve.
-    freedom : float
-        Degrees of freedom of the scatter, for quantiles of Student's t.
-    x, y : array, shape (points,)
-        All points after shifting, ascending in x.
+    x : array, shape (points,)
+        Abscissae after shifting, ascending.
+    y : array, shape (channels, points)
+        Ordinates after shifting.
     member : array of int, shape (points,)
-        The group of each.
-    curve_x, curve_y, curve_error : array, shape (curve points,)
-        The merged curve with its standard error, where the reference is held in place.
-    curve_cross : array, shape (curve points, 2 groups)
-        Covariance of the curve and the factors.
+        The group of each point.
+    curve_x : array, shape (curve points,)
+    curve_y, curve_error : array, shape (channels, curve points)
+        The merged curves and their standard errors, where the reference is held in place.
+    curve_cross : array, shape (channels, curve points, 2 groups)
+        Covariance of the curves and the factors.
     measured : tuple of float
-        Range of log10 x in which the reference itself was measured; the merged curve beyond is extrapolated by
-        superposition.
-    draws : array, shape (draws, 2 groups)
-        Bootstrap samples of the factors; none unless asked for.
+        Range of log10 x in which the reference itself was measured; beyond, the curve rests on the shift factors.
     undetermined : tuple of (float, float)
-        First and last group of each run of neighbours whose steps the curves hardly tell, as on a plateau.
-    usual : tuple of float
-        Mean and scatter of the steps between neighbours, decades: what is expected of steps that are not told.
+        First and last group of each run of neighbours whose steps the curves do not determine, as on a plateau.
     """
 
     groups: FloatArray
     horizontal: FloatArray
     vertical: FloatArray
-    covariance: FloatArray
+    draws: FloatArray
     reference: float
-    noise: float
-    freedom: float
+    noise: FloatArray
     x: FloatArray
     y: FloatArray
     member: NDArray[np.intp]
@@ -79,54 +81,60 @@ class Superposition:
     curve_error: FloatArray
     curve_cross: FloatArray
     measured: tuple[float, float]
-    draws: FloatArray
     undetermined: tuple[tuple[float, float], ...] = ()
-    usual: tuple[float, float] = (0.0, 0.0)
 
-    def moved(self, by: float) -> Superposition:
-        """Return the same with the abscissa of everything moved."""
-        low, high = self.measured
-        return replace(self, x=self.x + by, curve_x=self.curve_x + by, measured=(low + by, high + by))
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of horizontal and vertical factors together, decades squared, shape (2 groups, 2 groups)."""
+        return np.atleast_2d(np.cov(self.draws, rowvar=False))
 
     @property
     def horizontal_error(self) -> FloatArray:
         """Standard errors of the horizontal factors, decades."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)[: self.groups.size]), dtype=np.float64)
+        return np.asarray(self.draws[:, : self.groups.size].std(axis=0), dtype=np.float64)
 
     @property
     def vertical_error(self) -> FloatArray:
         """Standard errors of the vertical factors, decades."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)[self.groups.size :]), dtype=np.float64)
+        return np.asarray(self.draws[:, self.groups.size :].std(axis=0), dtype=np.float64)
+
+    def interval(self, confidence: float = CONFIDENCE) -> FloatArray:
+        """Return the ends of the intervals of all factors, shape (2, 2 groups)."""
+        ends = (0.5 - confidence / 2, 0.5 + confidence / 2)
+        return np.asarray(np.quantile(self.draws, ends, axis=0), dtype=np.float64)
 
 
 def superpose(
     groups: ArrayLike,
     curves: Sequence[tuple[ArrayLike, ArrayLike]],
-    vertical: bool = False,
+    vertical: Vertical = "none",
     reference: float | None = None,
-    draws: int = 0,
     seed: int = 0,
+    kelvin: ArrayLike | None = None,
 ) -> Superposition:
-    """Find the shifts that make curves parts of one smooth curve, with their covariance.
+    """Find the shifts that make curves parts of one smooth curve, with their uncertainty.
 
-    All shifts and the curve are fitted together by least squares. The curve is a cubic spline whose curvature is
-    weighted by restricted maximum likelihood. So curves are joined by their overlaps, and by smoothness where those are
-    short.
+    The shifts, a smooth curve, the scatter and vertical offsets have a joint probability density (module `posterior`),
+    from which they are drawn. Results are means over the draws, so that intervals contain what smoothness, scatter and
+    offsets leave open.
 
     Parameters
     ----------
     groups : array_like, shape (groups,)
         What the curves differ in; distinct numbers.
     curves : sequence of (x, y)
-        log10 of abscissa and ordinate of each curve, at least two points each.
-    vertical : bool
-        Whether curves may move along the ordinate as well.
+        log10 of abscissa, shape (points,), and ordinate of each curve, at least two points each. Ordinates of shape
+        (channels, points), such as storage and loss modulus, are shifted together.
+    vertical : {'none', 'modulus', 'compliance', 'free'}
+        Factors along the ordinate. A modulus of a polymer is proportional to density times temperature: b_T = rho0 T0 /
+        (rho T) with `EXPANSION` is taken out, and an offset of all channels of a curve has the prior `OFFSET`. Free
+        factors drift from curve to curve by unknown steps.
     reference : float, optional
-        Group whose factors are zero; the middle one if not given. A value between groups is interpolated to.
-    draws : int
-        Bootstrap samples, residuals drawn again curve by curve and everything but the smoothing fitted anew.
+        Group whose factors are zero; the middle one if not given. Between groups see `rereference`.
     seed : int
-        Seed of the bootstrap.
+        Seed of the draws.
+    kelvin : array_like, shape (groups,), optional
+        Absolute temperatures of the groups, for b_T; by default the groups themselves.
 
     Raises
     ------
@@ -137,17 +145,38 @@ def superpose(
     --------
     >>> time = np.linspace(0, 2, 9)
     >>> curves = [(time, 6 - 2 / (1 + np.exp(2 - time - shift))) for shift in (0.0, 1.0, 2.0)]
-    >>> print(superpose([20.0, 40.0, 60.0], curves, reference=20.0).horizontal.round(2))
+    >>> print(superpose([20.0, 40.0, 60.0], curves, reference=20.0).horizontal.round(1))
     [0. 1. 2.]
     """
-    values, sorted_curves = _sorted(groups, curves)
-    problem, origin = ShiftProblem.of(sorted_curves).from_own_origin()
-    found = find_both(problem) if vertical else find_horizontal(problem)
-    result = _result(problem, found, values).moved(origin)
-    _require_overlap(result)
-    if draws:
-        result = replace(result, draws=_bootstrap(problem, found, draws, seed))
-    return rereference(result, values[values.size // 2] if reference is None else reference)
+    values, arrays = _sorted(groups, curves)
+    rise = known_rise(values if kelvin is None else np.sort(np.asarray(kelvin, dtype=np.float64)), vertical)
+    width = float(np.median([np.ptp(x) for x, _ in arrays]))
+    problem = Curves(
+        x=np.concatenate([x for x, _ in arrays]) / width,
+        y=np.concatenate([y + k for (_, y), k in zip(arrays, rise, strict=True)], axis=1),
+        member=np.repeat(np.arange(values.size), [x.size for x, _ in arrays]),
+        count=values.size,
+        height=np.maximum(np.median([np.ptp(y, axis=1) for _, y in arrays], axis=0), 1e-3),
+        splines=4,
+        offset={"none": None, "free": FREE}.get(vertical, OFFSET),
+        drifting=vertical == "free",
+    )
+    generator = np.random.Generator(np.random.Philox(seed))
+    problem, rows = draws(problem, generator)
+    found = _merged(problem, rows, values, rise, width, generator)
+    apart = _gaps(problem.x * width, problem.member, found.draws[:, : values.size]).mean(axis=0)
+    if np.any(apart > CONFIDENCE):
+        after = values[int(np.argmax(apart))]
+        raise DataError(f"the curve at {after:g} does not overlap the others after shifting: measure in between")
+    return rereference(found, values[values.size // 2] if reference is None else reference)
+
+
+def known_rise(kelvin: FloatArray, vertical: Vertical) -> FloatArray:
+    """Return log10 of b_T for a modulus (of 1 / b_T for a compliance), about the first temperature, shape (groups,)."""
+    if vertical not in ("modulus", "compliance"):
+        return np.zeros(kelvin.size)
+    decades = np.log10(kelvin[0] / kelvin * (1 + EXPANSION * (kelvin - kelvin[0])))
+    return np.asarray(decades if vertical == "modulus" else -decades, dtype=np.float64)
 
 
 def _sorted(
@@ -158,48 +187,66 @@ def _sorted(
         raise DataError(f"expected one distinct group for each of two or more curves, got {values.tolist()!r}")
     arrays = []
     for place in np.argsort(values):
-        x, y = (np.asarray(a, dtype=np.float64).reshape(-1) for a in curves[place])
-        if x.size != y.size or x.size < 2 or np.ptp(x) == 0 or not np.all(np.isfinite(x) & np.isfinite(y)):
+        x, y = np.asarray(curves[place][0], dtype=np.float64), np.atleast_2d(np.asarray(curves[place][1], np.float64))
+        if x.size != y.shape[1] or x.size < 2 or np.ptp(x) == 0 or not np.all(np.isfinite(x) & np.isfinite(y)):
             raise DataError(f"the curve at {values[place]:g} needs two or more distinct points with finite logarithms")
         order = np.argsort(x, kind="stable")
-        arrays.append((x[order], y[order]))
+        arrays.append((x[order], y[:, order]))
     if all(np.ptp(y) == 0 for _, y in arrays):
         raise DataError("every curve is constant: nothing tells how far to shift them")
     return np.sort(values), arrays
 
 
-def _result(problem: ShiftProblem, found: Found, values: FloatArray) -> Superposition:
-    points, shifts, curves = problem.points, found.shifts, values.size
-    linear = _Merged.at(problem, found)
-    across, along = shifts.across[points.member], shifts.along[points.member]
-    order = np.argsort(points.x + across, kind="stable")
-    x = (points.x + across)[order]
-    grid = np.linspace(x[0], x[-1], CURVE_POINTS)
-    curve, error, covariance = linear.curve(grid, found.covariance)
-    places = np.r_[1:curves, curves + 1 : 2 * curves][: found.covariance.shape[0]]
-    full, cross = np.zeros((2 * curves, 2 * curves)), np.zeros((grid.size, 2 * curves))
-    full[np.ix_(places, places)], cross[:, places] = found.covariance, covariance
-    own = (points.x + across)[points.member == 0]
+def _merged(
+    problem: Curves,
+    rows: FloatArray,
+    values: FloatArray,
+    rise: FloatArray,
+    width: float,
+    generator: np.random.Generator,
+) -> Superposition:
+    """Return factors and merged curves about the first group, from draws of the parameters."""
+    count, channels, lines = values.size, problem.y.shape[0], values.size - 1
+    shifts = np.concatenate([np.zeros((len(rows), 1)), rows[:, :lines]], axis=1)
+    mean = shifts.mean(axis=0)
+    x = problem.x + mean[problem.member]
+    grid = np.linspace(x.min(), x.max(), CURVE_POINTS)
+    linear = [solve(problem, part) for part in np.array_split(rows, max(len(rows) // 50, 1))]
+    unknowns = np.concatenate([_drawn(each.mean, each.covariance, generator) for each in linear])
+    offsets = unknowns[:, -count:] if problem.offset else np.zeros((len(rows), count))
+    lifted = np.stack([problem.spline(c, unknowns, shifts, grid) for c in range(channels)], axis=1)
+    lifted -= offsets[:, None, :1]
+    factors = np.hstack([shifts * width, offsets - offsets[:, :1] + rise - rise[0]])
+    vertical = factors[:, count:].mean(axis=0)
+    curve, centred = lifted.mean(axis=0), factors - factors.mean(axis=0)
+    order = np.argsort(x, kind="stable")
+    scales = rows[:, lines + channels * count : lines + channels * (count + 1)]
+    own = x[problem.member == 0] * width
+    spread = shifts[:, 1:] - shifts[:, :-1]
     return Superposition(
         groups=values,
-        horizontal=shifts.across,
-        vertical=shifts.along,
-        covariance=full,
+        horizontal=mean * width,
+        vertical=vertical,
+        draws=factors,
         reference=float(values[0]),
-        noise=linear.noise,
-        freedom=linear.freedom,
-        x=x,
-        y=(points.y + along)[order],
-        member=points.member[order],
-        curve_x=grid,
+        noise=np.exp(scales.mean(axis=0)),
+        x=x[order] * width,
+        y=(problem.y + (vertical - rise + rise[0])[problem.member])[:, order] - rise[0],
+        member=problem.member[order],
+        curve_x=grid * width,
         curve_y=curve,
-        curve_error=error,
-        curve_cross=cross,
+        curve_error=lifted.std(axis=0),
+        curve_cross=np.einsum("dcj,df->cjf", lifted - curve, centred) / (len(rows) - 1),
         measured=(float(own.min()), float(own.max())),
-        draws=np.empty((0, 2 * curves)),
-        undetermined=_runs(values, found.told < HARDLY_TOLD),
-        usual=(found.common.mean, found.common.scatter),
+        undetermined=_runs(values, spread.std(axis=0) > DETERMINED * STEP_SCATTER),
     )
+
+
+def _drawn(mean: FloatArray, covariance: FloatArray, generator: np.random.Generator) -> FloatArray:
+    """Return one draw of each row of normal distributions."""
+    values, vectors = np.linalg.eigh(covariance)
+    normal = generator.standard_normal(mean.shape) * np.sqrt(np.maximum(values, 0))
+    return np.asarray(mean + (vectors @ normal[..., None])[..., 0], dtype=np.float64)
 
 
 def _runs(groups: FloatArray, steps: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
@@ -209,164 +256,94 @@ def _runs(groups: FloatArray, steps: NDArray[np.bool_]) -> tuple[tuple[float, fl
     return tuple((float(groups[first]), float(groups[last])) for first, last in ends)
 
 
-def _bootstrap(problem: ShiftProblem, found: Found, draws: int, seed: int) -> FloatArray:
-    """Return factors fitted to residuals drawn again within each curve, shape (draws, 2 curves).
-
-    A fit anew repeats the best fit. What the curves leave open, as along a plateau, is drawn from a normal distribution
-    beside.
-    """
-    generator = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed)))
-    linear, points = _Merged.at(problem, found), problem.points
-    fitted, scatter = linear.residuals()
-    along = found.shifts.along[points.member]
-    places = [np.flatnonzero(points.member == curve) for curve in range(problem.curves)]
-    samples = np.empty((draws, 2 * problem.curves))
-    for row in samples:
-        drawn = np.concatenate([generator.choice(scatter[place], place.size) for place in places])
-        again = points._replace(y=fitted + drawn - along)
-        smoothing = found.weight, found.variance
-        row[:] = np.concatenate(fit(again, found.shifts, problem.grid, found.prior, smoothing, DRAW_ITERATIONS)[0])
-    size = found.covariance.shape[0]
-    free = np.r_[1 : problem.curves, problem.curves + 1 : 2 * problem.curves][:size]
-    values, vectors = np.linalg.eigh(found.covariance - linear.repeated())
-    samples[:, free] += generator.standard_normal((draws, size)) * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
-    return samples
+def _gaps(x: FloatArray, member: NDArray[np.intp], shifts: FloatArray) -> NDArray[np.bool_]:
+    """Return for rows of shifts whether a gap in the abscissa lies beside each curve, shape (rows, curves)."""
+    ends = np.array([[x[member == k].min(), x[member == k].max()] for k in range(shifts.shape[1])])
+    low, high = ends[:, 0] + shifts, ends[:, 1] + shifts
+    order = np.argsort(low, axis=1)
+    reach = np.maximum.accumulate(np.take_along_axis(high, order, 1), axis=1)
+    apart = np.zeros(shifts.shape, dtype=bool)
+    gap = np.take_along_axis(low, order, 1)[:, 1:] > reach[:, :-1] + 1e-9 * np.ptp(x)
+    np.put_along_axis(apart, order[:, 1:], gap, 1)
+    return apart
 
 
-@dataclass(frozen=True)
-class _Merged:
-    """The problem about shifts that were found, as a dense matrix: for the curve, its band and the residuals."""
+def rereference(
+    result: Superposition,
+    reference: float,
+    law: FloatArray | None = None,
+    at_reference: float = 0.0,
+    logarithmic: bool = False,
+) -> Superposition:
+    """Return the same master curve with the factors zero at another group, or between two.
 
-    design: FloatArray
-    inverse: FloatArray
-    target: FloatArray
-    splines: int
-    low: float
-    step: float
-    noise: float
-    freedom: float
-    coefficients: FloatArray
-
-    @classmethod
-    def at(cls, problem: ShiftProblem, found: Found) -> _Merged:
-        """Return the problem about the shifts found, with the best curve through them."""
-        points, shifts, step = problem.points, found.shifts, problem.grid.step
-        low, splines = extent(points, shifts.across, step)
-        basis = rows(points, shifts.across, low, step, splines)
-        second = np.diff(np.eye(splines), 2, axis=0)
-        smooth = basis.T @ basis + found.weight * second.T @ second
-        target = points.y + shifts.along[points.member]
-        coefficients = np.asarray(np.linalg.solve(smooth, basis.T @ target), dtype=np.float64)
-        slope = slopes(points, shifts.across, low, step, coefficients)
-        moved = np.eye(problem.curves)[points.member][:, 1:]
-        border = [moved * slope[:, None]]
-        if found.prior.mean.size >= problem.curves:
-            border.append(-moved)
-        design = np.hstack([basis, *border])
-        known = np.zeros((design.shape[1], design.shape[1]))
-        known[:splines, :splines] = found.weight * second.T @ second
-        known[splines:, splines:] = found.variance * found.prior.precision
-        inverse = np.linalg.inv(design.T @ design + known)
-        freedom = max(target.size - float(np.sum(inverse * (design.T @ design))), 1.0)
-        noise = float(np.sqrt(np.sum((target - basis @ coefficients) ** 2) / freedom))
-        return cls(design, inverse, target, splines, low, step, noise, freedom, coefficients)
-
-    def curve(self, x: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the curve, its error, and its covariance with the shifts."""
-        inner, outer = slice(self.splines), slice(self.splines, None)
-        gain = self.inverse[inner, outer] @ np.linalg.inv(self.inverse[outer, outer])
-        alone = self.noise**2 * (self.inverse[inner, inner] - gain @ self.inverse[outer, inner])
-        nothing = Points(x, x, np.zeros(x.size, np.intp))
-        along = rows(nothing, np.zeros(1), self.low, self.step, self.splines)
-        cross = along @ gain @ covariance
-        variance = np.sum((along @ alone) * along, axis=1) + np.sum(cross * (along @ gain), axis=1)
-        return along @ self.coefficients, np.sqrt(np.maximum(variance, 0)), cross
-
-    def repeated(self) -> FloatArray:
-        """Return the covariance of shifts that are fitted anew to other residuals, all else as it is."""
-        gain = self.inverse[self.splines :] @ self.design.T
-        covariance: FloatArray = self.noise**2 * (gain @ gain.T)
-        return covariance
-
-    def residuals(self) -> tuple[FloatArray, FloatArray]:
-        """Return fitted values, and residuals enlarged by their leverage."""
-        fitted = self.design[:, : self.splines] @ self.coefficients
-        leverage = np.sum((self.design @ self.inverse) * self.design, axis=1)
-        return fitted, (self.target - fitted) / np.sqrt(np.maximum(1 - leverage, 0.05))
-
-
-def _require_overlap(result: Superposition) -> None:
-    low, high = (
-        np.array([function(result.x[result.member == k]) for k in range(result.groups.size)])
-        for function in (np.min, np.max)
-    )
-    order = np.argsort(low)
-    reach = np.maximum.accumulate(high[order])
-    gaps = np.flatnonzero(low[order][1:] > reach[:-1] + TOUCHING * np.ptp(result.x))
-    if gaps.size:
-        after = result.groups[order[gaps[0] + 1]]
-        raise DataError(f"the curve at {after:g} does not overlap the others after shifting: measure in between")
-
-
-def moved_with(
-    error: FloatArray, cross: FloatArray, gradient: FloatArray, covariance: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return error of a curve that moves with factors, and its covariance with them.
-
-    Parameters
-    ----------
-    error, cross : arrays, shapes (curve points,) and (curve points, factors)
-        As they were.
-    gradient : array, shape (curve points, factors)
-        How far each factor moves the curve up.
-    covariance : array, shape (factors, factors)
-    """
-    along = gradient @ covariance
-    variance = error**2 + np.sum(gradient * (2 * cross + along), axis=1)
-    return np.sqrt(np.maximum(variance, 0)), cross + along
-
-
-def rereference(result: Superposition, reference: float, logarithmic: bool = False) -> Superposition:
-    """Return the same master curve with the factors zero at another group, or between two by linear interpolation.
+    Between two groups, the horizontal factor is that of a law plus the departures from it, which are interpolated
+    linearly. The error of this interpolation, `dT^2 |h''| / 8` for a distance dT of the two groups, is added to the
+    draws; h'' is that of the departures.
 
     Parameters
     ----------
     reference : float
         In the range of the groups.
+    law : array, shape (groups,), optional
+        Factors of a law that holds; without it, the factors themselves are interpolated.
+    at_reference : float
+        The factor of the law at the reference.
     logarithmic : bool
-        Whether factors are linear in the logarithm of the groups, as those of velocities are.
+        Whether factors are nearly linear in the logarithm of the groups, as those of velocities are.
 
     Raises
     ------
     DataError
         If the value lies outside the groups.
     """
-    groups = result.groups
+    groups, size = result.groups, result.groups.size
     if not groups[0] <= reference <= groups[-1]:
-        told, low, high = distinguishable(reference, groups[0], groups[-1], digits=6)
+        told, low, high = apart(reference, groups[0], groups[-1], digits=6)
         raise DataError(f"the reference must lie between {low} and {high}, got {told}")
     place, places = (np.log(reference), np.log(groups)) if logarithmic else (reference, groups)
-    share = np.array([np.interp(place, places, unit) for unit in np.eye(groups.size)])
-    one = np.eye(groups.size) - np.outer(np.ones(groups.size), share)
-    change = np.kron(np.eye(2), one)
-    across, along = float(share @ result.horizontal), float(share @ result.vertical)
+    share = np.array([np.interp(place, places, unit) for unit in np.eye(size)])
+    known = np.zeros(size) if law is None or reference in groups else law - at_reference
+    both = np.kron(np.eye(2), share)
+    across, along = float(share @ (result.horizontal - known)), float(share @ result.vertical)
+    zero = both @ result.draws.T  # taken off each draw, shape (2, draws)
+    zero[0] -= share @ known
+    bend = interpolation_error(places, result.horizontal - known, float(place))
+    zero[0] += bend * ndtri((np.random.default_rng(0).permutation(zero.shape[1]) + 0.5) / zero.shape[1])
+    drawn = result.draws - np.repeat(zero.T, size, axis=1)
     nearest = int(np.argmin(np.abs(places - place)))
     own = result.x[result.member == nearest] - across
-    slope = np.gradient(result.curve_y, result.curve_x)
-    gradient = np.hstack([np.outer(slope, share), -np.outer(np.ones(slope.size), share)])
-    error, cross = moved_with(result.curve_error, result.curve_cross, gradient, result.covariance)
+    slope = np.gradient(result.curve_y, result.curve_x, axis=1)
+    moved = slope[..., None] * both[0] - both[1]
+    spread = moved @ result.covariance
+    variance = result.curve_error**2 + np.sum(moved * (2 * result.curve_cross + spread), axis=2)
+    variance += (slope * bend) ** 2
+    change = np.eye(2 * size) - np.repeat(both, size, axis=0)
     return replace(
         result,
-        horizontal=one @ result.horizontal,
-        vertical=one @ result.vertical,
-        covariance=change @ result.covariance @ change.T,
+        horizontal=result.horizontal - across,
+        vertical=result.vertical - along,
+        draws=drawn,
         reference=float(reference),
         x=result.x - across,
         y=result.y - along,
         curve_x=result.curve_x - across,
         curve_y=result.curve_y - along,
-        curve_error=error,
-        curve_cross=cross @ change.T,
+        curve_error=np.sqrt(np.maximum(variance, 0)),
+        curve_cross=(result.curve_cross + spread) @ change.T,
         measured=(float(own.min()), float(own.max())),
-        draws=result.draws @ change.T,
     )
+
+
+def interpolation_error(places: FloatArray, factors: FloatArray, place: float) -> float:
+    """Return the error of a linear interpolation, ``d^2 |h''| / 8`` for neighbours a distance d apart.
+
+    The second derivative is the larger one of those at the neighbours; zero at one of the places themselves.
+    """
+    if place in places:
+        return 0.0
+    after = int(np.searchsorted(places, place))
+    slopes = np.diff(factors) / np.diff(places)
+    bends = np.diff(slopes) / ((places[2:] - places[:-2]) / 2)
+    near = bends[max(after - 2, 0) : after]
+    return float((places[after] - places[after - 1]) ** 2 * np.max(np.abs(near), initial=0.0) / 8)

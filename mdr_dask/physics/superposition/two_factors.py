@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.physics.superposition.master_curve import Superposition, moved_with, superpose
+from mdr_dask.physics.superposition.master_curve import Superposition, Vertical, superpose
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class TwoShifts:
         Squared distance of the factors of all pairs from the sum, in their covariance, for every degree of freedom; the
         errors are enlarged by its root where it is above one.
     probability : float
-        Of a chi-squared that large if the sum held; 1 where nothing is left over to test it.
+        Probability of a chi-squared that large if the sum holds; 1 where no degree of freedom is left to test it.
     """
 
     first: Superposition
@@ -41,14 +41,13 @@ def superpose_twice(
     second: ArrayLike,
     curves: Sequence[tuple[ArrayLike, ArrayLike]],
     references: tuple[float, float] | None = None,
-    draws: int = 0,
+    vertical: Vertical = "none",
     seed: int = 0,
-    vertical: bool = False,
 ) -> TwoShifts:
     """Shift curves that differ in two things into one, and split the factors into a sum of two.
 
-    All curves are superposed freely; a and b follow by least squares in the covariance of all factors, which is what a
-    joint fit does to first order, and tells whether the sum holds.
+    All curves are superposed without the sum; a and b follow by least squares in the covariance of all factors, which
+    is what a joint fit does to first order, and tests the sum.
 
     Parameters
     ----------
@@ -58,10 +57,10 @@ def superpose_twice(
         log10 of abscissa and ordinate.
     references : pair of float, optional
         Groups whose factors are zero; the middle ones if not given.
-    draws, seed : int
-        Bootstrap samples, as of `superpose`; each is split into a sum as the factors are.
-    vertical : bool
+    vertical : {'none', 'free'}
         Whether curves may move along the ordinate as well, by factors that are such a sum, too.
+    seed : int
+        Seed of the draws of `superpose`.
 
     Raises
     ------
@@ -73,9 +72,14 @@ def superpose_twice(
     if min(group.size for group in groups) < 2:
         raise DataError("two shifts need two or more values of each group")
     order = _serpentine(places[0], places[1])
-    free = superpose(np.arange(order.size), [curves[k] for k in order], vertical, 0.0, draws, seed)
     zeros = [_nearest(group, None if references is None else references[i]) for i, group in enumerate(groups)]
-    return _split(free, groups, [place[order] for place in places], zeros, 1 + vertical)
+    places = [place[order] for place in places]
+    design = np.hstack([np.eye(group.size)[place] for group, place in zip(groups, places, strict=True)])
+    columns = np.delete(np.arange(design.shape[1]), [zeros[0], groups[0].size + zeros[1]])
+    if np.linalg.matrix_rank((design - design[0])[1:, columns]) < columns.size:
+        raise DataError("the curves fall into parts that share neither group: measure one value of each with the other")
+    free = superpose(np.arange(order.size), [curves[k] for k in order], vertical, 0.0, seed)
+    return _split(free, groups, places, zeros, design, columns, 1 if vertical == "none" else 2)
 
 
 def _split(
@@ -83,86 +87,66 @@ def _split(
     groups: Sequence[FloatArray],
     places: Sequence[NDArray[np.intp]],
     zeros: Sequence[int],
+    design: FloatArray,
+    columns: NDArray[np.intp],
     axes: int,
 ) -> TwoShifts:
-    """Fit the sum to free factors, which are zero for the first curve, in the covariance of the others.
+    """Fit the sum to the factors of all curves, zero for the first one, in the covariance of the others.
 
+    `design` makes the factors of the curves of those of both groups, of which `columns` are not zero by definition;
     `axes` is two if there are vertical factors, of which the same sum holds, else one.
     """
-    size, curves = groups[0].size, free.groups.size
-    columns = np.delete(np.arange(size + groups[1].size), [zeros[0], size + zeros[1]])
-    design = np.hstack([np.eye(group.size)[place] for group, place in zip(groups, places, strict=True)])
-    rows = (design - design[0])[1:, columns]
-    if np.linalg.matrix_rank(rows) < columns.size:
-        raise DataError("the curves fall into parts that share neither group: measure one value of each with the other")
+    curves, both = free.groups.size, design.shape[1]
+    rows = np.kron(np.eye(axes), (design - design[0])[1:, columns])
     moved = np.concatenate([curves * axis + np.arange(1, curves) for axis in range(axes)])
-    kept = np.concatenate([design.shape[1] * axis + columns for axis in range(axes)])
+    kept = np.concatenate([both * axis + columns for axis in range(axes)])
     whiten = np.linalg.inv(np.linalg.cholesky(free.covariance[np.ix_(moved, moved)]))
-    projected = whiten @ np.kron(np.eye(axes), rows)
-    target = whiten @ np.append(free.horizontal, free.vertical)[moved]
-    spread = np.linalg.inv(projected.T @ projected)
-    project = spread @ projected.T
-    misfit = float(np.sum((target - projected @ (project @ target)) ** 2))
-    freedom = target.size - kept.size
+    solve = np.zeros((2 * both, 2 * curves))
+    solve[np.ix_(kept, moved)] = np.linalg.pinv(whiten @ rows) @ whiten
+    target = np.append(free.horizontal, free.vertical)
+    sums = solve @ target
+    freedom = moved.size - kept.size
+    misfit = float(np.sum((whiten @ (target[moved] - rows @ sums[kept])) ** 2))
     reduced = misfit / freedom if freedom else 0.0
-    both, covariance = np.zeros(2 * design.shape[1]), np.zeros((2 * design.shape[1], 2 * design.shape[1]))
-    both[kept], covariance[np.ix_(kept, kept)] = project @ target, spread * max(reduced, 1.0)
-    drawn = np.zeros((free.draws.shape[0], both.size))
-    drawn[:, kept] = free.draws[:, moved] @ (project @ whiten).T
-    cross = np.zeros((free.curve_x.size, both.size))
-    cross[:, kept] = free.curve_cross[:, moved] @ (project @ whiten).T
-    summed = _summed(replace(free, curve_cross=cross), design, both, covariance)
-    own = summed.x[np.isin(free.member, np.flatnonzero((places[0] == zeros[0]) & (places[1] == zeros[1])))]
-    own = own if own.size else summed.x[places[0][free.member] == zeros[0]]
-    summed = replace(
-        summed,
-        measured=(float(own.min()), float(own.max())),
-        horizontal=both[: both.size // 2],
-        vertical=both[both.size // 2 :],
-        covariance=covariance,
-        draws=drawn,
-    )
-    one, other = (
-        _one(summed, groups[i], zeros[i], places[i], columns_of + np.arange(groups[i].size))
-        for i, columns_of in enumerate((0, size))
-    )
-    return TwoShifts(one, other, reduced, float(chi2.sf(misfit, freedom)) if freedom else 1.0)
+    drawn = sums + np.sqrt(max(reduced, 1.0)) * (free.draws - target) @ solve.T
 
-
-def _summed(free: Superposition, design: FloatArray, both: FloatArray, covariance: FloatArray) -> Superposition:
-    """Return points and curve shifted by the sums of factors, horizontal ones first, instead of freely."""
-    across, along = both.reshape(2, -1) @ design.T
-    slope = np.gradient(free.curve_y, free.curve_x)
-    gradient = np.hstack([-np.outer(slope, design[0]), np.outer(np.ones(slope.size), design[0])])
-    error, cross = moved_with(free.curve_error, free.curve_cross, gradient, covariance)
-    return replace(
+    across, along = sums.reshape(2, -1) @ design.T
+    slope = np.gradient(free.curve_y, free.curve_x, axis=1)
+    first = np.zeros((2, 2 * both))
+    first[0, :both], first[1, both:] = design[0], design[0]
+    moves = first[1] - slope[..., None] * first[0]
+    cross = free.curve_cross @ solve.T
+    spread = moves @ np.cov(drawn, rowvar=False)
+    variance = free.curve_error**2 + np.sum(moves * (2 * cross + spread), axis=2)
+    x = free.x + (across - free.horizontal)[free.member]
+    own = x[np.isin(free.member, np.flatnonzero((places[0] == zeros[0]) & (places[1] == zeros[1])))]
+    own = own if own.size else x[places[0][free.member] == zeros[0]]
+    merged = replace(
         free,
-        x=free.x + (across - free.horizontal)[free.member],
+        x=x,
         y=free.y + (along - free.vertical)[free.member],
         curve_x=free.curve_x + across[0],
         curve_y=free.curve_y + along[0],
-        curve_error=error,
-        curve_cross=cross,
-    )
-
-
-def _one(
-    summed: Superposition, groups: FloatArray, zero: int, place: NDArray[np.intp], own: NDArray[np.intp]
-) -> Superposition:
-    """Return the superposition as seen by one of the groups, whose factors are at `own` among those of both."""
-    kept = np.append(own, summed.horizontal.size + own)
-    return replace(
-        summed,
-        groups=groups,
-        horizontal=summed.horizontal[own],
-        vertical=summed.vertical[own],
-        covariance=summed.covariance[np.ix_(kept, kept)],
-        curve_cross=summed.curve_cross[:, kept],
-        reference=float(groups[zero]),
-        member=place[summed.member],
-        draws=summed.draws[:, kept],
+        curve_error=np.sqrt(np.maximum(variance, 0)),
+        measured=(float(own.min()), float(own.max())),
         undetermined=(),
     )
+    parts = []
+    for which, begin in enumerate((0, groups[0].size)):
+        own_columns = begin + np.arange(groups[which].size)
+        of_both = np.append(own_columns, both + own_columns)
+        part = replace(
+            merged,
+            groups=groups[which],
+            horizontal=sums[own_columns],
+            vertical=sums[both + own_columns],
+            draws=drawn[:, of_both],
+            curve_cross=(cross + spread)[..., of_both],
+            reference=float(groups[which][zeros[which]]),
+            member=places[which][free.member],
+        )
+        parts.append(part)
+    return TwoShifts(*parts, reduced, float(chi2.sf(misfit, freedom)) if freedom else 1.0)
 
 
 def _serpentine(first: NDArray[np.intp], second: NDArray[np.intp]) -> NDArray[np.intp]:
