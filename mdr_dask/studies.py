@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from mdr_dask.physics.superposition.master_curve import Vertical
     from mdr_dask.plots.base import Plot
 
 #: A campaign: the keys of a campaign file, or its path.
@@ -309,7 +310,7 @@ def master_curve(
     over: str | None = None,
     of: str | Sequence[str] | None = None,
     by: str | None = None,
-    vertical: Literal["none", "modulus", "compliance", "free"] | None = None,
+    vertical: Vertical | None = None,
     reference: float | None = None,
 ) -> xr.Dataset:
     """Shift curves into one master curve, like ``mdr-dask master-curve``.

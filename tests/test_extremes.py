@@ -194,7 +194,7 @@ def test_a_line_of_ten_million_nodes_is_solved(scheme, rounding):
 def factors(groups, curves, vertical):
     """Return a superposition, None if it is refused."""
     with contextlib.suppress(FitError):
-        return superpose(groups, curves, vertical=vertical)
+        return superpose(groups, curves, "free" if vertical else "none")
     return None
 
 

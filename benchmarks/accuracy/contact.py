@@ -265,7 +265,7 @@ def master_curves(short: bool) -> Iterator[Point]:
             errors, stated, times = [], [], []
             for seed in range(400_000, 400_000 + (2 if short else 20)):
                 groups, pieces, shifts, _ = family(seed, scatter, shape, False)
-                found, seconds = timed(superpose, groups, pieces, False, 5.0)
+                found, seconds = timed(superpose, groups, pieces, "none", 5.0)
                 errors.append(np.max(np.abs(found.horizontal - shifts)))
                 stated.append(2 * np.max(found.horizontal_error))
                 times.append(seconds)

@@ -141,7 +141,7 @@ def curves(cases: int, seed: int) -> Iterator[Honest]:
         errors, stated = [], []
         for number in range(cases):
             groups, pieces, shifts, _ = family(seed + number, 0.01, shape, False)
-            found = superpose(groups, pieces, False, reference=5.0)
+            found = superpose(groups, pieces, reference=5.0)
             errors.append(np.delete(np.abs(found.horizontal - shifts), 5))
             stated.append(np.delete(student.ppf(0.975, found.freedom) * found.horizontal_error, 5))
         yield judged("master curves", f"{shape}, intervals of 95 %", errors, stated)

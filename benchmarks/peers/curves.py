@@ -22,7 +22,7 @@ DECADE = np.log(10)
 
 def ours(groups, pieces):
     """Return factors and half widths of 95 %, the first curve's factor being zero."""
-    found = superpose(groups, pieces, False, reference=groups[0])
+    found = superpose(groups, pieces, reference=groups[0])
     return found.horizontal, student.ppf(0.975, found.freedom) * found.horizontal_error
 
 

@@ -120,8 +120,7 @@ def _collapse(curve: xr.Dataset) -> str:
     """
     names = [name for name in ("ordinate", "companion") if f"point_{name}" in curve]
     answers = [_collapse_of(curve, name) for name in names]
-    order = ("no", "not tested", "yes")
-    worst = min(range(len(names)), key=lambda i: order.index(answers[i].partition(":")[0]))
+    worst = min(range(len(names)), key=lambda i: {"no": 0, "yes": 2}.get(answers[i].partition(":")[0], 1))
     word, _, reason = answers[worst].partition(": ")
     if len(names) > 1 and word != "yes":
         reason = f"{curve.attrs[names[worst]]} {reason}"

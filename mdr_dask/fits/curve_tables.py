@@ -196,8 +196,11 @@ def pairs_of(
     labels = np.array([clusters(frame[name].to_numpy(dtype=np.float64)) for name in by])
     keys, curves = [], []
     for pair in sorted(set(map(tuple, labels.T))):
-        part = frame[np.all(labels.T == pair, axis=1)]
-        centre = [float(frame[name].to_numpy()[row == label].mean()) for name, row, label in zip(by, labels, pair, strict=True)]
+        part = frame[np.all(pair == labels.T, axis=1)]
+        centre = [
+            float(frame[name].to_numpy()[row == label].mean())
+            for name, row, label in zip(by, labels, pair, strict=True)
+        ]
         (_,), (curve,) = curves_of(part.assign(**{by[0]: centre[0]}), over, ordinates, by[0])
         if np.ptp(curve[0]) == 0:
             where = f"{by[0]} = {centre[0]:g}, {by[1]} = {centre[1]:g}"

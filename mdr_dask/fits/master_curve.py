@@ -120,7 +120,7 @@ def _undetermined(found: Superposition) -> str:
     if not found.undetermined:
         return ""
     runs = ", ".join(f"between {low:.6g} and {high:.6g}" for low, high in found.undetermined)
-    return f"not determined {runs}: the curves look alike wherever they lie there, as on a plateau"
+    return f"not determined {runs}: curves there do not overlap, or look alike wherever they lie, as on a plateau"
 
 
 def _of_two_groups(
@@ -152,8 +152,8 @@ def _of_two_groups(
         if vertical != "none":
             dataset[f"second_vertical_factor{part}"] = extra[f"vertical_factor{part}"]
     verdicts: dict[str, str] = {}
-    for part, name in zip((found.first, found.second), by, strict=True):
-        laws, said = laws_of(part, over, units.get(name, ""), part.reference, is_temperature=is_temperature(name))
+    for one, name in zip((found.first, found.second), by, strict=True):
+        laws, said = laws_of(one, over, units.get(name, ""), one.reference, is_temperature=is_temperature(name))
         dataset, verdicts = dataset.assign(constants_of(laws)), verdicts | said
     return with_verdict(dataset, verdicts)
 
@@ -265,7 +265,9 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
         measured=(0.0, 0.0),
     )
     units = {over: curve["curve_abscissa"].attrs.get("units", ""), by: curve[by].attrs.get("units", "")}
-    units |= {values: curve[f"curve_{name}"].attrs.get("units", "") for name, values in zip(names, ordinates, strict=True)}
+    units |= {
+        values: curve[f"curve_{name}"].attrs.get("units", "") for name, values in zip(names, ordinates, strict=True)
+    }
     kept = {name: value for name, value in curve.attrs.items() if name not in ("reference",)}
     dataset = _with_laws(old, _inside(groups, reference), over, ordinates, by, units, {})
     for name in [name for name in curve.data_vars if name not in dataset or name == "law_holds"]:

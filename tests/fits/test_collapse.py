@@ -43,38 +43,36 @@ def step(temperature):
     ids=["as planted", "a step in the shifts", "curves of their own shape"],
 )
 def test_what_is_planted_is_told(case, verdicts):
-    sentence = master_curve(modulus(1, 0.03, **case))["law_holds"].item()
+    sentence = master_curve(modulus(1, 0.01, **case))["law_holds"].item()
     assert sentence.startswith(verdicts[0]), sentence
     assert all(verdict in sentence for verdict in verdicts[1:]), sentence
 
 
 def test_false_alarms_are_rare():
     """Two tests with a chance of 5 % each; Arrhenius does not hold, and WLF is enough."""
-    told = [master_curve(modulus(seed, 0.04))["law_holds"].item() for seed in range(20)]
+    told = [master_curve(modulus(seed, 0.02))["law_holds"].item() for seed in range(10)]
     print(*(sentence for sentence in told if not sentence.startswith("yes")), sep="\n")
     assert np.mean([sentence.startswith("yes: ") for sentence in told]) >= 0.8
 
 
 def test_too_few_curves_leave_a_law_untested():
-    table = modulus(1, 0.03)
+    table = modulus(1, 0.01)
     sentence = master_curve(table[table["temperature"].isin([20.0, 30.0])])["law_holds"].item()
     assert sentence.startswith("not tested: the curves collapse: yes")
     assert "law of the shifts: not tested: the law arrhenius needs more than 1 shift factors" in sentence
 
 
 def test_degrees_celsius_and_kelvin_follow_the_same_laws():
-    result = SimpleNamespace(
-        groups=TEMPERATURES,
-        horizontal=wlf(TEMPERATURES),
-        covariance=1e-4 * np.diag(TEMPERATURES != REFERENCE),
-        reference=REFERENCE,
-    )
-    warmer = SimpleNamespace(**vars(result) | {"groups": TEMPERATURES + 273.15, "reference": REFERENCE + 273.15})
-    celsius, _ = laws_of(result, "frequency", "degC", is_temperature=True)
-    kelvin, _ = laws_of(warmer, "frequency", "K", is_temperature=True)
-    assert celsius.keys() == kelvin.keys() > {"arrhenius_activation_energy", "wlf_c2_low"}
-    for name, value in celsius.items():
-        assert value.item() == pytest.approx(kelvin[name].item(), rel=1e-6), name
-    assert celsius["wlf_c2"].item() == pytest.approx(100.0, rel=1e-3)
-    rise = np.polyfit(1 / (TEMPERATURES + 273.15), np.log(10) * -wlf(TEMPERATURES), 1)[0]
-    assert abs(celsius["arrhenius_activation_energy"].item()) == pytest.approx(8.314462618 * abs(rise), rel=0.05)
+    random = np.random.default_rng(0)
+    draws = wlf(TEMPERATURES) + np.where(TEMPERATURES == REFERENCE, 0, 0.01 * random.standard_normal((200, 7)))
+    result = SimpleNamespace(groups=TEMPERATURES, horizontal=wlf(TEMPERATURES), draws=draws)
+    warmer = SimpleNamespace(**vars(result) | {"groups": TEMPERATURES + 273.15})
+    celsius, _ = laws_of(result, "frequency", "degC", REFERENCE, is_temperature=True)
+    kelvin, _ = laws_of(warmer, "frequency", "K", REFERENCE + 273.15, is_temperature=True)
+    for one, other in zip(celsius, kelvin, strict=True):
+        for name, values in one.constants.items():
+            assert values == pytest.approx(other.constants[name], rel=1e-6), name
+    arrhenius, williams = celsius
+    assert williams.constants["c2"][0] == pytest.approx(100.0, rel=1e-3)
+    rise = np.polyfit(1 / (TEMPERATURES + 273.15), np.log(10) * wlf(TEMPERATURES), 1)[0]
+    assert arrhenius.constants["activation_energy"][0] == pytest.approx(8.314462618 * rise, rel=0.05)

@@ -118,7 +118,9 @@ def fit_wlf(
         constants = {"c1": (c1, first, last), "c2": (c2, least, np.inf)}
     else:
         gap = 1 / bend - lowest  # of the temperature at which the law diverges below the lowest one measured
-        change = np.array([1 / (bend + bend**2 * moved), -slope * (1 + 2 * bend * moved) / (bend + bend**2 * moved) ** 2])
+        change = np.array(
+            [1 / (bend + bend**2 * moved), -slope * (1 + 2 * bend * moved) / (bend + bend**2 * moved) ** 2]
+        )
         half = fitted.quantile * float(np.sqrt(change @ fitted.spread @ change))
         ratio = np.exp(min(half_of_bend / (bend**2 * gap), 700.0))
         near, far = (lowest + moved + gap * part for part in (1 / ratio, ratio))
@@ -139,8 +141,11 @@ def _one_constant(
     covariance: FloatArray,
 ) -> ShiftLaw:
     """Fit a law that is proportional to a distance."""
-    guess = np.array([_slope(distance(groups), factors)])
-    fitted = _fit(name, lambda constants, at: constants[0] * distance(at), guess, groups, factors, covariance)
+
+    def law(constants: FloatArray, at: FloatArray) -> FloatArray:
+        return np.asarray(constants[0] * distance(at), dtype=np.float64)
+
+    fitted = _fit(name, law, np.array([_slope(distance(groups), factors)]), groups, factors, covariance)
     value, half = float(fitted.x[0]), fitted.quantile * float(np.sqrt(fitted.spread[0, 0]))
     return fitted.law(name, {constant: (value, value - half, value + half)})
 
@@ -180,15 +185,12 @@ def _fit(
 
     def solved(scatter: float) -> OptimizeResult:
         whiten = vectors / np.sqrt(values + scatter**2)
-        return least_squares(
-            lambda constants: (law(constants, groups) - factors)[known] @ whiten,
-            np.clip(guess, *bounds),
-            bounds=bounds,
-            x_scale="jac",
-            xtol=1e-13,
-            ftol=1e-13,
-            gtol=1e-13,
-        )
+
+        def misfit(constants: FloatArray) -> FloatArray:
+            return np.asarray((law(constants, groups) - factors)[known] @ whiten, dtype=np.float64)
+
+        start = np.clip(guess, *bounds)
+        return least_squares(misfit, start, bounds=bounds, x_scale="jac", xtol=1e-13, ftol=1e-13, gtol=1e-13)
 
     def excess(log_scatter: float) -> float:
         """Return by how much chi-squared exceeds its degrees of freedom."""
@@ -204,4 +206,8 @@ def _fit(
     quantile = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2))
     best = np.asarray(found.x, dtype=np.float64)
     chance = float(chdtrc(freedom, squares))
-    return _Fitted(best, spread, quantile, lambda at: law(best, at), factors - law(best, groups), chance)
+
+    def fitted(at: FloatArray) -> FloatArray:
+        return law(best, at)
+
+    return _Fitted(best, spread, quantile, fitted, factors - law(best, groups), chance)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import DataError, apart
+from mdr_dask.errors import DataError, distinguishable
 from mdr_dask.physics.superposition.posterior import STEP_SCATTER, Curves, solve
 from mdr_dask.physics.superposition.sampling import draws
 
@@ -64,7 +64,8 @@ class Superposition:
     measured : tuple of float
         Range of log10 x in which the reference itself was measured; beyond, the curve rests on the shift factors.
     undetermined : tuple of (float, float)
-        First and last group of each run of neighbours whose steps the curves do not determine, as on a plateau.
+        First and last group of each run of neighbours whose steps the curves do not determine, as on a plateau or
+        beside a gap.
     """
 
     groups: FloatArray
@@ -139,7 +140,7 @@ def superpose(
     Raises
     ------
     DataError
-        If there are fewer than two curves, too few or not finite points, or the shifted curves leave a gap.
+        If there are fewer than two curves, or too few or not finite points.
 
     Examples
     --------
@@ -164,10 +165,6 @@ def superpose(
     generator = np.random.Generator(np.random.Philox(seed))
     problem, rows = draws(problem, generator)
     found = _merged(problem, rows, values, rise, width, generator)
-    apart = _gaps(problem.x * width, problem.member, found.draws[:, : values.size]).mean(axis=0)
-    if np.any(apart > CONFIDENCE):
-        after = values[int(np.argmax(apart))]
-        raise DataError(f"the curve at {after:g} does not overlap the others after shifting: measure in between")
     return rereference(found, values[values.size // 2] if reference is None else reference)
 
 
@@ -222,7 +219,9 @@ def _merged(
     order = np.argsort(x, kind="stable")
     scales = rows[:, lines + channels * count : lines + channels * (count + 1)]
     own = x[problem.member == 0] * width
-    spread = shifts[:, 1:] - shifts[:, :-1]
+    apart = _gaps(problem.x, problem.member, shifts).mean(axis=0)
+    loose = np.diff(shifts, axis=1).std(axis=0) > DETERMINED * STEP_SCATTER
+    loose |= np.maximum(apart[1:], np.where(np.arange(lines) == 0, apart[0], 0)) > 0.5
     return Superposition(
         groups=values,
         horizontal=mean * width,
@@ -238,7 +237,7 @@ def _merged(
         curve_error=lifted.std(axis=0),
         curve_cross=np.einsum("dcj,df->cjf", lifted - curve, centred) / (len(rows) - 1),
         measured=(float(own.min()), float(own.max())),
-        undetermined=_runs(values, spread.std(axis=0) > DETERMINED * STEP_SCATTER),
+        undetermined=_runs(values, loose),
     )
 
 
@@ -257,7 +256,7 @@ def _runs(groups: FloatArray, steps: NDArray[np.bool_]) -> tuple[tuple[float, fl
 
 
 def _gaps(x: FloatArray, member: NDArray[np.intp], shifts: FloatArray) -> NDArray[np.bool_]:
-    """Return for rows of shifts whether a gap in the abscissa lies beside each curve, shape (rows, curves)."""
+    """Return for rows of shifts whether each curve begins beyond a gap in the abscissa, shape (rows, curves)."""
     ends = np.array([[x[member == k].min(), x[member == k].max()] for k in range(shifts.shape[1])])
     low, high = ends[:, 0] + shifts, ends[:, 1] + shifts
     order = np.argsort(low, axis=1)
@@ -299,7 +298,7 @@ def rereference(
     """
     groups, size = result.groups, result.groups.size
     if not groups[0] <= reference <= groups[-1]:
-        told, low, high = apart(reference, groups[0], groups[-1], digits=6)
+        told, low, high = distinguishable(reference, groups[0], groups[-1], digits=6)
         raise DataError(f"the reference must lie between {low} and {high}, got {told}")
     place, places = (np.log(reference), np.log(groups)) if logarithmic else (reference, groups)
     share = np.array([np.interp(place, places, unit) for unit in np.eye(size)])

@@ -90,7 +90,9 @@ class Curves:
     @cached_property
     def centre(self) -> FloatArray:
         """Middle of the abscissae of each curve, shape (curves,)."""
-        return np.array([np.ptp(self.x[self.member == k]) / 2 + self.x[self.member == k].min() for k in range(self.count)])
+        return np.array(
+            [np.ptp(self.x[self.member == k]) / 2 + self.x[self.member == k].min() for k in range(self.count)]
+        )
 
     def begin(self, moved: FloatArray) -> FloatArray:
         """Return where the splines begin for rows of shifted points, which they are laid about, shape (rows,)."""
@@ -117,8 +119,8 @@ class Curves:
     def prior(self) -> tuple[FloatArray, FloatArray]:
         """Prior mean and precision of all parameters.
 
-        They are the shifts of all curves but the first in widths; the logarithms of the bend near each curve, channel by
-        channel; those of the noise of each channel; and that of the standard deviation of the offsets.
+        They are the shifts of all curves but the first in widths; the logarithms of the bend near each curve, channel
+        by channel; those of the noise of each channel; and that of the standard deviation of the offsets.
         """
         channels = self.y.shape[0]
         drift = np.diff(np.eye(self.count), axis=0) / BEND_DRIFT

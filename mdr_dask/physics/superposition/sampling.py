@@ -25,16 +25,17 @@ DIFFERENCE = 1e-3
 STIFFNESSES = (0.0, 3.0, 6.0)
 """Logarithms by which the splines of a first guess are stiffer than expected."""
 
-SCAN = 61
-"""Steps tried of each pair of neighbours, from no overlap on one side to no overlap on the other."""
+SCAN = 81
+"""Steps tried of each pair of neighbours, from a gap as wide as a curve on one side to one on the other."""
 
 
 def first_guess(curves: Curves) -> FloatArray:
     """Return shifts from each pair of neighbours by itself, shape (curves - 1,).
 
-    The mean and variance of a step over all that let the two curves overlap are combined with the prior of the steps.
+    The mean and variance of a step over those that let the two curves overlap, or nearly so, are combined with the
+    prior of the steps.
     """
-    steps = np.linspace(-1.0, 1.0, SCAN)
+    steps = np.linspace(-2.0, 2.0, SCAN)
     means, variances = [], []
     for k in range(curves.count - 1):
         pair = (curves.member == k) | (curves.member == k + 1)
@@ -65,6 +66,7 @@ def laid_out(curves: Curves, shifts: FloatArray) -> Curves:
     return replace(curves, splines=int(np.ceil((np.ptp(moved) + 2 * MARGIN) * CELLS)) + 3)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of moves that go far astray, and are not taken
 def draws(curves: Curves, generator: np.random.Generator) -> tuple[Curves, FloatArray]:
     """Return the curves with the spline used, and draws of their parameters, shape (draws, parameters)."""
     shifts = first_guess(curves)
@@ -82,7 +84,8 @@ def draws(curves: Curves, generator: np.random.Generator) -> tuple[Curves, Float
         speed, new, there = momentum, place, here
         for _ in range(STEPS):
             speed = speed - 0.5 * length * (there.gradient @ scale)
-            new = new + length * (speed @ scale.T)
+            further = new + length * (speed @ scale.T)
+            new = np.where(np.all(np.isfinite(further), axis=1, keepdims=True), further, place)
             there = solve(curves, new)
             speed = speed - 0.5 * length * (there.gradient @ scale)
         rise = there.energy - here.energy + 0.5 * np.sum(speed**2 - momentum**2, axis=1)
@@ -101,7 +104,6 @@ def draws(curves: Curves, generator: np.random.Generator) -> tuple[Curves, Float
             share = min(share, 1.0)
         else:
             kept.append(place)
-    draws.accepted = np.mean(probability), share
     return curves, np.concatenate(kept)
 
 

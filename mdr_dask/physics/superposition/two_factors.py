@@ -73,13 +73,13 @@ def superpose_twice(
         raise DataError("two shifts need two or more values of each group")
     order = _serpentine(places[0], places[1])
     zeros = [_nearest(group, None if references is None else references[i]) for i, group in enumerate(groups)]
-    places = [place[order] for place in places]
-    design = np.hstack([np.eye(group.size)[place] for group, place in zip(groups, places, strict=True)])
+    ordered = [place[order] for place in places]
+    design = np.hstack([np.eye(group.size)[place] for group, place in zip(groups, ordered, strict=True)])
     columns = np.delete(np.arange(design.shape[1]), [zeros[0], groups[0].size + zeros[1]])
     if np.linalg.matrix_rank((design - design[0])[1:, columns]) < columns.size:
         raise DataError("the curves fall into parts that share neither group: measure one value of each with the other")
     free = superpose(np.arange(order.size), [curves[k] for k in order], vertical, 0.0, seed)
-    return _split(free, groups, places, zeros, design, columns, 1 if vertical == "none" else 2)
+    return _split(free, groups, ordered, zeros, design, columns, 1 if vertical == "none" else 2)
 
 
 def _split(
@@ -146,7 +146,7 @@ def _split(
             member=places[which][free.member],
         )
         parts.append(part)
-    return TwoShifts(*parts, reduced, float(chi2.sf(misfit, freedom)) if freedom else 1.0)
+    return TwoShifts(parts[0], parts[1], reduced, float(chi2.sf(misfit, freedom)) if freedom else 1.0)
 
 
 def _serpentine(first: NDArray[np.intp], second: NDArray[np.intp]) -> NDArray[np.intp]:
