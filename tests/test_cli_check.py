@@ -13,7 +13,8 @@ from mdr_dask.campaign import load
 from mdr_dask.campaign.measured import read_measured
 from mdr_dask.cli import main
 from mdr_dask.errors import DataError
-from mdr_dask.summary import LISTED, axis_range, human_bytes, spacing
+from mdr_dask.summary import axis_range
+from mdr_dask.tables import described
 
 CAMPAIGN = """\
 name: tyre
@@ -166,27 +167,6 @@ def test_moduli_of_no_solid_are_asked_about(files, capsys, unit, ends):
     assert re.search(told, capsys.readouterr().out)
 
 
-@pytest.mark.parametrize(("size", "told"), [(999, "999 B"), (1500, "1.5 kB"), (39.2e9, "39 GB"), (2.5e14, "250 TB")])
-def test_sizes_are_for_people(size, told):
-    assert human_bytes(size) == told
-
-
-@pytest.mark.parametrize(
-    ("values", "told"),
-    [
-        ((1, 2, 3), ", linear"),
-        ((1, 2, 3 + 1e-7), ", linear"),
-        ((1, 2, 3 + 1e-4), ""),
-        ((1, 10, 100), ", geometric"),
-        ((1, 10, 100.1), ""),
-        ((1, 2, 5), ""),
-        ((-1, 0, 5), ""),
-    ],
-)
-def test_even_spacing_is_named(values, told):
-    assert spacing(values) == told
-
-
 def test_columns_of_measured_points_leave_out_structures_where_nothing_else_is_called_so():
     """German too, with a unit of its own; a name that two structures have is written in full."""
     conditions = {"material_temperature": "K", "velocity": "m/s", "oil_density": "kg/m^3", "body_density": "kg/m^3"}
@@ -234,13 +214,17 @@ def test_a_file_of_a_list_that_is_not_there_is_one_problem(tmp_path, capsys):
     assert "parameters.surface.map.files[0]: no such file: " in problem
 
 
-@pytest.mark.parametrize("more", [0, 1])
-def test_so_many_values_of_an_axis_are_listed_and_of_more_their_number(more):
-    count = LISTED + more
-    values, names = tuple(range(1, count + 1)), tuple("abcdefghij"[:count])
-    of_words = axis_range(SimpleNamespace(values=values, refinement=None, labels=names, dim="a"), "1")
-    of_numbers = axis_range(SimpleNamespace(values=values, refinement=None, labels=None, dim="a"), "N")
-    listed = ", ".join(names[:LISTED])
-    assert of_words == (f"{listed}, ... ({count} values)" if more else listed)
-    ends = f"1 N to {count} N, {count} values, linear"
-    assert of_numbers == (ends if more else ", ".join(f"{value} N" for value in values))
+def test_a_map_is_described_in_one_line():
+    text = "\n".join(",".join(str(row * column) for column in range(30)) for row in range(40))
+    assert described(text, "map.csv") == "40 rows x 30 columns, 0 to 1131"
+
+
+def test_an_axis_is_described_by_its_values_or_its_range():
+    axis = SimpleNamespace(values=(1.0, 10.0, 100.0), refinement=None, labels=None, dim="a")
+    assert axis_range(axis, "N") == "1 N, 10 N, 100 N"
+    axis.values = tuple(np.geomspace(1, 1e9, 10))
+    assert axis_range(axis, "N") == "1 N to 1 GN, 10 values, geometric"
+    axis.values = tuple(np.linspace(1, 10, 10))
+    assert axis_range(axis, "N", "mN") == "1000 mN to 1e+04 mN, 10 values, linear"
+    axis.labels = tuple("abcdefghij")
+    assert axis_range(axis, "1").endswith(", ... (10 values)")

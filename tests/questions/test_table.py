@@ -270,3 +270,21 @@ def test_a_number_without_its_ingredients_names_them(study):
 def test_an_order_of_arrays_is_refused(study):
     with pytest.raises(DataError, match="with --sort"):
         labelled(study, Question(sort=("velocity",)), silent)
+
+
+def test_the_first_rows_read_the_chunks_that_they_need(study):
+    """Not the ledger of the whole study, which may have a hundred thousand chunks."""
+    read = []
+
+    def seen(block, block_info=None):
+        read.append(block_info)
+        return block
+
+    chunked = study.chunk(normal_force=1, velocity=1)
+    watched = chunked.map(
+        lambda array: array.copy(data=array.data.map_blocks(seen, dtype=array.dtype, meta=array.data._meta))
+    )
+    answer = table(watched, Question(("rms_slope",)), 1, silent)
+    assert len(next(answer.frames)) == 1
+    assert (answer.total, answer.keys) == (12, 2)
+    assert len(read) <= 4
