@@ -39,8 +39,8 @@ class AdaptiveSpec(Parameters):
     at_most: int = Field(description="largest number of realisations of a case", ge=2)
     until: dict[str, float | str | ToleranceSpec] = Field(
         min_length=1,
-        description="largest standard error of outputs: 1 %, or {relative: 1 %, absolute: 2 um}; or largest half width of "
-        "the interval of fitted constants: zone_one.alpha: 0.01, plateau: 2 %",
+        description="largest standard error of outputs: 1 %, or {relative: 1 %, absolute: 2 um}; or largest half width "
+        "of the interval of fitted constants: zone_one.alpha: 0.01, plateau: 2 %",
     )
 
 
@@ -49,8 +49,8 @@ class RefinedSpec(Parameters):
 
     adaptive: list[Any] = Field(description="first and last value")
     until: float | str | dict[str, float | str | ToleranceSpec] = Field(
-        description="largest error of interpolation, relative to the largest value of the first output: 1 %; or by output: "
-        "{friction_coefficient: 1 %, indentation_depth: {absolute: 2 um}}"
+        description="largest error of interpolation, relative to the largest value of the first output: 1 %; or by "
+        "output: {friction_coefficient: 1 %, indentation_depth: {absolute: 2 um}}"
     )
     at_most: int = Field(60, ge=5, le=10**4, description="largest number of values of the axis")
 
@@ -156,7 +156,8 @@ class CampaignSpec(Parameters):
     sampling: Sampling = Field("grid", description="how varied parameters are combined")
     measured: MeasuredSpec | None = Field(
         None,
-        description="measured points for `mdr-dask fit STORE calibration`, which finds the varied parameters that the table lacks",
+        description="measured points for `mdr-dask fit STORE calibration`, which finds the varied parameters that the "
+        "table lacks",
     )
     accuracy: float | None = quantity(
         "1", "largest relative discretisation error of every output", default=None, gt=0, lt=1
