@@ -312,7 +312,7 @@ def test_next_to_full_stick_little_is_worn_and_nothing_fails(hold, c):
 
 def test_a_relative_accuracy_is_met_or_the_output_that_misses_it_is_named():
     names = ("wear_volume", "wear_volume_error", "worn_profile")
-    parameters = FrettingWear(stick_radius=0.455, accuracy=1e-1)
+    parameters = FrettingWear(stick_radius=0.455)
     for accuracy in (1e-2, 1e-8):
         columns = {"cycles": np.array([0.5, 2.0])}
         result = MODEL.compute(Block(parameters, columns, 2, (0, 1), 1, names, accuracy))

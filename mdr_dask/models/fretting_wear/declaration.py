@@ -112,7 +112,8 @@ class FrettingWear(Parameters):
         "shape": "write indenter: {shape: ...}, with radius, angle, coefficient and exponent inside",
         "measured": "write measured: {table: ...} beside parameters, and fit calibration",
         "method": "write wear_rule: exact, fast or limit; exact is the default",
-        "tolerance": "write accuracy",
+        "tolerance": "write accuracy beside parameters, the relative error of every output",
+        "accuracy": "write accuracy beside parameters, the relative error of every output",
         "load": "write normal_force",
         "shear_modulus": "write effective_shear_modulus: it is G* of the pair, G of one body elsewhere",
         "modulus": "write contact_modulus",
@@ -129,7 +130,7 @@ class FrettingWear(Parameters):
         ),
     )
     overrides: ClassVar[Mapping[str, str]] = {"history": "cycles", "path": "cycles"}
-    settings: ClassVar[frozenset[str]] = frozenset({"accuracy", "cells", "extent", "points"})
+    settings: ClassVar[frozenset[str]] = frozenset({"cells", "extent", "points"})
     requires: ClassVar[Mapping[str, tuple[str, str]]] = {"xi": ("wear_rule", "fast")}
     indenter: Indenter = Field(Parabola(), description="virgin body; its size is not needed without dimensions")
     wear_rule: Literal["exact", "fast", "limit"] = Field(
@@ -166,14 +167,6 @@ class FrettingWear(Parameters):
         "1", "wear coefficient k of the law V = k F u / hardness", usual="1e-4", ge=0, default=None
     )
     xi: float = quantity("1", "factor of the fast rule; docs/wear.md has its error", gt=0, default=0.8)
-    accuracy: float | None = quantity(
-        "1",
-        "error of the exact profile wanted, over the depth eta d0 that can wear; 1e-3 if not given, or what the "
-        "campaign's accuracy needs",
-        ge=1e-5,
-        le=1e-1,
-        default=None,
-    )
     cells: int = quantity("1", "cells of the grid of histories", ge=20, le=2000, default=200)
     friction_scatter: float = quantity("1", "relative scatter of friction (log-normal)", ge=0, le=2, default=0.0)
     amplitude_scatter: float = quantity("1", "relative scatter of the amplitude (log-normal)", ge=0, le=2, default=0.0)

@@ -33,11 +33,10 @@ from mdr_dask.physics.wear.worn import Worn
 _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border")
 #: Outputs whose name in a campaign is not that of a worn contact's number: a parameter has it.
 _RENAMED = {"contact_force": "normal_force"}
-#: Accuracies that are tried in turn where the campaign asks for a relative one: down to the finest, each half of the
-#: last at most, and less the more was missed, as errors fall with it; somewhat less, for they may fall more slowly.
-_USUAL, _FINEST, _FINER, _ENOUGH = 1e-3, 1e-5, 0.5, 0.7
-#: The accuracy that cases begin at over that of the campaign: to begin again costs more than to begin finer.
-_BEGIN = {"depth": 0.2, "force": 0.6}
+#: Resolution of the evolution (error of the profile over eta d0) without an accuracy of the campaign, and at best.
+_USUAL, _FINEST = 1e-3, 1e-5
+#: With one, the first resolution over the accuracy, and the factor to the next one where an output misses it.
+_FIRST, _FINER = {"depth": 0.2, "force": 0.6}, 0.25
 
 #: Positions of cases in a block.
 Places = list[tuple[int, int]]
@@ -53,7 +52,6 @@ class Task:
     level: float
     rule: str
     hold: str
-    accuracy: float | None
     cells: int
     blocks: tuple[tuple[float, float, float], ...]
 
@@ -91,7 +89,7 @@ def seconds(block: Block[FrettingWear]) -> float:
         return 0.01 + 1e-5 * size
     if parameters.history:
         return 0.01 + 1.2e-7 * parameters.cells**3 * size
-    accuracy = _first_accuracy(parameters.accuracy, block.accuracy, _BEGIN[parameters.hold])
+    accuracy = _first_resolution(block.accuracy, parameters.hold)
     followed, forced = _followed(parameters.hold, accuracy), parameters.hold == "force"
     rules_take = {"limit": followed if forced else 1e-3, "fast": 1e-3, "exact": followed}
     each = rules_take[parameters.wear_rule]
@@ -249,12 +247,11 @@ class _Demand:
         self.outputs = _judged(block)
         self.errors = self.accuracy is not None or any(_plain_name(name)[1] for name in block.outputs)
 
-    def missed(self, records: Sequence[Worn]) -> tuple[str, float]:
-        """Say which outputs miss the relative accuracy and by how much, nothing if none does; and how often at most."""
+    def missed(self, records: Sequence[Worn]) -> str:
+        """Return which outputs miss the relative accuracy and by how much, empty if none does."""
         if self.accuracy is None:
-            return "", 0.0
-        shares = {name: self._share(records, name) for name in self.outputs}
-        return missed(shares, self.accuracy), max(shares.values(), default=0.0) / self.accuracy
+            return ""
+        return missed({name: self._share(records, name) for name in self.outputs}, self.accuracy)
 
     def _share(self, records: Sequence[Worn], name: str) -> float:
         """Return the error of an output over its largest value; 0 over 0 is none."""
@@ -298,7 +295,6 @@ def _task(parameters: FrettingWear, indenter: Indenter, numbers: Numbers, place:
         for step in parameters.history
     )
     table = indenter if isinstance(indenter, Pressed) else None
-    followed = parameters.wear_rule == "exact" or (parameters.wear_rule == "limit" and parameters.hold == "force")
     return Task(
         table,
         1.0 if table is None else float(numbers.height[place]),
@@ -306,38 +302,30 @@ def _task(parameters: FrettingWear, indenter: Indenter, numbers: Numbers, place:
         float(numbers.level[place]),
         "sliding" if parameters.path is not None else parameters.wear_rule,
         parameters.hold,
-        parameters.accuracy if followed else None,
         parameters.cells if blocks else 0,
         blocks,
     )
 
 
-def _first_accuracy(given: float | None, asked: float | None, share: float) -> float:
-    """Return the accuracy that a case begins at: the finer of that given and what the campaign's probably needs."""
-    needed = _USUAL if given is None and asked is None else np.inf if asked is None else share * asked
-    return max(min(needed, np.inf if given is None else given), _FINEST)
+def _first_resolution(accuracy: float | None, hold: str) -> float:
+    """Return the resolution that a case is first solved at."""
+    return _USUAL if accuracy is None else max(_FIRST[hold] * accuracy, _FINEST)
 
 
 def _contacts(task: Task, wanted: Sequence[tuple[float, float]], demand: _Demand) -> list[tuple[Sequence[Worn], str]]:
-    """Solve a task for all its (N, xi), each more finely until it meets the accuracy asked; say which still miss it.
+    """Solve a task for all its (N, xi), more finely where an output misses the accuracy; return what still misses it.
 
-    How finely depends on the case alone; those that want the same are solved together.
+    The resolution of a result depends on its case alone. Results at the same resolution are solved together.
     """
-    first = _first_accuracy(task.accuracy, demand.accuracy, _BEGIN[task.hold])
-    left = dict.fromkeys(range(len(wanted)), first)
+    resolution, left = _first_resolution(demand.accuracy, task.hold), list(range(len(wanted)))
     found: dict[int, tuple[Sequence[Worn], str]] = {}
     while left:
-        accuracy = max(left.values())
-        alike = [number for number, at in left.items() if at == accuracy]
-        contacts = _solved(task, [wanted[number] for number in alike], accuracy, errors=demand.errors)
-        for number, records in zip(alike, contacts, strict=True):
-            told, times = demand.missed(records)
-            found[number] = records, told
-            if told and accuracy > _FINEST and not task.blocks:
-                halvings = np.ceil(np.log2(max(times / _ENOUGH, 1.0 / _FINER)))
-                left[number] = max(float(_FINER**halvings) * accuracy, _FINEST)
-            else:
-                del left[number]
+        contacts = _solved(task, [wanted[number] for number in left], resolution, errors=demand.errors)
+        for number, records in zip(left, contacts, strict=True):
+            found[number] = records, demand.missed(records)
+        refinable = task.rule != "fast" and not task.blocks and resolution > _FINEST
+        left = [number for number in left if found[number][1] and refinable]
+        resolution = max(_FINER * resolution, _FINEST)
     return [found[number] for number in range(len(wanted))]
 
 
