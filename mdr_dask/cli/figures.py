@@ -1,4 +1,4 @@
-"""Figures: of a store by name, of any output of any store, and of campaigns that are run first."""
+"""Figures of a store: by name, and of any output against its parameters."""
 
 from __future__ import annotations
 
@@ -10,26 +10,24 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mdr_dask.cli.campaigns import CAMPAIGN
 from mdr_dask.cli.options import select_option, tell, units_option, where_option
 from mdr_dask.cli.results import list_names, require_known
-from mdr_dask.cli.running import run
 from mdr_dask.cli.writing import FIGURES, format_option, require_suffix, writing
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
 
     from mdr_dask.plots.base import Plot
+    from mdr_dask.plots.figure import Figure
     from mdr_dask.plots.page import Page
 
-#: Options of figures of outputs; those with a name have axes of their own.
+#: Options for outputs; the axes of a named figure are fixed.
 OF_OUTPUTS = ("over", "by", "panels", "effects", "log")
 COMMAND = "mdr_dask.command"
 
 
 class Drawing(click.Command):
-    """A command that draws, and says in every table how it was called."""
+    """A command that draws; every table beside a figure repeats the command line."""
 
     def parse_args(self, context: click.Context, arguments: list[str]) -> list[str]:
         """Keep the arguments as they were typed."""
@@ -41,14 +39,16 @@ class Drawing(click.Command):
 @click.argument("words", nargs=-1, required=True, metavar="STORE... [NAME...]")
 @click.option("--all", "everything", is_flag=True, help="Draw every named figure that the store has the data for.")
 @click.option("--over", multiple=True, metavar="AXIS", help="Draw an output against this axis; twice for a map.")
-@click.option("--by", default="", metavar="AXIS", help="Axis, or sampled parameter, that gets the colours.")
-@click.option("--panels", default="", metavar="AXIS", help="A panel for each value of this axis.")
+@click.option("--by", default="", metavar="AXIS", help="Axis, or sampled parameter, of the colours.")
+@click.option("--panels", default="", metavar="AXIS", help="One panel for each value of this axis.")
 @click.option("--effects", is_flag=True, help="Draw the mean of an output against every parameter that varies.")
-@click.option("--series", multiple=True, help="Only this series; repeat.")
+@click.option("--series", multiple=True, help="Draw only this series; repeat.")
 @select_option
 @where_option
-@click.option("--log", metavar="[x][y][z]", help="Logarithmic axes, z for colours; 'none' for none. Else by the data.")
+@click.option("--log", metavar="[x][y][z]", help="Logarithmic axes (x, y, z = colours), or none.  [by the data]")
 @units_option
+@click.option("--measured", metavar="FILE", help="Draw the points of this table with their error bars, too.")
+@click.option("--title", metavar="TEXT", help="Title; '' for none.  [a description; none with --size]")
 @click.option("--size", metavar="WIDTH[xHEIGHT]", help="Printed size: 85mm, 85x60mm.")
 @click.option("--style", metavar="FILE", help="Style file of matplotlib, or the name of one of its styles.")
 @click.option("--output", "-o", type=click.Path(path_type=Path), help="A file for one figure, else a folder.")
@@ -62,49 +62,56 @@ def plot(
     series: tuple[str, ...],
     selections: tuple[str, ...],
     where: str,
+    measured: str | None,
     output: Path | None,
     suffix: str,
     **look: Any,
 ) -> None:
-    """Draw figures by name, or any output against any axis; without a name, say which figures there are.
+    """Draw figures by name, or any output against any axis; without a name, list the figures.
 
-    Beside every figure stands its data, FIGURE.csv. A figure holds axes that it cannot show at one value, and says
-    which; --select chooses another. Several stores share a figure.
+    The data of every figure is written beside it, as FIGURE.csv. Axes that a figure cannot show are fixed at one value,
+    which is printed; --select chooses another one. Several stores can be drawn in one figure.
 
     \b
     mdr-dask plot results/quickstart.zarr velocity -o quickstart.png
     mdr-dask plot results/friction_force.zarr --all -o figures
-    mdr-dask plot results/friction_force.zarr regions --select 'normal_force=1 N'
+    mdr-dask plot results/friction_force.zarr velocity --select 'normal_force=1 N'
     mdr-dask plot results/quickstart.zarr friction_coefficient --over velocity --by normal_force --size 85mm -o f.pdf
     mdr-dask plot results/quickstart.zarr friction_coefficient --over velocity --over normal_force -o map.png
+    mdr-dask plot results/rubber.zarr velocity --measured rig.csv -o rig.pdf
     """
-    from mdr_dask.plots import page, table
+    from mdr_dask.plots import page, render
     from mdr_dask.questions import selection
+    from mdr_dask.store import readable
 
-    urls, names = _apart(words)
+    urls, names = _split(words)
     known = _known_to_all(urls)
     if not names and not everything:
         list_names(_model(urls[0]), {name: figure.summary for name, figure in known.items()})
         return
-    figures = _asked(names, everything, known, urls, look)
+    figures = _requested(names, everything, known, urls, look)
     places = _places(output, list(figures), urls, suffix, alone=len(names) == 1 and not everything)
-    asked, style_file = _page(look), look.get("style")
-    with page.drawing_for(asked, style_file), _readable(urls):
+    asked = _page(look)
+    with page.drawing_for(asked, look["style"]), readable(", ".join(urls)):
         groups = {key: data for url in urls for key, data in _groups(url, urls, series).items()}
         _require_quantities(asked.units, groups)
         groups = selection.select_all(groups, selections, tell)
         if where:
             groups = selection.where_all(groups, where)
             figures = {name: _without(figure, where) for name, figure in figures.items()}
+        if measured is not None:
+            from mdr_dask.plots.measured import with_points
+
+            groups, figures = with_points(groups, figures, measured)
         for (name, figure), path in zip(figures.items(), places, strict=True):
-            origin = table.provenance(name, urls, str(context.meta.get(COMMAND, "")))
+            origin = render.provenance(name, urls, str(context.meta.get(COMMAND, "")))
             _draw(figure, groups, path, origin, everything)
-    if unused := asked.units.keys() - asked.used:
-        tell(f"--units {', '.join(sorted(unused))}: shown in no figure that was drawn")
+    if unused := look["units"].keys() - asked.used:
+        tell(f"--units {', '.join(sorted(unused))}: not shown in any figure that was drawn")
 
 
 def _require_quantities(units: Mapping[str, str], groups: Mapping[str, xr.Dataset]) -> None:
-    """Refuse units of what is no parameter and no output."""
+    """Refuse units of a name that is neither a parameter nor an output."""
     from mdr_dask.errors import DataError, did_you_mean
 
     known = sorted({str(name) for data in groups.values() for name in data.variables})
@@ -114,18 +121,17 @@ def _require_quantities(units: Mapping[str, str], groups: Mapping[str, xr.Datase
 
 
 def _without(figure: Plot, where: str) -> Plot:
-    """Return a figure that says which cases it leaves out."""
-    from mdr_dask.plots import style
+    """Return a figure that states which cases it leaves out."""
 
     def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
         drawn = figure.draw(groups)
-        style.leave_out(drawn, [f"cases other than {where}"])
+        drawn.leave_out([f"cases other than {where}"])
         return drawn
 
     return replace(figure, draw=draw)
 
 
-def _apart(words: Sequence[str]) -> tuple[list[str], list[str]]:
+def _split(words: Sequence[str]) -> tuple[list[str], list[str]]:
     """Return the stores among the words of a command, and the names behind them."""
     from mdr_dask.store import is_study
 
@@ -137,7 +143,7 @@ def _apart(words: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def _known_to_all(urls: Sequence[str]) -> dict[str, Plot]:
-    """Return the figures by name that all stores have."""
+    """Return the named figures that all stores have."""
     from mdr_dask import plots
 
     each = [plots.available(_model(url)) for url in urls]
@@ -150,41 +156,42 @@ def _model(url: str) -> str:
     return str(attributes(url)["model"])
 
 
-def _in(urls: Sequence[str]) -> list[str]:
-    """Return the outputs of stores."""
+def _outputs_of(urls: Sequence[str]) -> list[str]:
     from mdr_dask import store as stores
 
     found = [name for url in urls for data in stores.datasets(url).values() for name in map(str, data.data_vars)]
     return [name for name in dict.fromkeys(found) if name != "status"]
 
 
-def _asked(
+def _requested(
     names: Sequence[str], everything: bool, known: Mapping[str, Plot], urls: Sequence[str], look: Mapping[str, Any]
 ) -> dict[str, Plot]:
-    """Return the figures that are asked for, by the name of their files."""
-    outputs, model = _in(urls), _model(urls[0])
+    """Return the requested figures, by the name of their files."""
+    from mdr_dask.errors import did_you_mean
+
+    outputs, model = _outputs_of(urls), _model(urls[0])
     given = [option for option in OF_OUTPUTS if look.get(option)]
-    if not (look.get("over") or look.get("effects")):
+    if not (look["over"] or look["effects"]):
         for name in names:
             if name in outputs and name not in known:
-                raise click.UsageError(f"{name} is an output: say --over AXIS, or --effects")
+                raise click.UsageError(f"{name} is an output: add --over AXIS, or --effects")
+            if name not in known and (hint := did_you_mean(name, [*known, *outputs])):
+                raise click.UsageError(f"no figure and no output {name!r}{hint}")
         require_known(names, list(known), f"figure of {model}")
         if given:
             raise click.UsageError(
-                f"--{given[0]} is for an output with --over or --effects: a named figure has its own"
+                f"--{given[0]} is for an output with --over or --effects: the axes of a named figure are fixed"
             )
         return dict(known) if everything else {name: known[name] for name in names}
     if everything:
         raise click.UsageError("expected --all, or outputs with --over or --effects, got both")
     require_known(names, outputs, "output in this study")
-    for name in names:
-        if name in known:
-            tell(f"{name}: the output; without --over it is a figure, too")
-    return {f"{name}{ending}": _of_output(name, look) for name in names for ending in [_ending(look)]}
+    ending = f"-over-{'-'.join(look['over'])}" if look["over"] else "-effects"
+    return {f"{name}{ending}": _of_output(name, look) for name in names}
 
 
 def _of_output(name: str, look: Mapping[str, Any]) -> Plot:
-    from mdr_dask.plots.outputs import View, of_output
+    from mdr_dask.plots.view import View, figure_of
 
     over = tuple(axis.replace(".", "_") for axis in look["over"])
     if len(over) > 2 or (over and look["effects"]):
@@ -193,38 +200,28 @@ def _of_output(name: str, look: Mapping[str, Any]) -> Plot:
     if log is not None and log != "none" and not set(log) <= set("xyz"):
         raise click.UsageError(f"expected --log with letters of xyz, or 'none', got {log!r}")
     by, panels = (look[key].replace(".", "_") for key in ("by", "panels"))
-    return of_output(View(name, over, by, panels, "" if log == "none" else log))
-
-
-def _ending(look: Mapping[str, Any]) -> str:
-    return f"-over-{'-'.join(look['over'])}" if look["over"] else "-effects"
+    return figure_of(View(name, over, by, panels, "" if log == "none" else log))
 
 
 def _page(look: Mapping[str, Any]) -> Page:
     from mdr_dask.plots import page
 
-    width, height = page.size(look["size"]) if look.get("size") else (None, None)
-    return page.Page(width, height, look.get("units") or {})
-
-
-def _readable(urls: Sequence[str]) -> Any:
-    from mdr_dask.store import readable
-
-    return readable(", ".join(urls))
+    width, height = page.size(look["size"]) if look["size"] else (None, None)
+    return page.Page(width, height, look["title"], look["units"] or {})
 
 
 def _groups(url: str, urls: Sequence[str], series: Sequence[str]) -> dict[str, xr.Dataset]:
-    """Return the groups of a store, by names that tell the stores apart."""
+    """Return the groups of a store, by names that distinguish several stores."""
     from mdr_dask import store as stores
     from mdr_dask.questions import selection
 
     groups = stores.datasets(url)
     groups = {name: selection.group(groups, name) for name in series} if series else groups
-    return {_called(url, urls, name): data for name, data in groups.items()}
+    return {_name_of(url, urls, name): data for name, data in groups.items()}
 
 
-def _called(url: str, urls: Sequence[str], series: str) -> str:
-    """Return how a legend names a group: by its series, and by its store where there are several."""
+def _name_of(url: str, urls: Sequence[str], series: str) -> str:
+    """Return the name of a group in a legend: its series, and its store where there are several."""
     if len(urls) == 1:
         return series
     stems = [Path(each).stem for each in urls]
@@ -233,38 +230,37 @@ def _called(url: str, urls: Sequence[str], series: str) -> str:
 
 
 def _draw(figure: Plot, groups: Mapping[str, xr.Dataset], path: Path, origin: dict[str, str], one_of: bool) -> None:
-    """Draw a figure into a file, its data beside it; one of all that cannot be drawn is named."""
+    """Draw a figure into a file, its data beside it; with --all, report the reason if it cannot be drawn."""
     from mdr_dask.errors import DataError, FitError
-    from mdr_dask.plots import style
 
     try:
-        drawn = figure.figure(groups)
+        description = figure.describe(groups)
     except (DataError, FitError) as error:
         if not one_of:
             raise
         click.echo(f"{figure.name}: left out: {error}", err=True)
         return
-    save(drawn, path, origin)
+    save(description, path, origin)
     click.echo(str(path))
-    if style.left_out(drawn):
-        click.echo(f"{figure.name}: not drawn: {style.left_out(drawn)}", err=True)
 
 
-def save(figure: Figure, path: Path, origin: Mapping[str, str]) -> None:
-    """Write a figure, and its data beside it; a table there that is of no figure is not written over."""
-    from mdr_dask.plots import table
+def save(description: Figure, path: Path, origin: Mapping[str, str]) -> None:
+    """Draw a figure, write its data beside it, and print what neither the picture nor its title shows."""
+    from mdr_dask.plots import labels, page, render
 
-    if not isinstance(figure, table.Drawn):
-        with writing(path):
-            table.save_picture(figure, path)
-        return
-    figure.origin = origin
-    with writing(table.table_beside(path)), writing(path):
-        figure.save(path)
+    drawn = render.render(description)
+    drawn.origin = origin
+    with writing(render.table_beside(path)), writing(path):
+        drawn.save(path)
+    asked = page.current()
+    if (asked.title is not None or asked.width is not None) and description.fixed:
+        click.echo(f"{path.name}: {labels.plain(description.fixed)}", err=True)
+    if description.left_out:
+        click.echo(f"{path.name}: not drawn: {labels.plain('; '.join(description.left_out))}", err=True)
 
 
 def _places(output: Path | None, names: Sequence[str], urls: Sequence[str], suffix: str, alone: bool) -> list[Path]:
-    """Return the file of each figure: the one that is named for a figure alone, or in a folder."""
+    """Return the file of each figure: the requested one for a single figure, or files in a folder."""
     folder = output or Path("figures")
     if alone and folder.suffix and not folder.is_dir():
         require_suffix(folder, FIGURES)
@@ -273,24 +269,3 @@ def _places(output: Path | None, names: Sequence[str], urls: Sequence[str], suff
         raise click.UsageError(f"expected a folder for the figures, got {str(folder)!r}")
     stem = "-".join(Path(url).stem for url in urls)
     return [folder / f"{stem}-{name}.{suffix}" for name in names]
-
-
-@click.command(cls=Drawing)
-@click.argument("campaigns", nargs=-1, required=True, type=CAMPAIGN)
-@click.option("--output", "-o", default="figures", show_default=True, help="Folder of the figures.")
-@format_option
-@click.option("--quiet", is_flag=True, help="No progress on stderr.")
-@click.pass_context
-def figures(context: click.Context, /, campaigns: tuple[Path, ...], output: str, suffix: str, quiet: bool) -> int:
-    """Run campaigns, or what is missing of them, and draw every figure that their stores hold data for.
-
-    \b
-    mdr-dask figures campaigns/friction_force.yaml campaigns/friction_hurst.yaml -o figures
-    """
-    from mdr_dask.campaign import load
-
-    codes: list[int] = []
-    for path in campaigns:
-        codes.append(context.invoke(run, campaign=path, quiet=quiet))
-        context.invoke(plot, words=(load(path).store,), everything=True, output=Path(output), suffix=suffix)
-    return max(codes)

@@ -1,4 +1,8 @@
-"""Figures drawn from a store."""
+"""Figures drawn from a store.
+
+A figure is data (`figure`), made from the series of a store (`view` for outputs against parameters, `named` for those
+with a name) and drawn with matplotlib (`render`) or on the page of `mdr_dask.report`.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +11,8 @@ from importlib.metadata import entry_points
 
 from mdr_dask.plots.base import Plot
 
-#: Modules of this room that hold ``PLOTS``.
-SUBJECTS: tuple[str, ...] = (
-    *("calibration", "contact", "ehl", "friction", "kinetics", "master_curve", "mixed", "protocols", "scaling", "wear"),
-)
+#: Modules of this package that hold ``PLOTS``.
+MODULES = ("named", "history", "calibration", "master_curve")
 
 #: Entry point group in which other packages offer tuples of `Plot`.
 GROUP = "mdr_dask.plots"
@@ -18,6 +20,6 @@ GROUP = "mdr_dask.plots"
 
 def available(model: str) -> dict[str, Plot]:
     """Return the figures for stores of a model, by name; other packages offer tuples of them in `GROUP`."""
-    own = (import_module(f"mdr_dask.plots.{subject}").PLOTS for subject in SUBJECTS)
+    own = (import_module(f"mdr_dask.plots.{module}").PLOTS for module in MODULES)
     others = (entry.load() for entry in entry_points(group=GROUP))
     return {plot.name: plot for plots in (*own, *others) for plot in plots if model in plot.models or not plot.models}

@@ -1,9 +1,9 @@
-"""What a table of measured points says of the unknowns of a study: data and band, residuals, marginals."""
+"""What measured points say of the unknowns of a study: data and band, residuals, and the density of each unknown."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -11,22 +11,18 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits import calibration as room
+from mdr_dask.fits import calibration as fit
 from mdr_dask.fits import identifiability
-from mdr_dask.plots import drawing, style
+from mdr_dask.plots import colours, labels
 from mdr_dask.plots.base import Plot
-from mdr_dask.plots.drawing import Mean
+from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-#: Cells of the posterior whose predictions make the band, and parts that a marginal is drawn in.
-CELLS, PARTS = 400, 60
-#: Curves with colours of their own.
-MOST_CURVES = 7
-#: Quantiles of a normal distribution at 95 %.
-_Z = 1.96
+#: Samples of the posterior for the band of predictions, and bins of a density.
+SAMPLES, BINS = 400, 60
+#: Half width of a 95 % interval of a normal distribution in standard deviations.
+HALF = 1.96
+#: Bins that a density is averaged over.
+SMOOTH = np.array([0.1, 0.2, 0.4, 0.2, 0.1])
 
 
 class _Curve(NamedTuple):
@@ -38,186 +34,179 @@ class _Curve(NamedTuple):
 
 
 def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
-    """Draw measured points with the band of the study, their residuals, and the marginal of each unknown.
+    """Return measured points with the band of the study, their residuals, and the density of each unknown.
 
-    Bars of points are errors of measurement, the band is that of the posterior, both 95 %. A marginal is grey where the
-    data do not determine its unknown, and the marginals of what they determine instead follow.
+    Bars of points are 95 % intervals of measurement, the band is that of the posterior. A density is grey where the
+    data do not determine its unknown; what they determine instead follows.
     """
-    found, series = _first(groups)
-    marginals = [
-        (name, found.values[:, k], found.units[name], k in found.free) for k, name in enumerate(found.unknowns)
-    ]
-    marginals += [(*_named(found, product), False) for product in found.products]
-    figure, axes = drawing.panels(2 + len(marginals), size=(4.2, 3.4))
+    found, series, data = _first(groups)
     main = max(found.measured.conditions, key=lambda name: np.unique(found.measured.conditions[name]).size, default="")
-    curves = _curves(found, main)
-    _data(axes[0], found, main, curves)
-    _residuals(axes[1], found, main, curves)
-    for panel, (name, values, unit, is_free) in zip(axes[2:], marginals, strict=True):
-        _marginal(panel, found, name, values, unit, is_free)
-    about = f"{found.measured.source}, {found.measured.values.size} points{f', series {series}' if series else ''}"
-    style.title(figure, f"calibration: {room.sentence(found)}", f"{about}; bars, bands and shades: 95 % (dark: 68 %)")
-    return figure
+    curves = _curves(found, main, data)
+    panels = [_data(found, main, curves, data), _residuals(found, main, curves, data)]
+    for k, name in enumerate(found.unknowns):
+        panels.append(_density(found, name, found.values[:, k], found.units[name], k in found.free, data))
+    for product in found.products:
+        units = [found.units[name] for name in found.unknowns]
+        name, unit = identifiability.written(found.unknowns, product.exponents), identifiability.unit_of(units, product.exponents)
+        panels.append(_density(found, name, product.values, unit, False, data))
+    points = f"{found.measured.source}, {found.measured.values.size} points{f', series {series}' if series else ''}"
+    holds = found.law_holds
+    subject = f"calibration: {fit.sentence(found)}" if holds.startswith("yes") else f"calibration: {holds}"
+    return Figure(panels, subject, points, "bars, bands and shades: 95 % (dark: 68 %)", columns=3, ratio=0.8)
 
 
-def _first(groups: Mapping[str, xr.Dataset]) -> tuple[room.Calibration, str]:
+def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.Dataset]:
     """Return the calibration of the first series that the table is of."""
     reasons = []
     for name, dataset in groups.items():
         try:
-            return room.calibrate(dataset, room.measured_of(dataset)), name
+            return fit.calibrate(dataset, fit.measured_of(dataset)), name, dataset
         except FitError as error:
             reasons.append(str(error))
     raise FitError("; ".join(dict.fromkeys(reasons)))
 
 
-def _named(found: room.Calibration, product: identifiability.Product) -> tuple[str, FloatArray, str]:
-    units = [found.units[name] for name in found.unknowns]
-    name = identifiability.written(found.unknowns, product.exponents)
-    return name, product.values, identifiability.unit_of(units, product.exponents)
+def _quantity(found: fit.Calibration, name: str, data: xr.Dataset) -> labels.Quantity:
+    values = data[name] if name in data.variables else xr.DataArray(0.0, attrs={"units": found.units.get(name, "1")})
+    return labels.quantity(name, values)
 
 
-def _axis(found: room.Calibration, name: str, values: Any) -> xr.DataArray:
-    """Return values of a parameter or of the output as figures take them."""
-    attributes = {"units": found.units.get(name, "1"), "long_name": name.replace("_", " ")}
-    return xr.DataArray(np.asarray(values), dims="point", name=name, attrs=attributes)
-
-
-def _curves(found: room.Calibration, main: str) -> list[_Curve]:
+def _curves(found: fit.Calibration, main: str, data: xr.Dataset) -> list[_Curve]:
     """Return the points in groups of equal conditions other than the one along the axis."""
     others = {name: each for name, each in found.measured.conditions.items() if name != main}
     rows = np.stack(list(others.values()), axis=1) if others else np.zeros((found.measured.values.size, 1))
     places, which = np.unique(np.round(rows, 12), axis=0, return_inverse=True)
-    if not 1 < len(places) <= MOST_CURVES:
-        return [_Curve("", style.colour(0), np.arange(len(rows)))]
-    labels = [
-        ", ".join(
-            style.named(name, _axis(found, name, value)[0])
-            for name, value in zip(others, np.atleast_2d(row).T, strict=True)
-        )
-        for row in places
-    ]
-    return [_Curve(label, style.colour(k), np.flatnonzero(which.ravel() == k)) for k, label in enumerate(labels)]
+    if not 1 < len(places) <= colours.most():
+        return [_Curve("measured", colours.colour(0), np.arange(len(rows)))]
+    found_curves = []
+    for k, row in enumerate(places):
+        texts = []
+        for name, value in zip(others, np.atleast_1d(row), strict=True):
+            how = _quantity(found, name, data)
+            symbol = how.symbol[how.symbol.index("$") :] if "$" in how.symbol else how.symbol
+            texts.append(f"{symbol} = {how.of(value):.4g} {labels.printed_unit(how.unit)}".strip())
+        found_curves.append(_Curve(", ".join(texts), colours.colour(k), np.flatnonzero(which.ravel() == k)))
+    return found_curves
 
 
-def _along(found: room.Calibration, main: str, points: NDArray[np.intp]) -> FloatArray:
+def _axis(found: fit.Calibration, main: str, data: xr.Dataset) -> Axis:
+    if not main:
+        return Axis("measured point")
+    how = _quantity(found, main, data)
+    log = labels.is_geometric(found.measured.conditions[main])
+    return Axis(labels.with_unit(how.symbol, how.unit), log, quantity=main)
+
+
+def _along(found: fit.Calibration, main: str, points: NDArray[np.intp], data: xr.Dataset) -> FloatArray:
     if not main:
         return np.asarray(points, dtype=np.float64) + 1
-    shown: FloatArray = np.asarray(style.shown(main, _axis(found, main, found.measured.conditions[main][points])))
-    return shown
+    along: FloatArray = _quantity(found, main, data).of(found.measured.conditions[main][points])
+    return along
 
 
-def _finish(axes: Axes, found: room.Calibration, main: str) -> None:
-    conditions = found.measured.conditions
-    axes.set_xlabel(style.label(main, _axis(found, main, conditions[main])) if main else "measured point")
-    if main and style.is_geometric(conditions[main]):
-        style.logarithmic(axes, "x")
+def _conditions(found: fit.Calibration, points: NDArray[np.intp]) -> xr.Dataset:
+    """Return the conditions of some points as coordinates."""
+    of = found.measured.conditions
+    return xr.Dataset(
+        coords={name: ("point", each[points], {"units": found.units.get(name, "1")}) for name, each in of.items()}
+    )
 
 
-def _data(axes: Axes, found: room.Calibration, main: str, curves: list[_Curve]) -> None:
+def _data(found: fit.Calibration, main: str, curves: list[_Curve], data: xr.Dataset) -> Panel:
     output, values = found.measured.output, found.measured.values
-    half = _Z * found.noise[0]
-    low, best, high = _band(found)
-    for curve in curves:
-        at = curve.points[np.argsort(_along(found, main, curve.points))]
-        x = _along(found, main, at)
-        data = Mean(*(_axis(found, output, each[at]) for each in (values, values - half, values + half)))
-        drawing.points(axes, x, data, curve.colour, "o", curve.label or None)
-        drawing.law(axes, x, best[at], "-", color=curve.colour, name=f"study {curve.label}".strip(), linewidth=1)
-        drawing.band(axes, x, low[at], high[at], f"study {curve.label}".strip(), color=curve.colour)
-    if style.is_geometric(values) and found.prediction.logarithmic:
-        style.logarithmic(axes, "y")
-    _finish(axes, found, main)
-    axes.set_ylabel(style.label(output, _axis(found, output, values)))
-    style.legend(axes)
-
-
-def _band(found: room.Calibration) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return what the study predicts at the points: low end, median and high end of 95 %."""
-    steps = (np.arange(CELLS) + 0.5) / CELLS
+    how = _quantity(found, output, data)
+    log = labels.is_geometric(values) and found.prediction.logarithmic
+    panel = Panel(_axis(found, main, data), Axis(labels.with_unit(how.symbol, how.unit), log))
+    half = HALF * found.noise[0]
+    steps = (np.arange(SAMPLES) + 0.5) / SAMPLES
     cells = np.searchsorted(np.cumsum(found.posterior.weights), steps).clip(0, len(found.posterior.weights) - 1)
-    low, middle, high = np.quantile(found.prediction(found.posterior.places[cells]).mean, [0.025, 0.5, 0.975], axis=0)
-    return low, middle, high
-
-
-def _residuals(axes: Axes, found: room.Calibration, main: str, curves: list[_Curve]) -> None:
-    unknown = np.full(found.measured.values.size, np.nan)
+    predicted = found.prediction(found.posterior.places[cells]).mean
+    low, best, high = np.quantile(predicted, [0.025, 0.5, 0.975], axis=0)
     for curve in curves:
-        scaled = _axis(found, "residual", found.residuals.scaled[curve.points])
-        empty = _axis(found, "residual", unknown[curve.points])
-        x = _along(found, main, curve.points)
-        drawing.points(axes, x, Mean(scaled, empty, empty), curve.colour, "o", None)
-    axes.axhline(0, color="black", linewidth=0.8)
-    axes.axhspan(-_Z, _Z, color="0.9", zorder=0)
-    _finish(axes, found, main)
-    axes.set_ylabel("residual over its error")
-    axes.set_title(style.broken(found.law_holds, 52), fontsize="x-small")
+        at = curve.points[np.argsort(_along(found, main, curve.points, data))]
+        x, of = _along(found, main, at, data), _conditions(found, at)
+        measured = Mean(*(how.of(each[at]) for each in (values, values - half, values + half)))
+        study = f"study, {curve.label}"
+        look: dict[str, Any] = {"colour": curve.colour}
+        panel.traces += [
+            Trace("band", columns(of, x=x, y=Mean(*(how.of(each[at]) for each in (best, low, high)))), study, **look),
+            Trace("law", columns(of, x=x, y=how.of(best[at])), study, study, line="-", **look),
+            Trace("curve", columns(of, x=x, y=measured), "data", curve.label, marker="o", **look),
+        ]
+        panel.keys.append(Key(curve.label, curve.colour, "-", "o"))
+    return panel
 
 
-def _marginal(axes: Axes, found: room.Calibration, name: str, values: FloatArray, unit: str, is_free: bool) -> None:
-    """Draw the marginal density of an unknown, or of a product, over its natural scale."""
+def _residuals(found: fit.Calibration, main: str, curves: list[_Curve], data: xr.Dataset) -> Panel:
+    panel = Panel(_axis(found, main, data), Axis("residual over its error"), keys=[])
+    every = np.concatenate([_along(found, main, curve.points, data) for curve in curves])
+    ends = np.array([every.min(), every.max()])
+    strip = columns(x=ends, y=Mean(np.zeros(2), np.full(2, -HALF), np.full(2, HALF)))
+    panel.traces.append(Trace("band", strip, "95 % of normal residuals", colour="#b0b0b0"))
+    panel.traces.append(Trace("law", columns(x=ends, y=np.zeros(2)), "zero", "", "#000000", "-"))
+    for curve in curves:
+        of, x = _conditions(found, curve.points), _along(found, main, curve.points, data)
+        residuals = columns(of, x=x, y=found.residuals.scaled[curve.points])
+        panel.traces.append(Trace("curve", residuals, "data", curve.label, curve.colour, "", "o"))
+    panel.keys = [Key(curve.label, curve.colour, "-", "o") for curve in curves]
+    return panel
+
+
+def _density(
+    found: fit.Calibration, name: str, values: FloatArray, unit: str, is_free: bool, data: xr.Dataset
+) -> Panel:
+    """Return the density of an unknown, or of a product of unknowns, with its 68 % and 95 % intervals."""
+    how = _quantity(found, name, data) if name in found.unknowns else labels.Quantity(name, unit)
+    shown, weights = how.of(values), found.posterior.weights
     known = name in found.unknowns
-    shown = np.asarray(style.shown(name, _axis(found, name, values))) if known else values
-    label = style.label(name, _axis(found, name, values)) if known else style.with_unit(name, unit)
-    geometric = bool(np.all(shown > 0)) and (not known or _is_geometric(found, name))
-    weights = found.posterior.weights
-    across = np.log(shown) if geometric else shown
+    log = bool(np.all(shown > 0)) and (not known or found.prediction.scales[found.unknowns.index(name)].logarithmic)
+    across = np.log(shown) if log else shown
     ends = identifiability.quantiles(across, weights, [1e-4, 1 - 1e-4])
     if known and is_free:
         ends = np.array([across.min(), across.max()])
     margin = 1e-9 * np.abs(ends).max()
-    edges = np.linspace(ends[0] - margin, ends[1] + margin, PARTS + 1)
+    edges = np.linspace(ends[0] - margin, ends[1] + margin, BINS + 1)
     if known:
         place = found.posterior.places[:, found.unknowns.index(name)]
-        edges = _of_whole_cells(ends, across, place, found.posterior.width)
+        edges = of_whole_cells(ends, across, place, found.posterior.width)
     density = np.histogram(across, edges, weights=weights)[0]
     centres = (edges[1:] + edges[:-1]) / 2
-    smooth = np.convolve(np.pad(density, 2, mode="edge"), [0.1, 0.2, 0.4, 0.2, 0.1], mode="valid")
-    height = smooth / smooth.max()
-    x = np.exp(centres) if geometric else centres
-    colour = "0.6" if is_free else style.colour(style.FITTED)
-    drawing.law(axes, x, height, "-", color=colour, name=f"density of {name}")
-    if not is_free:
-        for level, alpha in ((0.95, 0.2), (0.6827, 0.35)):
-            low, high = identifiability.quantiles(across, weights, [0.5 - level / 2, 0.5 + level / 2])
-            inside, shaded = between(centres, height, low, high)
-            inside = np.exp(inside) if geometric else inside
-            axes.fill_between(inside, shaded, color=colour, alpha=alpha, linewidth=0, gid=style.LAW)
-    axes.set_ylim(0, 1.1)
-    axes.set_yticks([])
-    axes.set_xlabel(style.broken(label, 44))
-    if geometric:
-        style.logarithmic(axes, "x")
+    smooth = np.convolve(np.pad(density, 2, mode="edge"), SMOOTH, mode="valid")
+    height, back = smooth / smooth.max(), np.exp if log else np.asarray
+    colour = "#909090" if is_free else colours.colour(1)
+    x = Axis(labels.with_unit(how.symbol, how.unit), log)
+    panel = Panel(x, Axis("probability density", ticks=[(0.0, "0")], low=0.0, high=1.1))
+    panel.traces.append(Trace("law", columns(x=back(centres), y=height), f"density of {name}", "", colour, "-"))
     if is_free:
-        axes.set_title("not determined", fontsize="small")
+        panel.title = "not determined"
+        return panel
+    for level in (0.95, 0.6827):
+        low, high = identifiability.quantiles(across, weights, [0.5 - level / 2, 0.5 + level / 2])
+        inside = np.concatenate([[low], centres[(centres > low) & (centres < high)], [high]])
+        below = np.interp(inside, centres, height)
+        shade = columns(x=back(inside), y=Mean(below, np.zeros(inside.size), below))
+        panel.traces.append(Trace("band", shade, f"{level:.0%} of {name}", "", colour))
+    low, middle, high = back(identifiability.quantiles(across, weights, [0.025, 0.5, 0.975]))
+    panel.title = f"{middle:.3g} ({low:.3g}, {high:.3g}) {labels.printed_unit(how.unit)}".strip()
+    return panel
 
 
-def between(x: FloatArray, y: FloatArray, low: float, high: float) -> tuple[FloatArray, FloatArray]:
-    """Return the part of a curve between two ends, which lie on it."""
-    inside = np.concatenate([[low], x[(x > low) & (x < high)], [high]])
-    return inside, np.interp(inside, x, y)
-
-
-def _of_whole_cells(ends: FloatArray, across: FloatArray, place: FloatArray, width: float) -> FloatArray:
-    """Return edges of parts that hold as many cells each: others would show a density that beats with the cells."""
+def of_whole_cells(ends: FloatArray, across: FloatArray, place: FloatArray, width: float) -> FloatArray:
+    """Return edges of bins that hold the same number of cells each, for unequal numbers would look like structure."""
     low, high = int(place.argmin()), int(place.argmax())
     cell = width * (across[high] - across[low]) / (place[high] - place[low])
     start = across[low] - cell / 2
     first, last = np.floor((ends[0] - start) / cell), np.ceil((ends[1] - start) / cell)
-    cells = max(1, int(np.ceil((last - first) / PARTS)))
+    cells = max(1, int(np.ceil((last - first) / BINS)))
     edges: FloatArray = start + cell * np.arange(first, max(last, first + cells) + 1, cells)
     return edges
-
-
-def _is_geometric(found: room.Calibration, name: str) -> bool:
-    return found.prediction.scales[found.unknowns.index(name)].logarithmic
 
 
 PLOTS = (
     Plot(
         "calibration",
         (),
-        "measured points with the band of the study, residuals, marginals of the unknowns",
+        "measured points with the band of the study, residuals, and the density of each unknown",
         calibration,
     ),
 )

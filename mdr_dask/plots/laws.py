@@ -1,4 +1,4 @@
-"""Laws that a figure of any output lays over its data, where there is one: each a row with a function."""
+"""Laws that figures draw beside the data of an output: each a row with a function."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from mdr_dask.fits.kinetic_cases import is_jump
 from mdr_dask.models.ehl_line import groups
 from mdr_dask.physics.lubrication.film_formulas import PAN_HAMROCK_CENTRAL, PAN_HAMROCK_MINIMUM, FilmFormula
 from mdr_dask.physics.sliding import laws
-from mdr_dask.plots.friction import is_plane, on_generated_line
 
 
 class Law(NamedTuple):
@@ -28,9 +27,9 @@ class Law(NamedTuple):
     models, output
         What it is a law of.
     holds_for : callable, Dataset -> bool
-        Whether it is meant for a series.
+        Whether it is written for a series.
     value : callable, Dataset -> DataArray
-        Its value from the parameters, and from what a line has of its own.
+        Its value in SI, from the parameters and the outputs in `NEEDED`.
     """
 
     name: str
@@ -40,19 +39,19 @@ class Law(NamedTuple):
     value: Callable[[xr.Dataset], xr.DataArray]
 
 
-#: What laws need of what a store holds beside parameters.
+#: Outputs that laws are computed from.
 NEEDED = ("rms_slope", "friction_coefficient_before")
 
 
 def law_of(data: xr.Dataset, output: str) -> Law | None:
-    """Return the law of an output that is meant for a series."""
+    """Return the law of an output that is written for a series."""
     model = data.attrs.get("model")
     known = (law for law in LAWS if model in law.models and law.output == output)
     return next((law for law in known if law.holds_for(data)), None)
 
 
 def along(data: xr.Dataset, name: str, count: int = 200) -> xr.Dataset:
-    """Return a curve with many values of its parameter, or as it is where what its law needs changes along it.
+    """Return a curve with many values of its parameter; unchanged where an output that the law needs varies along it.
 
     Parameters
     ----------
@@ -76,6 +75,17 @@ def along(data: xr.Dataset, name: str, count: int = 200) -> xr.Dataset:
     return fine
 
 
+def on_generated_line(data: xr.Dataset) -> bool:
+    """Return whether a series has a Kelvin body on a generated line."""
+    needed = {"shear_modulus", "relaxation_time", "rms_roughness", "length", "hurst", "points"}
+    return needed <= set(data.coords) and bool((data["rms_roughness"] > 0).all())
+
+
+def is_plane(data: xr.Dataset) -> bool:
+    """Return whether a series has a plane Kelvin body on a generated line."""
+    return on_generated_line(data) and not any(str(name).startswith("indenter_") for name in data.coords)
+
+
 def _plane(data: xr.Dataset) -> xr.DataArray:
     force, velocity = loads_and_velocities(data)
     law = laws.interpolation(force, velocity, laws.alpha(data["hurst"]), laws.BETA)
@@ -92,7 +102,7 @@ def _is_rough_indenter(data: xr.Dataset) -> bool:
 
 
 def _jump(data: xr.Dataset) -> xr.DataArray:
-    """Return the law of the jump from friction before it, which the store holds."""
+    """Return the law of the jump, from the stored friction before it."""
     from mdr_dask.fits.jumps import LAW, jump_law
 
     slope = spectral_slope(data)

@@ -1,60 +1,52 @@
-"""Figures of a master curve: the curves as measured, the merged curve, the shift factors.
-
-Thesis figures 3.17 to 3.19 are such figures of measurements, which are not public.
-"""
+"""Figures of a master curve: the curves as measured, the merged curve, the shift factors."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.plots import curves, drawing, style
+from mdr_dask.plots import colours, curves, labels
 from mdr_dask.plots.base import Plot
+from mdr_dask.plots.figure import Axis, Bar, Figure, Key, Mean, Panel, Trace, columns
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-BAR = 1.0  # standard errors shown
-#: Rms deviation from the merged curve up to which curves count as one: laws of friction are not meant to hold better.
+#: Rms deviation from the merged curve up to which curves count as one.
 COLLAPSED = 0.05
 
 
 def draw_master_curve(curve: xr.Dataset) -> Figure:
-    """Draw what :func:`mdr_dask.fits.master_curve.master_curve` returns: curves, merged curve and factors side by side.
+    """Return what :func:`mdr_dask.fits.master_curve.master_curve` found: curves, merged curve and factors.
 
-    Bars and the band are 68 %; the merged curve is dashed beyond the range measured at the reference. The title says
-    how far the points are from the merged curve, and whether they collapse at all.
+    Bars and the band are 68 %; the merged curve is dashed beyond the range measured at the reference.
     """
     shown = [(str(curve.attrs["group"]), "shift_factor", "vertical_factor", curve.attrs["reference"])]
     if "second" in curve.attrs:
         second = str(curve.attrs["second"]), "second_factor", "second_vertical_factor", curve.attrs["second_reference"]
         shown.append(second)
     rising = bool(curve["vertical_factor"].any())
-    count = 2 + len(shown) * (1 + rising)
-    figure, panels = drawing.panels(count, columns=count, size=(4.6, 4.0))
-    axes = iter(panels)
-    _measured(figure, next(axes), curve)
-    _merged(next(axes), curve)
+    groups, keys, bar = _groups(curve)
+    panels = [_measured(curve, groups), _merged(curve, groups)]
+    panels[0].keys = panels[1].keys = [*keys, Key("reached by shifting", "#000000", "--"), Key("measured at the reference", "#000000", "-")]
+    panels[0].bar = panels[1].bar = bar
     for by, across, along, reference in shown:
-        _factors(next(axes), curve, by, across, reference)
+        panels.append(_factors(curve, by, across, reference))
         if rising:
-            _factors(next(axes), curve, by, along, reference)
+            panels.append(_factors(curve, by, along, reference))
     references = ", ".join(f"{by} = {reference:.4g} {_unit(curve, by)}".strip() for by, _, _, reference in shown)
-    style.title(figure, "master curve", f"reference: {references}", _collapse(curve))
-    return figure
+    return Figure(
+        panels, "master curve", f"reference: {references}", f"bars and band: 68 %; {_collapse(curve)}", ratio=0.85
+    )
 
 
 def _collapse(curve: xr.Dataset) -> str:
     """Return how far the points are from the merged curve, and whether that is a collapse."""
     away = deviations(curve)
     rms, largest = float(np.sqrt(np.mean(away**2))), float(np.max(np.abs(away)))
-    said = "" if rms < COLLAPSED else "the curves do NOT collapse: "
-    return f"{said}points deviate from the merged curve by {rms:.1%} (rms), at most by {largest:.1%}"
+    verdict = "" if rms < COLLAPSED else "the curves do NOT collapse: "
+    return f"{verdict}points deviate from the merged curve by {rms:.1%} (rms), at most by {largest:.1%}"
 
 
 def deviations(curve: xr.Dataset) -> FloatArray:
@@ -72,108 +64,104 @@ def _unit(curve: xr.Dataset, name: str) -> str:
 
 
 def _label(name: str, values: xr.DataArray) -> str:
-    return style.with_unit(name.replace("_", " "), str(values.attrs.get("units", "")))
+    return labels.with_unit(name.replace("_", " "), str(values.attrs.get("units", "")))
 
 
-def _colours(curve: xr.Dataset) -> list[Any]:
-    """Return a colour for every group: named in a legend, or read off a colour bar."""
-    groups = curve[str(curve.attrs["group"])].to_numpy()
-    if groups.size <= style.most_colours():
-        return list(style.scale(groups.size))
-    how, norm = style.shades(groups)
-    return [how(norm(float(value))) for value in groups]
+class _Group(NamedTuple):
+    """The points of one group with its factors, its name and its colour."""
+
+    value: float
+    points: xr.Dataset
+    shift: float
+    rise: float
+    label: str
+    colour: str
 
 
-def _by_group(curve: xr.Dataset) -> list[tuple[float, xr.Dataset, float, float]]:
-    """Return each group with its points and factors."""
+def _groups(curve: xr.Dataset) -> tuple[list[_Group], list[Key], Bar | None]:
+    """Return every group, with the legend of a few or the colour bar of many."""
     by = str(curve.attrs["group"])
-    return [
-        (
+    values = curve[by].to_numpy()
+    bar = colours.bar(_label(by, curve[by]), values) if values.size > colours.most() else None
+    points = curve[[name for name in curve.data_vars if curve[name].dims == ("point",)]]
+    found = [
+        _Group(
             float(value),
-            curve[[name for name in curve.data_vars if curve[name].dims == ("point",)]].isel(
-                point=np.flatnonzero(curve["point_group"].to_numpy() == value)
-            ),
-            float(curve["shift_factor"][i]),
-            float(curve["vertical_factor"][i]),
+            points.isel(point=np.flatnonzero(curve["point_group"].to_numpy() == value)),
+            float(curve["shift_factor"][k]),
+            float(curve["vertical_factor"][k]),
+            f"{value:.3g} {_unit(curve, by)}".strip(),
+            colours.shade(bar, float(value)) if bar else colours.colour(k),
         )
-        for i, value in enumerate(curve[by].to_numpy())
+        for k, value in enumerate(values)
     ]
+    keys = [] if bar else [Key(group.label, group.colour, "", ".") for group in found]
+    return found, keys, bar
 
 
-def _measured(figure: Figure, axes: Axes, curve: xr.Dataset) -> None:
-    groups = _by_group(curve)
-    for (value, points, shift, rise), colour in zip(groups, _colours(curve), strict=True):
-        shifts = points.get("point_shift", shift)
-        x, y = points["point_abscissa"] / 10**shifts, points["point_ordinate"] / 10 ** points.get("point_rise", rise)
-        if "point_second" not in points:
-            drawing.plain(axes, x, y, ".-", color=colour, label=f"{value:.3g}")
-            continue
-        for number, other in enumerate(np.unique(points["point_second"])):
-            one = np.flatnonzero(points["point_second"] == other)
-            label = None if number else f"{value:.3g}"
-            drawing.plain(axes, x[one], y[one], ".-", color=colour, label=label)
-    axes.set_xlabel(_label(curve.attrs["abscissa"], curve["curve_abscissa"]))
-    axes.set_ylabel(_label(curve.attrs["ordinate"], curve["curve_ordinate"]))
-    heading = _label(curve.attrs["group"], curve[curve.attrs["group"]])
-    style.logarithmic(axes, "xy")
-    if len(groups) <= style.most_colours():
-        style.legend(axes, heading)
-    else:
-        from matplotlib.cm import ScalarMappable
-
-        how, norm = style.shades([value for value, *_ in groups])
-        figure.colorbar(ScalarMappable(norm, how), ax=axes, label=heading)
-    axes.set_title("as measured", fontsize="small")
+def _measured(curve: xr.Dataset, groups: list[_Group]) -> Panel:
+    across, up = (_label(curve.attrs[name], curve[f"curve_{name}"]) for name in ("abscissa", "ordinate"))
+    panel = Panel(Axis(across, log=True), Axis(up, log=True), title="as measured")
+    for group in groups:
+        points = group.points
+        x = points["point_abscissa"] / 10 ** points.get("point_shift", group.shift)
+        y = points["point_ordinate"] / 10 ** points.get("point_rise", group.rise)
+        second = points["point_second"].to_numpy() if "point_second" in points else np.zeros(x.size)
+        for value in np.unique(second):
+            one = np.flatnonzero(second == value)
+            data = columns(x=x[one].values, y=y[one].values)
+            panel.traces.append(Trace("curve", data, label=group.label, colour=group.colour, line="-", marker="."))
+    return panel
 
 
-def _merged(axes: Axes, curve: xr.Dataset) -> None:
-    for (_, points, _, _), colour in zip(_by_group(curve), _colours(curve), strict=True):
-        drawing.plain(axes, points["point_abscissa"], points["point_ordinate"], ".", color=colour)
+def _merged(curve: xr.Dataset, groups: list[_Group]) -> Panel:
+    across, up = (_label(curve.attrs[name], curve[f"curve_{name}"]) for name in ("abscissa", "ordinate"))
+    panel = Panel(Axis(f"shifted {across}", log=True), Axis(up, log=True), title="merged")
+    for group in groups:
+        data = columns(x=group.points["point_abscissa"].values, y=group.points["point_ordinate"].values)
+        panel.traces.append(Trace("curve", data, label=group.label, colour=group.colour, marker="."))
     x, y = curve["curve_abscissa"].to_numpy(), curve["curve_ordinate"].to_numpy()
-    error = 10 ** (BAR * curve["curve_error"].to_numpy())
+    error = 10 ** curve["curve_error"].to_numpy()
     low, high = (curve["curve_abscissa"].attrs[f"measured_{end}"] for end in ("low", "high"))
     inside = (x >= low) & (x <= high)
-    drawing.law(axes, x, y, "k--", linewidth=1, label="reached by shifting")
-    drawing.law(axes, x, np.where(inside, y, np.nan), "k-", label="measured at the reference")
-    drawing.band(axes, x, y / error, y * error, "merged curve", color="k", label="standard error")
-    axes.set_xlabel("shifted " + _label(curve.attrs["abscissa"], curve["curve_abscissa"]))
-    axes.set_ylabel(_label(curve.attrs["ordinate"], curve["curve_ordinate"]))
-    style.logarithmic(axes, "xy")
-    axes.set_title("merged", fontsize="small")
-    style.legend(axes)
+    black = {"colour": "#000000"}
+    panel.traces += [
+        Trace("band", columns(x=x, y=Mean(y, y / error, y * error)), "merged curve", **black),
+        Trace("law", columns(x=x, y=y), "reached by shifting", "reached by shifting", line="--", **black),
+        Trace("law", columns(x=x[inside], y=y[inside]), "measured at the reference", "measured at the reference", line="-", **black),
+    ]
+    return panel
 
 
-def _factors(axes: Axes, curve: xr.Dataset, by: str, factor: str, reference: float) -> None:
+def _factors(curve: xr.Dataset, by: str, factor: str, reference: float) -> Panel:
     groups = curve[by].to_numpy()
-    error = BAR * curve[f"{factor}_error"]
-    value = curve[factor]
-    factors = drawing.Mean(value, value - error, value + error)
-    drawing.points(axes, groups, factors, "k", "o", "factors, 68 %")
+    value, error = curve[factor], curve[f"{factor}_error"]
     across = "vertical" not in factor
-    if "power_exponent" in curve and "temperature" not in by.lower() and by not in ("T", "temp"):
-        exponent = float(curve["power_exponent"])
-        if across:
-            slope = exponent * np.log10(groups / reference)
-            drawing.law(axes, groups, slope, color=style.colour(style.FITTED), label=f"slope {exponent:.3g}")
-        style.logarithmic(axes, "x")
-    axes.set_xlabel(_label(by, curve[by]))
     moved = str(curve.attrs["abscissa" if across else "ordinate"]).replace("_", " ")
-    axes.set_ylabel(style.with_unit(f"shift of log10 {moved}", "decades"))
-    axes.set_title("shift factors" if across else "vertical factors", fontsize="small")
-    style.legend(axes)
+    power = "power_exponent" in curve and "temperature" not in by.lower() and by not in ("T", "temp")
+    y = Axis(labels.with_unit(f"shift of log10 {moved}", "decades"))
+    panel = Panel(Axis(_label(by, curve[by]), log=power), y, title="shift factors" if across else "vertical factors")
+    points = columns(value, x=groups, y=Mean(value, value - error, value + error))
+    panel.traces.append(Trace("curve", points, label="factors, 68 %", marker="o"))
+    if power and across:
+        exponent = float(curve["power_exponent"])
+        name = f"slope {exponent:.3g}"
+        line = columns(x=groups, y=exponent * np.log10(groups / reference))
+        panel.traces.append(Trace("law", line, name, name, colours.colour(1), "-"))
+    return panel
 
 
 def _of_store(groups: Mapping[str, xr.Dataset]) -> Figure:
     from mdr_dask.fits.master_curve import friction_of_roughness, master_curve
 
-    found, told = {}, []
+    found, left_out = {}, []
     for name, data in groups.items():
         if "friction_coefficient" in data:
             others = [d for d in curves.axes_of(data, "friction_coefficient") if d not in ("normal_force", "velocity")]
             found[name], more = curves.hold(data, others)
-            told += [f"{name}: {each}" if name else each for each in more]
+            left_out += [f"{name}: {each}" if name else each for each in more]
     figure = draw_master_curve(master_curve(friction_of_roughness(found)))
-    style.leave_out(figure, told)
+    figure.leave_out(left_out)
     return figure
 
 
@@ -181,7 +169,7 @@ PLOTS = (
     Plot(
         "master_curve",
         ("sliding_friction",),
-        "coefficient of friction over force at each velocity, merged, and shift factors (as figures 3.17 to 3.19)",
+        "coefficient of friction against force at each velocity, merged, and shift factors",
         _of_store,
     ),
 )

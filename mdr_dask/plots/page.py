@@ -1,4 +1,4 @@
-"""The page that figures are drawn for: its size, its units and its style, for whatever is drawn meanwhile."""
+"""The page that figures are drawn for: printed size, title, units and style, as requested by the user."""
 
 from __future__ import annotations
 
@@ -13,55 +13,69 @@ from typing import Any
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.units import to_si
 
-#: Letters and lines of a figure whose size is asked for, in points: journals print it as it is.
-LETTERS: dict[Any, Any] = {
-    "font.size": 8.5,
+#: Letters and lines of a figure with a requested size, in points: a journal prints it without scaling.
+LETTERS: dict[str, Any] = {
+    "font.size": 8,
     "axes.labelsize": 8,
+    "axes.titlesize": 8,
     "xtick.labelsize": 7,
     "ytick.labelsize": 7,
+    "legend.fontsize": 7,
     "axes.linewidth": 0.6,
     "lines.linewidth": 1.0,
+    "lines.markersize": 3,
 }
-#: Metres to an inch, and the least and greatest width and height.
+#: The same for a figure on a screen.
+SCREEN: dict[str, Any] = {"legend.fontsize": 8, "lines.linewidth": 1.2, "lines.markersize": 4}
+#: Metres to an inch; least and greatest width and height in metres.
 INCH = 0.0254
 LEAST, MOST = 0.02, 1.0
 
 
 @dataclass(frozen=True)
 class Page:
-    """What a user asks of the look of a figure: width and height in inches, and units by the name of a quantity.
+    """What a user requests of the look of a figure.
 
-    `used` names the quantities that were shown in a unit asked for, `cycle` has what a style says of one curve after
-    the other.
+    Parameters
+    ----------
+    width, height : float, optional
+        In inches; without a height, it follows from the content.
+    title : str, optional
+        The title; None for the default, which is a description on a screen and no title at a requested size.
+    units : mapping of str to str
+        Units by the name of a quantity.
+    used : set of str
+        Quantities that were shown so far.
+    cycle : tuple of mappings
+        Colours, lines and markers of successive curves, from the style.
     """
 
     width: float | None = None
     height: float | None = None
+    title: str | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     used: set[str] = field(default_factory=set)
     cycle: tuple[Mapping[str, str], ...] = ()
 
     def unit(self, name: str) -> str | None:
-        """Return the unit that a quantity is to be shown in, None for its usual one."""
-        if name in self.units:
-            self.used.add(name)
+        """Return the unit in which a quantity is shown, None for that of the store."""
+        self.used.add(name)
         return self.units.get(name)
 
 
-_NOTHING_ASKED = Page()
-_PAGE: ContextVar[Page] = ContextVar("page", default=_NOTHING_ASKED)
+_PAGE: ContextVar[Page | None] = ContextVar("page", default=None)
 
 
 @contextmanager
-def drawing_for(asked: Page, file: str | None = None) -> Iterator[None]:
-    """Draw figures for a page: in its size, with letters for it, in its units, in a style of matplotlib.
+def drawing_for(page: Page, style: str | None = None) -> Iterator[None]:
+    """Draw figures for a page.
 
     Parameters
     ----------
-    asked : Page
-        Size and units.
-    file : str, optional
-        A style file of matplotlib, or the name of one of its own styles; it has the last word.
+    page : Page
+        Size, title and units.
+    style : str, optional
+        A style file of matplotlib, or the name of one of its styles; its settings take precedence.
 
     Raises
     ------
@@ -71,14 +85,14 @@ def drawing_for(asked: Page, file: str | None = None) -> Iterator[None]:
     from matplotlib import rc_context, rc_params_from_file
     from matplotlib.style import context, library
 
-    if file is not None and not (Path(file).is_file() or file in library):
-        hint = did_you_mean(file, [*library])
+    if style is not None and not (Path(style).is_file() or style in library):
+        hint = did_you_mean(style, [*library])
         near = hint if "mean" in hint else " (such as 'grayscale' or 'seaborn-v0_8-paper')"
-        raise DataError(f"expected a style file, or the name of a style of matplotlib{near}, got {file!r}")
-    said = {} if file is None else library.get(file) or rc_params_from_file(file, use_default_template=False)
-    token = _PAGE.set(replace(asked, cycle=tuple(said.get("axes.prop_cycle", ()))))
+        raise DataError(f"expected a style file, or the name of a style of matplotlib{near}, got {style!r}")
+    given = {} if style is None else library.get(style) or rc_params_from_file(style, use_default_template=False)
+    token = _PAGE.set(replace(page, cycle=tuple(given.get("axes.prop_cycle", ()))))
     try:
-        with rc_context(LETTERS if asked.width else {}), context([file] if file else []):
+        with rc_context(LETTERS if page.width else SCREEN), context([style] if style else []):
             yield
     finally:
         _PAGE.reset(token)
@@ -86,17 +100,17 @@ def drawing_for(asked: Page, file: str | None = None) -> Iterator[None]:
 
 @contextmanager
 def with_units(units: Mapping[str, str]) -> Iterator[None]:
-    """Show quantities in units, unless others were asked for."""
-    token = _PAGE.set(replace(_PAGE.get(), units={**units, **_PAGE.get().units}))
+    """Show quantities in these units, unless the user requested others."""
+    token = _PAGE.set(replace(current(), units={**units, **current().units}))
     try:
         yield
     finally:
         _PAGE.reset(token)
 
 
-def asked() -> Page:
-    """Return the page that is drawn for."""
-    return _PAGE.get()
+def current() -> Page:
+    """Return the page that figures are drawn for."""
+    return _PAGE.get() or Page()
 
 
 def size(text: str) -> tuple[float, float | None]:

@@ -1,41 +1,33 @@
-"""Sobol indices as bars with their intervals."""
+"""Sobol indices with their intervals."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
-from mdr_dask.plots import drawing, style
-from mdr_dask.plots.drawing import Mean
+from mdr_dask.plots import colours, labels
+from mdr_dask.plots.figure import Axis, Figure, Mean, Panel, Trace, columns
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-LABELS = {"first": "first order: alone", "total": "total: with interactions"}
-#: Thickness of a bar, and how far those of one input lie apart, of a row.
-THICK, APART = 0.36, 0.38
+NAMES = {"first": "first order: alone", "total": "total: with interactions"}
+#: Distance of the two indices of one input, in rows.
+APART = 0.25
 
 
 def sensitivity(indices: xr.Dataset) -> Figure:
-    """Draw what `mdr_dask.fits.sensitivity.sobol_indices` found: a bar for every index of every input."""
-    inputs = [style.quantity(str(name)).symbol for name in indices["parameter"].to_numpy()]
-    kinds = [kind for kind in ("first", "total") if indices[kind].notnull().any()]
-    figure, (axes,) = drawing.panels(1, size=(drawing.PANEL[0], 1.6 + 0.5 * len(inputs)))
+    """Return the figure of what `mdr_dask.fits.sensitivity.sobol_indices` found: both indices of every input."""
+    inputs = [str(name) for name in indices["parameter"].to_numpy()]
+    ticks = [(float(k), labels.SYMBOLS.get(name, name.replace("_", " "))) for k, name in enumerate(inputs)]
+    y = Axis("", ticks=ticks, low=-0.6, high=len(inputs) - 0.4, reverse=True)
+    panel = Panel(Axis("share of the variance"), y)
+    kinds = [kind for kind in NAMES if indices[kind].notnull().any()]
     for k, kind in enumerate(kinds):
-        place = xr.zeros_like(indices[kind]) + np.arange(len(inputs)) + APART * (k - (len(kinds) - 1) / 2)
-        unknown = xr.full_like(place, np.nan)
-        axes.barh(place, indices[kind], THICK, color=style.colour(k), label=LABELS[kind], alpha=0.85)
-        along = Mean(indices[kind], indices[f"{kind}_low"], indices[f"{kind}_high"])
-        drawing.points(axes, indices[kind], Mean(place, unknown, unknown), "black", "|", kind, along)
-    axes.set_yticks(np.arange(len(inputs)), inputs)
-    axes.invert_yaxis()
-    axes.axvline(0, color="black", linewidth=0.8)
-    axes.set_xlabel("share of the variance")
-    handles, labels = axes.get_legend_handles_labels()
-    bars = [(handle, label) for handle, label in zip(handles, labels, strict=True) if label in LABELS.values()]
-    axes.legend(*zip(*bars, strict=True), fontsize="small")
-    about = f"{indices.attrs['cases']} cases, {indices.attrs['realisations']} realisations; bars: 95 % intervals"
-    style.title(figure, f"{str(indices.attrs['output']).replace('_', ' ')}: Sobol indices", about)
-    return figure
+        row = np.arange(len(inputs)) + APART * (k - (len(kinds) - 1) / 2)
+        share = Mean(indices[kind], indices[f"{kind}_low"], indices[f"{kind}_high"])
+        points = columns(indices[[kind]], x=share, y=row)
+        panel.traces.append(Trace("curve", points, kind, NAMES[kind], colours.colour(k), "", colours.MARKERS[k]))
+    zero = columns(x=np.zeros(2), y=np.array([-0.6, len(inputs) - 0.4]))
+    panel.traces.append(Trace("law", zero, "zero", "", "#808080", ":"))
+    cases, realisations = indices.attrs["cases"], indices.attrs["realisations"]
+    subject = f"{str(indices.attrs['output']).replace('_', ' ')}: Sobol indices"
+    about = f"{cases} cases, {realisations} realisations; bars: 95 % intervals"
+    return Figure([panel], subject, bars=about, ratio=min(1.5, 0.2 + 0.1 * len(inputs)))

@@ -1,99 +1,85 @@
-"""The figure of a measured surface: its spectrum with the power law, the line of the method beside straight cuts."""
+"""The figure of a measured surface: its spectrum with the power law, and the line of the method with straight cuts."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
-from mdr_dask.plots import drawing, style
+from mdr_dask.plots import colours
+from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from mdr_dask.arrays import FloatArray
     from mdr_dask.models.parts.surface_report import FileReport
     from mdr_dask.physics.surfaces.spectrum import Spectrum
-    from mdr_dask.plots.table import Drawn
 
-
-#: How a legend names the line that replaces a surface.
+#: Name of the line that replaces a surface.
 METHOD = r"line of the method, $\pi q\,C^{2D}$"
 
 
-def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...]) -> Drawn:
-    """Draw C2D of every file with its law, and C1D of the line that a campaign takes with the cuts.
+def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...]) -> Figure:
+    """Return C2D of every file with its law, and C1D of the line that a campaign uses with the cuts.
 
     Parameters
     ----------
     reports : tuple of FileReport
-        What each file says.
+        Statistics of each file.
     spectra : tuple of Spectrum
-        What a campaign takes of each: between the cut-offs, without noise.
+        The spectrum that a campaign uses of each file: between the cut-offs, without noise.
     """
-    figure, (areal, line) = drawing.panels(2, columns=2, size=(5.2, 4.2))
-    for axes in (areal, line):
-        axes.set(xscale="log", yscale="log", xlabel="wave number (rad/m)")
-    for report, taken, colour in zip(reports, spectra, style.scale(len(reports)), strict=True):
-        first = report is reports[0]
-        file = xr.Dataset(coords={"file": Path(report.file.name).name})
-        _areal(areal, report, taken, colour, file, "taken" if len(reports) == 1 else f"{file['file'].item()} taken")
-        for (direction, (q, cut)), dash in zip(report.cuts.items(), ("-", ":"), strict=False):
-            there = cut > 1e-20 * cut.max()
-            look: dict[str, Any] = {
-                "color": "0.6",
-                "lw": 0.8,
-                "label": f"straight cut along {direction}" if first else None,
-            }
-            drawing.law(line, q[there], cut[there], dash, name=f"straight cut along {direction}", of=file, **look)
-        q = np.geomspace(taken.wavenumber[0], taken.wavenumber[-1], 400)
-        look = {"color": colour, "lw": 1.5, "zorder": 3, "label": METHOD if first else None}
-        drawing.law(line, q, np.pi * q * taken.at(q), name=METHOD, of=file, **look)
-    areal.set_ylabel(r"$C^{2D}$ (m$^4$)")
-    line.set_ylabel("spectrum of a line (m$^3$)")
-    for axes in (areal, line):
-        axes.legend(fontsize="x-small")
-        axes.grid(alpha=0.3)
-        top = axes.secondary_xaxis("top", functions=(_other, _other))
-        top.set_xlabel("wavelength (m)", fontsize="small")
+    q = Axis("wave number $q$ [rad/m]", log=True)
+    areal = Panel(q, Axis("$C^{2D}$ [m$^4$]", log=True))
+    line = Panel(q, Axis("spectrum of a line [m$^3$]", log=True))
+    for k, (report, used) in enumerate(zip(reports, spectra, strict=True)):
+        file, colour = xr.Dataset(coords={"file": Path(report.file.name).name}), colours.colour(k)
+        areal.traces += _areal(report, used, colour, file)
+        for (direction, (wave, cut)), dash in zip(report.cuts.items(), ("-", ":"), strict=False):
+            there, name = cut > 1e-20 * cut.max(), f"straight cut along {direction}"
+            line.traces.append(Trace("law", columns(file, x=wave[there], y=cut[there]), name, name, "#909090", dash))
+        wave = np.geomspace(used.wavenumber[0], used.wavenumber[-1], 400)
+        method = columns(file, x=wave, y=np.pi * wave * used.at(wave))
+        line.traces.append(Trace("law", method, METHOD, METHOD, colour, "-"))
+        areal.keys.append(Key(f"{file['file'].item()}: measured, in bins", colour, "", "o"))
+    areal.keys += [Key("used by a campaign", colours.colour(0), "-")]
+    for report in reports[:1]:
+        if report.law is not None:
+            hurst = report.law.hurst
+            areal.keys.append(Key(f"power law, H = {hurst.value:.2f} ({hurst.low:.2f}, {hurst.high:.2f})", "#000000", "--"))
+    line.keys = [key for key in line.entries() if key.label != METHOD or key.colour == colours.colour(0)]
+    line.keys = [Key(METHOD, "#000000", "-") if key.label == METHOD else key for key in line.keys]
     rms, gradient = (
         np.sqrt(np.mean([value**2 for value in values]))
-        for values in zip(*((taken.rms_height(), taken.rms_gradient()) for taken in spectra), strict=True)
+        for values in zip(*((used.rms_height(), used.rms_gradient()) for used in spectra), strict=True)
     )
-    style.title(figure, "measured surface", f"taken: rms height {rms:.4g} m, rms gradient {gradient:.4g}")
-    return figure
+    fixed = f"used by a campaign: rms height {rms:.4g} m, rms gradient {gradient:.4g}"
+    return Figure([areal, line], "spectrum of a measured surface", fixed, columns=2, ratio=0.85)
 
 
-def _areal(axes: Axes, report: FileReport, taken: Spectrum, colour: Any, file: xr.Dataset, label: str) -> None:
-    """Draw C2D of a file: all of it, in bins with their errors, what of it is taken, and its power law."""
+def _areal(report: FileReport, used: Spectrum, colour: str, file: xr.Dataset) -> list[Trace]:
+    """Return C2D of a file: all of it, in bins with their errors, what a campaign uses of it, and its power law."""
     spectrum, bins = report.found.spectrum, report.bins
-    raw = {"color": colour, "lw": 0.5, "alpha": 0.4}
-    drawing.law(axes, spectrum.wavenumber, spectrum.density, name="spectrum as measured", of=file, **raw)
+    raw = columns(file, x=spectrum.wavenumber, y=spectrum.density)
     there = bins.density > 0
     q, density, error = (each[there] for each in (bins.wavenumber, bins.density, bins.density * bins.error))
-    mean = drawing.Mean(*(_of(file, each) for each in (density, density - error, density + error)))
-    drawing.points(axes, q, mean, colour, "o", None)
-    low, high = taken.wavenumber[[0, -1]]
-    axes.axvspan(low, high, color=colour, alpha=0.06, label=label)
+    ends = columns(file, x=q, y=Mean(density, density - error, density + error))
+    inside = columns(file, x=used.wavenumber, y=used.density)
+    found = [
+        Trace("law", raw, "spectrum as measured", "", "#c0c0c0", "-"),
+        Trace("curve", ends, "spectrum in bins", "", colour, "", "o"),
+        Trace("law", inside, "used by a campaign", "", colour, "-"),
+    ]
     if report.law is None:
-        return
-    hurst = report.law.hurst
-    ends = [2 * np.pi / end.value if end else None for end in (report.law.longest, report.law.shortest)]
-    along = np.array([ends[0] or bins.wavenumber[0], ends[1] or high])
+        return found
+    along = np.array(
+        [
+            2 * np.pi / end.value if end else default
+            for end, default in ((report.law.longest, bins.wavenumber[0]), (report.law.shortest, used.wavenumber[-1]))
+        ]
+    )
     middle = (q >= along[0] * 0.999) & (q <= along[1] * 1.001)
-    power = -2 - 2 * hurst.value
+    power = -2 - 2 * report.law.hurst.value
     level = np.exp(np.median(np.log(density[middle]) - power * np.log(q[middle])))
-    told = f"H = {hurst.value:.2f} ({hurst.low:.2f}, {hurst.high:.2f})"
-    drawing.law(axes, along, level * along**power, "k--", lw=1, label=told, name="power law", of=file)
-
-
-def _of(file: xr.Dataset, values: FloatArray) -> xr.DataArray:
-    return xr.DataArray(values, dims="wavenumber", coords=file.coords)
-
-
-def _other(number: Any) -> Any:
-    """Return wavelengths of wave numbers, and the other way round."""
-    with np.errstate(divide="ignore"):
-        return 2 * np.pi / np.asarray(number, dtype=np.float64)
+    law = columns(file, x=along, y=level * along**power)
+    return [*found, Trace("law", law, "power law", "", "#000000", "--")]

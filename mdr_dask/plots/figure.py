@@ -1,0 +1,280 @@
+"""A figure as data: panels with everything that is drawn in them, independent of how it is drawn.
+
+`render` draws it with matplotlib, `mdr_dask.report` draws it in a browser, and its table is written beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import NDArray
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.plots.labels import plain
+
+#: Columns of a table before and after those of the parameters.
+FIRST = ("panel", "curve", "what")
+LAST = tuple(f"{name}{end}" for name in ("x", "y", "value") for end in ("", "_low", "_high"))
+#: Entry of the column ``what`` for results of a study; laws have their names there.
+DATA = "data"
+Kind = Literal["curve", "law", "band", "dots", "map", "absent"]
+
+
+class Mean(NamedTuple):
+    """Values with the ends of their 95 % intervals; ends are NaN where no error is known."""
+
+    value: Any
+    low: Any
+    high: Any
+
+
+@dataclass(frozen=True)
+class Axis:
+    """An axis of a panel.
+
+    Parameters
+    ----------
+    label : str
+        With its unit; symbols as mathtext between dollars.
+    log : bool
+        Whether it is logarithmic.
+    ticks : sequence of (float, str)
+        Ticks with texts, for words in place of numbers.
+    low, high : float, optional
+        Limits; None for those of the data.
+    quantity : str
+        Name of the parameter or output whose values are shown unchanged, apart from the unit; empty for others.
+    reverse : bool
+        Whether values grow downwards or to the left.
+    """
+
+    label: str
+    log: bool = False
+    ticks: Sequence[tuple[float, str]] = ()
+    low: float | None = None
+    high: float | None = None
+    quantity: str = ""
+    reverse: bool = False
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A colour bar from `low` to `high`."""
+
+    label: str
+    low: float
+    high: float
+    log: bool = False
+
+
+@dataclass(frozen=True)
+class Key:
+    """An entry of a legend."""
+
+    label: str
+    colour: str
+    line: str = ""
+    marker: str = ""
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One curve, law, band, map or set of points.
+
+    Parameters
+    ----------
+    kind : str
+        ``curve`` and ``law`` (points, joined where they have a line), ``band`` (from ``y_low`` to ``y_high``), ``dots``
+        (coloured by ``value``), ``map`` (cells coloured by ``value``), ``absent`` (marks at the foot of the panel).
+    data : Dataset
+        ``x``, ``y`` and ``value`` as the axes show them, with ``_low`` and ``_high`` where their intervals are known;
+        coordinates are the parameters of each point, in SI.
+    what : str
+        ``data``, the name of a law, or the reason why cases have no value.
+    label : str
+        Name of the curve.
+    colour, line, marker : str
+        As in matplotlib.
+    bars : bool
+        Whether intervals are drawn as bars instead of a band.
+    """
+
+    kind: Kind
+    data: xr.Dataset
+    what: str = DATA
+    label: str = ""
+    colour: str = "#000000"
+    line: str = ""
+    marker: str = ""
+    bars: bool = False
+
+    def column(self, name: str) -> FloatArray:
+        """Return one variable of all points in a row, broadcast to the shape of the trace."""
+        whole = self.data[name].broadcast_like(self.data[self._widest]).transpose(*self.data[self._widest].dims)
+        return np.asarray(whole.values, dtype=np.float64).ravel()
+
+    @property
+    def _widest(self) -> str:
+        return str(max(self.data.data_vars, key=lambda name: self.data[name].ndim))
+
+    def frame(self) -> pd.DataFrame:
+        """Return a row for every point that is drawn."""
+        data = self.data.rename({name: f"parameter {name}" for name in self.data.coords if name in (*FIRST, *LAST)})
+        own = [str(name) for name in (*data.data_vars, *data.coords)]
+        rows = (data if data.sizes else data.expand_dims("point")).to_dataframe().reset_index()[own]
+        drawn = next(name for name in ("value", "y", "y_low", "x") if name in rows)
+        return rows[np.isfinite(rows[drawn])].assign(curve=plain(self.label), what=plain(self.what))
+
+
+@dataclass
+class Panel:
+    """Axes with the traces in them.
+
+    `keys` are the entries of the legend; without any, and without a colour bar, those of the traces.
+    """
+
+    x: Axis
+    y: Axis
+    traces: list[Trace] = field(default_factory=list)
+    title: str = ""
+    bar: Bar | None = None
+    keys: list[Key] = field(default_factory=list)
+
+    def entries(self) -> list[Key]:
+        """Return the entries of the legend, without doubles."""
+        of_traces = [Key(t.label, t.colour, t.line, t.marker) for t in self.traces if t.label and not self.bar]
+        found = self.keys or of_traces
+        return list(dict.fromkeys(found))
+
+
+@dataclass
+class Figure:
+    """A figure.
+
+    Parameters
+    ----------
+    panels : list of Panel
+        In rows, from left to right.
+    subject : str
+        What it shows, for its title.
+    fixed : str
+        Parameters at one value.
+    bars : str
+        What bars and bands mean.
+    left_out : list of str
+        What is not drawn.
+    columns : int, optional
+        Panels in a row.
+    ratio : float
+        Height of a panel over its width.
+    share_y : bool
+        Whether all panels have the same vertical axis.
+    """
+
+    panels: list[Panel]
+    subject: str
+    fixed: str = ""
+    bars: str = ""
+    left_out: list[str] = field(default_factory=list)
+    columns: int | None = None
+    ratio: float = 0.7
+    share_y: bool = False
+
+    def leave_out(self, sentences: Iterable[str]) -> None:
+        """Add sentences about what is not drawn."""
+        self.left_out = [*dict.fromkeys([*self.left_out, *(sentence for sentence in sentences if sentence)])]
+
+    def table(self) -> pd.DataFrame:
+        """Return all that is drawn, a row for every point.
+
+        Parameters are in SI, ``x``, ``y`` and ``value`` as the axes show them. Parameters that are the same everywhere
+        are in ``attrs["held"]``, units of all of them in ``attrs["units"]``.
+        """
+        frames = [trace.frame().assign(panel=k + 1) for k, panel in enumerate(self.panels) for trace in panel.traces]
+        frames = [frame.dropna(axis=1, how="all") for frame in frames if len(frame)]
+        whole = pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=[*FIRST])
+        parameters = [name for name in whole if name not in (*FIRST, *LAST)]
+        held = {name: whole[name].iloc[0] for name in parameters if (whole[name] == whole[name].iloc[0]).all()}
+        ends = [name for name in LAST if name in whole or name in ("x", "y")]
+        shown = whole.reindex(columns=[*FIRST, *(name for name in parameters if name not in held), *ends])
+        shown.attrs = {"held": held, "units": self.units()}
+        return shown
+
+    def units(self) -> dict[str, str]:
+        """Return the units of all parameters."""
+        coords = (item for panel in self.panels for trace in panel.traces for item in trace.data.coords.items())
+        return {
+            f"parameter {name}" if name in (*FIRST, *LAST) else str(name): str(value.attrs.get("units", "1"))
+            for name, value in coords
+        }
+
+    def head(self, origin: Mapping[str, str]) -> list[str]:
+        """Return the comment lines above the table: origin, parameters held, units, and labels of each panel."""
+        table = self.table()
+        units = table.attrs["units"]
+        held = {name: f"{_number(value)} {units[name]}".removesuffix(" 1") for name, value in table.attrs["held"].items()}
+        varied = [name for name in table if name in units]
+        lines = [f"{name}: {text}" for name, text in origin.items()]
+        lines.append(f"title: {'; '.join(part for part in (self.subject, self.fixed, self.bars) if part)}")
+        lines += [f"not drawn: {'; '.join(self.left_out)}"] * bool(self.left_out)
+        lines += [f"held fixed: {', '.join(f'{name} = {value}' for name, value in held.items())}"] * bool(held)
+        lines += [f"units: {', '.join(f'{name} [{units[name]}]' for name in varied)}"] * bool(varied)
+        for number, panel in enumerate(self.panels):
+            parts = [f"x: {panel.x.label}", f"y: {panel.y.label}", panel.title]
+            lines.append(f"panel {number + 1}: {'; '.join(part for part in parts if part)}")
+        return [plain(line) for line in lines]
+
+
+def _number(value: Any) -> str:
+    return f"{value:.12g}" if isinstance(value, int | float | np.number) else str(value)
+
+
+def columns(of: xr.Dataset | xr.DataArray | None = None, **values: Any) -> xr.Dataset:
+    """Return the data of a trace: arrays of points with the parameters of their case.
+
+    Parameters
+    ----------
+    of : Dataset or DataArray, optional
+        Its coordinates along the dimensions of the values, and its scalar ones, are the parameters of the points.
+    **values
+        ``x``, ``y`` and ``value``: a `Mean` brings its ends along; a plain array of as many numbers as the labelled
+        array beside it has the same dimension.
+    """
+    parts: dict[str, Any] = {}
+    for name, value in values.items():
+        ends = value if isinstance(value, Mean) else (value,)
+        parts |= {f"{name}{end}": each for end, each in zip(("", "_low", "_high"), ends, strict=False)}
+    labelled = [part for part in parts.values() if isinstance(part, xr.DataArray)]
+    shapes = {part.shape: part.dims for part in labelled if part.ndim}
+    arrays = {}
+    for name, part in parts.items():
+        array = np.asarray(part.values if isinstance(part, xr.DataArray) else part, dtype=np.float64)
+        dims = part.dims if isinstance(part, xr.DataArray) else shapes.get(array.shape, ("point",) * array.ndim)
+        arrays[name] = (dims, array)
+    used = {dim for dims, _ in arrays.values() for dim in dims}
+    found: dict[str, Any] = {} if of is None else {str(name): coord for name, coord in of.coords.items()}
+    kept = {name: (coord.dims, coord.values, coord.attrs) for name, coord in found.items() if set(coord.dims) <= used}
+    data = xr.Dataset(arrays, coords=kept)
+    unknown = [name for name in arrays if name.endswith(("_low", "_high")) and not np.isfinite(data[name]).any()]
+    return data.drop_vars(unknown)
+
+
+def edges(centres: FloatArray, log: bool) -> FloatArray:
+    """Return the ends of the cells around the values of an axis, halfway between them: of their logarithms if `log`."""
+    if centres.size == 1:
+        half = 0.5 * (abs(float(centres[0])) or 1.0)
+        return np.array([centres[0] - half, centres[0] + half])
+    at = np.log(centres) if log else centres
+    between = 0.5 * (at[1:] + at[:-1])
+    ends: FloatArray = np.concatenate([[2 * at[0] - between[0]], between, [2 * at[-1] - between[-1]]])
+    return np.asarray(np.exp(ends)) if log else ends
+
+
+def texts(values: NDArray[Any]) -> list[str]:
+    """Return words without mathtext."""
+    return [plain(str(value)) for value in values.ravel()]

@@ -1,0 +1,122 @@
+"""Friction against time through a jump of the velocity, or along any history of velocity and load."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from mdr_dask import aggregation
+from mdr_dask.arrays import FloatArray
+from mdr_dask.errors import DataError
+from mdr_dask.models.parts.loading_history import pieces
+from mdr_dask.models.velocity_jump import VelocityJump
+from mdr_dask.plots import colours, curves, labels
+from mdr_dask.plots.base import Plot
+from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
+from mdr_dask.plots.view import MOST_PANELS
+
+BEFORE, JUMP, AFTER = (f"friction_coefficient_{name}" for name in ("before", "jump", "after"))
+FRICTION = "friction_coefficient"
+TIME = "relaxation_times"
+DRIVEN = ("velocity", "normal_force")
+#: Time before the history, as a share of the time shown.
+LEAD = 0.08
+STEADY = "steady state at the end"
+
+
+def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
+    """Return friction, velocity and normal force against time; each series has a column of panels."""
+    needed = (BEFORE, JUMP, FRICTION)
+    found = {name: data for name, data in groups.items() if all(output in data for output in needed)}
+    if not found:
+        raise DataError(f"expected a series with the outputs {', '.join(needed)}")
+    rest = list(found)[MOST_PANELS:]
+    found = {name: found[name] for name in list(found)[:MOST_PANELS]}
+    rows: list[list[Panel]] = [[], [], []]
+    families = []
+    for name, data in found.items():
+        one = curves.family(data, FRICTION, TIME)
+        families.append(one)
+        for row, panel in zip(rows, _column(name, data, one), strict=True):
+            row.append(panel)
+    figure = Figure([panel for row in rows for panel in row], "friction along histories of velocity and load")
+    figure.columns, figure.ratio = len(found), 0.4 if len(found) == 1 else 0.6
+    figure.fixed = curves.fixed_text(curves.fixed_by_all([one.held for one in families]), next(iter(found.values())))
+    figure.bars = curves.meaning_of_bars(found.values(), [FRICTION])
+    figure.leave_out([f"series {', '.join(rest)}" if rest else ""])
+    figure.leave_out([sentence for one in families for sentence in one.left_out])
+    return figure
+
+
+def _column(name: str, data: xr.Dataset, one: curves.Family) -> list[Panel]:
+    last = float(data[TIME].values[-1])
+    time = Axis(labels.SYMBOLS[TIME], low=-LEAD * last, high=last)
+    friction = Axis(labels.label(FRICTION, data[FRICTION]), quantity=FRICTION)
+    driven = [_driven(key, data) for key in DRIVEN]
+    panels = [Panel(time, friction, title=f"series {name}" if name else "", bar=one.bar)]
+    panels += [Panel(time, axis) for axis, _ in driven]
+    for curve in one.curves:
+        case = curve.data
+        look: dict[str, Any] = {"label": curve.label, "colour": curve.colour, "line": curve.line or "-"}
+        panels[0].traces.append(Trace("curve", _trace(case, last), **look))
+        after = float(aggregation.mean(case[AFTER])) if AFTER in case else np.nan
+        if np.isfinite(after):
+            level = columns(case, x=np.array([0.0, last]), y=np.full(2, after))
+            panels[0].traces.append(Trace("law", level, STEADY, STEADY, curve.colour, ":"))
+        at, *values = loading_history(VelocityJump.model_validate(curves.parameters_at(case)), last)
+        for panel, (_, how), value in zip(panels[1:], driven, values, strict=True):
+            panel.traces.append(Trace("curve", columns(case, x=at, y=how.of(value)), **look))
+    panels[0].keys = [*one.keys, Key(STEADY, "#808080", ":")] if len(panels[0].traces) > 1 else one.keys
+    for panel, row in zip(panels[1:], driven, strict=True):
+        highest = max(float(trace.column("y").max()) for trace in panel.traces)
+        lowest = min(float(trace.column("y").min()) for trace in panel.traces)
+        panel.y = Axis(row[0].label, low=min(0.0, 1.1 * lowest), high=1.15 * highest)
+        panel.keys = one.keys
+    return panels
+
+
+def _driven(name: str, data: xr.Dataset) -> tuple[Axis, labels.Quantity]:
+    """Return axis and unit of a prescribed quantity; it is no parameter where the history itself has its values."""
+    unit = {"velocity": "m/s", "normal_force": "N"}[name]
+    values = data[name] if name in data.coords else xr.DataArray(np.nan, attrs={"units": unit})
+    how = labels.quantity(name, values)
+    return Axis(labels.with_unit(how.symbol, how.unit)), how
+
+
+def _trace(case: xr.Dataset, last: float) -> xr.Dataset:
+    """Return friction before the history, just after its first instant, and along it."""
+    before = curves.mean(case, BEFORE)
+    at_once = case.assign({JUMP: (case[BEFORE] + case[JUMP]).assign_attrs(case[JUMP].attrs)})
+    errors = [aggregation.companion(case, name) for name in (BEFORE, JUMP)]
+    known = [abs(error) for error in errors if error is not None]
+    start = Mean(*aggregation.mean_and_ends(at_once[JUMP], sum(known[1:], known[0]) if known else None))
+    later = curves.mean(case, FRICTION)
+    joined = [
+        np.concatenate([[float(b), float(b), float(s)], np.ravel(c.values)])
+        for b, s, c in zip(before, start, later, strict=True)
+    ]
+    time = np.concatenate([[-LEAD * last, 0.0, 0.0], np.asarray(case[TIME].values)])
+    return columns(case, x=time, y=Mean(*joined))
+
+
+def loading_history(case: VelocityJump, last: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return times in relaxation times up to `last`, with velocity in m/s and normal force in N at these times."""
+    unit = case.time_unit()
+    before, parts = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
+    found = [np.array([[-LEAD * last, 0.0], [before, before], [case.normal_force, case.normal_force]])]
+    for part in parts:
+        if part.start < last * unit:
+            count = 400 if part.swing[2] else 2
+            time = np.linspace(part.start, min(part.end, last * unit), count)
+            _, speed, force = part.at(time)
+            found.append(np.array([time / unit, speed, force]))
+    time, speed, force = np.concatenate(found, axis=1)
+    return time, speed, force
+
+
+PLOTS: tuple[Plot, ...] = (
+    Plot("history", ("velocity_jump",), "friction, velocity and normal force against time", draw),
+)

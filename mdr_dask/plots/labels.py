@@ -1,0 +1,172 @@
+"""How quantities are written in figures: symbols, units, labels of axes, and single values."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from mdr_dask.campaign.written import written_units
+from mdr_dask.errors import DataError
+from mdr_dask.plots import page
+from mdr_dask.units import conversion
+
+#: Names and symbols of parameters, where they are better than the parameter's own name.
+SYMBOLS: Mapping[str, str] = {
+    "normal_force": "normal force $F_N$",
+    "line_load": "line load $w$",
+    "velocity": "velocity $v$",
+    "velocity_change": r"velocity change $\Delta v/v_1$",
+    "mean_velocity": "mean velocity $u$",
+    "shear_modulus": "shear modulus $G$",
+    "contact_modulus": "contact modulus $E^*$",
+    "relaxation_time": r"relaxation time $\tau$",
+    "hurst": "Hurst exponent $H$",
+    "rms_roughness": "rms height $h$",
+    "length": "length $L$",
+    "pressure_viscosity": r"pressure-viscosity coefficient $\alpha$",
+    "layer_thickness": "layer thickness $h_c$",
+    "layer_shear_strength": r"layer strength $\tau_0$",
+    "load_parameter": "load parameter $W$",
+    "speed_parameter": "speed parameter $U$",
+    "material_parameter": "material parameter $G$",
+    "inlet": "inlet $x_{in}/a$",
+    "viscosity": r"viscosity $\eta_0$",
+    "radius": "radius $R$",
+    "stick_radius": "stick radius $c/a_0$",
+    "amplitude": "amplitude $U_0$",
+    "depth": "depth $d_0$",
+    "xi": r"$\xi$",
+    "relaxation_times": r"$(t - t_0)/\tau$",
+}
+#: Units that are shown in place of an SI unit, where the campaign has none of its own.
+USUAL = {"rad/s": "rpm", "rad": "deg"}
+#: Powers of a thousand whose prefix everybody reads, and the units that are written with a prefix.
+PREFIXES = {-3: "n", -2: "u", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
+_PREFIXED = re.compile(r"(m|Pa|N|s|W|ohm)(?:\^([23]))?")
+#: Symbols in the long names of outputs, as mathtext.
+_MATHTEXT = {r"\bd_mu_(\w+)": r"$\\Delta\\mu_{\1}$", r"\bmu_(\w+)": r"$\\mu_{\1}$", r"\b([A-Za-z])_(\w+)": r"$\1_{\2}$"}
+
+
+class Quantity(NamedTuple):
+    """A symbol with the unit shown; a value in SI becomes ``value * factor + offset`` in that unit."""
+
+    symbol: str
+    unit: str
+    factor: float = 1.0
+    offset: float = 0.0
+
+    def of(self, values: Any) -> Any:
+        """Return values in SI in the unit shown."""
+        return values * self.factor + self.offset
+
+
+def chosen_units(groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
+    """Return the unit in which figures show every quantity of some series.
+
+    A parameter has the unit in which all campaigns write it. Other quantities have the SI unit with the prefix that
+    brings the largest value between 1 and 1000; temperatures are in degrees Celsius.
+    """
+    written = [written_units(str(data.attrs.get("campaign", ""))) for data in groups.values()]
+    found: dict[str, str] = {}
+    for name in dict.fromkeys(str(name) for data in groups.values() for name in data.variables):
+        arrays = [data[name] for data in groups.values() if name in data.variables]
+        units = {str(array.attrs.get("units", "1")) for array in arrays}
+        own = {units_of.get(name) for units_of in written}
+        if len(own) == 1 and None not in own:
+            found[name] = str(own.pop())
+        elif len(units) == 1:
+            found[name] = _readable(name, units.pop(), arrays)
+    return found
+
+
+def _readable(name: str, unit: str, arrays: list[xr.DataArray]) -> str:
+    if unit == "K" and name.endswith("temperature"):
+        return "degC"
+    match = _PREFIXED.fullmatch(unit)
+    if match is None:
+        return USUAL.get(unit, unit)
+    if any(array.dtype.kind not in "fiu" for array in arrays):
+        return unit
+    largest = max((float(abs(array).where(np.isfinite(array)).max()) for array in arrays if array.size), default=np.nan)
+    if not (np.isfinite(largest) and largest > 0):
+        return unit
+    power = int(match[2] or 1)
+    step = int(np.clip(np.floor(np.log10(largest) / (3 * power) + 1e-9), min(PREFIXES), max(PREFIXES)))
+    return f"{PREFIXES[step]}{unit}"
+
+
+def quantity(name: str, values: xr.DataArray) -> Quantity:
+    """Return how a parameter or an output is written.
+
+    Raises
+    ------
+    DataError
+        If it cannot be shown in the unit that was requested.
+    """
+    unit = str(values.attrs.get("units", "1"))
+    symbol = SYMBOLS.get(name) or (name.replace("_", " ") if name in values.coords else meaning(values, name))
+    wanted = page.current().unit(name)
+    if wanted is None or wanted == unit:
+        return Quantity(symbol, "" if unit == "1" else unit)
+    try:
+        factor, zero = conversion(wanted, unit)
+    except ValueError as error:
+        raise DataError(f"{name}: {error}, got {wanted!r}") from None
+    return Quantity(symbol, wanted, 1 / factor, -zero / factor)
+
+
+def meaning(values: xr.DataArray, name: str) -> str:
+    """Return the long name of an output without its explanation in brackets, symbols as mathtext."""
+    words = re.split(r"[;,] | \(", str(values.attrs.get("long_name", name.replace("_", " "))))[0]
+    for ascii_form, symbol in _MATHTEXT.items():
+        words = re.sub(ascii_form, symbol, words)
+    return words
+
+
+def shown(name: str, values: xr.DataArray) -> Any:
+    """Return values as an array in the unit that figures show; words as they are."""
+    if values.dtype.kind not in "fiu":
+        return values.values
+    return quantity(name, values).of(np.asarray(values.values, dtype=np.float64))
+
+
+def label(name: str, values: xr.DataArray) -> str:
+    """Return the label of an axis: ``normal force $F_N$ [N]``."""
+    how = quantity(name, values)
+    return with_unit(how.symbol, how.unit)
+
+
+def with_unit(symbol: str, unit: str) -> str:
+    """Return a label with its unit in square brackets."""
+    return f"{symbol} [{printed_unit(unit)}]" if unit and unit != "1" else symbol
+
+
+def printed_unit(unit: str) -> str:
+    """Return a unit as it is printed: raised powers, ``um`` as µm, ``degC`` as °C."""
+    unit = re.sub(r"\bu(?=(m|s|N|Pa|W|rad)\b)", "µ", unit)
+    unit = re.sub(r"\bpercent\b", "%", re.sub(r"\bdeg(?=C?\b)", "°", unit))
+    return re.sub(r"\^(-?\d+)", r"$^{\1}$", unit)
+
+
+def named(name: str, value: xr.DataArray) -> str:
+    """Return one value as legends and titles write it: ``$F_N$ = 1.5 N``."""
+    how, number = quantity(name, value), shown(name, value)
+    text = f"{float(number):.4g}" if value.dtype.kind in "fiu" else str(number[()])
+    symbol = how.symbol[how.symbol.index("$") :] if "$" in how.symbol else how.symbol
+    return f"{symbol} = {text} {printed_unit(how.unit)}".strip()
+
+
+def plain(text: str) -> str:
+    """Return a label without mathtext, in one line: ``F_N = 1 N``."""
+    return re.sub(r"[$\\]", "", text.replace("\\,", " ")).replace("#", "no. ").replace("\n", " ").strip()
+
+
+def is_geometric(values: Any) -> bool:
+    """Return whether numbers belong on a logarithmic axis: positive, and spread over more than a factor of ten."""
+    values = np.asarray(values, dtype=np.float64)
+    values = values[np.isfinite(values)]
+    return bool(values.size and values.min() > 0 and values.max() > 10 * values.min())

@@ -1,0 +1,400 @@
+"""Draw a figure with matplotlib: panels, legend, colour bars and title, without overlaps at any width.
+
+The height follows from the content unless it was requested. Legends and colour bars have a place of their own below or
+beside the panels; labels are broken into lines, and ticks are thinned out, where they would collide.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure as MplFigure
+
+from mdr_dask import store as stores
+from mdr_dask.errors import DataError
+from mdr_dask.plots import colours, page
+from mdr_dask.plots.figure import Axis, Bar, Figure, Key, Panel, Trace, edges
+from mdr_dask.version import __version__
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: Width of a panel on a screen in inches, alone and beside others; of a panel at a requested width, at least.
+ALONE, BESIDE, LEAST_PANEL = 6.4, 4.2, 2.2
+#: Least height of a panel in inches, and most panels in a row.
+LEAST_HEIGHT, MOST_COLUMNS = 1.3, 3
+#: Largest share of a requested height for the legend; entries beyond it are left out.
+LEGEND_SHARE = 0.35
+#: Least distance of the texts of two ticks, in points.
+GAP = 3
+#: Most lines of a title.
+MOST_LINES = 7
+#: Points of a curve from which on they have no markers.
+MANY_POINTS = 60
+#: Height in a panel of marks for cases without a value.
+FOOT = 0.02
+#: Dots per inch of a picture for a screen, and of one for print.
+DPI, PRINTED_DPI = 150, 300
+
+
+class Drawn(MplFigure):
+    """A figure of matplotlib with its description; a notebook shows it at the end of a cell."""
+
+    def __init__(self, description: Figure, **options: Any) -> None:
+        super().__init__(**options)
+        FigureCanvasAgg(self)
+        self.description = description
+        self.origin: Mapping[str, str] = {}
+
+    def _repr_png_(self) -> bytes:
+        stream = io.BytesIO()
+        self.savefig(stream, format="png")
+        return stream.getvalue()
+
+    def table(self) -> pd.DataFrame:
+        """Return all that is drawn: see `mdr_dask.plots.figure.Figure.table`."""
+        return self.description.table()
+
+    def save(self, path: str | Path) -> None:
+        """Write the figure, and its data beside it: ``mu.pdf`` and ``mu.csv``.
+
+        Raises
+        ------
+        DataError
+            If there is a table of that name that belongs to no figure.
+        """
+        beside = table_beside(path)
+        self.savefig(path, dpi=DPI if page.current().width is None else PRINTED_DPI)
+        with beside.open("w", encoding="utf-8", newline="") as stream:
+            stream.writelines(f"# {line}\n" for line in self.description.head(self.origin))
+            self.table().to_csv(stream, index=False, lineterminator="\n")
+
+
+def table_beside(path: str | Path) -> Path:
+    """Return the place of the table of a figure; DataError if there is a table that belongs to no figure."""
+    beside = Path(path).with_suffix(".csv")
+    if beside.exists() and not beside.read_bytes().startswith(b"# mdr_dask"):
+        raise DataError(f"{beside} exists and was not written beside a figure; choose another name for the figure")
+    return beside
+
+
+def provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:
+    """Return the origin of a figure that a command drew, for its table."""
+    origin = {"mdr_dask": f"{__version__}, figure {name}", "command": command}
+    return origin | {f"store {url}": _campaign_of(stores.attributes(url)) for url in urls}
+
+
+def origin_of(name: str, groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
+    """Return the origin of a figure that was drawn from Python, for its table."""
+    campaigns = dict.fromkeys(_campaign_of(data.attrs) for data in groups.values())
+    return {"mdr_dask": f"{__version__}, figure {name}", "study": "; ".join(campaigns)}
+
+
+def _campaign_of(held: Mapping[Any, Any]) -> str:
+    title, text, model, version = (str(held.get(key)) for key in ("title", "campaign", "model", "model_version"))
+    digest, computed = hashlib.sha256(text.encode()).hexdigest(), held.get("versions", {}).get("mdr_dask")
+    return f"campaign {title}, sha256 {digest}, model {model} version {version}, computed by mdr_dask {computed}"
+
+
+def render(description: Figure) -> Drawn:
+    """Return the figure of matplotlib."""
+    panels, asked = description.panels, page.current()
+    columns = _columns(description)
+    rows = -(-len(panels) // columns)
+    width = asked.width or (ALONE if columns == 1 else BESIDE * columns)
+    height = rows * max(LEAST_HEIGHT, description.ratio * width / columns)
+    figure = Drawn(description, figsize=(width, asked.height or height), layout="constrained")
+    figure.get_layout_engine().set(w_pad=0.03, h_pad=0.03)  # type: ignore[union-attr]
+    places = _axes(figure, description, rows, columns)
+    for axes, panel in zip(places, panels, strict=True):
+        _draw_panel(axes, panel)
+    _bars(figure, places, panels)
+    _title(figure, description)
+    legend = _legend(figure, places, panels)
+    if asked.height is None:
+        figure.set_size_inches(width, height + legend + _height_of_title(figure))
+    _fit(figure, places)
+    return figure
+
+
+def _columns(description: Figure) -> int:
+    asked, count = page.current(), len(description.panels)
+    free = MOST_COLUMNS if asked.width is None else max(1, min(MOST_COLUMNS, int(asked.width / LEAST_PANEL)))
+    wanted = description.columns or (2 if count == 4 else free)
+    return max(1, min(wanted, free, count))
+
+
+def _axes(figure: Drawn, description: Figure, rows: int, columns: int) -> list[Axes]:
+    """Return the axes of all panels, the last row filled up with nothing."""
+    count = len(description.panels)
+    grid = list(figure.subplots(rows, columns, squeeze=False, sharey=description.share_y).ravel())
+    for unused in grid[count:]:
+        unused.remove()
+    return grid[:count]
+
+
+def _draw_panel(axes: Axes, panel: Panel) -> None:
+    for name, axis in (("x", panel.x), ("y", panel.y)):
+        getattr(axes, f"set_{name}label")(axis.label)
+        if axis.log:
+            getattr(axes, f"set_{name}scale")("log")
+    for trace in panel.traces:
+        _DRAW[trace.kind](axes, trace, panel)
+    for name, axis in (("x", panel.x), ("y", panel.y)):
+        _finish_axis(axes, name, axis)
+    if panel.title:
+        axes.set_title(panel.title)
+
+
+def _finish_axis(axes: Axes, name: str, axis: Axis) -> None:
+    if axis.low is not None or axis.high is not None:
+        getattr(axes, f"set_{name}lim")(axis.low, axis.high)
+    if axis.reverse:
+        getattr(axes, f"invert_{name}axis")()
+    if axis.ticks:
+        getattr(axes, f"set_{name}ticks")([place for place, _ in axis.ticks], [text for _, text in axis.ticks])
+    elif axis.log:
+        _log_ticks(getattr(axes, f"{name}axis"))
+
+
+def _log_ticks(axis: Any) -> None:
+    """Put ticks with plain numbers at 1, 2 and 5 times powers of ten on an axis of less than two decades."""
+    from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter
+
+    low, high = sorted(np.abs(axis.get_view_interval()))
+    axis.set_minor_formatter(NullFormatter())
+    if not 0 < high < 100 * low:
+        axis.set_major_locator(LogLocator(numticks=8))
+        return
+    decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
+    ticks = np.sort(np.ravel(decades[:, None] * np.array([1, 2, 5])))
+    ticks = ticks[(ticks >= low) & (ticks <= high)]
+    if ticks.size < 2:
+        ticks = np.array(MaxNLocator(4).tick_values(low, high))
+        ticks = ticks[(ticks >= low) & (ticks <= high)]
+    axis.set_major_locator(FixedLocator(ticks.tolist()))
+    axis.set_major_formatter(lambda value, _: f"{value:.4g}")
+
+
+def _curve(axes: Axes, trace: Trace, _: Panel) -> None:
+    x, y = trace.column("x"), trace.column("y")
+    order = np.argsort(x, kind="stable") if trace.line and trace.kind == "curve" else np.arange(x.size)
+    marker = trace.marker if y.size < MANY_POINTS or not trace.line else ""
+    look: dict[str, Any] = {"color": trace.colour, "linestyle": trace.line or "none", "marker": marker}
+    if trace.kind == "law":
+        look["linewidth"] = 0.8 * mpl.rcParams["lines.linewidth"]
+    axes.plot(x[order], y[order], gid=trace.kind, zorder=2 if trace.kind == "law" else 2.5, **look)
+    ends = [trace.column(f"y_{end}") for end in ("low", "high") if f"y_{end}" in trace.data]
+    along = [trace.column(f"x_{end}") for end in ("low", "high") if f"x_{end}" in trace.data]
+    if len(ends) == 2 and trace.line and not trace.bars:
+        axes.fill_between(x[order], ends[0][order], ends[1][order], color=trace.colour, alpha=0.25, linewidth=0)
+        ends = []
+    if len(ends) == 2 or len(along) == 2:
+        lengths = {"yerr": _lengths(y, *ends)} if len(ends) == 2 else {}
+        lengths |= {"xerr": _lengths(x, *along)} if len(along) == 2 else {}
+        axes.errorbar(x, y, fmt="none", ecolor=trace.colour, elinewidth=0.8, capsize=2, **lengths)
+
+
+def _lengths(value: Any, low: Any, high: Any) -> Any:
+    """Return the lengths of bars down and up, 0 where they are unknown."""
+    return np.nan_to_num(np.clip([value - low, high - value], 0, None), nan=0.0, posinf=0.0)
+
+
+def _band(axes: Axes, trace: Trace, _: Panel) -> None:
+    x, low, high = (trace.column(name) for name in ("x", "y_low", "y_high"))
+    axes.fill_between(x, low, high, color=trace.colour, alpha=0.25, linewidth=0, gid=trace.kind)
+
+
+def _dots(axes: Axes, trace: Trace, panel: Panel) -> None:
+    x, y, value = (trace.column(name) for name in ("x", "y", "value"))
+    if "y_low" in trace.data:
+        lengths = _lengths(y, trace.column("y_low"), trace.column("y_high"))
+        axes.errorbar(x, y, lengths, fmt="none", ecolor="0.7", elinewidth=0.8, capsize=2)
+    how, norm = colours.scale(panel.bar or colours.bar("", value))
+    known = np.isfinite(value) & np.isfinite(y)
+    axes.scatter(x[known], y[known], c=value[known], s=16, cmap=how, norm=norm, zorder=3, gid=trace.kind)
+
+
+def _map(axes: Axes, trace: Trace, panel: Panel) -> None:
+    x, y, value = (trace.column(name) for name in ("x", "y", "value"))
+    columns, rows = np.unique(x), np.unique(y)
+    cells = np.full((rows.size, columns.size), np.nan)
+    cells[np.searchsorted(rows, y), np.searchsorted(columns, x)] = value
+    how, norm = colours.scale(panel.bar or colours.bar("", value))
+    ends = edges(columns, panel.x.log), edges(rows, panel.y.log)
+    axes.pcolormesh(*ends, cells, cmap=how, norm=norm, rasterized=True, gid=trace.kind)
+
+
+def _absent(axes: Axes, trace: Trace, _: Panel) -> None:
+    x = trace.column("x")
+    place = np.full(x.size, FOOT)
+    look = {"color": trace.colour, "marker": trace.marker, "linestyle": "none"}
+    axes.plot(x, place, transform=axes.get_xaxis_transform(), zorder=4, gid=trace.kind, **look)
+
+
+_DRAW = {"curve": _curve, "law": _curve, "band": _band, "dots": _dots, "map": _map, "absent": _absent}
+
+
+def _bars(figure: Drawn, places: list[Axes], panels: list[Panel]) -> None:
+    """Draw the colour bars: one for all panels where it is the same."""
+    from matplotlib.cm import ScalarMappable
+
+    beside: dict[Bar, list[Axes]] = {}
+    for axes, panel in zip(places, panels, strict=True):
+        if panel.bar:
+            beside.setdefault(panel.bar, []).append(axes)
+    for bar, where in beside.items():
+        how, norm = colours.scale(bar)
+        drawn = figure.colorbar(ScalarMappable(norm, how), ax=where, aspect=30 if len(where) > 1 else 20)
+        drawn.set_label(bar.label)
+        if bar.log:
+            _log_ticks(drawn.ax.yaxis)
+
+
+def _title(figure: Drawn, description: Figure) -> None:
+    asked = page.current()
+    if asked.title is not None:
+        lines = [asked.title] if asked.title else []
+    elif asked.width is not None:
+        lines = []
+    else:
+        left_out = f"not drawn: {'; '.join(description.left_out)}" if description.left_out else ""
+        lines = [part for part in (description.subject, description.fixed, description.bars, left_out) if part]
+    if not lines:
+        return
+    size = mpl.rcParams["axes.titlesize" if len(lines) == 1 else "legend.fontsize"]
+    broken = "\n".join(_broken(figure, line, 0.97 * figure.get_figwidth(), size) for line in lines).split("\n")
+    if len(broken) > MOST_LINES:
+        broken = [*broken[: MOST_LINES - 1], "more: see the table beside the figure"]
+    figure.suptitle("\n".join(broken), fontsize=size)
+
+
+def _height_of_title(figure: Drawn) -> float:
+    text = figure.get_suptitle()
+    return 1.3 / 72 * float(mpl.rcParams["font.size"]) * (text.count("\n") + 1) if text else 0.0
+
+
+def _width_of(figure: Drawn, text: str, size: Any) -> float:
+    """Return the printed width of a line in inches."""
+    from matplotlib.font_manager import FontProperties
+
+    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    font = FontProperties(size=size)
+    width: float = renderer.get_text_width_height_descent(text, font, ismath="$" in text)[0]
+    return width / figure.dpi
+
+
+def _broken(figure: Drawn, text: str, width: float, size: Any) -> str:
+    """Return a text in lines of at most so many inches; a value is not parted from its symbol and its unit."""
+    joined = text.replace(" = ", "\u00a0=\u00a0")
+    lines: list[str] = []
+    for word in joined.split(" "):
+        longer = f"{lines[-1]} {word}" if lines else word
+        whole = longer.count("$") % 2 == 0 and _width_of(figure, longer, size) > width and bool(lines)
+        if whole and lines[-1].count("$") % 2 == 0:
+            lines.append(word)
+        else:
+            lines[-1:] = [longer]
+    return "\n".join(lines).replace("\u00a0", " ")
+
+
+def _legend(figure: Drawn, places: list[Axes], panels: list[Panel]) -> float:
+    """Draw one legend below all panels, and return its height in inches.
+
+    Panels whose entries contradict each other have legends of their own, in the panel.
+    """
+    entries = {axes: panel.entries() for axes, panel in zip(places, panels, strict=True)}
+    every = list(dict.fromkeys(key for keys in entries.values() for key in keys))
+    looks: dict[tuple[str, str, str], str] = {}
+    alike = all(looks.setdefault((k.colour, k.line, k.marker), k.label) == k.label for k in every)
+    if alike and every:
+        return _legend_below(figure, every)
+    for axes, keys in entries.items():
+        if keys:
+            axes.legend(handles=[_handle(key) for key in keys], loc="best", framealpha=0.7)
+    return 0.0
+
+
+def _handle(key: Key) -> Any:
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], color=key.colour, linestyle=key.line or "none", marker=key.marker or "none", label=key.label)
+
+
+def _legend_below(figure: Drawn, keys: list[Key]) -> float:
+    """Draw a legend with as many columns as fit; with a requested height, leave out entries that do not fit."""
+    width, height = figure.get_size_inches()
+    size = mpl.rcParams["legend.fontsize"]
+    kept = [Key(_broken(figure, k.label, 0.8 * width, size), k.colour, k.line, k.marker) for k in keys]
+    while True:
+        rest = len(keys) - len(kept)
+        handles = [_handle(key) for key in kept]
+        handles += [_handle(Key(f"and {rest} more, see the table", "none"))] if rest else []
+        for columns in range(min(len(handles), 6), 0, -1):
+            legend = figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False)
+            extent = legend.get_window_extent(figure.canvas.get_renderer())  # type: ignore[attr-defined]
+            if extent.width <= width * figure.dpi or columns == 1:
+                break
+            legend.remove()
+        used = float(extent.height / figure.dpi)
+        if page.current().height is None or used <= LEGEND_SHARE * height or len(kept) <= 1:
+            return used
+        legend.remove()
+        kept = kept[: len(kept) // 2]
+
+
+def _fit(figure: Drawn, places: list[Axes]) -> None:
+    """Break labels into lines that are no longer than their axes, and thin out ticks that collide."""
+    for _ in range(2):
+        figure.draw_without_rendering()
+        changed = False
+        for axes in figure.axes:
+            box = axes.get_window_extent()
+            for name, length in (("x", box.width), ("y", box.height)):
+                axis = getattr(axes, f"{name}axis")
+                text = axis.get_label_text().replace("\n", " ")
+                room = 1.15 * length / figure.dpi if axes in places else 0.95 * length / figure.dpi
+                broken = _broken(figure, text, room, axis.label.get_fontsize())
+                if broken != axis.get_label_text():
+                    axis.set_label_text(broken)
+                    changed = True
+                changed |= _thin(figure, axis, name)
+            if axes.get_title():
+                title = _broken(figure, axes.get_title().replace("\n", " "), box.width / figure.dpi, axes.title.get_fontsize())
+                changed |= title != axes.get_title()
+                axes.set_title(title)
+        if not changed:
+            return
+
+
+def _thin(figure: Drawn, axis: Any, name: str) -> bool:
+    """Keep every second tick of an axis until their texts do not touch; return whether any was left out."""
+    from matplotlib.ticker import FixedLocator, FuncFormatter
+
+    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    low, high = sorted(axis.get_view_interval())
+    inside = [tick for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high]
+    texts = {t.get_loc(): text for t in inside for text in (t.label1, t.label2) if text.get_visible() and text.get_text()}
+    boxes = [text.get_window_extent(renderer) for text in texts.values()]
+    ends = [(box.x0, box.x1) if name == "x" else (box.y0, box.y1) for box in boxes]
+    gap = GAP / 72 * figure.dpi if name == "x" else 0.0
+    step = 1
+    while len(ends[::step]) > 2 and any(
+        one[1] + gap > two[0] for one, two in zip(sorted(ends[::step])[:-1], sorted(ends[::step])[1:], strict=True)
+    ):
+        step += 1
+    if step == 1:
+        return False
+    kept = {place: text.get_text() for place, text in [*texts.items()][::step]}
+    axis.set_major_locator(FixedLocator(list(kept)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: kept.get(value, "")))
+    return True

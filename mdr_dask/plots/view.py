@@ -1,0 +1,451 @@
+"""Any output of any model against its parameters: curves, maps, and main effects.
+
+A `View` says what is shown, and `draw` makes the figure of it.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from mdr_dask import aggregation
+from mdr_dask.errors import DataError, did_you_mean
+from mdr_dask.models.base import Status
+from mdr_dask.plots import colours, curves, labels, laws
+from mdr_dask.plots.base import Plot
+from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
+
+#: Most panels of one figure, and most letters in a line of a word at a tick.
+MOST_PANELS, LONGEST_WORD = 6, 20
+#: Main effects of a sampled study: cases in a bin, most bins, most parameters, and most cases that are drawn as points.
+IN_A_BIN, MOST_BINS, MOST_EFFECTS, MOST_POINTS = 8, 10, 12, 5000
+#: Marks for cases without a value.
+MARKS = {
+    Status.FAILED: ("x", "failed"),
+    Status.NOT_CONVERGED: ("+", "did not converge"),
+    Status.MISSING: ("1", "missing"),
+}
+
+
+@dataclass(frozen=True)
+class View:
+    """What a figure of outputs shows.
+
+    Parameters
+    ----------
+    outputs : str or tuple of str
+        Outputs, or errors beside them; several have panels one above the other.
+    over : str or tuple of str
+        The parameter on the horizontal axis; two for a map, none for the main effects of all parameters.
+    by : str
+        The parameter of the colours.
+    panels : str
+        The parameter that panels differ in.
+    log : str, optional
+        Which axes are logarithmic, of ``x``, ``y`` and ``z`` (colours). By default, those whose numbers are positive
+        and spread over more than a factor of ten.
+    guides : mapping of str to mapping of float to str
+        Horizontal lines in the panels of an output, with their names.
+    """
+
+    outputs: str | tuple[str, ...]
+    over: str | tuple[str, ...] = ()
+    by: str = ""
+    panels: str = ""
+    log: str | None = None
+    guides: Mapping[str, Mapping[float, str]] = field(default_factory=dict)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The outputs."""
+        return (self.outputs,) if isinstance(self.outputs, str) else tuple(self.outputs)
+
+    @property
+    def along(self) -> tuple[str, ...]:
+        """The parameters on the axes."""
+        return (self.over,) if isinstance(self.over, str) else tuple(self.over)
+
+    def is_log(self, which: str, values: Any) -> bool:
+        """Return whether an axis is logarithmic."""
+        values = np.asarray(values, dtype=np.float64)
+        positive = bool((values[np.isfinite(values)] > 0).all())
+        return labels.is_geometric(values) if self.log is None else which in self.log and positive
+
+
+class _Part(NamedTuple):
+    """The series in one panel, by name, and the title of the panel."""
+
+    title: str
+    series: dict[str, xr.Dataset]
+
+
+def figure_of(view: View) -> Plot:
+    """Return the figure of a view, with the output's name."""
+    over = " and ".join(view.along) or "every parameter that varies"
+    return Plot(view.names[0], (), f"{view.names[0]} against {over}", lambda groups: draw(groups, view))
+
+
+def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
+    """Return the figure of one output or several, one above the other.
+
+    Raises
+    ------
+    DataError
+        If no series can be drawn as requested, with the reason of each.
+    """
+    figures, shown, reasons = [], [], []
+    for view, output in ((view, output) for view in views for output in view.names):
+        found, why = _holding(groups, view, output)
+        reasons += why
+        if found:
+            form = {0: _effects, 1: _lines, 2: _map}[len(view.along)]
+            figures.append(form(found, view, output))
+            shown.append((view, output, found))
+    if not figures:
+        raise DataError("; ".join(dict.fromkeys(reasons)))
+    whole = figures[0]
+    whole.subject = _subject(*shown[0], len(figures) - 1)
+    if len(figures) > 1:
+        whole.columns = len(whole.panels)
+        whole.panels = [panel for figure in figures for panel in figure.panels]
+        whole.ratio, whole.share_y = 0.45, False
+    whole.leave_out([sentence for figure in figures for sentence in figure.left_out])
+    whole.leave_out(reasons)
+    return whole
+
+
+def _holding(groups: Mapping[str, xr.Dataset], view: View, output: str) -> tuple[dict[str, xr.Dataset], list[str]]:
+    """Return the series that hold an output and vary along what is named, and the reasons of the others."""
+    known = sorted({str(name) for data in groups.values() for name in data.data_vars if name != "status"})
+    if output not in known:
+        return {}, [f"{output} is not an output of this study{did_you_mean(output, known)}"]
+    found, reasons = {}, []
+    for name, data in groups.items():
+        reason = _unfit(data, view, output) if output in data else f"it does not hold {output}"
+        if reason:
+            reasons.append(f"series {name}: {reason}" if name and len(groups) > 1 else reason)
+        else:
+            found[name] = data
+    return found, reasons
+
+
+def _unfit(data: xr.Dataset, view: View, output: str) -> str:
+    """Return why a series cannot be drawn as requested; nothing if it can."""
+    own = [str(dim) for dim in data[output].dims if dim not in (*curves.axes_of(data, output), "realisation")]
+    known = [*_varied(data, output), *own]
+    for name in (*view.along, view.by, view.panels):
+        if name and name not in known:
+            fixed = name in data.coords and data[name].ndim == 0
+            hint = f"no axis {name!r}{did_you_mean(name, known)}"
+            at = f"{name} is fixed, {labels.plain(labels.named(name, data[name]))}" if fixed else hint
+            return f"{at}; {output} varies along {', '.join(known) or 'nothing'}"
+    if rest := [dim for dim in own if dim not in view.along]:
+        return f"{output} varies along {rest[0]}: --over {rest[0]}, or --select {rest[0]}=VALUE"
+    dims = [(name, curves.along_dim(data, name, output)) for name in (*view.along, view.by, view.panels) if name]
+    if view.panels and _is_sampled(data, dims[-1][1]):
+        return f"every case of a sampled study has another {view.panels}: --by {view.panels} gives it colours"
+    for name, dim in dims:
+        if [each for _, each in dims].count(dim) > 1 and not _is_sampled(data, dim):
+            return f"{name} is requested twice: curves, panels and axes need different parameters"
+    return ""
+
+
+def _varied(data: xr.Dataset, output: str) -> list[str]:
+    return [name for dim in curves.axes_of(data, output) for name in curves.parameters_along(data, dim)]
+
+
+def _is_sampled(data: xr.Dataset, dim: str | None) -> bool:
+    """Return whether several parameters change together along a dimension."""
+    return dim is not None and len(curves.parameters_along(data, dim)) > 1
+
+
+def _subject(view: View, output: str, found: Mapping[str, xr.Dataset], more: int) -> str:
+    several = f" and {more} more output{'s' * (more > 1)}" if more else ""
+    along = " and ".join(name.replace("_", " ") for name in view.along) or "every parameter that varies"
+    series = f", series {next(iter(found))}" if len(found) == 1 and next(iter(found)) else ""
+    return f"{labels.quantity(output, next(iter(found.values()))[output]).symbol}{several} against {along}{series}"
+
+
+def _places(data: xr.Dataset, name: str) -> xr.DataArray:
+    """Return places along an axis: numbers in the unit shown, or consecutive numbers for words."""
+    values = data[name]
+    shown = labels.shown(name, values) if values.dtype.kind in "fiu" else np.arange(values.size)
+    return xr.DataArray(shown, dims=values.dims)
+
+
+def _axis(name: str, arrays: list[xr.DataArray], view: View, which: str) -> Axis:
+    """Return the axis of a parameter: with its scale, or with words in place of numbers."""
+    first = arrays[0]
+    own = name in curves.OWN and first.attrs.get("units", "1") == "1"
+    label = labels.SYMBOLS.get(name) or labels.meaning(first, name) if own else labels.label(name, first)
+    if first.dtype.kind not in "fiu":
+        words = [textwrap.fill(str(word), LONGEST_WORD) for word in np.atleast_1d(first.values)]
+        return Axis(label, ticks=[*enumerate(words)])
+    every = np.concatenate([np.ravel(labels.shown(name, each)) for each in arrays])
+    return Axis(label, log=view.is_log(which, every), quantity=name)
+
+
+# curves
+
+
+def _lines(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
+    """Draw an output against one parameter."""
+    along = view.along[0]
+    parts, left_out = _parts(found, view, output)
+    x = _axis(along, [data[along] for data in found.values()], view, "x")
+    families = [{name: curves.family(data, output, along, view.by) for name, data in p.series.items()} for p in parts]
+    panels = [_panel(part, each, view, output, x) for part, each in zip(parts, families, strict=True)]
+    log = view.is_log("y", np.concatenate([_values(panel) for panel in panels]))
+    first = next(iter(found.values()))
+    y = Axis(labels.label(output, first[output]), log, quantity=output)
+    for panel in panels:
+        panel.y = y
+        panel.traces += _guides(view.guides.get(output, {}), panel)
+    every = [one for part in families for one in part.values()]
+    figure = Figure(panels, "", share_y=len(panels) > 1)
+    figure.fixed = curves.fixed_text(curves.fixed_by_all([one.held for one in every]), first)
+    figure.bars = curves.meaning_of_bars(found.values(), [output])
+    figure.leave_out([*left_out, *(sentence for one in every for sentence in one.left_out)])
+    return figure
+
+
+def _values(panel: Panel) -> np.ndarray:
+    drawn = [trace.column("y") for trace in panel.traces if trace.kind in ("curve", "dots") and trace.what == "data"]
+    return np.concatenate(drawn) if drawn else np.array([])
+
+
+def _guides(levels: Mapping[float, str], panel: Panel) -> list[Trace]:
+    across = [trace.column("x") for trace in panel.traces if trace.what == "data"]
+    if not across:
+        return []
+    ends = np.array([np.nanmin(np.concatenate(across)), np.nanmax(np.concatenate(across))])
+    found = []
+    for k, (level, name) in enumerate(levels.items()):
+        line = colours.LINES[1 + k % 3]
+        panel.keys.append(Key(name, "#808080", line))
+        found.append(Trace("law", columns(x=ends, y=np.full(2, level)), name, name, "#808080", line))
+    return found
+
+
+def _parts(found: Mapping[str, xr.Dataset], view: View, output: str) -> tuple[list[_Part], list[str]]:
+    """Return what each panel shows: a value of a parameter, all series, or one series where all are too many curves."""
+    if view.panels:
+        return _by_value(found, view)
+    count = sum(len(curves.family(data, output, view.along[0], view.by).curves) for data in found.values())
+    if len(found) > 1 and count > colours.most():
+        return _by_series(found)
+    return [_Part("", dict(found))], []
+
+
+def _by_value(found: Mapping[str, xr.Dataset], view: View) -> tuple[list[_Part], list[str]]:
+    parts: dict[Any, _Part] = {}
+    for name, data in found.items():
+        for k in range(data.sizes[view.panels]):
+            part = data.isel({view.panels: k})
+            title = labels.named(view.panels, part[view.panels])
+            parts.setdefault(part[view.panels].item(), _Part(title, {})).series[name] = part
+    keys = sorted(parts)
+    kept = np.unique(np.linspace(0, len(keys) - 1, min(len(keys), MOST_PANELS)).round().astype(int))
+    left_out = f"{len(keys) - kept.size} of {len(keys)} values of {view.panels} ({kept.size} drawn, spread evenly)"
+    return [parts[keys[k]] for k in kept], [left_out] if kept.size < len(keys) else []
+
+
+def _by_series(found: Mapping[str, xr.Dataset]) -> tuple[list[_Part], list[str]]:
+    names = list(found)
+    rest = [f"series {', '.join(names[MOST_PANELS:])}"] if len(names) > MOST_PANELS else []
+    title = "series {}" if len(names) > 1 else ""
+    return [_Part(title.format(name), {name: found[name]}) for name in names[:MOST_PANELS]], rest
+
+
+def _panel(part: _Part, families: Mapping[str, curves.Family], view: View, output: str, x: Axis) -> Panel:
+    """Draw the curves of all series of a panel with their laws, and mark the cases without a value."""
+    panel = Panel(x, Axis(""), title=part.title)
+    along, marked, law_name = view.along[0], {}, ""
+    several_styles = any(one.bar or len({curve.line for curve in one.curves}) > 1 for one in families.values())
+    for curve, one in _coloured(families):
+        data = curve.data
+        place, value = _places(data, along), curves.mean(data, output)
+        shades = data[view.by] if view.by in data.coords and data[view.by].ndim else None
+        if shades is not None and shades.dtype.kind in "fiu":
+            shown = labels.shown(view.by, shades)
+            panel.bar = colours.bar(labels.label(view.by, shades), shown)
+            panel.traces.append(Trace("dots", columns(data, x=place, y=value, value=shown), label=curve.label))
+        else:
+            points = columns(data, x=place, y=value)
+            look = {"colour": curve.colour, "line": curve.line, "marker": curve.marker}
+            panel.traces.append(Trace("curve", points, label=curve.label, bars=not curve.line, **look))
+        panel.traces += _absent(curve, place, output, marked)
+        if curve.line and not several_styles and (law := laws.law_of(data, output)):
+            panel.traces.append(_law(curve, law, along, output))
+            law_name = law.name
+        panel.bar = panel.bar or one.bar
+    panel.keys = _keys(families)
+    if law_name:
+        panel.keys.append(Key(law_name, "#000000", "--"))
+    panel.keys += [Key(name, "#404040", "", mark) for name, mark in marked.items()]
+    varying = dict.fromkeys(name.replace("_", " ") for one in families.values() for name in one.varying)
+    if varying:
+        panel.keys.append(Key(f"varying too: {', '.join(varying)}", "none"))
+    return panel
+
+
+def _coloured(families: Mapping[str, curves.Family]) -> list[tuple[curves.Curve, curves.Family]]:
+    """Return the curves of a panel with their family; several series have colours and markers of their own."""
+    every = [(name, curve, one) for name, one in families.items() for curve in one.curves]
+    if len(families) == 1:
+        return [(curve, one) for _, curve, one in every]
+    if len(every) > colours.most():
+        raise DataError(
+            f"expected at most {colours.most()} curves of several series in a panel, got {len(every)}: "
+            "--select fewer, or leave --panels out"
+        )
+    markers = dict(zip(families, colours.MARKERS * len(families), strict=False))
+    found = []
+    for k, (name, curve, one) in enumerate(every):
+        label = ", ".join(part for part in (name, curve.label) if part)
+        line = colours.line_and_marker(k)[0] if curve.line else ""
+        found.append((curves.Curve(curve.data, label, colours.colour(k), line, markers[name]), one))
+    return found
+
+
+def _keys(families: Mapping[str, curves.Family]) -> list[Key]:
+    if len(families) == 1:
+        return list(next(iter(families.values())).keys)
+    return [Key(c.label, c.colour, c.line, c.marker) for c, _ in _coloured(families) if c.label]
+
+
+def _law(curve: curves.Curve, law: laws.Law, along: str, output: str) -> Trace:
+    fine = laws.along(curve.data, along)
+    value = labels.quantity(output, curve.data[output]).of(law.value(fine))
+    label = ", ".join(part for part in (law.name, curve.label) if part)
+    data = columns(fine, x=_places(fine, along), y=value)
+    return Trace("law", data, law.name, label, curve.colour, "--")
+
+
+def _absent(curve: curves.Curve, x: xr.DataArray, output: str, marked: dict[str, str]) -> list[Trace]:
+    """Return marks at the foot of a panel where no realisation has a value, with the reason."""
+    data = curve.data
+    if "status" not in data:
+        return []
+    found = []
+    rest = data[output].isnull().all("realisation")
+    for state, (mark, reason) in MARKS.items():
+        here = rest & (data["status"] == state.value).any("realisation")
+        rest = rest & ~here
+        if bool(here.any()):
+            place = np.flatnonzero(np.atleast_1d(here.values))
+            part = data.isel({here.dims[0]: place}) if here.ndim else data
+            at = columns(part, x=x.isel({x.dims[0]: place}) if x.ndim and here.ndim else x)
+            found.append(Trace("absent", at, reason, curve.label, curve.colour, "", mark))
+            marked[reason] = mark
+    return found
+
+
+# maps
+
+
+def _map(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
+    """Draw an output against two parameters: the cells of a grid, or the cases of a sampled study as points."""
+    if view.by or (view.panels and len(found) > 1):
+        raise DataError("expected a map of one series, without --by: the colours are the values")
+    parts, left_out = _by_value(found, view) if view.panels else _by_series(found)
+    drawn = []
+    for part in parts:
+        ((_, data),) = part.series.items()
+        shown_along = {curves.along_dim(data, name, output) for name in view.along}
+        data, sentences = curves.hold(data, [dim for dim in curves.axes_of(data, output) if dim not in shown_along])
+        left_out += sentences
+        drawn.append((part.title, data, curves.mean(data, output)))
+    every = np.concatenate([np.ravel(value.value) for _, _, value in drawn])
+    if not np.isfinite(every).any():
+        raise DataError(f"expected {output} of some case, got none that succeeded")
+    bar = colours.bar(labels.label(output, drawn[0][1][output]), every, None if view.log is None else "z" in view.log)
+    panels = []
+    for title, data, value in drawn:
+        x, y = (_places(data, name) for name in view.along)
+        points = columns(data, value=Mean(*(xr.broadcast(part, x, y)[0] for part in value)), x=x, y=y)
+        trace = Trace("dots" if x.dims == y.dims else "map", points)
+        across, up = (_axis(name, [data[name]], view, which) for name, which in zip(view.along, "xy", strict=True))
+        panels.append(Panel(across, up, [trace], title, bar, _crossed_out(trace)))
+        if panels[-1].keys:
+            at = ~np.isfinite(trace.column("value"))
+            missing = columns(x=trace.column("x")[at], y=trace.column("y")[at])
+            panels[-1].traces.append(Trace("curve", missing, "no value", "no value", "#606060", "", "x"))
+    figure = Figure(panels, "", share_y=len(panels) > 1)
+    figure.fixed = curves.fixed_text(curves.fixed_by_all([curves.scalars(data) for _, data, _ in drawn]), drawn[0][1])
+    half = np.concatenate([np.ravel(value.high - value.low) / 2 for _, _, value in drawn])
+    unit = labels.printed_unit(labels.quantity(output, drawn[0][1][output]).unit)
+    if np.isfinite(half).any() and np.nanmax(half) > 1e-12 * np.nanmax(abs(every)):
+        figure.bars = f"95 % intervals: at most ±{np.nanmax(half):.2g} {unit}".rstrip()
+    figure.leave_out(left_out)
+    return figure
+
+
+def _crossed_out(trace: Trace) -> list[Key]:
+    return [] if np.isfinite(trace.column("value")).all() else [Key("no value", "#606060", "", "x")]
+
+
+# main effects
+
+
+def _effects(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
+    """Draw the mean of an output against every parameter of a series in turn, over all others."""
+    if len(found) > 1 or view.by or view.panels:
+        raise DataError(
+            f"expected one series, without --by and --panels, got {', '.join(found)}: effects fill a figure"
+        )
+    ((_, data),) = found.items()
+    names = _varied(data, output)
+    if not names:
+        raise DataError(f"{output} varies along nothing: it has no effects")
+    how = labels.quantity(output, data[output])
+    cases = how.of(aggregation.mean(data[output]))
+    y = Axis(labels.with_unit(how.symbol, how.unit), view.is_log("y", cases), quantity=output)
+    panels = []
+    for name in names[:MOST_EFFECTS]:
+        dim = curves.along_dim(data, name, output) or name
+        panel = Panel(_axis(name, [data[name]], view, "x"), y)
+        if cases.size <= MOST_POINTS:
+            x, y_of = xr.broadcast(_places(data, name), cases)
+            one = Trace("curve", columns(data, x=x, y=y_of), label="one case", colour="#b0b0b0", marker=".")
+            panel.traces.append(one)
+        x_of, value = _bins(data, output, name, dim) if _is_sampled(data, dim) else _means(data, output, name)
+        shown = columns(x=x_of, y=Mean(*map(how.of, value)))
+        label = "mean over all other parameters, 95 % interval"
+        panel.traces.append(Trace("curve", shown, "mean", label, colours.colour(0), "-", "o", bars=True))
+        panels.append(panel)
+    figure = Figure(panels, "", share_y=True)
+    figure.fixed = curves.fixed_text(curves.scalars(data), data)
+    figure.leave_out([", ".join(names[MOST_EFFECTS:])])
+    figure.leave_out([f"the {cases.size} cases themselves"] if cases.size > MOST_POINTS else [])
+    return figure
+
+
+def _means(data: xr.Dataset, output: str, name: str) -> tuple[xr.DataArray, Mean]:
+    """Return the mean over all other axes at every value of one."""
+    rest = [dim for dim in curves.axes_of(data, output) if dim != name]
+    error = aggregation.companion(data, output)
+    pair = data[output].mean(rest), None if error is None else abs(error).mean(rest)
+    return _places(data, name), Mean(*aggregation.mean_and_ends(*pair))
+
+
+def _bins(data: xr.Dataset, output: str, name: str, dim: str) -> tuple[xr.DataArray, Mean]:
+    """Return the mean of groups of cases, in the order of one parameter of a sampled study."""
+    cases = aggregation.mean(data[output])
+    cases = cases.mean([each for each in cases.dims if each != dim]).dropna(dim)
+    if not cases.size:
+        raise DataError(f"expected {output} of some case, got none that succeeded")
+    order = np.argsort(cases[name].values, kind="stable")
+    count = int(np.clip(cases.size // IN_A_BIN, 1, MOST_BINS))
+    groups = [cases.isel({dim: part}) for part in np.array_split(order, count)]
+    across = [float(_places(group.to_dataset(name=output), name).mean()) for group in groups]
+    means = [
+        aggregation.mean_and_ends(group.rename({dim: "realisation"}).reset_coords(drop=True), None) for group in groups
+    ]
+    joined = Mean(*(xr.concat(ends, "bin") for ends in zip(*means, strict=True)))
+    return xr.DataArray(across, dims="bin"), joined
