@@ -278,7 +278,7 @@ def plot(study: Study, figure: str, select: Words = (), **view: Any) -> Figure:
         Parts of the study, as for the option ``--select``.
     **view
         ``over`` (an axis, two for a map, none for main effects), ``by``, ``panels`` and ``log``; see
-        :class:`mdr_dask.plots.outputs.View`.
+        :class:`mdr_dask.plots.view.View`.
 
     Returns
     -------
@@ -300,9 +300,9 @@ def plot(study: Study, figure: str, select: Words = (), **view: Any) -> Figure:
 
 
 def _of_output(output: str, over: str | Sequence[str], **view: Any) -> Plot:
-    from mdr_dask.plots.outputs import View, of_output
+    from mdr_dask.plots.view import View, figure_of
 
-    return of_output(View(output, _several(over), **view))
+    return figure_of(View(output, _several(over), **view))
 
 
 def master_curve(

@@ -14,12 +14,12 @@ from typing import Any
 import click
 
 from mdr_dask.cli.campaigns import check, init, models, schema
-from mdr_dask.cli.figures import figures, plot
+from mdr_dask.cli.figures import plot
 from mdr_dask.cli.fitting import fit
 from mdr_dask.cli.law import law
 from mdr_dask.cli.master import master_curve
 from mdr_dask.cli.printing import printable, say
-from mdr_dask.cli.publishing import publish, report, serve
+from mdr_dask.cli.publishing import publish, report
 from mdr_dask.cli.results import aggregate, show, status
 from mdr_dask.cli.running import run
 from mdr_dask.cli.sensitivity import sensitivity
@@ -91,9 +91,7 @@ for command in (
     sensitivity,
     law,
     plot,
-    figures,
     report,
-    serve,
     publish,
     master_curve,
     surface,

@@ -175,7 +175,7 @@ def _requested(
         for name in names:
             if name in outputs and name not in known:
                 raise click.UsageError(f"{name} is an output: add --over AXIS, or --effects")
-            if name not in known and (hint := did_you_mean(name, [*known, *outputs])):
+            if name not in known and "mean" in (hint := did_you_mean(name, [*known, *outputs])):
                 raise click.UsageError(f"no figure and no output {name!r}{hint}")
         require_known(names, list(known), f"figure of {model}")
         if given:

@@ -83,10 +83,11 @@ def fit(
                 click.echo(f"{group + ': ' if group else ''}{name}: {known[name].summary}")
             _print(result, group, form, limit)
     if figure is not None:
-        from mdr_dask.plots.calibration import calibration as drawn
-        from mdr_dask.plots.table import provenance
+        from mdr_dask.plots import available
+        from mdr_dask.plots.render import provenance
 
-        save(drawn(groups), figure, provenance("calibration", [store], str(context.meta[COMMAND])))
+        drawn = available(model)["calibration"].describe(groups)
+        save(drawn, figure, provenance("calibration", [store], str(context.meta[COMMAND])))
         tell(str(figure))
 
 

@@ -62,8 +62,8 @@ def sensitivity(
     for sentence in _sentences(found.attrs):
         tell(sentence)
     if figure is not None:
+        from mdr_dask.plots.render import provenance
         from mdr_dask.plots.sensitivity import sensitivity as drawn
-        from mdr_dask.plots.table import provenance
 
         save(drawn(found), figure, provenance("sensitivity", [store], str(context.meta[COMMAND])))
         tell(str(figure))

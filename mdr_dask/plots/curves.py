@@ -174,7 +174,21 @@ def family(data: xr.Dataset, output: str, along: str, by: str = "") -> Family:
     together = parameters_along(data, over) if over else [along]
     joined = over is not None and len(together) == 1 and data.sizes[over] > 1
     curves, keys, bar = _split(data, kept, joined)
-    return Family(curves, keys, bar, scalars(data), left_out, tuple(name for name in together if name not in (along, by)))
+    return Family(
+        curves, keys, bar, scalars(data), left_out, tuple(name for name in together if name not in (along, by))
+    )
+
+
+def with_one_legend(families: Mapping[str, Family]) -> tuple[list[str], list[str]]:
+    """Return the series that can share a legend and a colour bar, as many as possible, and a sentence about the rest."""
+    groups: dict[Any, list[str]] = {}
+    for name, one in families.items():
+        groups.setdefault((tuple(one.keys), one.bar), []).append(name)
+    kept = max(groups.values(), key=len)
+    rest = [name for name in families if name not in kept]
+    return kept, [
+        f"series {', '.join(rest)}, whose curves differ in other parameters (--series draws them)"
+    ] if rest else []
 
 
 def _most_shown(data: xr.Dataset, others: list[str]) -> list[str]:

@@ -159,7 +159,7 @@ class Figure:
     Parameters
     ----------
     panels : list of Panel
-        In rows, from left to right.
+        In rows from left to right, or in stacks from left to right.
     subject : str
         What it shows, for its title.
     fixed : str
@@ -169,7 +169,9 @@ class Figure:
     left_out : list of str
         What is not drawn.
     columns : int, optional
-        Panels in a row.
+        Most panels in a row.
+    stack : int
+        Number of successive panels that stand one above the other.
     ratio : float
         Height of a panel over its width.
     share_y : bool
@@ -182,6 +184,7 @@ class Figure:
     bars: str = ""
     left_out: list[str] = field(default_factory=list)
     columns: int | None = None
+    stack: int = 1
     ratio: float = 0.7
     share_y: bool = False
 
@@ -199,7 +202,7 @@ class Figure:
         frames = [frame.dropna(axis=1, how="all") for frame in frames if len(frame)]
         whole = pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=[*FIRST])
         parameters = [name for name in whole if name not in (*FIRST, *LAST)]
-        held = {name: whole[name].iloc[0] for name in parameters if (whole[name] == whole[name].iloc[0]).all()}
+        held = {name: whole[name].dropna().iloc[0] for name in parameters if whole[name].nunique() == 1}
         ends = [name for name in LAST if name in whole or name in ("x", "y")]
         shown = whole.reindex(columns=[*FIRST, *(name for name in parameters if name not in held), *ends])
         shown.attrs = {"held": held, "units": self.units()}
@@ -217,7 +220,9 @@ class Figure:
         """Return the comment lines above the table: origin, parameters held, units, and labels of each panel."""
         table = self.table()
         units = table.attrs["units"]
-        held = {name: f"{_number(value)} {units[name]}".removesuffix(" 1") for name, value in table.attrs["held"].items()}
+        held = {
+            name: f"{_number(value)} {units[name]}".removesuffix(" 1") for name, value in table.attrs["held"].items()
+        }
         varied = [name for name in table if name in units]
         lines = [f"{name}: {text}" for name, text in origin.items()]
         lines.append(f"title: {'; '.join(part for part in (self.subject, self.fixed, self.bars) if part)}")

@@ -13,7 +13,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.models.parts.loading_history import pieces
 from mdr_dask.models.velocity_jump import VelocityJump
-from mdr_dask.plots import colours, curves, labels
+from mdr_dask.plots import curves, labels
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 from mdr_dask.plots.view import MOST_PANELS
@@ -33,28 +33,23 @@ def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
     found = {name: data for name, data in groups.items() if all(output in data for output in needed)}
     if not found:
         raise DataError(f"expected a series with the outputs {', '.join(needed)}")
-    rest = list(found)[MOST_PANELS:]
-    found = {name: found[name] for name in list(found)[:MOST_PANELS]}
-    rows: list[list[Panel]] = [[], [], []]
-    families = []
-    for name, data in found.items():
-        one = curves.family(data, FRICTION, TIME)
-        families.append(one)
-        for row, panel in zip(rows, _column(name, data, one), strict=True):
-            row.append(panel)
-    figure = Figure([panel for row in rows for panel in row], "friction along histories of velocity and load")
-    figure.columns, figure.ratio = len(found), 0.4 if len(found) == 1 else 0.6
-    figure.fixed = curves.fixed_text(curves.fixed_by_all([one.held for one in families]), next(iter(found.values())))
+    families = {name: curves.family(data, FRICTION, TIME) for name, data in found.items()}
+    kept, left_out = curves.with_one_legend(families)
+    rest, kept = kept[MOST_PANELS:], kept[:MOST_PANELS]
+    panels = [panel for name in kept for panel in _column(name, found[name], families[name])]
+    figure = Figure(panels, "friction along histories of velocity and load", stack=3, ratio=0.45)
+    held = curves.fixed_by_all([families[name].held for name in kept])
+    figure.fixed = curves.fixed_text(held, found[kept[0]])
     figure.bars = curves.meaning_of_bars(found.values(), [FRICTION])
-    figure.leave_out([f"series {', '.join(rest)}" if rest else ""])
-    figure.leave_out([sentence for one in families for sentence in one.left_out])
+    figure.leave_out([*left_out, f"series {', '.join(rest)}" if rest else ""])
+    figure.leave_out([sentence for name in kept for sentence in families[name].left_out])
     return figure
 
 
 def _column(name: str, data: xr.Dataset, one: curves.Family) -> list[Panel]:
     last = float(data[TIME].values[-1])
     time = Axis(labels.SYMBOLS[TIME], low=-LEAD * last, high=last)
-    friction = Axis(labels.label(FRICTION, data[FRICTION]), quantity=FRICTION)
+    friction = Axis("coefficient of friction", quantity=FRICTION)
     driven = [_driven(key, data) for key in DRIVEN]
     panels = [Panel(time, friction, title=f"series {name}" if name else "", bar=one.bar)]
     panels += [Panel(time, axis) for axis, _ in driven]
@@ -105,16 +100,15 @@ def _trace(case: xr.Dataset, last: float) -> xr.Dataset:
 def loading_history(case: VelocityJump, last: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return times in relaxation times up to `last`, with velocity in m/s and normal force in N at these times."""
     unit = case.time_unit()
-    before, parts = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
-    found = [np.array([[-LEAD * last, 0.0], [before, before], [case.normal_force, case.normal_force]])]
+    (speed, force), parts = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
+    found = [np.array([[-LEAD * last, 0.0], [speed, speed], [force, force]])]
     for part in parts:
         if part.start < last * unit:
             count = 400 if part.swing[2] else 2
             time = np.linspace(part.start, min(part.end, last * unit), count)
-            _, speed, force = part.at(time)
-            found.append(np.array([time / unit, speed, force]))
-    time, speed, force = np.concatenate(found, axis=1)
-    return time, speed, force
+            found.append(np.array([time / unit, *part.at(time)[1:]]))
+    times, speeds, forces = np.concatenate(found, axis=1)
+    return times, speeds, forces
 
 
 PLOTS: tuple[Plot, ...] = (

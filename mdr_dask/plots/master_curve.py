@@ -29,7 +29,11 @@ def draw_master_curve(curve: xr.Dataset) -> Figure:
     rising = bool(curve["vertical_factor"].any())
     groups, keys, bar = _groups(curve)
     panels = [_measured(curve, groups), _merged(curve, groups)]
-    panels[0].keys = panels[1].keys = [*keys, Key("reached by shifting", "#000000", "--"), Key("measured at the reference", "#000000", "-")]
+    panels[0].keys = panels[1].keys = [
+        *keys,
+        Key("reached by shifting", "#000000", "--"),
+        Key("measured at the reference", "#000000", "-"),
+    ]
     panels[0].bar = panels[1].bar = bar
     for by, across, along, reference in shown:
         panels.append(_factors(curve, by, across, reference))
@@ -128,7 +132,14 @@ def _merged(curve: xr.Dataset, groups: list[_Group]) -> Panel:
     panel.traces += [
         Trace("band", columns(x=x, y=Mean(y, y / error, y * error)), "merged curve", **black),
         Trace("law", columns(x=x, y=y), "reached by shifting", "reached by shifting", line="--", **black),
-        Trace("law", columns(x=x[inside], y=y[inside]), "measured at the reference", "measured at the reference", line="-", **black),
+        Trace(
+            "law",
+            columns(x=x[inside], y=y[inside]),
+            "measured at the reference",
+            "measured at the reference",
+            line="-",
+            **black,
+        ),
     ]
     return panel
 

@@ -67,13 +67,15 @@ PLOTS: tuple[Plot, ...] = (
     ),
     described(
         *("profiles", MIXED, "the two surfaces in the contact where contact is greatest"),
-        View(("upper_profile", "lower_profile"), "position"),
+        View(("upper_profile", "lower_profile"), "position", single=True),
     ),
     described(
-        *("trace", MIXED, "contact length during one revolution"), View("contact_length_trace", "angle", log="")
+        *("trace", MIXED, "contact length during one revolution"),
+        View("contact_length_trace", "angle", log="", single=True),
     ),
     described(
-        *("film_profile", EHL, "pressure and film thickness against position"), View(("pressure", "film"), "position", log="")
+        *("film_profile", EHL, "pressure and film thickness against position"),
+        View(("pressure", "film"), "position", log="y"),
     ),
     described(
         *("starvation", EHL, "central and minimum film thickness against the position of the inlet"),

@@ -109,7 +109,7 @@ def render(description: Figure) -> Drawn:
     """Return the figure of matplotlib."""
     panels, asked = description.panels, page.current()
     columns = _columns(description)
-    rows = -(-len(panels) // columns)
+    rows = -(-len(panels) // (columns * description.stack)) * description.stack
     width = asked.width or (ALONE if columns == 1 else BESIDE * columns)
     height = rows * max(LEAST_HEIGHT, description.ratio * width / columns)
     figure = Drawn(description, figsize=(width, asked.height or height), layout="constrained")
@@ -117,9 +117,11 @@ def render(description: Figure) -> Drawn:
     places = _axes(figure, description, rows, columns)
     for axes, panel in zip(places, panels, strict=True):
         _draw_panel(axes, panel)
+    _share_labels(places, panels)
     _bars(figure, places, panels)
     _title(figure, description)
-    legend = _legend(figure, places, panels)
+    keys = list(dict.fromkeys(key for panel in panels for key in panel.entries()))
+    legend = _legend(figure, keys) if keys else 0.0
     if asked.height is None:
         figure.set_size_inches(width, height + legend + _height_of_title(figure))
     _fit(figure, places)
@@ -129,17 +131,35 @@ def render(description: Figure) -> Drawn:
 def _columns(description: Figure) -> int:
     asked, count = page.current(), len(description.panels)
     free = MOST_COLUMNS if asked.width is None else max(1, min(MOST_COLUMNS, int(asked.width / LEAST_PANEL)))
-    wanted = description.columns or (2 if count == 4 else free)
-    return max(1, min(wanted, free, count))
+    stacks = -(-count // description.stack)
+    wanted = description.columns or (2 if stacks == 4 else free)
+    return max(1, min(wanted, free, stacks))
 
 
 def _axes(figure: Drawn, description: Figure, rows: int, columns: int) -> list[Axes]:
-    """Return the axes of all panels, the last row filled up with nothing."""
-    count = len(description.panels)
-    grid = list(figure.subplots(rows, columns, squeeze=False, sharey=description.share_y).ravel())
-    for unused in grid[count:]:
-        unused.remove()
-    return grid[:count]
+    """Return the axes of all panels: stacks from left to right, or rows of single panels."""
+    grid, stack = figure.subplots(rows, columns, squeeze=False, sharey=description.share_y), description.stack
+    found = []
+    for k in range(len(description.panels)):
+        place = k // stack
+        found.append(grid[(place // columns) * stack + k % stack, place % columns])
+    for unused in grid.ravel():
+        if unused not in found:
+            unused.remove()
+    return found
+
+
+def _share_labels(places: list[Axes], panels: list[Panel]) -> None:
+    """Label a horizontal axis once where the panel below has the same."""
+    at = {}
+    for axes, panel in zip(places, panels, strict=True):
+        place = axes.get_subplotspec()
+        assert place is not None
+        at[place.rowspan.start, place.colspan.start] = axes, panel
+    for (row, column), (axes, panel) in at.items():
+        below = at.get((row + 1, column))
+        if below and below[1].x == panel.x:
+            axes.set_xlabel("")
 
 
 def _draw_panel(axes: Axes, panel: Panel) -> None:
@@ -307,31 +327,17 @@ def _broken(figure: Drawn, text: str, width: float, size: Any) -> str:
     return "\n".join(lines).replace("\u00a0", " ")
 
 
-def _legend(figure: Drawn, places: list[Axes], panels: list[Panel]) -> float:
-    """Draw one legend below all panels, and return its height in inches.
-
-    Panels whose entries contradict each other have legends of their own, in the panel.
-    """
-    entries = {axes: panel.entries() for axes, panel in zip(places, panels, strict=True)}
-    every = list(dict.fromkeys(key for keys in entries.values() for key in keys))
-    looks: dict[tuple[str, str, str], str] = {}
-    alike = all(looks.setdefault((k.colour, k.line, k.marker), k.label) == k.label for k in every)
-    if alike and every:
-        return _legend_below(figure, every)
-    for axes, keys in entries.items():
-        if keys:
-            axes.legend(handles=[_handle(key) for key in keys], loc="best", framealpha=0.7)
-    return 0.0
-
-
 def _handle(key: Key) -> Any:
     from matplotlib.lines import Line2D
 
     return Line2D([], [], color=key.colour, linestyle=key.line or "none", marker=key.marker or "none", label=key.label)
 
 
-def _legend_below(figure: Drawn, keys: list[Key]) -> float:
-    """Draw a legend with as many columns as fit; with a requested height, leave out entries that do not fit."""
+def _legend(figure: Drawn, keys: list[Key]) -> float:
+    """Draw one legend below all panels, with as many columns as fit, and return its height in inches.
+
+    With a requested height, entries that do not fit are left out.
+    """
     width, height = figure.get_size_inches()
     size = mpl.rcParams["legend.fontsize"]
     kept = [Key(_broken(figure, k.label, 0.8 * width, size), k.colour, k.line, k.marker) for k in keys]
@@ -362,14 +368,16 @@ def _fit(figure: Drawn, places: list[Axes]) -> None:
             for name, length in (("x", box.width), ("y", box.height)):
                 axis = getattr(axes, f"{name}axis")
                 text = axis.get_label_text().replace("\n", " ")
-                room = 1.15 * length / figure.dpi if axes in places else 0.95 * length / figure.dpi
+                room = length / figure.dpi
                 broken = _broken(figure, text, room, axis.label.get_fontsize())
                 if broken != axis.get_label_text():
                     axis.set_label_text(broken)
                     changed = True
                 changed |= _thin(figure, axis, name)
             if axes.get_title():
-                title = _broken(figure, axes.get_title().replace("\n", " "), box.width / figure.dpi, axes.title.get_fontsize())
+                title = _broken(
+                    figure, axes.get_title().replace("\n", " "), box.width / figure.dpi, axes.title.get_fontsize()
+                )
                 changed |= title != axes.get_title()
                 axes.set_title(title)
         if not changed:
@@ -383,7 +391,9 @@ def _thin(figure: Drawn, axis: Any, name: str) -> bool:
     renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
     low, high = sorted(axis.get_view_interval())
     inside = [tick for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high]
-    texts = {t.get_loc(): text for t in inside for text in (t.label1, t.label2) if text.get_visible() and text.get_text()}
+    texts = {
+        t.get_loc(): text for t in inside for text in (t.label1, t.label2) if text.get_visible() and text.get_text()
+    }
     boxes = [text.get_window_extent(renderer) for text in texts.values()]
     ends = [(box.x0, box.x1) if name == "x" else (box.y0, box.y1) for box in boxes]
     gap = GAP / 72 * figure.dpi if name == "x" else 0.0

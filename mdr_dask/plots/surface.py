@@ -46,7 +46,9 @@ def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...])
     for report in reports[:1]:
         if report.law is not None:
             hurst = report.law.hurst
-            areal.keys.append(Key(f"power law, H = {hurst.value:.2f} ({hurst.low:.2f}, {hurst.high:.2f})", "#000000", "--"))
+            areal.keys.append(
+                Key(f"power law, H = {hurst.value:.2f} ({hurst.low:.2f}, {hurst.high:.2f})", "#000000", "--")
+            )
     line.keys = [key for key in line.entries() if key.label != METHOD or key.colour == colours.colour(0)]
     line.keys = [Key(METHOD, "#000000", "-") if key.label == METHOD else key for key in line.keys]
     rms, gradient = (

@@ -49,6 +49,8 @@ class View:
     log : str, optional
         Which axes are logarithmic, of ``x``, ``y`` and ``z`` (colours). By default, those whose numbers are positive
         and spread over more than a factor of ten.
+    single : bool
+        Whether the first realisation is drawn instead of the mean over realisations.
     guides : mapping of str to mapping of float to str
         Horizontal lines in the panels of an output, with their names.
     """
@@ -58,6 +60,7 @@ class View:
     by: str = ""
     panels: str = ""
     log: str | None = None
+    single: bool = False
     guides: Mapping[str, Mapping[float, str]] = field(default_factory=dict)
 
     @property
@@ -102,6 +105,10 @@ def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
     for view, output in ((view, output) for view in views for output in view.names):
         found, why = _holding(groups, view, output)
         reasons += why
+        if found and view.single:
+            most = max(data.sizes.get("realisation", 1) for data in found.values())
+            reasons += [f"realisations but the first of {most}"] * (most > 1)
+            found = {name: data.isel(realisation=[0]) for name, data in found.items()}
         if found:
             form = {0: _effects, 1: _lines, 2: _map}[len(view.along)]
             figures.append(form(found, view, output))
@@ -111,8 +118,12 @@ def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
     whole = figures[0]
     whole.subject = _subject(*shown[0], len(figures) - 1)
     if len(figures) > 1:
-        whole.columns = len(whole.panels)
-        whole.panels = [panel for figure in figures for panel in figure.panels]
+        alike = len({len(figure.panels) for figure in figures}) == 1
+        groups_of = zip(*(figure.panels for figure in figures), strict=True) if alike else [f.panels for f in figures]
+        whole.panels = [panel for group in groups_of for panel in group]
+        whole.stack = len(figures) if alike else 1
+        for k, panel in enumerate(whole.panels):
+            panel.title = panel.title if k % whole.stack == 0 else ""
         whole.ratio, whole.share_y = 0.45, False
     whole.leave_out([sentence for figure in figures for sentence in figure.left_out])
     whole.leave_out(reasons)
@@ -123,15 +134,18 @@ def _holding(groups: Mapping[str, xr.Dataset], view: View, output: str) -> tuple
     """Return the series that hold an output and vary along what is named, and the reasons of the others."""
     known = sorted({str(name) for data in groups.values() for name in data.data_vars if name != "status"})
     if output not in known:
-        return {}, [f"{output} is not an output of this study{did_you_mean(output, known)}"]
-    found, reasons = {}, []
+        hint = did_you_mean(output, known)
+        return {}, [f"{output}, which is not an output of this study{hint if 'mean' in hint else ''}"]
+    found: dict[str, xr.Dataset] = {}
+    reasons: dict[str, list[str]] = {}
     for name, data in groups.items():
-        reason = _unfit(data, view, output) if output in data else f"it does not hold {output}"
+        reason = _unfit(data, view, output) if output in data else f"{output} was not computed"
         if reason:
-            reasons.append(f"series {name}: {reason}" if name and len(groups) > 1 else reason)
+            reasons.setdefault(reason, []).append(name)
         else:
             found[name] = data
-    return found, reasons
+    several = len(groups) > 1
+    return found, [f"series {', '.join(names)}: {why}" if several else why for why, names in reasons.items()]
 
 
 def _unfit(data: xr.Dataset, view: View, output: str) -> str:
@@ -140,10 +154,11 @@ def _unfit(data: xr.Dataset, view: View, output: str) -> str:
     known = [*_varied(data, output), *own]
     for name in (*view.along, view.by, view.panels):
         if name and name not in known:
-            fixed = name in data.coords and data[name].ndim == 0
-            hint = f"no axis {name!r}{did_you_mean(name, known)}"
-            at = f"{name} is fixed, {labels.plain(labels.named(name, data[name]))}" if fixed else hint
-            return f"{at}; {output} varies along {', '.join(known) or 'nothing'}"
+            along = f"{output} varies along {', '.join(known) or 'nothing'}"
+            if name in data.coords and data[name].ndim == 0:
+                return f"{labels.plain(labels.named(name, data[name]))} is fixed; {along}"
+            hint = did_you_mean(name, known)
+            return f"no axis {name!r}{hint if 'mean' in hint else ''}; {along}"
     if rest := [dim for dim in own if dim not in view.along]:
         return f"{output} varies along {rest[0]}: --over {rest[0]}, or --select {rest[0]}=VALUE"
     dims = [(name, curves.along_dim(data, name, output)) for name in (*view.along, view.by, view.panels) if name]
@@ -182,7 +197,7 @@ def _axis(name: str, arrays: list[xr.DataArray], view: View, which: str) -> Axis
     """Return the axis of a parameter: with its scale, or with words in place of numbers."""
     first = arrays[0]
     own = name in curves.OWN and first.attrs.get("units", "1") == "1"
-    label = labels.SYMBOLS.get(name) or labels.meaning(first, name) if own else labels.label(name, first)
+    label = labels.meaning(first, name) if own else labels.label(name, first)
     if first.dtype.kind not in "fiu":
         words = [textwrap.fill(str(word), LONGEST_WORD) for word in np.atleast_1d(first.values)]
         return Axis(label, ticks=[*enumerate(words)])
@@ -236,10 +251,12 @@ def _parts(found: Mapping[str, xr.Dataset], view: View, output: str) -> tuple[li
     """Return what each panel shows: a value of a parameter, all series, or one series where all are too many curves."""
     if view.panels:
         return _by_value(found, view)
-    count = sum(len(curves.family(data, output, view.along[0], view.by).curves) for data in found.values())
-    if len(found) > 1 and count > colours.most():
-        return _by_series(found)
-    return [_Part("", dict(found))], []
+    families = {name: curves.family(data, output, view.along[0], view.by) for name, data in found.items()}
+    if len(found) == 1 or sum(len(one.curves) for one in families.values()) <= colours.most():
+        return [_Part("", dict(found))], []
+    kept, left_out = curves.with_one_legend(families)
+    parts, more = _by_series({name: found[name] for name in kept})
+    return parts, [*left_out, *more]
 
 
 def _by_value(found: Mapping[str, xr.Dataset], view: View) -> tuple[list[_Part], list[str]]:
@@ -258,8 +275,7 @@ def _by_value(found: Mapping[str, xr.Dataset], view: View) -> tuple[list[_Part],
 def _by_series(found: Mapping[str, xr.Dataset]) -> tuple[list[_Part], list[str]]:
     names = list(found)
     rest = [f"series {', '.join(names[MOST_PANELS:])}"] if len(names) > MOST_PANELS else []
-    title = "series {}" if len(names) > 1 else ""
-    return [_Part(title.format(name), {name: found[name]}) for name in names[:MOST_PANELS]], rest
+    return [_Part(f"series {name}" if name else "", {name: found[name]}) for name in names[:MOST_PANELS]], rest
 
 
 def _panel(part: _Part, families: Mapping[str, curves.Family], view: View, output: str, x: Axis) -> Panel:

@@ -1,8 +1,8 @@
-"""A page for every study: one HTML file that needs no network, the same page served, and a study to be published.
+"""A page about a study: one HTML file that needs no network; and a study packed for publication.
 
-Read in this order: `figures` (a drawn figure as data for the page), `cases` (means of all cases, to choose from),
-`subjects` (methods, papers and limits of each model), `study` (all that the page says of one store), `page` (the HTML
-with its content security policy), `serving`, `publishing`.
+Read in this order: `figures` (a figure as data for the page), `cases` (means of all cases, for the choice of axes),
+`subjects` (method, papers and limits of each model), `study` (everything about one store), `page` (the HTML),
+`publishing`.
 """
 
 from mdr_dask.report.page import page

@@ -1,4 +1,4 @@
-"""The means of all cases of a study, with their errors: what the page lets its reader choose axes from."""
+"""The means of all cases of a study with their errors, for the choice of axes on the page."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask import aggregation
-from mdr_dask.plots import curves, style
+from mdr_dask.plots import curves, labels
 from mdr_dask.report.figures import Json, numbers
 from mdr_dask.report.words import markup, plain
 
@@ -19,14 +19,14 @@ MOST_CASES = 4000
 
 
 def cases_of(groups: Mapping[str, xr.Dataset]) -> list[Json]:
-    """Return the cases of every series of a study that has any output without further dimensions.
+    """Return the cases of every series that has an output without further dimensions.
 
     Returns
     -------
     list of dict
-        For each series ``axes`` and ``outputs`` with labels, and a row for every case: ``at`` the parameters that vary,
-        as figures show them, ``value``, ``low``, ``high``, ``lines`` and ``grid`` of each output. ``reduced`` says
-        which values of axes are not here.
+        For each series ``axes`` and ``outputs`` with labels, and columns of all cases: ``at`` the parameters that
+        vary, in the units of figures, ``value``, ``low``, ``high``, ``lines`` and ``grid`` of each output. ``reduced``
+        names the values of axes that are left out.
     """
     found = [_series(name, data) for name, data in groups.items()]
     return [series for series in found if series["outputs"] and series["axes"]]
@@ -43,7 +43,7 @@ def _series(name: str, data: xr.Dataset) -> Json:
         "name": name,
         "reduced": reduced,
         "axes": {axis: {**_named(axis, data[axis]), "dim": str(data[axis].dims[0])} for axis in varied},
-        "at": {axis: _column(style.shown(axis, data[axis]), data[axis].dims, shape) for axis in varied},
+        "at": {axis: _column(labels.shown(axis, data[axis]), data[axis].dims, shape) for axis in varied},
         "outputs": {output: _named(output, data[output]) for output in outputs},
         "values": {output: _measured(data, output, shape) for output in outputs},
         "states": _states(data, shape),
@@ -51,7 +51,7 @@ def _series(name: str, data: xr.Dataset) -> Json:
 
 
 def main_outputs(data: xr.Dataset) -> list[str]:
-    """Return the outputs of a study that are no errors of others."""
+    """Return the outputs of a study without their errors."""
     names = [str(name) for name in data.data_vars if name != "status"]
     errors = {str(data[name].attrs.get("ancillary_variables")) for name in names}
     return [name for name in names if name not in errors]
@@ -64,20 +64,20 @@ def _companions(data: xr.Dataset, outputs: list[str]) -> list[str]:
 
 def _thinned(data: xr.Dataset, dims: list[str]) -> tuple[xr.Dataset, list[str]]:
     """Return at most `MOST_CASES` cases: of the longest axes evenly spread values, and what is left out."""
-    told: list[str] = []
+    left_out: list[str] = []
     while (total := math.prod(data.sizes[dim] for dim in dims)) > MOST_CASES:
         longest = max(dims, key=lambda dim: data.sizes[dim])
         most = max(
             1, min(data.sizes[longest] - 1, data.sizes[longest] * MOST_CASES // total, 2 + data.sizes[longest] // 2)
         )
         data, sentences = curves.thin(data, longest, most)
-        told += sentences
-    return data, told
+        left_out += sentences
+    return data, left_out
 
 
 def _named(name: str, values: xr.DataArray) -> Json:
-    label = style.label(name, values)
-    return {"label": markup(label), "spoken": plain(label), "unit": style.quantity(name, values).unit}
+    label = labels.label(name, values)
+    return {"label": markup(label), "spoken": plain(label), "unit": labels.quantity(name, values).unit}
 
 
 def _column(values: Any, dims: tuple[Any, ...], shape: xr.DataArray) -> list[Any]:
@@ -88,10 +88,10 @@ def _column(values: Any, dims: tuple[Any, ...], shape: xr.DataArray) -> list[Any
 
 def _measured(data: xr.Dataset, output: str, shape: xr.DataArray) -> Json:
     """Return mean, interval and both errors of an output, in the unit that figures show."""
-    factor = style.quantity(output, data[output]).factor
-    mean = curves.measured(data, output, factor) if "realisation" in data[output].dims else None
-    if mean is None:
-        return {"value": _column(data[output] * factor, data[output].dims, shape)}
+    how = labels.quantity(output, data[output])
+    if "realisation" not in data[output].dims:
+        return {"value": _column(how.of(data[output]), data[output].dims, shape)}
+    mean, factor = curves.mean(data, output), how.factor
     columns: dict[str, xr.DataArray] = {"value": mean.value, "low": mean.low, "high": mean.high}
     columns["lines"] = aggregation.standard_error(data[output] * factor)
     error = aggregation.companion(data, output)

@@ -1,7 +1,7 @@
-"""The page: one HTML file with everything in it, and a policy that lets nothing else in.
+"""The page: one HTML file with everything in it, and a policy that forbids everything else.
 
-Text from a store is escaped by the template, data stand in a block of JSON that no browser runs, and the policy names
-the two scripts of this package by their digests: whatever a store holds, none of it can become a script.
+The template escapes text from a store, data are a block of JSON that no browser runs, and the policy allows only the
+scripts of this package, by their digests. So nothing that a store contains can become a script.
 """
 
 from __future__ import annotations
@@ -22,15 +22,13 @@ from mdr_dask.version import __version__
 SCRIPTS = ("plotly-cartesian.min.js", "look.js", "figure.js", "choose.js", "page.js")
 
 
-def page(studies: Sequence[Study], follows: bool = False) -> str:
+def page(studies: Sequence[Study]) -> str:
     """Return the page of one study or more.
 
     Parameters
     ----------
     studies : sequence of Study
         As `mdr_dask.report.read_study` returns them.
-    follows : bool
-        Whether the page asks the place that it came from how far the study has come; otherwise it asks nobody.
 
     Returns
     -------
@@ -48,26 +46,24 @@ def page(studies: Sequence[Study], follows: bool = False) -> str:
         data=harmless(data),
         scripts=scripts,
         style=asset("page.css"),
-        policy=policy(follows),
-        follows=follows,
+        policy=policy(),
         version=__version__,
         mathml=mathml,
     )
     return written
 
 
-def policy(follows: bool) -> str:
-    """Return the content security policy: the page's own scripts by their digests, and no place to send anything to."""
+def policy() -> str:
+    """Return the content security policy: the scripts of the page by their digests, and no network."""
     digests = [base64.b64encode(hashlib.sha256(asset(name).encode()).digest()).decode() for name in SCRIPTS]
     scripts = " ".join(f"'sha256-{digest}'" for digest in digests)
-    asks = "'self'" if follows else "'none'"
     return "; ".join(
         [
             "default-src 'none'",
             f"script-src {scripts}",
             "style-src 'unsafe-inline'",  # the figures' library sets styles of its own
             "img-src data: blob:",
-            f"connect-src {asks}",
+            "connect-src 'none'",
             "base-uri 'none'",
             "form-action 'none'",
         ]
@@ -75,20 +71,20 @@ def policy(follows: bool) -> str:
 
 
 def harmless(data: Any) -> str:
-    """Return data as JSON in which nothing can end the block of a page that holds it."""
+    """Return data as JSON that cannot end the block of the page around it."""
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026").replace("\u2028", "\\u2028")
 
 
 @lru_cache(maxsize=16)
 def asset(name: str) -> str:
-    """Return a file that comes with this room."""
+    """Return a file of this package."""
     return (files("mdr_dask.report") / "assets" / name).read_text(encoding="utf-8")
 
 
 @lru_cache(maxsize=64)
 def mathml(equation: Equation) -> str:
-    """Return an equation as MathML, which browsers draw and screen readers read."""
+    """Return an equation as MathML, which browsers draw and screen readers understand."""
     from latex2mathml.converter import convert
 
     return str(convert(equation.latex, display="block"))

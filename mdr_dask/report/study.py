@@ -1,4 +1,4 @@
-"""All that a page says of one study, read from its store."""
+"""The content of a page about one study, read from its store."""
 
 from __future__ import annotations
 
@@ -19,23 +19,25 @@ import xarray as xr
 
 from mdr_dask import aggregation, fits, plots, store
 from mdr_dask.errors import DataError, FitError, StoreError
-from mdr_dask.plots import curves
-from mdr_dask.plots.table import provenance
+from mdr_dask.plots import curves, labels, page
+from mdr_dask.plots.render import provenance
 from mdr_dask.questions import progress
 from mdr_dask.questions.columns import fixed_words
 from mdr_dask.report.cases import cases_of, main_outputs
 from mdr_dask.report.figures import Json, drawn_of
 from mdr_dask.report.subjects import Subject, subject_of
-from mdr_dask.units import seconds, shown
+from mdr_dask.units import seconds
 
-#: Rows of a table on the page; the command that prints all stands under it.
+#: Rows of a table on the page; a note below the table has the command that prints all.
 MOST_ROWS = 60
 #: Values of an axis that are written out.
 LISTED = 6
+#: Results of a series that the page is made from; of larger studies, evenly spread values of the axes are read.
+MOST_RESULTS = 50_000
 
 
 class Table(NamedTuple):
-    """A table of the page: a title, headings, rows of texts, and what stands under it."""
+    """A table of the page: a title, headings, rows of texts, and a note below."""
 
     title: str
     headings: list[str]
@@ -45,7 +47,7 @@ class Table(NamedTuple):
 
 @dataclass(frozen=True)
 class Study:
-    """What a page says of one study.
+    """The content of a page about one study.
 
     Parameters
     ----------
@@ -60,15 +62,15 @@ class Study:
     failures : list of Group
         Messages of failed results and warnings, those alike together.
     not_fitted, not_drawn : list of (name, reason)
-        Laws and figures that the study has not the data for.
+        Laws and figures for which the study does not hold the data.
     figures, cases : list of dict
         As `mdr_dask.report.figures` and `mdr_dask.report.cases` return them.
     subject : Subject or None
-        What is known of its method.
+        Its method.
     digests, rerun : dict of str to str, list of str
-        What the numbers can be recognised by; commands.
+        Digests of campaign and results; commands.
     at_work : str
-        Who is at work on it; empty if nobody is.
+        Processes that work on it.
     """
 
     url: str
@@ -95,7 +97,7 @@ class Study:
 
 
 def read_study(url: str) -> Study:
-    """Read what a page says of a study, finished or not.
+    """Read the content of a page about a study, finished or not.
 
     Raises
     ------
@@ -107,7 +109,26 @@ def read_study(url: str) -> Study:
 
 
 def _read(url: str) -> Study:
-    held, groups = store.attributes(url), store.datasets(url)
+    held, whole = store.attributes(url), store.datasets(url)
+    groups = {name: _thinned(data) for name, data in whole.items()}
+    with page.with_units(labels.chosen_units(groups)):
+        return _study(url, held, whole, groups)
+
+
+def _thinned(data: xr.Dataset) -> xr.Dataset:
+    """Return a series of at most `MOST_RESULTS` results, in memory: evenly spread values of the longest axes."""
+    dims = [str(dim) for dim in data["status"].dims if dim != "realisation"]
+    while data["status"].size > MOST_RESULTS and dims:
+        longest = max(dims, key=lambda dim: data.sizes[dim])
+        if data.sizes[longest] < 3:
+            break
+        most = max(2, min(data.sizes[longest] - 1, data.sizes[longest] * MOST_RESULTS // data["status"].size))
+        data, _ = curves.thin(data, longest, max(most, data.sizes[longest] // 4))
+    return data.load()
+
+
+def _study(url: str, held: Mapping[str, Any], whole: Mapping[str, xr.Dataset], groups: dict[str, xr.Dataset]) -> Study:
+    reduced = any(whole[name]["status"].size > data["status"].size for name, data in groups.items())
     model = str(held["model"])
     counted = [progress.counts(look) for look in progress.looks(url)]
     records = [record for name in groups for record in store.records(url, name)]
@@ -118,7 +139,15 @@ def _read(url: str) -> Study:
             lambda name: provenance(name, [url], f"mdr-dask plot {shlex.quote(url)} {name}"),
         )
     )
-    laws, not_fitted = _laws(url, model, groups)
+    laws, not_fitted = _laws(url, model, {} if reduced else groups)
+    if reduced:
+        first = next(iter(groups.values()))
+        not_fitted = [("all laws", f"the study is large; use mdr-dask fit {shlex.quote(url)} NAME")]
+        note = f"figures and errors are made from evenly spread values of the axes, such as {dict(first.sizes)}"
+        drawn = [
+            one | {"left_out": "; ".join(p for p in (one["left_out"], note) if p)} if isinstance(one, dict) else one
+            for one in drawn
+        ]
     return Study(
         url=url,
         title=str(held["title"]),
@@ -131,7 +160,7 @@ def _read(url: str) -> Study:
         counts=[_count_table(counted)],
         machines=_machines(records, held),
         failures=progress.grouped(
-            [m for name, data in groups.items() for m in progress.messages(url, name, data)], groups
+            [m for name, data in groups.items() for m in progress.messages(url, name, whole[name])], groups
         ),
         laws=laws,
         not_fitted=not_fitted,
@@ -147,12 +176,12 @@ def _read(url: str) -> Study:
 
 
 def _shows_no_errors(figure: Json) -> bool:
-    """Say whether a figure shows no means with errors: pictures of single cases come after those."""
+    """Return whether a figure shows no errors; such figures come last."""
     return not any("y_low" in trace or "value_low" in trace for trace in figure["traces"])
 
 
 def who_is_at_work(url: str) -> str:
-    """Say who is at work on a study; nothing if nobody is."""
+    """Return which processes work on a study; nothing if none does."""
     try:
         runner, parts = store.at_work(url)
     except StoreError as error:
@@ -201,12 +230,13 @@ def _understood(name: str, data: xr.Dataset) -> Iterator[Table]:
     dims = [str(dim) for dim in data["status"].dims if dim != "realisation"]
     varied = [axis for dim in dims for axis in curves.parameters_along(data, dim) if axis in data.coords]
     rows = [
-        [axis, str(data[axis].attrs.get("long_name", "")), str(data[axis].size), _range(data[axis])] for axis in varied
+        [axis, str(data[axis].attrs.get("long_name", "")), str(data[axis].size), _range(axis, data[axis])]
+        for axis in varied
     ]
     rows.append(["realisation", "independent realisations, at most", str(data.sizes["realisation"]), ""])
     yield Table(f"Axes{of}", ["axis", "meaning", "values", "range"], rows)
     fixed = [
-        [str(key), str(value.attrs.get("long_name", "")), shown(value.item(), str(value.attrs.get("units", "1")))]
+        [str(key), str(value.attrs.get("long_name", "")), _shown(str(key), value)]
         for key, value in data.coords.items()
         if value.ndim == 0 and value.dtype.kind in "fiu"
     ]
@@ -220,14 +250,19 @@ def _understood(name: str, data: xr.Dataset) -> Iterator[Table]:
     yield Table(f"Outputs{of}", ["output", "meaning", "unit"], computed, notes)
 
 
-def _range(values: xr.DataArray) -> str:
+def _shown(name: str, value: xr.DataArray) -> str:
+    """Return one value in the unit that figures show."""
+    unit = labels.quantity(name, value).unit
+    return f"{float(labels.shown(name, value)):.6g} {unit}".strip()
+
+
+def _range(name: str, values: xr.DataArray) -> str:
     if values.dtype.kind not in "fiu":
         words = [str(value) for value in values.to_numpy()]
         return ", ".join(words[:LISTED]) + (", ..." if len(words) > LISTED else "")
-    unit = str(values.attrs.get("units", "1"))
     if values.size <= LISTED:
-        return ", ".join(shown(value, unit) for value in values.to_numpy().tolist())
-    return f"{shown(float(values.min()), unit)} to {shown(float(values.max()), unit)}"
+        return ", ".join(_shown(name, value) for value in values)
+    return f"{_shown(name, values.min(keep_attrs=True))} to {_shown(name, values.max(keep_attrs=True))}"
 
 
 def _machines(records: list[Json], held: Mapping[str, Any]) -> list[Table]:
@@ -237,7 +272,7 @@ def _machines(records: list[Json], held: Mapping[str, Any]) -> list[Table]:
         spent[str(record["host"])] += float(record["compute_seconds"])
     workers = {host: len({record.get("process") for record in records if record["host"] == host}) for host in hosts}
     rows = [[host, str(count), str(workers[host]), seconds(spent[host])] for host, count in hosts.items()]
-    kinds = Counter(str(record.get("kind", "not told")) for record in records)
+    kinds = Counter(str(record.get("kind", "unknown")) for record in records)
     versions = [[name, str(number)] for name, number in {"Python": held.get("python", ""), **held["versions"]}.items()]
     return [
         Table("Machines", ["machine", "blocks", "processes", "time in the model"], rows),
@@ -260,8 +295,7 @@ def _laws(url: str, model: str, groups: Mapping[str, xr.Dataset]) -> tuple[list[
         except Exception as error:
             if store.is_damage(error):
                 raise
-            # as of figures: a fault of one law must not end the page
-            missing.append((name, f"a fault of this law, please report it with the campaign: {error}"))
+            missing.append((name, f"internal error in this law; please report it with the campaign: {error}"))
             continue
         found += [_law(url, f"{name} {series}".strip(), law.summary, result) for series, result in results.items()]
     return found, missing
@@ -352,7 +386,7 @@ def _percent(values: Any, at: float) -> str:
 
 
 def _digests(url: str, held: Mapping[str, Any], records: list[Json]) -> dict[str, str]:
-    """Return what the campaign and the numbers can be recognised by."""
+    """Return digests of the campaign and of the results."""
     now = datetime.now(UTC).isoformat(timespec="seconds")
     written = sorted(json.dumps([r["block"], r["attempt"], r.get("chunks", {})], sort_keys=True) for r in records)
     return {

@@ -1,12 +1,11 @@
 "use strict";
-// The page: figures with their controls, drawn when they come into view; and following a run where it is served.
+// The page: figures with their controls, drawn when they come into view.
 (() => {
   const { element } = report;
   const CONFIG = { displayModeBar: false, responsive: true, doubleClick: "reset" };
   const SIZE = { width: 720, height: 460 }; // of a panel of a downloaded figure
   const MOST_ROWS = 500; // of a table on the page; the file has all
   const MOST_CHOICES = 60;
-  const PAUSE = 1000;
   const LAST = ["x", "x_low", "x_high", "y", "y_low", "y_high", "value", "value_low", "value_high"];
   const figures = [];
   const seen = new IntersectionObserver((entries) => entries.forEach((entry) => entry.isIntersecting && entry.target.figure.come()), { rootMargin: "400px" });
@@ -274,37 +273,6 @@
     for (const plot of figures.flatMap((figure) => figure.plots)) Plotly.relayout(plot, { autosize: true, width: null, height: null });
   });
 
-  // Follow a run: how far it has come every second, and the page anew whenever it was made anew.
-  const follow = async () => {
-    const line = document.getElementById("follow");
-    line.hidden = false;
-    let edition = null;
-    for (;;) {
-      try {
-        const told = await (await fetch("progress", { cache: "no-store" })).json();
-        const bar = element("progress", { max: Math.max(told.results, 1), value: told.settled, "aria-label": "results settled" });
-        line.replaceChildren(bar, ` ${told.sentence}`);
-        if (edition !== null && told.edition !== edition) await renew();
-        edition = told.edition;
-      } catch (error) {
-        line.replaceChildren("The server does not answer; what is here stays. Trying again.");
-      }
-      await new Promise((resolve) => setTimeout(resolve, PAUSE));
-    }
-  };
-  const renew = async () => {
-    const text = await (await fetch("./", { cache: "no-store" })).text();
-    const fresh = new DOMParser().parseFromString(text, "text/html");
-    const data = read(fresh);
-    if (data.map((study) => study.key + study.title).join() !== studies.map((study) => study.key + study.title).join()) return location.reload();
-    for (const part of fresh.querySelectorAll("[data-part]")) {
-      const old = document.querySelector(`[data-part="${part.dataset.part}"]`);
-      if (old && old.innerHTML !== part.innerHTML) old.replaceChildren(...document.adoptNode(part).childNodes);
-    }
-    return show(data);
-  };
-
   show(read(document));
   report.figures = figures;
-  if ("follows" in document.documentElement.dataset) follow();
 })();

@@ -1,0 +1,106 @@
+"""Measured points in any figure that shows their output against one of their conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+
+from mdr_dask.campaign.measured import Measured
+from mdr_dask.errors import DataError, FitError
+from mdr_dask.fits.calibration import measured_of, with_table
+from mdr_dask.plots import labels
+from mdr_dask.plots.base import Plot
+from mdr_dask.plots.figure import Figure, Key, Mean, Panel, Trace, columns
+
+#: Relative difference up to which a condition is that of a curve or a panel.
+SAME = 1e-3
+#: Half width of a 95 % interval in standard errors.
+HALF = 1.96
+NAME = "measured"
+
+
+def with_points(
+    groups: Mapping[str, xr.Dataset], figures: Mapping[str, Plot], file: str
+) -> tuple[dict[str, xr.Dataset], dict[str, Plot]]:
+    """Return the series with a table of measurements, and figures that show its points.
+
+    Raises
+    ------
+    DataError
+        If the table cannot be read, or is of no output of the study.
+    """
+    given = with_table(groups, file)
+    return given, {name: _with_points(figure) for name, figure in figures.items()}
+
+
+def _with_points(figure: Plot) -> Plot:
+    def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
+        drawn = figure.draw(groups)
+        if figure.name != "calibration":
+            add_points(drawn, groups)
+        return drawn
+
+    return replace(figure, draw=draw)
+
+
+def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
+    """Add the measured points of a study to the panels that show their output against one of their conditions.
+
+    Raises
+    ------
+    DataError
+        If there is no such panel.
+    """
+    data = next(iter(groups.values()))
+    try:
+        measured = measured_of(data)
+    except FitError as error:
+        raise DataError(str(error)) from None
+    panels = [p for p in figure.panels if p.y.quantity == measured.output and p.x.quantity in measured.conditions]
+    if not panels:
+        known = ", ".join(measured.conditions)
+        raise DataError(f"{measured.source} holds {measured.output} against {known}, which this figure does not show")
+    drawn = sum(_add(panel, measured, data) for panel in panels)
+    if drawn < measured.values.size:
+        rest = measured.values.size - drawn
+        figure.leave_out([f"{rest} of {measured.values.size} measured points, whose conditions are not drawn"])
+
+
+def _add(panel: Panel, measured: Measured, data: xr.Dataset) -> int:
+    """Add the points at the conditions of a panel, in the colours of its curves; return their number."""
+    found = 0
+    left = np.ones(measured.values.size, dtype=bool)
+    for trace in [trace for trace in panel.traces if trace.kind == "curve" and trace.what == "data"]:
+        here = left & _at(trace.data, measured, panel.x.quantity)
+        if here.any():
+            panel.traces.append(_points(panel, measured, data, here, trace.colour, trace.label))
+            left &= ~here
+            found += int(here.sum())
+    if found:
+        panel.keys = [*panel.entries(), Key(f"{NAME}, 95 %", "#000000", "", "D")]
+    return found
+
+
+def _at(curve: xr.Dataset, measured: Measured, along: str) -> np.ndarray:
+    """Return which points have the conditions of a curve."""
+    here = np.ones(measured.values.size, dtype=bool)
+    for name, values in measured.conditions.items():
+        if name != along and name in curve.coords and curve[name].ndim == 0:
+            here &= np.isclose(values, float(curve[name]), rtol=SAME, atol=0)
+    return here
+
+
+def _points(panel: Panel, measured: Measured, data: xr.Dataset, here: np.ndarray, colour: str, label: str) -> Trace:
+    x = labels.quantity(panel.x.quantity, data[panel.x.quantity]).of(measured.conditions[panel.x.quantity][here])
+    how, values = labels.quantity(measured.output, data[measured.output]), measured.values[here]
+    half = np.full(values.size, np.nan) if measured.errors is None else HALF * measured.errors[here]
+    coords = {
+        name: ("point", each[here], {"units": str(data[name].attrs.get("units", "1"))})
+        for name, each in measured.conditions.items()
+    }
+    points = columns(xr.Dataset(coords=coords), x=x, y=Mean(*map(how.of, (values, values - half, values + half))))
+    name = ", ".join(part for part in (NAME, label) if part)
+    return Trace("curve", points, NAME, name, colour, "", "D", bars=True)
