@@ -105,7 +105,7 @@ def parameters_along(data: xr.Dataset, dim: str) -> list[str]:
 
 
 def hold(data: xr.Dataset, dims: Sequence[str]) -> tuple[xr.Dataset, list[str]]:
-    """Hold axes at their middle value; return the rest of the series, and a sentence for each axis of several values."""
+    """Hold axes at their middle value; return the rest of the series, and a sentence for each of these axes."""
     places = {dim: data.sizes[dim] // 2 for dim in dims}
     sentences = [_only_one(data, dim, place) for dim, place in places.items() if data.sizes[dim] > 1]
     return data.isel(places), sentences
@@ -180,7 +180,7 @@ def family(data: xr.Dataset, output: str, along: str, by: str = "") -> Family:
 
 
 def with_one_legend(families: Mapping[str, Family]) -> tuple[list[str], list[str]]:
-    """Return the series that can share a legend and a colour bar, as many as possible, and a sentence about the rest."""
+    """Return as many series as possible that share a legend and a colour bar, and a sentence about the others."""
     groups: dict[Any, list[str]] = {}
     for name, one in families.items():
         groups.setdefault((tuple(one.keys), one.bar), []).append(name)

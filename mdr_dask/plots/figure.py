@@ -12,7 +12,6 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import pandas as pd
 import xarray as xr
-from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.plots.labels import plain
@@ -124,11 +123,11 @@ class Trace:
 
     def frame(self) -> pd.DataFrame:
         """Return a row for every point that is drawn."""
-        data = self.data.rename({name: f"parameter {name}" for name in self.data.coords if name in (*FIRST, *LAST)})
-        own = [str(name) for name in (*data.data_vars, *data.coords)]
-        rows = (data if data.sizes else data.expand_dims("point")).to_dataframe().reset_index()[own]
+        data, own = self.data, [str(name) for name in self.data.variables]
+        rows: pd.DataFrame = (data if data.sizes else data.expand_dims("point")).to_dataframe().reset_index()[own]
         drawn = next(name for name in ("value", "y", "y_low", "x") if name in rows)
-        return rows[np.isfinite(rows[drawn])].assign(curve=plain(self.label), what=plain(self.what))
+        shown: pd.DataFrame = rows[np.isfinite(rows[drawn])]
+        return shown.assign(curve=plain(self.label), what=plain(self.what))
 
 
 @dataclass
@@ -211,10 +210,7 @@ class Figure:
     def units(self) -> dict[str, str]:
         """Return the units of all parameters."""
         coords = (item for panel in self.panels for trace in panel.traces for item in trace.data.coords.items())
-        return {
-            f"parameter {name}" if name in (*FIRST, *LAST) else str(name): str(value.attrs.get("units", "1"))
-            for name, value in coords
-        }
+        return {str(name): str(value.attrs.get("units", "1")) for name, value in coords}
 
     def head(self, origin: Mapping[str, str]) -> list[str]:
         """Return the comment lines above the table: origin, parameters held, units, and labels of each panel."""
@@ -260,13 +256,20 @@ def columns(of: xr.Dataset | xr.DataArray | None = None, **values: Any) -> xr.Da
     for name, part in parts.items():
         array = np.asarray(part.values if isinstance(part, xr.DataArray) else part, dtype=np.float64)
         dims = part.dims if isinstance(part, xr.DataArray) else shapes.get(array.shape, ("point",) * array.ndim)
-        arrays[name] = (dims, array)
+        arrays[name] = ([_apart(dim) for dim in dims], array)
     used = {dim for dims, _ in arrays.values() for dim in dims}
-    found: dict[str, Any] = {} if of is None else {str(name): coord for name, coord in of.coords.items()}
-    kept = {name: (coord.dims, coord.values, coord.attrs) for name, coord in found.items() if set(coord.dims) <= used}
+    found = (
+        {} if of is None else {name: ([_apart(d) for d in c.dims], c.values, c.attrs) for name, c in of.coords.items()}
+    )
+    kept = {_apart(name): coord for name, coord in found.items() if set(coord[0]) <= used}
     data = xr.Dataset(arrays, coords=kept)
     unknown = [name for name in arrays if name.endswith(("_low", "_high")) and not np.isfinite(data[name]).any()]
     return data.drop_vars(unknown)
+
+
+def _apart(name: Any) -> str:
+    """Return the name of a parameter that is no column of a figure's own."""
+    return f"parameter {name}" if name in (*FIRST, *LAST) else str(name)
 
 
 def edges(centres: FloatArray, log: bool) -> FloatArray:
@@ -278,8 +281,3 @@ def edges(centres: FloatArray, log: bool) -> FloatArray:
     between = 0.5 * (at[1:] + at[:-1])
     ends: FloatArray = np.concatenate([[2 * at[0] - between[0]], between, [2 * at[-1] - between[-1]]])
     return np.asarray(np.exp(ends)) if log else ends
-
-
-def texts(values: NDArray[Any]) -> list[str]:
-    """Return words without mathtext."""
-    return [plain(str(value)) for value in values.ravel()]

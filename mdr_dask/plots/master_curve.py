@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -128,7 +128,7 @@ def _merged(curve: xr.Dataset, groups: list[_Group]) -> Panel:
     error = 10 ** curve["curve_error"].to_numpy()
     low, high = (curve["curve_abscissa"].attrs[f"measured_{end}"] for end in ("low", "high"))
     inside = (x >= low) & (x <= high)
-    black = {"colour": "#000000"}
+    black: dict[str, Any] = {"colour": "#000000"}
     panel.traces += [
         Trace("band", columns(x=x, y=Mean(y, y / error, y * error)), "merged curve", **black),
         Trace("law", columns(x=x, y=y), "reached by shifting", "reached by shifting", line="--", **black),

@@ -14,7 +14,7 @@ from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.units import to_si
 
 #: Letters and lines of a figure with a requested size, in points: a journal prints it without scaling.
-LETTERS: dict[str, Any] = {
+LETTERS: dict[Any, Any] = {
     "font.size": 8,
     "axes.labelsize": 8,
     "axes.titlesize": 8,
@@ -26,7 +26,7 @@ LETTERS: dict[str, Any] = {
     "lines.markersize": 3,
 }
 #: The same for a figure on a screen.
-SCREEN: dict[str, Any] = {"legend.fontsize": 8, "lines.linewidth": 1.2, "lines.markersize": 4}
+SCREEN: dict[Any, Any] = {"legend.fontsize": 8, "lines.linewidth": 1.2, "lines.markersize": 4}
 #: Metres to an inch; least and greatest width and height in metres.
 INCH = 0.0254
 LEAST, MOST = 0.02, 1.0

@@ -112,8 +112,8 @@ def render(description: Figure) -> Drawn:
     rows = -(-len(panels) // (columns * description.stack)) * description.stack
     width = asked.width or (ALONE if columns == 1 else BESIDE * columns)
     height = rows * max(LEAST_HEIGHT, description.ratio * width / columns)
-    figure = Drawn(description, figsize=(width, asked.height or height), layout="constrained")
-    figure.get_layout_engine().set(w_pad=0.03, h_pad=0.03)  # type: ignore[union-attr]
+    figure = Drawn(description, figsize=(width, asked.height or height))
+    figure.set_layout_engine("constrained", w_pad=0.03, h_pad=0.03)
     places = _axes(figure, description, rows, columns)
     for axes, panel in zip(places, panels, strict=True):
         _draw_panel(axes, panel)
@@ -257,7 +257,7 @@ def _map(axes: Axes, trace: Trace, panel: Panel) -> None:
 def _absent(axes: Axes, trace: Trace, _: Panel) -> None:
     x = trace.column("x")
     place = np.full(x.size, FOOT)
-    look = {"color": trace.colour, "marker": trace.marker, "linestyle": "none"}
+    look: dict[str, Any] = {"color": trace.colour, "marker": trace.marker, "linestyle": "none"}
     axes.plot(x, place, transform=axes.get_xaxis_transform(), zorder=4, gid=trace.kind, **look)
 
 
@@ -330,7 +330,8 @@ def _broken(figure: Drawn, text: str, width: float, size: Any) -> str:
 def _handle(key: Key) -> Any:
     from matplotlib.lines import Line2D
 
-    return Line2D([], [], color=key.colour, linestyle=key.line or "none", marker=key.marker or "none", label=key.label)
+    line: Any = key.line or "none"
+    return Line2D([], [], color=key.colour, linestyle=line, marker=key.marker or "none", label=key.label)
 
 
 def _legend(figure: Drawn, keys: list[Key]) -> float:

@@ -102,7 +102,7 @@ def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
         If no series can be drawn as requested, with the reason of each.
     """
     figures, shown, reasons = [], [], []
-    for view, output in ((view, output) for view in views for output in view.names):
+    for view, output in [(each, name) for each in views for name in each.names]:
         found, why = _holding(groups, view, output)
         reasons += why
         if found and view.single:
@@ -281,7 +281,8 @@ def _by_series(found: Mapping[str, xr.Dataset]) -> tuple[list[_Part], list[str]]
 def _panel(part: _Part, families: Mapping[str, curves.Family], view: View, output: str, x: Axis) -> Panel:
     """Draw the curves of all series of a panel with their laws, and mark the cases without a value."""
     panel = Panel(x, Axis(""), title=part.title)
-    along, marked, law_name = view.along[0], {}, ""
+    along, law_name = view.along[0], ""
+    marked: dict[str, str] = {}
     several_styles = any(one.bar or len({curve.line for curve in one.curves}) > 1 for one in families.values())
     for curve, one in _coloured(families):
         data = curve.data

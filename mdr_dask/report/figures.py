@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.plots import colours
 from mdr_dask.plots.base import Plot
-from mdr_dask.plots.figure import FIRST, LAST, Axis, Bar, Figure, Panel, Trace, edges
+from mdr_dask.plots.figure import LAST, Axis, Bar, Figure, Panel, Trace, edges
 from mdr_dask.plots.labels import plain
 from mdr_dask.report.words import markup
 
@@ -93,10 +93,7 @@ def _trace(trace: Trace, panel: int, of: Panel, bars: list[Bar], step: int) -> J
     order = order[kept]
     widest = trace.data[max(trace.data.data_vars, key=lambda name: trace.data[name].ndim)]
     parameters = {
-        f"parameter {name}" if name in (*FIRST, *LAST) else str(name): coord.broadcast_like(widest)
-        .transpose(*widest.dims)
-        .to_numpy()
-        .ravel()[order]
+        str(name): coord.broadcast_like(widest).transpose(*widest.dims).to_numpy().ravel()[order]
         for name, coord in trace.data.coords.items()
     }
     found: Json = {

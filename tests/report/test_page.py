@@ -7,14 +7,16 @@ import re
 from pathlib import Path
 
 import numpy as np
+import planted
 import pytest
 import xarray as xr
-from matplotlib.figure import Figure
 from report_stores import HOSTILE, friction, hostile
 
 from mdr_dask import aggregation, fits, plots, store
 from mdr_dask.cli import main
 from mdr_dask.execute import Resources, run
+from mdr_dask.plots.figure import Axis
+from mdr_dask.plots.page import with_units
 from mdr_dask.report import cases, figures, page, read_study, words
 from mdr_dask.report import study as study_room
 
@@ -116,12 +118,36 @@ def test_large_studies_are_reduced_and_say_so(url, monkeypatch):
     (series,) = cases.cases_of(store.datasets(url))
     assert len(series["states"]) <= 6
     assert "values of velocity" in " ".join(series["reduced"])
-    drawn = plots.available("sliding_friction")["velocity"].figure(store.datasets(url))
+    drawn = plots.available("sliding_friction")["velocity"].describe(store.datasets(url))
     shown = figures.figure_data("velocity", "", drawn, {})
-    count = sum(len(trace["x"]) for trace in shown["traces"])
-    assert f"{count} of {len(drawn.table())} points are on this page" in shown["left_out"]
-    for full, thin in zip(drawn.rows, shown["traces"], strict=True):
-        assert thin["x"][-1] == pytest.approx(np.max(full.columns["x"]), rel=1e-8)
+    assert sum(len(trace["x"]) for trace in shown["traces"]) < 20
+    assert "points is on this page" in shown["left_out"]
+    for full, thin in zip(drawn.panels[0].traces, shown["traces"], strict=True):
+        assert thin["x"][-1] == pytest.approx(np.max(full.column("x")), rel=1e-8)
+
+
+def test_pages_of_large_studies_are_made_from_a_part_of_their_results(url, monkeypatch):
+    monkeypatch.setattr(study_room, "MOST_RESULTS", 30)
+    study = read_study(url)
+    assert all("evenly spread values of the axes" in figure["left_out"] for figure in study.figures)
+    assert study.not_fitted == [("all laws", f"the study is large; use mdr-dask fit {url} NAME")]
+    assert "60 of 60" in study.facts["results"]
+    velocities = {value for trace in study.figures[0]["traces"] for value in np.ravel(trace["of"]["velocity"])}
+    assert len(velocities) < 5
+
+
+def test_differences_of_temperatures_are_in_kelvin_and_temperatures_as_written(tmp_path):
+    material = "material: {standard_solid: {static_modulus: 3 MPa, glass_modulus: 1 GPa, relaxation_time: 1 us}"
+    material += ", wlf: {c1: 8.86, c2: 101.6 K, reference: 20 degC}, temperature: [20 degC, 40 degC]}"
+    text = planted.SLIDING.replace("  shear_modulus: 10 MPa\n  relaxation_time: 1 ms\n", f"  {material}\n")
+    planted.make(tmp_path, text + "  normal_force: 1 N\n  velocity: [1 mm/s, 10 mm/s]\n")
+    study = read_study(str(tmp_path / "study.zarr"))
+    fixed = {row[0]: row[2] for table in study.understood for row in table.rows if table.title == "Fixed parameters"}
+    assert fixed["material_wlf_c2"] == "101.6 K"
+    axes = {row[0]: row[3] for table in study.understood for row in table.rows if table.title == "Axes"}
+    assert axes["material_temperature"] == "20 degC, 40 degC"
+    assert axes["velocity"] == "1 mm/s, 10 mm/s"
+    assert study.cases[0]["axes"]["velocity"]["unit"] == "mm/s"
 
 
 @pytest.mark.parametrize(
@@ -211,19 +237,16 @@ def test_an_error_beside_a_mean_of_zero_is_no_percentage(url):
     assert "Over 100 %: the mean is zero within its error" in errors.note
 
 
-def test_an_axis_of_a_page_is_turned_round_and_named_as_that_of_the_picture():
-    axes = Figure().subplots()
-    axes.set_ylim(2, -1)
-    axes.set_yticks([0.0, 1.0], ["$H$", "load & speed"])
-    axes.set(xscale="log", xlabel="time\n[s]")
-    assert figures._axis(axes.yaxis, axes.get_ylim()) == {
+def test_an_axis_of_a_page_is_that_of_the_description():
+    ticks = [(0.0, "$H$"), (1.0, "load & speed")]
+    assert figures._axis(Axis("", ticks=ticks, reverse=True)) == {
         "label": "",
         "spoken": "",
         "log": False,
         "reversed": True,
         "ticks": [[0.0, "H"], [1.0, "load &amp; speed"]],
     }
-    assert figures._axis(axes.xaxis, axes.get_xlim()) == {"label": "time [s]", "spoken": "time [s]", "log": True}
+    assert figures._axis(Axis("time [s]", log=True)) == {"label": "time [s]", "spoken": "time [s]", "log": True}
 
 
 def test_what_has_no_realisations_is_a_value_without_an_interval(url):
@@ -241,7 +264,8 @@ def test_errors_of_a_case_are_in_the_unit_of_its_value(url):
     pressure = (1e9 * data["friction_coefficient"]).assign_attrs(units="Pa", ancillary_variables="pressure_error")
     data = data.assign(pressure=pressure, pressure_error=0.01 * pressure)
     shape = data["pressure"].isel(realisation=0, drop=True)
-    found = {name: np.array(values) for name, values in cases._measured(data, "pressure", shape).items()}
+    with with_units({"pressure": "GPa"}):
+        found = {name: np.array(values) for name, values in cases._measured(data, "pressure", shape).items()}
     mean, lines = 1e-9 * pressure.mean("realisation"), 1e-9 * aggregation.standard_error(pressure)
     for name, expected in (("value", mean), ("lines", lines), ("grid", 0.01 * mean)):
         np.testing.assert_allclose(found[name], expected.to_numpy().ravel(), rtol=1e-6)
@@ -258,7 +282,7 @@ def test_errors_of_a_case_are_in_the_unit_of_its_value(url):
     ],
 )
 def test_six_values_of_an_axis_are_listed_and_of_more_both_ends(values, said):
-    assert study_room._range(xr.DataArray(values, attrs={"units": "m"})) == said
+    assert study_room._range("x", xr.DataArray(values, attrs={"units": "m"})) == said
 
 
 @pytest.mark.parametrize(

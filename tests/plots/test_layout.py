@@ -1,0 +1,132 @@
+"""Figures at the widths of a journal: nothing overlaps, nothing is cut, whatever the number of curves."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from mdr_dask.plots import page
+from mdr_dask.plots.render import render
+from mdr_dask.plots.view import View, draw
+
+#: Pixels that two texts may share: rounding of their boxes.
+TOLERANCE = 2.0
+
+
+def study(curves, second=1, words=False, name="a_parameter_with_a_rather_long_name"):
+    """Return a series of an output against velocity, with other axes of some values."""
+    values = np.array([f"word number {k}" for k in range(curves)]) if words else np.linspace(1.0, 2.0, curves)
+    velocity = np.geomspace(1e-4, 1e2, 13)
+    shape = (curves, second, 13, 3)
+    random = np.random.default_rng(1)
+    output = 1e-3 * (1 + np.arange(curves))[:, None, None, None] * random.uniform(0.9, 1.1, shape)
+    output *= (velocity / (1 + velocity))[:, None]
+    data = xr.Dataset(
+        {
+            "mu": (
+                (name, "load", "velocity", "realisation"),
+                output,
+                {"long_name": "coefficient of friction in the whole contact"},
+            ),
+            "status": ((name, "load", "velocity", "realisation"), np.ones(shape, dtype=np.int8)),
+        },
+        coords={
+            name: (name, values, {"units": "1"}),
+            "load": ("load", np.linspace(1, 2, second), {"units": "N"}),
+            "velocity": ("velocity", velocity, {"units": "m/s"}),
+        },
+        attrs={"axes": [{"name": axis, "dim": axis, "path": axis} for axis in (name, "load", "velocity")]},
+    )
+    return data.squeeze([dim for dim in (name, "load") if data.sizes[dim] == 1])
+
+
+def boxes(figure):
+    """Return the boxes of all texts that are seen, by their text and kind."""
+    figure.draw_without_rendering()
+    renderer = figure.canvas.get_renderer()
+    texts = [text for text in (figure._suptitle,) if text is not None]
+    for axes in figure.axes:
+        texts += [axes.title, axes.xaxis.label, axes.yaxis.label, axes.xaxis.offsetText, axes.yaxis.offsetText]
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            inside = [tick for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high]
+            texts += [label for tick in inside for label in (tick.label1, tick.label2)]
+    texts += [text for legend in figure.legends for text in legend.get_texts()]
+    seen = [text for text in texts if text.get_visible() and text.get_text().strip()]
+    found = [(text.get_text(), text.get_window_extent(renderer)) for text in seen]
+    return found + [("legend", legend.get_window_extent(renderer)) for legend in figure.legends]
+
+
+def overlap(a, b):
+    return min(a.x1, b.x1) - max(a.x0, b.x0) > TOLERANCE and min(a.y1, b.y1) - max(a.y0, b.y0) > TOLERANCE
+
+
+def problems(figure):
+    whole, found = figure.bbox, boxes(figure)
+    for text, box in found:
+        outside = max(whole.x0 - box.x0, whole.y0 - box.y0, box.x1 - whole.x1, box.y1 - whole.y1)
+        if outside > TOLERANCE:
+            yield f"{text!r} is cut by {outside:.1f} pixels"
+    of_texts = [each for each in found if each[0] != "legend"]
+    for (one, a), (other, b) in combinations(of_texts, 2):
+        if overlap(a, b):
+            yield f"{one!r} overlaps {other!r}"
+    panels = [axes.get_window_extent() for axes in figure.axes]
+    for text, box in found:
+        if any(overlap(box, panel) for panel in panels):
+            yield f"{text!r} lies on a panel"
+
+
+@pytest.mark.parametrize("size", ["", "85mm", "170mm", "85x60mm"])
+@pytest.mark.parametrize(
+    ("curves", "second", "words"), [(1, 1, False), (5, 1, False), (25, 1, False), (6, 3, False), (25, 3, True)]
+)
+def test_nothing_overlaps_and_nothing_is_cut(size, case):
+    curves, second, words = case
+    asked = page.Page(*(page.size(size) if size else ()))
+    with page.drawing_for(asked):
+        figure = render(draw({"": study(curves, second, words)}, View("mu", "velocity")))
+        assert not list(problems(figure))
+        assert min(axes.get_window_extent().height / figure.dpi for axes in figure.axes) > 0.5
+        assert bool(figure.get_suptitle()) == (not size)
+        if size:
+            assert figure.get_figwidth() == pytest.approx(asked.width)
+
+
+@pytest.mark.parametrize("size", ["85mm"])
+@pytest.mark.parametrize("view", [View("mu", ("velocity", "load")), View("mu"), View("mu", "velocity", panels="load")])
+def test_maps_effects_and_panels_do_not_overlap_either(size, view):
+    with page.drawing_for(page.Page(*page.size(size))):
+        figure = render(draw({"": study(5, 4)}, view))
+        assert not list(problems(figure))
+
+
+def test_a_title_can_be_set_and_switched_off():
+    for title, size, shown in (("Mine", "85mm", "Mine"), ("", "", ""), (None, "85mm", "")):
+        with page.drawing_for(page.Page(*(page.size(size) if size else (None, None)), title=title)):
+            assert render(draw({"": study(3)}, View("mu", "velocity"))).get_suptitle() == shown
+
+
+def test_styles_of_matplotlib_are_used():
+    with page.drawing_for(page.Page(), "grayscale"):
+        figure = render(draw({"": study(4)}, View("mu", "velocity")))
+    lines = [line for line in figure.axes[0].lines if line.get_gid() == "curve"]
+    assert len({line.get_linestyle() for line in lines}) == 4
+    with pytest.raises(Exception, match="expected a style file"), page.drawing_for(page.Page(), "greyscale"):
+        pass
+
+
+@pytest.mark.parametrize("text", ["85", "1mm", "85 x 60", "2 m", "wide"])
+def test_bad_sizes_are_refused(text):
+    with pytest.raises(Exception, match="expected"):
+        page.size(text)
+
+
+def test_matplotlib_draws_the_data_of_the_description():
+    description = draw({"": study(3)}, View("mu", "velocity"))
+    figure = render(description)
+    drawn = [line for line in figure.axes[0].lines if line.get_gid() == "curve"]
+    for line, trace in zip(drawn, description.panels[0].traces, strict=True):
+        np.testing.assert_array_equal(line.get_xdata(), trace.column("x"))
+        np.testing.assert_array_equal(line.get_ydata(), trace.column("y"))

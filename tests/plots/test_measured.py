@@ -1,0 +1,73 @@
+"""Measured points in figures: in the figure of a calibration, and beside any curves."""
+
+import numpy as np
+import planted
+import pytest
+
+from mdr_dask.errors import DataError
+from mdr_dask.fits.calibration import calibrate, measured_of, with_table
+from mdr_dask.plots import available
+from mdr_dask.plots.measured import with_points
+
+CAMPAIGN = planted.SLIDING + "  normal_force: [100 mN, 1 N]\n  velocity: {geometric: [0.01 mm/s, 10 m/s, 9]}\n"
+
+
+@pytest.fixture
+def groups(tmp_path):
+    return planted.make(tmp_path, CAMPAIGN)
+
+
+def drawn(groups, tmp_path, table, name="velocity"):
+    path = tmp_path / "rig.csv"
+    path.write_text(table)
+    figures = {name: available("sliding_friction")[name]}
+    given, figures = with_points(groups, figures, str(path))
+    return figures[name].describe(given)
+
+
+def test_points_have_the_colour_of_their_curve_and_their_error_bars(groups, tmp_path):
+    table = "velocity [mm/s],normal_force [N],friction_coefficient,standard error\n1,0.1,2e-3,1e-4\n100,1,5e-3,2e-4\n"
+    figure = drawn(groups, tmp_path, table)
+    panel = figure.panels[0]
+    curves = {trace.label: trace.colour for trace in panel.traces if trace.what == "data"}
+    points = [trace for trace in panel.traces if trace.what == "measured"]
+    assert [trace.label.removeprefix("measured, ") for trace in points] == list(curves)
+    assert [trace.colour for trace in points] == list(curves.values())
+    rows = figure.table().query("what == 'measured'")
+    np.testing.assert_allclose(rows.y, [2e-3, 5e-3])
+    np.testing.assert_allclose(rows.x, [1e-3, 0.1] if "[m/s]" in panel.x.label else [1, 100])
+    np.testing.assert_allclose(rows.y_high - rows.y, [1.96e-4, 3.92e-4])
+    assert "measured, 95 %" in [key.label for key in panel.keys]
+
+
+def test_points_at_other_conditions_are_counted(groups, tmp_path):
+    table = "velocity [m/s],normal_force [N],friction_coefficient\n0.01,0.1,2e-3\n0.01,7,5e-3\n"
+    figure = drawn(groups, tmp_path, table)
+    assert "1 of 2 measured points, whose conditions are not drawn" in figure.left_out
+
+
+def test_figures_of_other_quantities_are_refused(groups, tmp_path):
+    table = "velocity [m/s],friction_coefficient\n0.01,2e-3\n0.02,5e-3\n"
+    with pytest.raises(DataError, match=r"rig.csv holds friction_coefficient against velocity"):
+        drawn(groups, tmp_path, table, "force")
+
+
+def test_calibration_shows_what_the_fit_found(tmp_path):
+    text = CAMPAIGN.replace("[100 mN, 1 N]", "{geometric: [100 mN, 10000 mN, 5]}")
+    groups = planted.make(tmp_path, text)
+    rows = [f"{v},{4e-3 * v**0.5:.6g},{1e-5:g}" for v in np.geomspace(1e-4, 1, 8)]
+    path = tmp_path / "rig.csv"
+    path.write_text("\n".join(["velocity [m/s],friction_coefficient,standard error", *rows]) + "\n")
+    given = with_table(groups, path)
+    found = calibrate(given[""], measured_of(given[""]))
+    figure = available("sliding_friction")["calibration"].describe(given)
+    holds = found.law_holds.startswith("yes")
+    assert figure.subject.startswith("calibration: " + ("every" if holds else found.law_holds[:10]))
+    data = [trace for trace in figure.panels[0].traces if trace.kind == "curve"]
+    np.testing.assert_allclose(np.sort(np.concatenate([t.column("y") for t in data])), np.sort(found.measured.values))
+    residuals = [trace for trace in figure.panels[1].traces if trace.kind == "curve"]
+    np.testing.assert_allclose(np.sort(residuals[0].column("y")), np.sort(found.residuals.scaled))
+    density = figure.panels[2]
+    assert density.x.label == "normal force $F_N$ [mN]"
+    shades = [trace for trace in density.traces if trace.kind == "band"]
+    assert bool(shades) != (density.title == "not determined")
