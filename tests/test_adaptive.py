@@ -21,8 +21,7 @@ from mdr_dask.execute import Part, Resources, stages
 from mdr_dask.fits.base import Fit
 from mdr_dask.fits.interpolant import law
 from mdr_dask.models.base import Status
-from mdr_dask.plots.outputs import View, of_output
-from mdr_dask.plots.style import DATA
+from mdr_dask.plots.view import View, figure_of
 from mdr_dask.questions.table import Question, table
 from mdr_dask.refinement import Mean, Stage, interpolation_error, refined
 
@@ -348,14 +347,14 @@ def test_a_figure_has_the_values_that_each_curve_needed(study, url):
     shifts = [-1.5, 1.7]
     run(study(f"shift: {shifts}"), url)
     data = store.datasets(url)[""]
-    (axes,) = of_output(View("y", ("x",))).figure({"": data}).axes
-    drawn = [line for line in axes.lines if line.get_gid() == DATA]
-    for shift, line in zip(shifts, drawn, strict=True):
+    (panel,) = figure_of(View("y", "x")).describe({"": data}).panels
+    drawn = [trace for trace in panel.traces if trace.kind == "curve"]
+    for shift, trace in zip(shifts, drawn, strict=True):
         one = data.sel(shift=shift)
         needed = (one.status == Status.DONE).any("realisation").to_numpy()
         assert not needed.all()
-        np.testing.assert_allclose(line.get_xdata(), one.x.to_numpy()[needed])
-        np.testing.assert_allclose(line.get_ydata(), one.y.mean("realisation").to_numpy()[needed])
+        np.testing.assert_allclose(trace.column("x"), one.x.to_numpy()[needed])
+        np.testing.assert_allclose(trace.column("y"), one.y.mean("realisation").to_numpy()[needed])
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,6 @@ import json
 import os
 import re
 import sys
-import threading
-import urllib.request
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +17,6 @@ from planted import SLIDING
 from mdr_dask import campaign, fits, models
 from mdr_dask.cli import main
 from mdr_dask.cli.results import list_names
-from mdr_dask.report import serving
 
 TABLE = Path(__file__).parent / "data/dma/time_user_raw.csv"
 
@@ -168,30 +165,3 @@ def test_a_reader_that_has_read_enough_is_no_error(monkeypatch, tmp_path):
         assert main(["models", "--json"]) == 0
         assert os.path.samestat(os.fstat(pipe.fileno()), Path(os.devnull).stat())
         monkeypatch.undo()
-
-
-@pytest.mark.slow
-def test_a_page_is_served_until_ctrl_c(store, monkeypatch, capsys):
-    served = []
-
-    def serve_forever(server):
-        served.append(server.address)
-        with urllib.request.urlopen(f"{server.address}progress", timeout=60) as answer:
-            served.append(json.load(answer))
-        raise KeyboardInterrupt
-
-    def asked_once(server):
-        thread = threading.Thread(target=server.handle_request)
-        thread.start()
-        try:
-            serve_forever(server)
-        finally:
-            thread.join()
-
-    monkeypatch.setattr(serving.Server, "serve_forever", asked_once)
-    assert main(["serve", store]) == 0
-    out, err = capsys.readouterr()
-    assert out.strip() == served[0]
-    assert served[1]["results"] == 120
-    assert err.split()[-1] == "ended"
-    assert "other machines" not in err

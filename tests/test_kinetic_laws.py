@@ -10,7 +10,6 @@ from mdr_dask import execute
 from mdr_dask.campaign import load
 from mdr_dask.cli import main
 from mdr_dask.fits import available as fits
-from mdr_dask.plots import available as plots
 from mdr_dask.store import datasets
 
 CAMPAIGN = """
@@ -47,15 +46,6 @@ outputs:
 """
 #: Rates of one exponential, every time alike, from 100 lines on a finer grid, at v_1 = 0.02, 0.05 and 0.2 m/s.
 CHECKED = {0.3: [9.9, 22.3, 70.0], 0.7: [2.64, 3.75, 7.57]}
-FIGURES = (
-    "jump_trace",
-    "jump_velocities",
-    "jump_fit",
-    "jump_height",
-    "jump_law",
-    "relaxation_rate",
-    "relaxation_power",
-    "relaxation_course",
 )
 FIT = fits("velocity_jump")
 
@@ -117,24 +107,6 @@ def test_powers_in_both_regimes(groups):
     # not proportional to v_1 tau q_max there, as eq. 4.12 has it: the little that relaxes takes about tau
     assert below["power_low"] < below["power"] < below["power_high"]
     assert abs(below["power"]) < 0.5
-
-
-def test_every_figure_says_what_its_bars_are(groups):
-    for name in FIGURES:
-        figure = plots("velocity_jump")[name].figure(groups)
-        figure.savefig(io.BytesIO())
-        texts = [text.get_text() for text in figure.findobj(lambda artist: hasattr(artist, "get_text"))]
-        assert any("95 %" in text or "standard error" in text for text in texts), name
-        panels = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]
-        assert all(axes.get_xlabel() and axes.get_ylabel() for axes in panels), name
-
-
-def test_figures_of_a_store_with_one_case(groups):
-    for name in ("jump_trace", "jump_velocities", "jump_fit", "jump_height"):
-        figure = plots("velocity_jump")[name].figure({"": groups["example"]})
-        figure.savefig(io.BytesIO())
-        drawn = [line for axes in figure.axes for line in axes.lines if np.any(np.isfinite(line.get_ydata(orig=False)))]
-        assert drawn, name
 
 
 def test_the_command_line_fits_each_series_and_joins_intervals(store, capsys):

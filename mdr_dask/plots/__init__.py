@@ -12,7 +12,7 @@ from importlib.metadata import entry_points
 from mdr_dask.plots.base import Plot
 
 #: Modules of this package that hold ``PLOTS``.
-MODULES = ("named", "history", "calibration", "master_curve")
+SUBJECTS = ("named", "history", "calibration", "master_curve")
 
 #: Entry point group in which other packages offer tuples of `Plot`.
 GROUP = "mdr_dask.plots"
@@ -20,6 +20,6 @@ GROUP = "mdr_dask.plots"
 
 def available(model: str) -> dict[str, Plot]:
     """Return the figures for stores of a model, by name; other packages offer tuples of them in `GROUP`."""
-    own = (import_module(f"mdr_dask.plots.{module}").PLOTS for module in MODULES)
+    own = (import_module(f"mdr_dask.plots.{module}").PLOTS for module in SUBJECTS)
     others = (entry.load() for entry in entry_points(group=GROUP))
     return {plot.name: plot for plots in (*own, *others) for plot in plots if model in plot.models or not plot.models}

@@ -19,7 +19,7 @@ from mdr_dask.fits.calibration import LEAST, _bound, calibrate, calibration, sum
 from mdr_dask.fits.identifiability import OPEN, Ends, written
 from mdr_dask.fits.posterior import Likelihood, Noise
 from mdr_dask.fits.prediction import prediction
-from mdr_dask.plots.calibration import PARTS, _of_whole_cells
+from mdr_dask.plots.calibration import BINS, of_whole_cells
 
 AXES = {
     "normal_force": (np.geomspace(0.1, 10, 5), "N"),
@@ -276,7 +276,7 @@ def test_parts_of_a_marginal_hold_as_many_cells_each():
     place = np.linspace(0.1, 0.6, 241)
     across = np.log(2e-4) + 7 * place
     for ends in ([across[0], across[-1]], [across[31], across[150]], [across[100], across[101]]):
-        edges = _of_whole_cells(np.array(ends), across, place, np.diff(place)[0])
+        edges = of_whole_cells(np.array(ends), across, place, np.diff(place)[0])
         inside = (across > ends[0]) & (across < ends[1])
         assert edges[0] < across[inside].min(initial=ends[1])
         assert edges[-1] > across[inside].max(initial=ends[0])
@@ -284,7 +284,7 @@ def test_parts_of_a_marginal_hold_as_many_cells_each():
         cell = np.diff(across)[0]
         whole = (edges[:-1] > across[0] - cell) & (edges[1:] < across[-1] + cell)
         assert np.ptp(counts[whole]) == 0
-        assert len(counts) <= PARTS + 2
+        assert len(counts) <= BINS + 2
 
 
 @pytest.mark.parametrize("given", [True, False])

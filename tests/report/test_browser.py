@@ -10,9 +10,12 @@ from browser import PATIENCE, Browser, program
 from report_stores import friction, hostile
 
 from mdr_dask import aggregation, store
-from mdr_dask.report import page, read_study, serving
+from mdr_dask.report import page, read_study
 
-pytestmark = pytest.mark.skipif(program() is None, reason="no Chromium; .ci/run installs it where it may")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(program() is None, reason="no Chromium; .ci/run installs it where it may"),
+]
 VELOCITY = "report.figures.find((figure) => figure.spec.name === 'velocity')"
 
 #: The least contrast of any text with the paper.
@@ -178,30 +181,3 @@ def test_no_script_of_a_store_runs(browser, tmp_path, monkeypatch):
     assert browser.js("document.images.length") == 0
     assert "<script>window.ran" in browser.js("document.querySelector('h1').textContent")
     assert browser.told == []
-
-
-def test_a_served_page_follows_the_store(browser, toy, url, monkeypatch):
-    from threading import Thread
-
-    from mdr_dask.execute import Resources, run
-
-    def grow(*positions):
-        run(toy.campaign(toy.axis("position", positions)), url, Resources(threads=1), lambda _: None)
-
-    monkeypatch.setattr(serving, "SHARE", 0.0)
-    grow(1.0, 2.0)
-    follower = serving.Follower([url])
-    follower.look()
-    with serving.Server(follower) as server:
-        thread = Thread(target=server.serve_forever)
-        thread.start()
-        browser.open(server.address)
-        browser.until("document.getElementById('follow').textContent.includes('12 of 12')")
-        grow(1.0, 2.0, 3.0)
-        follower.look()
-        browser.until("report.figures[0].spec.traces[0].x.length === 3")
-        assert "18 of 18" in browser.until("document.getElementById('follow').textContent")
-        assert browser.told == []
-        browser.js("location.href = 'about:blank'")
-        server.shutdown()
-        thread.join()

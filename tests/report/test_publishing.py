@@ -1,6 +1,5 @@
-"""A published study: whole, its own witness, a store to read and to go on with, and a crate."""
+"""A published study: complete, verified, and a store to read and to extend."""
 
-import hashlib
 import json
 import platform
 import re
@@ -8,14 +7,12 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 import zarr
-from report_stores import friction
 
 from mdr_dask.cli import main
 from mdr_dask.store import datasets
@@ -51,7 +48,7 @@ def made(tmp_path_factory):
     (folder / "data/road.csv").write_text(spectrum())
     (folder / "work/road.yaml").write_text(CAMPAIGN.format(realisations=2, file="../data/road.csv"))
     assert main(["run", str(folder / "work/road.yaml"), "--store", str(folder / "road.zarr"), "--quiet"]) == 0
-    assert main(["publish", str(folder / "road.zarr"), "-o", str(folder / "road.zip"), "--license", "CC-BY-4.0"]) == 0
+    assert main(["publish", str(folder / "road.zarr"), "-o", str(folder / "road.zip")]) == 0
     return folder
 
 
@@ -85,33 +82,8 @@ def test_it_holds_all_that_belongs_to_it(folder):
         assert b"<h1>road</h1>" in packed.read("published/report.html")
         machine, when, *installed = packed.read("published/environment.txt").decode().splitlines()
         assert machine.startswith(f"# Python {platform.python_version()}, ")
-        assert re.fullmatch(r"# [\d-]+T[\d:]+\+00:00; what computed each block is in status/records", when)
+        assert re.match(r"# [\d-]+T[\d:]+\+00:00; ", when)
         assert f"numpy=={np.__version__}" in installed
-        crate = json.loads(packed.read("ro-crate-metadata.json"))
-        known = {each["@id"]: each for each in crate["@graph"]}
-        root = known["./"]
-        assert root["license"] == {"@id": "https://spdx.org/licenses/CC-BY-4.0"}
-        assert {"@id": "published/road.csv"} in known["#run"]["object"]
-        begun, ended = (datetime.fromisoformat(known["#run"][name]) for name in ("startTime", "endTime"))
-        assert begun.replace(microsecond=0) <= ended <= datetime.now(UTC)
-        linked = [part["@id"] for part in (*root["hasPart"], *known["#run"]["object"], *known["#run"]["result"])]
-        assert set(linked) <= known.keys()
-        arrays = {name.split("/c/")[0] for name in packed.namelist() if "/c/" in name}
-        assert {"friction_coefficient", "velocity"} <= arrays
-        assert {name.removesuffix("/") for name in linked if known[name]["@type"] == "Dataset"} == arrays
-        assert known["zarr.json"]["description"] == "metadata of the Zarr store"
-        assert known["published/road.csv"]["description"] == "a file that the campaign names"
-        for part in (known[name] for name in linked if known[name]["@type"] == "File"):
-            assert part["sha256"] == hashlib.sha256(packed.read(part["@id"])).hexdigest()
-
-
-def test_a_campaign_that_names_no_file_is_all_that_its_run_was_given(tmp_path):
-    friction(str(tmp_path / "small.zarr"))
-    assert main(["publish", str(tmp_path / "small.zarr"), "-o", str(tmp_path / "small.zip")]) == 0
-    with zipfile.ZipFile(tmp_path / "small.zip") as packed:
-        crate = json.loads(packed.read("ro-crate-metadata.json"))
-    (run,) = (each for each in crate["@graph"] if each["@id"] == "#run")
-    assert run["object"] == {"@id": "published/small.yaml"}
 
 
 def test_the_checksums_are_those_of_sha256sum(folder):
