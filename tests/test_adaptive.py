@@ -21,6 +21,7 @@ from mdr_dask.execute import Part, Resources, stages
 from mdr_dask.fits.base import Fit
 from mdr_dask.fits.interpolant import law
 from mdr_dask.models.base import Status
+from mdr_dask.plots import page
 from mdr_dask.plots.view import View, figure_of
 from mdr_dask.questions.table import Question, table
 from mdr_dask.refinement import Mean, Stage, interpolation_error, refined
@@ -347,7 +348,8 @@ def test_a_figure_has_the_values_that_each_curve_needed(study, url):
     shifts = [-1.5, 1.7]
     run(study(f"shift: {shifts}"), url)
     data = store.datasets(url)[""]
-    (panel,) = figure_of(View("y", "x")).describe({"": data}).panels
+    with page.with_units({"x": "m"}):
+        (panel,) = figure_of(View("y", "x")).describe({"": data}).panels
     drawn = [trace for trace in panel.traces if trace.kind == "curve"]
     for shift, trace in zip(shifts, drawn, strict=True):
         one = data.sel(shift=shift)

@@ -163,7 +163,8 @@ def test_outputs_of_a_model_of_ones_own_have_figures_too(view, tmp_path, monkeyp
     monkeypatch.delitem(sys.modules, "wear_rate", raising=False)
     assert main(["run", "pin.yaml", "--quiet"]) == 0
     assert main(["plot", "results/pin.zarr"]) == 0
-    assert main(["plot", "results/pin.zarr", "wear_volume", *view.split(), "-o", "own.svg"]) == 0
+    units = ["--units", "wear_volume=m^3"]
+    assert main(["plot", "results/pin.zarr", "wear_volume", *view.split(), *units, "-o", "own.svg"]) == 0
     table = pd.read_csv("own.csv", comment="#")
     (study,) = datasets("results/pin.zarr").values()
     wanted = study["wear_volume"].mean("realisation").values.ravel()

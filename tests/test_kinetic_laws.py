@@ -1,6 +1,5 @@
 """The laws of the kinetics of friction from a campaign run through the runner, and the figures drawn from it."""
 
-import io
 import json
 
 import numpy as np
@@ -46,7 +45,6 @@ outputs:
 """
 #: Rates of one exponential, every time alike, from 100 lines on a finer grid, at v_1 = 0.02, 0.05 and 0.2 m/s.
 CHECKED = {0.3: [9.9, 22.3, 70.0], 0.7: [2.64, 3.75, 7.57]}
-)
 FIT = fits("velocity_jump")
 
 pytestmark = pytest.mark.slow

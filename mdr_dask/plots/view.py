@@ -338,7 +338,8 @@ def _keys(families: Mapping[str, curves.Family]) -> list[Key]:
 
 def _law(curve: curves.Curve, law: laws.Law, along: str, output: str) -> Trace:
     fine = laws.along(curve.data, along)
-    value = labels.quantity(output, curve.data[output]).of(law.value(fine))
+    with np.errstate(invalid="ignore"):  # a failed case has no rms slope
+        value = labels.quantity(output, curve.data[output]).of(law.value(fine))
     label = ", ".join(part for part in (law.name, curve.label) if part)
     data = columns(fine, x=_places(fine, along), y=value)
     return Trace("law", data, law.name, label, curve.colour, "--")
