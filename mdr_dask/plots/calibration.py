@@ -47,7 +47,10 @@ def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
         panels.append(_density(found, name, found.values[:, k], found.units[name], k in found.free, data))
     for product in found.products:
         units = [found.units[name] for name in found.unknowns]
-        name, unit = identifiability.written(found.unknowns, product.exponents), identifiability.unit_of(units, product.exponents)
+        name, unit = (
+            identifiability.written(found.unknowns, product.exponents),
+            identifiability.unit_of(units, product.exponents),
+        )
         panels.append(_density(found, name, product.values, unit, False, data))
     points = f"{found.measured.source}, {found.measured.values.size} points{f', series {series}' if series else ''}"
     holds = found.law_holds
