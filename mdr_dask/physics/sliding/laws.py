@@ -94,3 +94,19 @@ def indenter(xi: Any, exponent: Any = INDENTER_EXPONENT) -> Any:
         alpha of the law.
     """
     return np.exp(-np.logaddexp(0.0, -exponent * np.log(xi)) / exponent)
+
+
+def single_tip(curvature: Any, force: Any, viscosity: Any, velocity: Any) -> Any:
+    """Return mu of a viscous foundation at very high velocity, (2/3) sqrt(kappa F_N / (2 eta v)).
+
+    One parabolic tip is in contact, from a = sqrt(F_N / (2 eta v kappa)) ahead of its summit to the summit; the rms
+    slope in contact is kappa a / sqrt 3, sqrt(3)/2 of mu. Derived in docs/high-speed.md.
+
+    Parameters
+    ----------
+    curvature : array_like
+        Curvature kappa of the highest point of the line, 1/m.
+    force, viscosity, velocity : array_like
+        F_N, eta of the dashpot (G tau of a Kelvin solid) and v.
+    """
+    return 2 / 3 * np.sqrt(curvature * force / (2 * viscosity * velocity))
