@@ -60,7 +60,7 @@ PUBLIC: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
 
 
 def api_page() -> str:
-    """Return the page as it stands in ``docs/api.md``."""
+    """Return the text of ``docs/api.md``."""
     parts = [_HEAD]
     for subject, rooms in PUBLIC.items():
         parts.append(f"## {subject}\n")

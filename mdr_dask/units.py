@@ -244,7 +244,7 @@ _FAR, _FAR_TEMPERATURE = 3.0, 0.3
 
 
 def is_far(value: float, unit: str, usual: str) -> bool:
-    """Return whether a number in SI lies more than three decades from a usual value such as ``10 MPa``."""
+    """Return whether a number in SI units is more than three decades from a usual value such as ``10 MPa``."""
     return value != 0 and _decades(value, to_si(usual, unit)) > (_FAR_TEMPERATURE if unit == "K" else _FAR) + 1e-9
 
 

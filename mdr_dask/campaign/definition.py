@@ -65,7 +65,7 @@ class Axis:
     name : str
         Name of its coordinate in the store: the path with ``_`` for ``.``.
     dim : str
-        Dimension of the store that it lies along: its own name in a grid, ``case`` where parameters vary together.
+        Its dimension in the store: its own name in a grid, ``case`` where parameters vary together.
     values : tuple
         Checked values in SI, in the order of the file: numbers, names, or whole parameter sets.
     labels : tuple of str or None

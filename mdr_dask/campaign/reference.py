@@ -80,7 +80,7 @@ the points of a smaller one. The headings of a table are names of parameters, wi
 
 
 def reference_page() -> str:
-    """Return the page as it stands in ``docs/campaign-file.md``."""
+    """Return the text of ``docs/campaign-file.md``."""
     parts = [_HEAD, "## Keys\n", _table(_rows(CampaignSpec, "key")), _VARIATION, _units()]
     parts += [_model(models.load(name)) for name in models.NAMES]
     return "\n".join(parts)

@@ -9,7 +9,7 @@ import click
 
 from mdr_dask.cli.figures import COMMAND, save
 from mdr_dask.cli.options import csv_option, json_option, limit_option, select_option, series_option, tell
-from mdr_dask.cli.printing import print_aligned, print_rows, printable, short, table, with_intervals
+from mdr_dask.cli.printing import print_aligned, print_rows, say, short, table, with_intervals
 from mdr_dask.cli.results import list_names, require_known, store_argument
 from mdr_dask.cli.sensitivity import Asking
 from mdr_dask.cli.writing import FIGURES, require_suffix
@@ -80,7 +80,7 @@ def fit(
         found = known[name].results(groups)
         for group, result in found.items():
             if (len(names) > 1 or len(found) > 1) and not form:
-                click.echo(f"{group + ': ' if group else ''}{name}: {known[name].summary}")
+                say(f"{group + ': ' if group else ''}{name}: {known[name].summary}")
             _print(result, group, form, limit)
     if figure is not None:
         from mdr_dask.plots import available
@@ -109,7 +109,7 @@ def _print_constants(row: dict[str, Any], units: dict[str, str]) -> None:
     ends = {name + end for name in constants for end in _ENDS.values()}
     for name in (name for name in units if name not in ends):
         unit = "" if units[name] == "1" else f" {units[name]}"
-        click.echo(f"{name}: {printable(short(row[name]))}{unit}")
+        say(f"{name}: {short(row[name])}{unit}")
 
 
 _ENDS = {"value": "", "95 % from": "_low", "to": "_high", "68 % from": "_low_68", "68 % to": "_high_68"}

@@ -168,7 +168,7 @@ def _print_block(heads: Sequence[Sequence[str]], cells: Sequence[Sequence[str]],
 
 
 def hanging(before: str, text: str) -> str:
-    """Return a text behind something, wrapped below its own beginning if it is too long."""
+    """Join two texts; the second is wrapped below its own beginning if the line is too long."""
     room = max(terminal_width() - len(before), NARROWEST // 2)
     if len(before) + len(text) <= terminal_width() or room <= NARROWEST // 2:
         return (before + text).rstrip()
@@ -177,7 +177,7 @@ def hanging(before: str, text: str) -> str:
 
 
 def _heading(title: str, width: int) -> list[str]:
-    """Return the lines of a heading: its name broken behind ``_`` where the cells are narrower, then its unit."""
+    """Return the lines of a heading: its name, broken after ``_`` to the width of the cells, then its unit."""
     name, unit = _name(title), _unit(title).strip()
     pieces = re.findall(r"[^_ ]+[_ ]*", name) or [name]
     lines = [""]

@@ -31,9 +31,9 @@ def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings
     dataset : Dataset
         A group of a study, or a Dataset derived from it.
     selections : sequence of str
-        Each names an axis, a column of a sampled study, ``case`` or ``realisation``, and behind ``=`` values and
-        ranges, separated by commas: ``velocity=1 mm/s..1 m/s``, ``hurst=0.3,0.7``, ``radius=..2``. Ends of a range
-        belong to it; a bare number is SI. A number between two values of the axis takes the nearest.
+        Each has the name of an axis, a column of a sampled study, ``case`` or ``realisation``, and after ``=`` values
+        and ranges, separated by commas: ``velocity=1 mm/s..1 m/s``, ``hurst=0.3,0.7``, ``radius=..2``. Both ends of a
+        range are included; bare numbers are in SI units. A number between two values selects the nearest one.
     tell : callable, str -> object
         Receives a message when the nearest value differs from the given one.
 
