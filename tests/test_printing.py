@@ -80,3 +80,12 @@ def test_messages_wrap_between_words(capsys, monkeypatch):
     lines = capsys.readouterr().err.splitlines()
     assert max(map(len, lines)) <= 60
     assert len(lines) > 2
+
+
+def test_a_text_in_the_last_column_is_wrapped_beside_the_others(printed):
+    lines = printed(
+        ["force", "value", "verdict"], [[1.0, 2.0], [0.1, 0.2], ["no: " + "one word after another " * 5, "yes"]]
+    )
+    assert lines[1].split()[:3] == ["1", "0.1", "no:"]
+    assert lines[2].startswith(" " * 14)
+    assert max(map(len, lines)) <= 80

@@ -24,6 +24,8 @@ Row = dict[str, Any]
 ROUNDING = 1e-13
 #: Columns between two columns of a table, and the narrowest terminal that tables are made for.
 GAP, NARROWEST = 2, 40
+#: Columns in which a long text at the end of a row is wrapped.
+WRAPPED = 30
 #: Sizes outside which numbers are printed with a power of ten.
 _SMALL, _LARGE = 1e-4, 1e6
 UNKNOWN = "-"
@@ -128,7 +130,8 @@ def print_aligned(titles: Sequence[str], columns: Sequence[Sequence[Any]], keys:
 def _print_table(titles: Sequence[str], cells: Sequence[Sequence[str]], keys: int) -> None:
     heads = [_heading(title, max(map(len, column), default=0)) for title, column in zip(titles, cells, strict=True)]
     widths = [max(map(len, [*head, *column])) for head, column in zip(heads, cells, strict=True)]
-    if sum(widths) + GAP * (len(widths) - 1) <= terminal_width():
+    needed = [*widths[:-1], min(widths[-1], WRAPPED) if _is_text(cells[-1]) else widths[-1]]
+    if sum(needed) + GAP * (len(needed) - 1) <= terminal_width():
         _print_block(heads, cells, widths)
         return
     if len(cells[0]) == 1:
@@ -136,7 +139,7 @@ def _print_table(titles: Sequence[str], cells: Sequence[Sequence[str]], keys: in
         for title, column in zip(titles, cells, strict=True):
             click.echo(hanging(f"{title.ljust(size)}  ", column[0]))
         return
-    for part in _parts(widths, keys):
+    for part in _parts(needed, keys):
         _print_block([heads[k] for k in part], [cells[k] for k in part], [widths[k] for k in part])
 
 
@@ -155,7 +158,7 @@ def _parts(widths: Sequence[int], keys: int) -> list[list[int]]:
 
 def _print_block(heads: Sequence[Sequence[str]], cells: Sequence[Sequence[str]], widths: Sequence[int]) -> None:
     """Print headings and cells; a long text in the last column is wrapped."""
-    left = [any(re.search(r"[a-df-zA-Z]{2}", cell) for cell in column) for column in cells]
+    left = [_is_text(column) for column in cells]
     height = max(map(len, heads))
     lines = [[*[""] * (height - len(head)), *head] for head in heads]
     for line in [*zip(*lines, strict=True), *zip(*cells, strict=True)]:
@@ -165,6 +168,11 @@ def _print_block(heads: Sequence[Sequence[str]], cells: Sequence[Sequence[str]],
         ]
         before = "".join(cell + " " * GAP for cell in aligned[:-1])
         click.echo(hanging(before, aligned[-1].rstrip()) if left[-1] else (before + aligned[-1]).rstrip())
+
+
+def _is_text(column: Sequence[str]) -> bool:
+    """Return whether a column has words rather than numbers, and is aligned to the left."""
+    return any(re.search(r"[a-df-zA-Z]{2}", cell) for cell in column)
 
 
 def hanging(before: str, text: str) -> str:
