@@ -28,6 +28,8 @@ def reporter(quiet: bool) -> Iterator[Callable[[Progress], None]]:
     elif "ipykernel" in sys.modules:
         with _in_notebook() as draw, _beating(draw, LIVE_PAUSE) as show:
             yield show
+    elif sys.stderr is None:
+        yield lambda _: None
     elif sys.stderr.isatty():
         with _live() as draw, _beating(draw, LIVE_PAUSE) as show:
             yield show
@@ -43,7 +45,7 @@ def at_work(what: str) -> Iterator[None]:
     def draw(_: Progress | None, elapsed: float) -> None:
         _write(", ".join([what, seconds(round(elapsed)), *(["compiling ..."] if _compiles() else [])]))
 
-    if not sys.stderr.isatty():
+    if sys.stderr is None or not sys.stderr.isatty():
         yield
         return
     with _beating(draw, PAUSE):

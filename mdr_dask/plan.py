@@ -113,7 +113,7 @@ class Template:
         blocks, arrays = math.prod(self.grid), len(self.outputs) + 1
         axes = {axis.name for axis in self.series.axes}
         coordinates = axes | set(self.extra) | (numbers_of(self.series.parameters).keys() - self.sizes.keys())
-        return blocks * arrays + math.ceil(blocks / RECORDS_TOGETHER) + 2 * (len(coordinates) + 1) + arrays + 3
+        return blocks * arrays + math.ceil(blocks / RECORDS_TOGETHER) + 2 * (len(coordinates) + 1) + arrays + 2
 
     def block_indices(self) -> Iterator[BlockIndex]:
         """Yield every block, first realisations of all cases first: a look at a running store sees all cases."""

@@ -1,4 +1,4 @@
-"""One task: compute a block, write it whole, tell the counts."""
+"""One task: compute a block, write it, and return its counts."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import pickle
 import platform
 import time
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -16,11 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask import models, store
-from mdr_dask.campaign import Replication
 from mdr_dask.compile_clock import compile_clock
 from mdr_dask.errors import ClusterError, MachineError, MdrDaskError
 from mdr_dask.models.base import Block, Model, Result, Status
-from mdr_dask.replication import growth_needed, known_scatter, next_round
 from mdr_dask.store import Place
 from mdr_dask.version import __version__
 
@@ -29,35 +28,25 @@ MAPPED, TRIMMED = 32 * 2**20, 128 * 2**20  # bytes: the largest that glibc allow
 
 
 @dataclass(frozen=True)
-class Rounds:
-    """Rounds that a block may go through by itself: what decides them, and how many realisations it holds at most."""
-
-    replication: Replication
-    most: int
-
-
-@dataclass(frozen=True)
 class Work:
-    """One task: everything a worker needs to compute a block and write it.
+    """One task: everything that a worker needs to compute a block and write it.
 
     Parameters
     ----------
     place : Place
-        Where it stands in the store.
+        Its place in the store.
     model : str
         Name of the model.
     versions : tuple
-        What the driver runs, as `versions` gives it.
+        The versions that the driver runs, as `versions` returns them.
     block : Block
         Its cases and realisations.
     wanted, spared : bool array, shape of the block
-        Results to compute, and those to write down as not needed.
+        Results to compute, and results to write down as not needed.
     attempt : int
-        How often the block has been run, this time included.
+        How often the block has been begun, this time included.
     estimate : float
-        Seconds that it should take by the model's estimate.
-    rounds : Rounds, optional
-        By which it goes on, if it holds the whole study.
+        Work by the model's estimate, in seconds.
     """
 
     place: Place
@@ -68,7 +57,6 @@ class Work:
     spared: NDArray[np.bool_]
     attempt: int
     estimate: float
-    rounds: Rounds | None = None
 
     def halves(self) -> tuple[Work, ...]:
         """Return the same work as two tasks, to be run one after the other; none for a single result."""
@@ -77,32 +65,18 @@ class Work:
             return ()
         first = np.zeros_like(self.wanted)
         first.flat[cells[: cells.size // 2]] = True
-        half = self.estimate / 2
-        rest = self.wanted & ~first
-        part = replace(self, estimate=half, rounds=None)
-        return replace(part, wanted=first), replace(part, wanted=rest)
-
-    def grown(self, count: int) -> Work:
-        """Return the same block with so many realisations, all of them this task's."""
-        *cases, realisations = self.place.region
-        numbers = slice(realisations.start, realisations.start + count)
-        wanted = np.ones((*self.wanted.shape[:-1], count), dtype=bool)
-        return replace(
-            self,
-            place=replace(self.place, region=(*cases, numbers)),
-            block=replace(self.block, realisations=tuple(range(numbers.start, numbers.stop))),
-            wanted=wanted,
-            spared=~wanted,
+        half, nothing = self.estimate / 2, np.zeros_like(self.spared)
+        return replace(self, wanted=first, estimate=half), replace(
+            self, wanted=self.wanted & ~first, spared=nothing, estimate=half
         )
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a task sends home: counts and times, never numbers of the study.
+    """What a task returns to the driver: counts and times, never results.
 
-    Of the time to compute, `compile_seconds` went by while this process compiled kernels. `warned` counts the results
-    that are done and have a message all the same, `further` the results of rounds that the block went on to by itself;
-    it is `settled` if no case needs more.
+    `compile_seconds` is the part of `compute_seconds` in which this process compiled kernels. `warned` counts results
+    that are done and have a message all the same.
     """
 
     counts: tuple[int, ...]
@@ -112,22 +86,15 @@ class Outcome:
     write_seconds: float
     compile_seconds: float = 0.0
     warned: int = 0
-    further: int = 0
-    settled: bool = False
-
-    @property
-    def seconds(self) -> float:
-        """Time that the block kept its worker busy, compiling left out."""
-        return self.compute_seconds + self.write_seconds - min(self.compile_seconds, self.compute_seconds)
 
 
 def versions(model: str) -> tuple[str, int]:
-    """Return what decides the numbers of a model: the versions of the program and of the model."""
+    """Return the versions of the program and of the model."""
     return __version__, models.load(model).version
 
 
 def run_block(work: Work) -> Outcome:
-    """Compute a block and write it: whole, at once, ledger last; doing it twice changes nothing.
+    """Compute a block and write it. Doing it twice changes nothing.
 
     Raises
     ------
@@ -139,40 +106,33 @@ def run_block(work: Work) -> Outcome:
     if versions(work.model) != work.versions:
         raise ClusterError(_other_version(work))
     model = models.load(work.model)
-    _one_blas_thread()
     keep_freed_memory()
     clock = compile_clock() if model.compiling else None
     compiled = clock.seconds if clock else 0.0
     started = time.perf_counter()
+    is_own = models.is_own(work.model)
     if work.wanted.all():
-        result = _compute(model, work.block, models.is_own(work.model))
+        result = _compute(model, work.block, is_own)
         shape = work.wanted.shape
         values = {name: array.reshape(shape + array.shape[2:]) for name, array in result.values.items()}
         status = result.status.reshape(shape)
     else:
-        kept = not (work.wanted | work.spared).all()
-        values, status = store.read_block(work.place, work.block.outputs) if kept else _nothing(model, work)
+        is_new = bool((work.wanted | work.spared).all())
+        values, status = _nothing(model, work) if is_new else store.read_block(work.place, work.block.outputs)
         status[work.spared] = Status.NOT_NEEDED
-        result = _compute_part(
-            model, models.is_own(work.model), work.block, work.wanted.reshape(work.block.cases, -1), values, status
-        )
-    asked, settled = work, False
-    if work.rounds:
-        work, values, status, result, settled = _go_on(model, work, values, status, result)
+        result = _compute_part(model, is_own, work.block, work.wanted.reshape(work.block.cases, -1), values, status)
     middle = time.perf_counter()
     compiled = clock.seconds - compiled if clock else 0.0
     record = _record(work, result, status, middle - started)
-    _write(work, values if work.wanted.any() else {}, status, record)
-    written, warned = time.perf_counter() - middle, _warned(record)
-    further = work.wanted.size - asked.wanted.size
-    times = work.estimate, middle - started, written, compiled
-    return Outcome(_counts(work, status), result.solves, *times, warned, further, settled)
+    store.write_block(work.place, work.attempt, values if work.wanted.any() else {}, status, record)
+    times = work.estimate, middle - started, time.perf_counter() - middle, compiled
+    return Outcome(_counts(work, status), result.solves, *times, _warned(record))
 
 
 def finished(work: Work) -> Outcome | None:
-    """Return how a task ended that a worker finished before it died untold; None for one that is not finished.
+    """Return the outcome of a task that was finished by a worker which died afterwards; None if it is not finished.
 
-    The record of an attempt is written before the ledger, and holds the digest of what the ledger then is.
+    The record of an attempt is written before the ledger, and holds the digest of the ledger.
     """
     record = store.record(work.place.url, work.place.series, work.place.index, work.attempt)
     if record is None or not store.is_written(work.place, record):
@@ -187,12 +147,6 @@ def _other_version(work: Work) -> str:
         f"mdr_dask {program} with {work.model} {model}" for program, model in (versions(work.model), work.versions)
     )
     return f"worker {platform.node()} has {here}, this program is {there}; install the same on both"
-
-
-def _write(
-    work: Work, values: dict[str, NDArray[np.float64]], status: NDArray[np.int8], record: dict[str, Any]
-) -> None:
-    store.write_block(work.place, work.attempt, values, status, record)
 
 
 def _counts(work: Work, status: NDArray[np.int8]) -> tuple[int, ...]:
@@ -331,40 +285,6 @@ def _compute_part(
     return replace(result, messages=messages)
 
 
-def _go_on(
-    model: Model[Any], work: Work, values: dict[str, NDArray[np.float64]], status: NDArray[np.int8], result: Result
-) -> tuple[Work, dict[str, NDArray[np.float64]], NDArray[np.int8], Result, bool]:
-    """Compute the rounds that follow, decided as between tasks, as long as the block holds them; say if all end."""
-    assert work.rounds
-    replication, until = work.rounds.replication, work.rounds.replication.until
-    scatter = known_scatter(model, until, work.block.outputs)
-    needed = np.ones(status.shape[:-1], dtype=bool)
-    while True:
-        count = status.shape[-1]
-        within = {output: values[own] for output, own in scatter.items()}
-        growth = np.where(needed, growth_needed(values, status, until, within), 0.0)
-        needed = growth > 1
-        further = next_round(replication, count, growth)
-        if not count < further <= work.rounds.most:
-            return work, values, status, result, not needed.any()
-        work = work.grown(further)
-        values = {name: _longer(array, status.ndim - 1, further, np.nan) for name, array in values.items()}
-        status = _longer(status, status.ndim - 1, further, Status.NOT_NEEDED)
-        wanted = np.zeros(status.shape, dtype=bool)
-        wanted[..., count:] = needed[..., None]
-        more = _compute_part(
-            model, models.is_own(work.model), work.block, wanted.reshape(work.block.cases, -1), values, status
-        )
-        messages = {**result.messages, **more.messages}
-        result = replace(result, messages=messages, solves=result.solves + more.solves)
-
-
-def _longer(array: NDArray[Any], axis: int, length: int, fill: float) -> NDArray[Any]:
-    """Return an array with a longer axis."""
-    before = [(0, length - size if dim == axis else 0) for dim, size in enumerate(array.shape)]
-    return np.pad(array, before, constant_values=fill)
-
-
 def _record(work: Work, result: Result, status: NDArray[np.int8], seconds: float) -> dict[str, Any]:
     states = status.reshape(work.block.cases, -1)
     messages = [
@@ -391,7 +311,7 @@ def _record(work: Work, result: Result, status: NDArray[np.int8], seconds: float
 
 
 def _place(work: Work, case: int, number: int) -> list[int]:
-    """Return where a result of a block stands in the ledger."""
+    """Return the place of a result in the ledger."""
     region = work.place.region
     shape = [part.stop - part.start for part in region]
     inside = [int(offset) for offset in np.unravel_index(case, shape[:-1])] if len(shape) > 1 else []
@@ -405,7 +325,7 @@ def _describe(block: Block[Any], case: int) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def kind() -> str:
-    """Return what the last digits of numbers may depend on: the processor, and what computes on it."""
+    """Return what the last digits of results may depend on: the processor and the numerical libraries."""
     from importlib.metadata import version
 
     import scipy.linalg  # noqa: F401  (brings its own BLAS)
@@ -419,21 +339,18 @@ def kind() -> str:
     return ", ".join([f"processor {processor}", f"BLAS for {' '.join(blas)}", *programs, f"mdr_dask {__version__}"])
 
 
-@lru_cache(maxsize=1)
-def _one_blas_thread() -> None:
-    """Keep linear algebra to one thread in every kind of worker: same speed overall, and the same bytes."""
-    import scipy.linalg  # noqa: F401  (brings its own BLAS, which has to be there to be limited)
+def one_blas_thread() -> AbstractContextManager[object]:
+    """Keep linear algebra to one thread, now and until the context ends: the same bytes, and one thread per block."""
+    import scipy.linalg  # noqa: F401  (brings a BLAS of its own, which must be there to be limited)
     from threadpoolctl import threadpool_limits
 
-    threadpool_limits(limits=1, user_api="blas")
+    limits: AbstractContextManager[object] = threadpool_limits(limits=1, user_api="blas")
+    return limits
 
 
 @lru_cache(maxsize=1)
 def keep_freed_memory() -> None:
-    """Keep arrays of some megabytes within the process: glibc gives them back, and faults on every page the next time.
-
-    Lines of 100000 points took a third longer with it.
-    """
+    """Keep freed arrays of some megabytes in the process; otherwise each allocation costs page faults (glibc)."""
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None) if os.name == "posix" else None
     if mallopt is not None:
         mallopt(M_MMAP_THRESHOLD, MAPPED)
@@ -441,11 +358,11 @@ def keep_freed_memory() -> None:
 
 
 def write_off(work: Work, message: str) -> Outcome:
-    """Write a block down as failed without computing it, because computing it kills whoever tries."""
+    """Write the results of a block down as failed without computing them, because they crash the process."""
     _, status = store.read_block(work.place, ())
     status[work.spared] = Status.NOT_NEEDED
     status[work.wanted] = Status.FAILED
     lost = zip(*np.nonzero(work.wanted.reshape(work.block.cases, -1)), strict=True)
     result = Result({}, status, {(int(case), int(number)): message for case, number in lost})
-    _write(work, {}, status, _record(work, result, status, 0.0))
+    store.write_block(work.place, work.attempt, {}, status, _record(work, result, status, 0.0))
     return Outcome(_counts(work, status), 0, work.estimate, 0.0, 0.0)

@@ -128,7 +128,7 @@ def test_a_study_in_a_bucket_is_run_grown_verified_and_mended_like_one_on_a_disk
     assert chunks(bucket) == chunks(url)
     assert caplog.text == ""
     assert store.verify(bucket).findings == []
-    with store.lock(bucket), pytest.raises(StoreBusyError, match=rf"process {os.getpid()} on .* is running"):
+    with locks.acquire(bucket), pytest.raises(StoreBusyError, match=rf"process {os.getpid()} on .* is running"):
         run(small(toy), bucket)
     files.remove(bucket, ["height/c/0/0"])
     files.write_bytes(bucket, "position/c/0", b"")
@@ -225,7 +225,7 @@ def test_a_runner_that_is_killed_is_taken_over_when_it_is_silent(toy, bucket, ur
 
 
 def test_parts_in_a_bucket_are_kept_apart_and_may_be_killed(toy, bucket, url):
-    with store.beside(bucket, Part(1, 2)), store.beside(bucket, Part(2, 2)):
+    with store.shared(bucket, Part(1, 2)), store.shared(bucket, Part(2, 2)):
         assert store.at_work(bucket) == (None, [Part(1, 2), Part(2, 2)])
         with pytest.raises(StoreBusyError, match="part 1/2 is running on this store"):
             execute.run(study(12), bucket, Resources(threads=1), lambda _: None, part=Part(1, 2))

@@ -16,7 +16,7 @@ from planted import SLIDING, make
 
 from mdr_dask import store
 from mdr_dask.campaign import Replication, Tolerance
-from mdr_dask.execute import Resources, run, stages
+from mdr_dask.execute import Resources, run
 from mdr_dask.models import load
 from mdr_dask.models.base import Block
 from mdr_dask.physics.sliding import kelvin, steady
@@ -24,7 +24,7 @@ from mdr_dask.physics.surfaces import roughness, waves
 from mdr_dask.physics.surfaces.cubic_line import cut, periodic_line
 from mdr_dask.physics.transients import ends
 from mdr_dask.physics.transients.velocity_jump import Transient, velocity_jumps
-from mdr_dask.store import files, study
+from mdr_dask.store import files
 
 HEAVY = {"dask", "distributed", "matplotlib", "numba", "pandas", "pint", "scipy", "xarray", "zarr"}
 STORE = HEAVY - {"pandas", "xarray", "zarr"}  # what a reader of stores has no need of
@@ -126,49 +126,6 @@ def test_a_round_writes_what_changes_and_reads_no_block(toy, url, monkeypatch):
     coordinates = {name for name, count in layout.items() if name.endswith("/zarr.json") and count > 1}
     assert coordinates == {"height/zarr.json", "status/zarr.json", "realisation/zarr.json"}
     assert Counter(path.relative_to(url).parts[0] for path in written if "/c/" in str(path))["position"] == 1
-
-
-def test_a_run_looks_through_metadata_once_for_each_shape_and_lays_out_once(toy, url, monkeypatch):
-    """Two rounds in one task, two shapes; the first is known from looking whether the campaign fits."""
-    looked, laid_out, read, values = [], [], [], store.values
-    monkeypatch.setattr(store, "values", lambda *given: read.append(given) or values(*given))
-    whole, templates = study.faults, stages.templates
-    monkeypatch.setattr(study, "faults", lambda found: looked.append(found) or whole(found))
-    monkeypatch.setattr(stages, "templates", lambda *given: laid_out.append(given) or templates(*given))
-    study._looked_through.cache_clear()
-    tolerance = {"height": Tolerance(absolute=1.0)}
-    campaign = toy.campaign(toy.axis("position", [1.0, 100.0]), realisations=Replication(10, 20, tolerance))
-    assert run(campaign, url, Resources(threads=1), lambda _: None).blocks == 1
-    assert not read  # the block has decided
-    assert len(looked) == 2
-    assert len(laid_out) == 1
-
-
-def test_rounds_of_a_cheap_study_go_on_in_one_block(toy, url, tmp_path):
-    """A file of every array, with the numbers of a block a round; nothing is computed twice."""
-    tolerance = {"height": Tolerance(absolute=0.5)}
-    study = toy.campaign(toy.axis("position", [1.0, 100.0]), realisations=Replication(10, 80, tolerance))
-    found = {}
-    for where, blocks in ((url, {}), (str(tmp_path / "rounds.zarr"), {"realisation": 10})):
-        toy.COMPUTED.clear()
-        progress = run(replace(study, blocks=blocks), where, Resources(threads=1), lambda _: None)
-        chunks = sum(path.is_file() for path in Path(where, "height/c").rglob("*"))
-        found[where] = len(toy.COMPUTED), progress.done, chunks, store.datasets(where)[""]["height"].to_numpy()
-    (computed, done, chunks, heights), (again, also, more, same) = found.values()
-    assert computed == done == again == also > 40
-    assert chunks == 1 < more
-    np.testing.assert_array_equal(heights, same)
-
-
-@pytest.fixture
-def sweeps(monkeypatch):
-    """The search for a depth uncompiled, so that its sweeps can be counted."""
-    counted = []
-    whole = steady.sweep_cells
-    monkeypatch.setattr(steady, "sweep_cells", lambda *arguments: counted.append(1) or whole(*arguments))
-    for name in ("_solve", "_states"):
-        monkeypatch.setattr(steady, name, getattr(steady, name).py_func)
-    return counted
 
 
 def line(points, oversampling, hurst=0.7, seed=0):

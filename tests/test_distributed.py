@@ -5,8 +5,6 @@ import platform
 import shutil
 import subprocess
 import sys
-from collections import Counter
-from concurrent import futures
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,7 +18,7 @@ from test_execute import digests, run, values
 from mdr_dask import execute, store, task
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.errors import ClusterError, StoreError
-from mdr_dask.execute import Resources, clusters, crew, executors
+from mdr_dask.execute import Resources, clusters, executors, window
 from mdr_dask.models.base import Status
 
 
@@ -40,21 +38,17 @@ TWO = Replication(2, 2, {})
 
 
 @pytest.mark.slow
-def test_only_the_results_that_kill_their_worker_fail_and_none_that_went_out_with_them(toy, url, workers, monkeypatch):
-    """All but the first few blocks go out as one task; what it has finished when it is killed is not done again."""
-    monkeypatch.setattr(crew, "PACE", 1e-6)
+def test_only_the_results_that_kill_their_worker_fail(toy, url, workers):
+    """A worker dies once; then the block is computed in a child process, by halves."""
     positions = [1.0, 2.0, 3.0, 4.0, 5.0, 9.0, 6.0]
     campaign = toy.campaign(toy.axis("position", positions), realisations=TWO, kill_above=8.0)
-    begun = []
-    progress = execute.run(
-        replace(campaign, blocks={"position": 1}), url, workers, lambda _: None, tell=lambda event: begun.append(event)
-    )
+    events = []
+    progress = execute.run(replace(campaign, blocks={"position": 7}), url, workers, lambda _: None, tell=events.append)
     assert (progress.done, progress.failed, progress.not_needed) == (12, 2, 0)
     messages = [message for record in store.records(url, "") for message in record["messages"]]
     assert {(m["case"]["position"], m["realisation"]) for m in messages} == {(9.0, 0), (9.0, 1)}
-    assert all(m["message"].startswith("its worker died again and again (1 times)") for m in messages)
-    told = Counter(event.facts["block"][0] for event in begun if event.name in ("block begun", "block retried"))
-    assert told[positions.index(5.0)] <= 1  # it dies with the worker if that dies at once
+    assert all(m["message"] == "its process ended with exit code 1" for m in messages)
+    assert sum(event.name == "worker lost" and not event.facts["expected"] for event in events) <= 1
     clean = toy.campaign(toy.axis("position", [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]), realisations=TWO)
     run(clean, url + "2")
     np.testing.assert_array_equal(values(url).sel(position=values(url + "2").position), values(url + "2"))
@@ -69,89 +63,18 @@ def test_a_lost_worker_fails_nothing(toy, url, tmp_path, workers):
 
 
 class Central:
-    """As much of a scheduler as a crew sees, with any number of workers; what it is given ends when it is told to."""
+    """As much of a scheduler as a window of tasks needs."""
 
     status = "running"
 
     def __init__(self):
-        self.threads, self.tasks, self.scheduler = {"first": 1}, [], self
+        self.threads, self.scheduler = {"first": 1}, self
 
     def subscribe_topic(self, *_):
         pass
 
-    def sync(self, *_, **__):
-        return self.threads
-
     def ncores(self):
-        raise AssertionError("asked by way of sync")
-
-    def submit(self, _, works, pure=True):
-        same = [each for each in self.tasks if pure and each.works == works]
-        if same:  # as of a pure function, whose answer is known
-            return same[0]
-        future = futures.Future()
-        future.key, future.release, future.works = f"task-{len(self.tasks)}", (lambda: None), works
-        self.tasks.append(future)
-        return future
-
-    def end(self, seconds):
-        task_, *_ = (each for each in self.tasks if not each.done())
-        task_.set_result([task.Outcome((), 1, 0.0, seconds, 0.0) for _ in task_.works])
-
-
-@pytest.mark.parametrize(
-    ("threads", "seconds", "together"), [(1, 0.1, 1), (2, 1e-3, 25), (1000, 0.25, 50), (9, 1e-9, 100)]
-)
-def test_blocks_go_out_together_that_would_drown_the_scheduler_one_by_one(monkeypatch, threads, seconds, together):
-    """A thousand workers and blocks of a quarter of a second: fifty to a task, and eighty tasks end in a second."""
-    monkeypatch.setattr(crew, "LOOK", 0.0)
-    central = Central()
-    workers = crew.Crew(central, lambda _: None, 9.0, 0, lambda: None, str)
-    workers.look()
-    assert (workers.room, workers.together) == (4, 1)
-    workers.give(("first block",))
-    central.threads = {"many": threads}
-    rooms = []
-
-    def refill():
-        rooms.append(workers.room)
-        central.end(seconds)
-
-    assert workers.take(refill)[0] == ("first block",)
-    assert (rooms, workers.together) == ([2 * threads + 1], together)
-
-
-def test_a_block_that_goes_out_again_is_computed_again():
-    """A suspect goes out as it was; what a scheduler still knows of the first time is no answer."""
-    central = Central()
-    workers = crew.Crew(central, lambda _: None, 9.0, 0, lambda: None, str)
-    for _ in range(2):
-        workers.give(("a block",))
-    assert [task_.works for task_ in central.tasks] == [("a block",)] * 2
-
-
-def test_what_a_scheduler_says_of_workers_and_blocks_is_told():
-    """Of a task that its worker takes with it, the last block that had begun is lost; those before it are done."""
-    told, central = [], Central()
-    works = tuple(SimpleNamespace(place=SimpleNamespace(series="", index=(k, 0)), attempt=1) for k in range(3))
-    workers = crew.Crew(central, lambda event: told.append((event.name, event.facts)), 9.0, 0, lambda: None, str)
-    workers.give(works)
-    workers._hear_of_worker((0.0, {"action": "add-worker", "worker": "here"}))
-    for number in (0, 1, 1):
-        workers._hear_of_block((0.0, {"key": "task-0", "number": number, "block": [number, 0]}))
-    for gone in ("task-7", "task-0"):
-        workers._hear_of_worker((0.0, {"action": "remove-worker", "worker": "here", "processing-tasks": {gone: 1}}))
-    workers._hear_of_worker((0.0, {"action": "remove-worker", "worker": "there", "expected": True}))
-    assert told == [
-        ("worker joined", {"worker": "here"}),
-        ("block begun", {"block": [0, 0]}),
-        ("block begun", {"block": [1, 0]}),
-        ("block retried", {"block": [1, 0]}),
-        ("worker lost", {"worker": "here", "expected": False}),
-        ("worker lost", {"worker": "here", "expected": False}),
-        ("block lost", {"series": "", "block": [1, 0], "attempt": 1, "worker": "here"}),
-        ("worker lost", {"worker": "there", "expected": True}),
-    ]
+        raise AssertionError("called by sync")
 
 
 SILENT = {
@@ -164,7 +87,7 @@ SILENT = {
 @pytest.mark.parametrize("what", SILENT)
 def test_within_five_seconds_a_user_is_told_what_is_waited_for_and_within_the_limit_it_ends(monkeypatch, what):
     clock, told, central = SimpleNamespace(now=0.0), [], Central()
-    monkeypatch.setattr(crew, "time", SimpleNamespace(monotonic=lambda: clock.now))
+    monkeypatch.setattr(window, "time", SimpleNamespace(monotonic=lambda: clock.now))
 
     def answer(*_, callback_timeout):
         if central.threads is None:
@@ -174,14 +97,16 @@ def test_within_five_seconds_a_user_is_told_what_is_waited_for_and_within_the_li
 
     central.sync = answer
     central.threads, after = SILENT[what]
-    workers = crew.Crew(central, lambda event: told.append((clock.now, event.sentence)), 30.0, 0, lambda: None, str)
-    workers.look()
+    workers = window.TaskWindow(
+        central, lambda e: told.append((clock.now, e.sentence)), 30.0, 0, lambda: None, str, None
+    )
+    workers._look()
     central.threads = after
 
     def look_on():
         while True:
-            clock.now += crew.LOOK
-            workers.look()
+            clock.now += window.LOOK
+            workers._look()
 
     with pytest.raises(ClusterError, match=r"for \d+ s; what is in the store is kept: run the campaign again"):
         look_on()
@@ -191,7 +116,7 @@ def test_within_five_seconds_a_user_is_told_what_is_waited_for_and_within_the_li
     assert clock.now <= 35
     central.status = "closed"
     with pytest.raises(ClusterError, match="the scheduler went away; what is in the store is kept"):
-        workers.look()
+        workers._look()
 
 
 @pytest.mark.slow
@@ -329,7 +254,7 @@ def test_a_block_whose_worker_died_untold_is_found_in_the_ledger(toy, url, retry
     if retry:
         run(campaign, url)
     sent = []
-    monkeypatch.setattr(execute.rounds, "_settle", lambda *_: None)  # records are put together at the end of a run
+    monkeypatch.setattr(execute.rounds, "_merge", lambda *_: None)  # records are merged at the end of a run
     monkeypatch.setattr(executors, "run_block", lambda work: sent.append(work) or task.run_block(work))
     run(campaign, url, retry_failed=retry)
     (work,) = sent

@@ -192,13 +192,13 @@ def test_a_store_of_another_campaign_is_refused_and_untouched(toy, url):
 
 def test_a_foreign_group_is_refused(toy, url):
     xr.Dataset({"a": ("x", [1.0])}).to_zarr(url, consolidated=False)
-    with pytest.raises(StoreError, match="not a study that mdr_dask made"):
+    with pytest.raises(StoreError, match="but not a study of mdr_dask"):
         run(toy.campaign(toy.axis("position", [1.0])), url)
 
 
 def test_a_second_runner_is_refused_with_the_name_of_the_first(toy, url):
     campaign = toy.campaign(toy.axis("position", [1.0]))
-    with store.alone(url), pytest.raises(StoreBusyError, match=r"process \d+ on .* is running on this store"):
+    with store.exclusive(url), pytest.raises(StoreBusyError, match=r"process \d+ on .* is running on this store"):
         run(campaign, url)
     assert run(campaign, url).done == 6
 

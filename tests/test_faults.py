@@ -143,20 +143,21 @@ def test_after_any_failed_write_a_plain_run_ends_with_the_same_bytes(toy, tmp_pa
         shutil.rmtree(url)
 
 
-def test_all_contents_are_on_the_disk_before_a_name_is_given_and_all_names_when_a_write_returns(tmp_path, monkeypatch):
+def test_contents_are_flushed_before_names_are_given_and_names_before_the_ledger_has_its_own(tmp_path, monkeypatch):
     acts = []
     monkeypatch.setattr(files, "flush", lambda path: acts.append(("flushed", path.is_dir())))
     given = files.give_name
     monkeypatch.setattr(files, "give_name", lambda old, new: acts.append(("named", given(old, new) or new.name)))
     files.write_stages(str(tmp_path), [{"values/0": b"1", "values/1": b"2"}, {"ledger": b"3"}])
     named = [("named", "0"), ("named", "1"), ("named", "ledger")]
-    assert acts == [("flushed", False)] * 3 + named + [("flushed", True)] * 2
+    first, last = named[:2], named[2:]
+    assert acts == [("flushed", False)] * 3 + first + [("flushed", True)] * 2 + last + [("flushed", True)]
 
 
 def test_the_root_of_a_store_with_series_says_where_to_look(toy, tmp_path):
     url = str(tmp_path / "series.zarr")
     run(two_series(small(toy)), url)
-    where = "results of series stand in groups: open_datatree, or open_zarr with group='far' or group='near'"
+    where = "the results of each series are in a group: open_datatree, or open_zarr with group='far' or group='near'"
     assert xr.open_zarr(url).attrs["comment"] == where
     assert "comment" not in xr.open_zarr(url, group="far").attrs
 

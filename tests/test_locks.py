@@ -9,9 +9,7 @@ import threading
 import time
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from test_execute import digests, run
 
@@ -19,7 +17,7 @@ from mdr_dask import execute, store
 from mdr_dask.campaign import Replication
 from mdr_dask.errors import ClusterError, StoreBusyError, StoreError
 from mdr_dask.execute import Resources
-from mdr_dask.store import Hold, Part, files, locks, runners
+from mdr_dask.store import Lock, Part, files, locks
 from mdr_dask.task import run_block
 
 
@@ -50,9 +48,12 @@ def test_a_file_system_without_locks_is_named_and_a_claim_keeps_others_out(toy, 
     run(small(toy), url + "2")
     without_locks(monkeypatch, number)
     assert run(small(toy), url).done == 12
-    assert f"this file system has no locks ({os.strerror(number)}); claims" in caplog.text
+    assert f"no locks on this file system ({os.strerror(number)}); the run makes a claim" in caplog.text
     assert run(small(toy), url).kept == 12
-    with store.lock(url), pytest.raises(StoreBusyError, match=rf"process {os.getpid()} on .* is running on this store"):
+    with (
+        locks.acquire(url),
+        pytest.raises(StoreBusyError, match=rf"process {os.getpid()} on .* is running on this store"),
+    ):
         run(small(toy), url)
     assert digests(url) == digests(url + "2")
     assert not [path for path in Path(url, ".claims").rglob("*") if path.is_file()]
@@ -65,15 +66,15 @@ def test_a_lock_that_fails_otherwise_is_said_to_fail(toy, url, monkeypatch):
 
 
 def test_a_file_that_its_holder_takes_away_at_that_moment_is_no_lock(url, monkeypatch):
-    file, left = locks.lock_file(url), []
+    file, left = locks._lock_file(url), []
 
-    def taken_away(descriptor):
+    def taken_away(descriptor, shared=False):
         if not left:
             left.append(file.unlink())
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
     monkeypatch.setattr(locks, "_flock", taken_away)
-    with store.lock(url), pytest.raises(StoreBusyError), store.lock(url):
+    with locks.acquire(url), pytest.raises(StoreBusyError), locks.acquire(url):
         pass
 
 
@@ -81,43 +82,16 @@ def test_who_is_refused_keeps_no_file_open(url):
     def count():
         return len([*Path("/proc/self/fd").iterdir()])
 
-    with store.lock(url):
+    with locks.acquire(url):
         before = count()
         for _ in range(5):
-            with pytest.raises(StoreBusyError), store.lock(url):
+            with pytest.raises(StoreBusyError), locks.acquire(url):
                 pass
         assert count() == before
 
 
-def refused(url, part, meanwhile=lambda: None):
-    with store.beside(url, part):
-        meanwhile()
-        raise StoreError("no workers")
-
-
-def test_a_run_that_is_interrupted_before_there_is_a_store_leaves_nothing(tmp_path):
-    def waiting_for_workers():
-        with store.alone(str(tmp_path / "results/study.zarr")):
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        waiting_for_workers()
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_refusal_takes_no_lock_of_others_away(url):
-    def meanwhile():
-        with pytest.raises(StoreError, match="no workers"):
-            refused(url, Part(2, 2))
-        assert store.at_work(url)[1] == [Part(1, 2)]
-
-    with pytest.raises(StoreError, match="no workers"):
-        refused(url, Part(1, 2), meanwhile)
-    assert not list(Path(url).parent.iterdir())
-
-
 def test_at_a_url_the_second_runner_is_refused_and_the_claim_goes_with_the_first(toy, bucket, caplog):
-    with store.lock(bucket), pytest.raises(StoreBusyError, match=rf"process {os.getpid()} on .* is running"):
+    with locks.acquire(bucket), pytest.raises(StoreBusyError, match=rf"process {os.getpid()} on .* is running"):
         run(small(toy), bucket)
     assert run(small(toy), bucket).done == 12
     assert files.listed(bucket, files.CLAIMS) == []
@@ -130,7 +104,7 @@ def test_of_many_that_want_a_study_at_once_one_gets_it(bucket):
     def want():
         start.wait()
         try:
-            with store.lock(bucket) as hold:
+            with locks.acquire(bucket) as hold:
                 held.append(hold)
                 while len(held) + len(refused) < 8:  # nobody comes late, however busy the machine is
                     time.sleep(0.01)
@@ -152,24 +126,24 @@ def test_a_silent_claim_is_taken_over_and_its_owner_writes_nothing_more(toy, buc
     run(small(toy), bucket)
     gone = {"owner": "a" * 32, "who": "process 1 on node7", "time": time.time() - 3.0}
     files.write_bytes(bucket, ".claims/alone/000004.json", json.dumps(gone).encode())
-    with store.lock(bucket) as hold:
+    with locks.acquire(bucket) as hold:
         assert hold.claim == 5
         assert "sign of life of process 1 on node7" in caplog.text
         with (
-            pytest.raises(StoreBusyError, match="has ended or lost the store"),
-            store.holding(bucket, Hold("", "a" * 32, 4)),
+            pytest.raises(StoreBusyError, match="has ended or lost its lock"),
+            store.while_locked(bucket, Lock("", "a" * 32, 4)),
         ):
             pass
         time.sleep(2.2)  # longer than anybody may be silent: it is the signs of life that keep it
-        with pytest.raises(StoreBusyError, match="is running on this store"), store.lock(bucket):
+        with pytest.raises(StoreBusyError, match="is running on this store"), locks.acquire(bucket):
             pass
 
 
 def test_a_claim_that_goes_between_two_looks_is_not_waited_for(bucket, monkeypatch):
     listings = iter([[".claims/entrance/000007.json"]])
-    monkeypatch.setattr(locks, "_standing", lambda *_: next(listings, []))
+    monkeypatch.setattr(locks, "listed", lambda *_: next(listings, []))
     monkeypatch.setattr(locks.time, "sleep", lambda _: pytest.fail("it waits"))
-    with store.lock(bucket, "entrance") as hold:
+    with locks.acquire(bucket, "entrance") as hold:
         assert hold.claim == 1
 
 
@@ -179,7 +153,7 @@ def test_a_server_that_only_looks_before_it_writes_is_named(toy, bucket, monkeyp
 
     monkeypatch.setattr(MemoryFileSystem, "pipe_file", AbstractFileSystem.pipe_file)
     assert run(small(toy), bucket).done == 12
-    assert "nothing here keeps two runs apart (no conditional write): start one at a time" in caplog.text
+    assert "nothing keeps two runs apart here (no conditional write): start one at a time" in caplog.text
 
 
 def late_task(toy, url, monkeypatch):
@@ -201,7 +175,7 @@ def test_a_worker_that_outlives_its_driver_writes_nothing(toy, url, monkeypatch)
     late = late_task(toy, url, monkeypatch)
     run(small(toy), url)
     before = digests(url)
-    with pytest.raises(StoreBusyError, match="has ended or lost the store; nothing was written"):
+    with pytest.raises(StoreBusyError, match="has ended or lost its lock; nothing was written"):
         run_block(late)
     run(small(toy, 9), url)
     grown = digests(url)
@@ -211,14 +185,14 @@ def test_a_worker_that_outlives_its_driver_writes_nothing(toy, url, monkeypatch)
 
 
 def test_the_next_runner_waits_for_a_task_in_the_middle_of_writing(url, monkeypatch):
-    with store.lock(url) as hold:
+    with locks.acquire(url) as hold:
         path = next(Path(url).parent.glob(".*.runner"))
         survivor = path.read_bytes()
     path.write_bytes(survivor)  # as SIGKILL leaves it
     order = []
 
     def finish():
-        with store.holding(url, hold):
+        with store.while_locked(url, hold):
             writing.set()
             time.sleep(0.3)
             order.append("written")
@@ -227,41 +201,55 @@ def test_the_next_runner_waits_for_a_task_in_the_middle_of_writing(url, monkeypa
     thread = threading.Thread(target=finish)
     thread.start()
     writing.wait()
-    with store.lock(url):
+    with locks.acquire(url):
         order.append("next")
     thread.join()
     assert order == ["written", "next"]
     monkeypatch.setattr(locks, "SILENCE", 0.1)
     path.write_bytes(survivor)
     with (
-        store.holding(url, hold),
+        store.while_locked(url, hold),
         pytest.raises(StoreBusyError, match=r"a task of process \d+ on .* is running"),
-        store.lock(url),
+        locks.acquire(url),
     ):
         pass
 
 
 def test_an_owner_gives_several_signs_of_life_before_it_counts_as_gone():
     assert 4 * locks.BEAT < locks.SILENCE
-    assert 10 * runners.KNOCK < runners.GLANCE < runners.SILENT
 
 
-@pytest.mark.parametrize("patience", [runners.GLANCE, 10.0])
-def test_whoever_waits_at_the_entrance_says_so_once_and_only_so_long(patience, monkeypatch, caplog):
-    times = [50.0]
-    clock = SimpleNamespace(monotonic=lambda: times[-1], sleep=lambda seconds: times.append(times[-1] + seconds))
+def test_a_run_that_waits_at_the_gate_says_so_once(url, monkeypatch, caplog):
+    monkeypatch.setattr(locks, "PATIENCE", 0.1)
+    monkeypatch.setattr(locks, "GLANCE", 0.05)
+    left = threading.Event()
 
-    def occupied(*_):
-        raise StoreBusyError("process 7 is running; wait")
+    def occupy():
+        with locks.gate(url):
+            inside.set()
+            left.wait()
 
-    monkeypatch.setattr(runners, "time", clock)
-    monkeypatch.setattr(runners, "lock", occupied)
-    with pytest.raises(StoreBusyError, match="process 7"), runners.entrance("study.zarr", patience):
-        pass
-    assert np.allclose(np.diff(times), runners.KNOCK)
-    assert times[-1] - 50.0 == pytest.approx(patience, abs=runners.KNOCK)
-    waiting = "process 7 is running; waiting until it has looked at what is there"
-    assert [each.message for each in caplog.records] == [waiting] * (patience > runners.SILENT)
+    inside = threading.Event()
+    thread = threading.Thread(target=occupy)
+    thread.start()
+    inside.wait()
+    threading.Timer(0.6, left.set).start()
+    with locks.gate(url):
+        assert left.is_set()
+    thread.join()
+    assert caplog.text.count("waiting until it has looked at the store") == 1
+
+
+def test_a_look_at_who_is_at_work_writes_nothing_and_stops_nobody(toy, url):
+    run(small(toy), url)
+    before = sorted(Path(url).parent.iterdir())
+    folder = Path(url).parent
+    with store.shared(url, Part(1, 2)):
+        assert store.at_work(url) == (None, [Part(1, 2)])
+    with store.exclusive(url):
+        assert store.at_work(url)[0].startswith("process ")
+    assert store.at_work(url) == (None, [])
+    assert sorted(folder.iterdir()) == before
 
 
 def test_resources_that_are_refused_leave_nothing_behind(toy, tmp_path):

@@ -125,9 +125,9 @@ def test_parts_do_not_wait_for_each_other_s_failed_results(toy, url):
 
 
 BUSY = {
-    "alone": (lambda url: store.alone(url), r"process \d+ on .* is running on this store; wait for it, or stop it"),
-    "2/3": (lambda url: store.beside(url, Part(2, 3)), "part 2/3 is running on this store; wait for them"),
-    "3/4": (lambda url: store.beside(url, Part(3, 4)), "part 3/4 is running on this store"),
+    "alone": (lambda url: store.exclusive(url), r"process \d+ on .* is running on this store; wait for it, or stop it"),
+    "2/3": (lambda url: store.shared(url, Part(2, 3)), "part 2/3 is running on this store; wait for them"),
+    "3/4": (lambda url: store.shared(url, Part(3, 4)), "part 3/4 is running on this store"),
 }
 
 
@@ -145,10 +145,10 @@ def test_parts_at_work_are_counted_and_leave_no_files_to_a_runner_alone(toy, tmp
     url = str(tmp_path / "a [1].zarr")
     with ExitStack() as held:
         for number in (1, 3, 4):
-            held.enter_context(store.beside(url, Part(number, 8)))
+            held.enter_context(store.shared(url, Part(number, 8)))
         assert store.at_work(url) == (None, [Part(1, 8), Part(3, 8), Part(4, 8)])
     assert store.at_work(url) == (None, [])
-    with store.alone(url):
+    with store.exclusive(url):
         runner, parts = store.at_work(url)
     assert runner.startswith("process ")
     assert parts == []
@@ -178,13 +178,13 @@ def test_a_log_tells_what_happened_and_a_watch_until_nobody_is_at_work(toy, camp
     (laid_out,) = {json.dumps(event["blocks"]) for event in events if event["event"] == "laid out"}
     assert laid_out == '{"-": [2, 2]}'
 
-    with store.beside("toy.zarr", Part(2, 8)), store.beside("toy.zarr", Part(3, 8)):
+    with store.shared("toy.zarr", Part(2, 8)), store.shared("toy.zarr", Part(3, 8)):
         assert main(["status", "toy.zarr"]) == 0
         assert capsys.readouterr().out.endswith("\nat work: 2 of 8 parts (2-3)\n")
         assert main(["status", "toy.zarr", "--json"]) == 0
         assert json.loads(capsys.readouterr().out)["at_work"] == ["2 of 8 parts (2-3)"]
     leaving = ExitStack()
-    leaving.enter_context(store.alone("toy.zarr"))
+    leaving.enter_context(store.exclusive("toy.zarr"))
     timer = threading.Timer(0.3, leaving.close)
     timer.start()
     assert main(["status", "toy.zarr", "--watch"]) == 0

@@ -205,6 +205,6 @@ def test_a_block_takes_the_share_of_its_time_that_is_wanted_of_it():
     wanted = np.zeros((4, 6), dtype=bool)
     wanted[0, :3] = True
     template = SimpleNamespace(region=lambda index: (slice(2 * index, 2 * index + 2),), seconds=lambda _: 40.0)
-    cells = Cells(template, wanted, ~wanted, 0)
+    cells = Cells(template, wanted, ~wanted, 0, 0)
     assert [cells.seconds(0), cells.seconds(1)] == [10.0, 0.0]
     assert cells.new == wanted.size

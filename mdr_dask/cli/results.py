@@ -57,12 +57,11 @@ def status(store: str, failures: bool, messages: bool, watch: bool, form: str | 
     if watch:
         if failures or messages or form:
             raise click.UsageError("expected --watch alone, without --failures, --messages and --json")
-        watching.watch(store, lambda: [progress.counts(look) for look in progress.looks(store)])
+        watching.watch(store, lambda: progress.counts(store))
         return
     if not (failures or messages):
-        looks = progress.looks(store)
-        _print_counts([progress.counts(look) for look in looks], watching.at_work(store), form)
-        room.require_blocks(looks)
+        _print_counts(progress.counts(store), watching.at_work(store), form)
+        room.require_sound(store, room.series_names(store))
         return
     studies = room.datasets(store)
     found = [message for name, data in studies.items() for message in progress.messages(store, name, data)]

@@ -35,7 +35,10 @@ if TYPE_CHECKING:
     show_default=True,
     help="Wait for workers so long.",
 )
-@click.option("--part", metavar="K/N", help="Run the K-th of N disjoint sets of blocks, beside the other ones.")
+@click.option("--part", metavar="K/N", help="Run the K-th of N disjoint sets of blocks.")
+@click.option(
+    "--case-timeout", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS", help="A longer case has failed."
+)
 @click.option("--retry-failed", is_flag=True, help="Compute the cases again that failed or did not converge.")
 @click.option("--log", type=click.Path(dir_okay=False, path_type=Path), help="Append events to FILE, JSON lines.")
 @click.option("--quiet", is_flag=True, help="No progress on stderr.")
@@ -43,7 +46,8 @@ if TYPE_CHECKING:
 def run(campaign: Path, dry_run: bool, log: Path | None, quiet: bool, form: str | None, **options: Any) -> int:
     """Run a campaign into its store: everything, or what is missing.
 
-    Interrupt it, kill it, run it again: what is in the store is kept, and only the rest is computed.
+    After an interruption, run it again: finished results are kept, and only the rest is computed. Exit code 0: all
+    results are done; 1: some have failed, in this run or before; 2: the run was refused or could not go on.
 
     \b
     mdr-dask run campaigns/quickstart.yaml
@@ -70,7 +74,7 @@ def run(campaign: Path, dry_run: bool, log: Path | None, quiet: bool, form: str 
     with reporter(quiet) as report, telling(quiet, log, **about) as tell:
         progress = execute.run(study, url, resources, report, options["retry_failed"], part, tell)
     _print_outcome(url if part is None else f"{url}, part {part}", url, progress, form)
-    return 1 if progress.failed else 0
+    return 1 if progress.failed or progress.kept_failed else 0
 
 
 def _print_plan(study: Campaign, url: str, form: str | None) -> None:
@@ -117,7 +121,8 @@ def _resources(options: dict[str, Any]) -> Resources:
     if len(chosen) > 1:
         raise click.UsageError(f"expected one of --{', --'.join(chosen)}, got {len(chosen)} of them")
     cluster = options["cluster"] and load_cluster(options["cluster"])
-    return Resources(options["threads"], options["workers"], options["scheduler"], cluster, options["patience"])
+    names = ("threads", "workers", "scheduler", "patience", "case_timeout")
+    return Resources(**{name: options[name] for name in names}, cluster=cluster)
 
 
 def _part(text: str | None) -> Part | None:
@@ -136,11 +141,15 @@ def _print_outcome(what: str, url: str, progress: Progress, form: str | None) ->
     if form == "json":
         from dataclasses import asdict
 
-        print_json({"store": url, **asdict(progress)})
+        print_json({"store": url, **asdict(progress), "failed": progress.failed + progress.kept_failed})
         return
     fresh = progress.done + progress.failed
+    if not progress.total:
+        click.echo(f"{what}: this part has no block; the study has fewer blocks than parts")
+        return
     if not fresh and not progress.not_needed:
         click.echo(f"{what}: all {progress.kept} results are there already; nothing to do")
+        _print_failed(url, progress)
         return
     kept = f"{progress.kept} kept, " if progress.kept else ""
     spared = f", {progress.not_needed} not needed" if progress.not_needed else ""
@@ -152,13 +161,19 @@ def _print_outcome(what: str, url: str, progress: Progress, form: str | None) ->
         f"{seconds(progress.compute_seconds)} in the model, {seconds(progress.write_seconds)} writing",
         err=True,
     )
-    if progress.failed:
-        click.echo(f"which ones, and why: mdr-dask status {url} --failures", err=True)
+    _print_failed(url, progress)
     if progress.warned:
         click.echo(f"{progress.warned} done with a warning: mdr-dask status {url} --messages", err=True)
 
 
+def _print_failed(url: str, progress: Progress) -> None:
+    if progress.kept_failed:
+        click.echo(f"{progress.kept_failed} of them failed before: --retry-failed computes them again", err=True)
+    if progress.failed or progress.kept_failed:
+        click.echo(f"which ones, and why: mdr-dask status {url} --failures", err=True)
+
+
 def _shared(progress: Progress) -> str:
     """Return the share of the results that needed no solve of their own."""
-    share = 1 - progress.solves / max(progress.done + progress.failed, 1)
+    share = 1 - progress.solves / max(progress.done, 1)
     return f" ({share:.1%} of the results needed none of their own)" if progress.solves and share > 0 else ""

@@ -1,4 +1,4 @@
-"""The command that reads all of a store, and mends it."""
+"""The command that verifies a store, and repairs it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mdr_dask.cli.campaigns import CAMPAIGN
 from mdr_dask.cli.printing import print_json, print_rows, printable
 
 if TYPE_CHECKING:
@@ -16,30 +15,27 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("store")
-@click.option("--repair", is_flag=True, help="Write metadata anew, mark damaged blocks as missing, set the rest aside.")
-@click.option("--campaign", type=CAMPAIGN, help="With --repair: its campaign, if metadata and copies of them are gone.")
+@click.option(
+    "--repair", is_flag=True, help="Write metadata again, mark damaged blocks as missing, rename what does not belong."
+)
 @click.option("--limit", type=click.IntRange(min=0), default=40, show_default=True, help="Most lines; 0 for all.")
 @click.option("--json", "form", flag_value="json", help="Print one JSON document.")
-def verify(store: str, repair: bool, campaign: Path | None, limit: int, form: str | None) -> int:
+def verify(store: str, repair: bool, limit: int, form: str | None) -> int:
     """Read every file of a store and name what is damaged, missing, swapped or foreign; exit code 1 if anything is.
 
     \b
     mdr-dask verify results/quickstart.zarr
     mdr-dask verify results/quickstart.zarr --repair
-    mdr-dask verify results/quickstart.zarr --repair --campaign campaigns/quickstart.yaml
     mdr-dask verify study.zip
     """
     from mdr_dask import store as room
-    from mdr_dask.campaign import load
 
-    if campaign and not repair:
-        raise click.UsageError("--campaign is for --repair")
     if _is_packed(store):
         if repair:
             raise click.UsageError("--repair is for a store, not for a published zip; unpack it first")
         found, left = room.verify_packed(Path(store)), None
     else:
-        found, left = room.repair(store, load(campaign) if campaign else None) if repair else (room.verify(store), None)
+        found, left = room.repair(store) if repair else (room.verify(store), None)
     if form == "json":
         print_json(_document(found) | ({"left": _document(left)["findings"]} if left else {}))
     else:

@@ -1,4 +1,4 @@
-"""Who is at work on a store, and how far the work has come, again and again until it ends."""
+"""Show who is at work on a store and its progress, until the work ends."""
 
 from __future__ import annotations
 
@@ -12,19 +12,15 @@ import click
 
 from mdr_dask.cli.printing import Row
 
-#: Seconds between two looks, and how much longer than a look takes.
+#: Seconds between two looks, at least this many times as long as a look takes.
 PAUSE, SHARE = 1.0, 5.0
 
 
 def at_work(store: str) -> list[str]:
-    """Say who is at work on a store: a runner alone, or how many parts and which."""
-    from mdr_dask.errors import StoreError
-    from mdr_dask.store import runners
+    """Return who is at work on a store: an exclusive run, or how many parts and which."""
+    from mdr_dask import store as room
 
-    try:
-        runner, parts = runners.at_work(store)
-    except StoreError as error:
-        return [str(error)]
+    runner, parts = room.at_work(store)
     found = [runner] if runner else []
     for count, alike in itertools.groupby(parts, key=lambda part: part.count):
         numbers = [part.number for part in alike]
@@ -33,14 +29,14 @@ def at_work(store: str) -> list[str]:
 
 
 def _ranges(numbers: list[int]) -> str:
-    """Return ascending numbers with runs of them drawn together: ``1-3, 7``."""
+    """Return ascending numbers as ranges: ``1-3, 7``."""
     runs = itertools.groupby(enumerate(numbers), key=lambda pair: pair[1] - pair[0])
     ends = [[number for _, number in run] for _, run in runs]
     return ", ".join(f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in ends)
 
 
 def watch(store: str, count: Callable[[], list[Row]]) -> None:
-    """Show how far a run has come until nobody is at work: in place on a terminal, a line for every change elsewhere.
+    """Show the progress of a run until nobody is at work: in place on a terminal, else a line for every change.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Plan and store through Dask: resume, retries, failures, progress. The only room that knows Dask."""
+"""Run a campaign: rounds, resume, failures, progress. The only room that uses Dask."""
 
 from mdr_dask.execute.events import Event, Tell
 from mdr_dask.execute.progress import Progress

@@ -1,4 +1,4 @@
-"""What a round has to compute of a group of the store, cell by cell, and the tasks that do so."""
+"""Which results of a group a round has to compute, and the tasks that compute them."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from mdr_dask import store
 from mdr_dask.errors import StoreError
 from mdr_dask.models.base import Status
 from mdr_dask.plan import RECORDS_TOGETHER, BlockIndex, Template
-from mdr_dask.store import Hold, Part, Place
-from mdr_dask.task import Rounds, Work, versions
+from mdr_dask.store import Lock, Part, Place
+from mdr_dask.task import Work, versions
 
 
 @dataclass(frozen=True)
 class Cells:
-    """Which results of a group a round has to compute, and which only need a word in the ledger.
+    """Which results of a group a round has to compute, and which only have to be marked as not needed.
 
     Parameters
     ----------
@@ -27,22 +27,23 @@ class Cells:
         The group.
     wanted, spared : bool array, shape of the group
         Results to compute, and those to write down as not needed.
-    kept : int
-        Number of results of the round that are in the store already.
+    kept, failed : int
+        Number of results of the round that are in the store already, and how many of them have failed.
     """
 
     template: Template
     wanted: NDArray[np.bool_]
     spared: NDArray[np.bool_]
     kept: int
+    failed: int
 
     @property
     def new(self) -> int:
-        """Number of results that are not in the store yet, those included that turn out not to be needed."""
+        """Number of results that are not in the store yet, with those that are not needed."""
         return int(np.count_nonzero(self.wanted) + np.count_nonzero(self.spared))
 
     def seconds(self, index: BlockIndex) -> float:
-        """Return the seconds that a block should take, in proportion to what is wanted of it."""
+        """Return the estimated work of a block, in proportion to what is wanted of it."""
         part = float(np.mean(self.wanted[self.template.region(index)]))
         return part * self.template.seconds(index) if part else 0.0
 
@@ -56,9 +57,10 @@ def find_cells(
     retry_failed: bool,
     own: NDArray[np.bool_] | None = None,
 ) -> Cells:
-    """Compare a round with the ledger: its cases `asked` for, those of them still `needed`, and its realisations.
+    """Compare a round with the ledger.
 
-    Of all that, only the `own` results of a part, if it is one.
+    `asked` are the cases of the round, `needed` those of them that need its `realisations` (from, to), and `own` the
+    results that belong to a part.
     """
     status = store.ledger(url, template.series.name, template.shape)
     open_states = [Status.MISSING, Status.NOT_NEEDED]
@@ -71,11 +73,13 @@ def find_cells(
         in_round &= own
     wanted = in_round & needed[..., None] & np.isin(status, open_states)
     spared = in_round & ~wanted & (status == Status.MISSING)
-    return Cells(template, wanted, spared, int(np.count_nonzero(in_round & ~wanted & ~spared)))
+    kept = in_round & ~wanted & ~spared
+    failed = kept & np.isin(status, [Status.FAILED, Status.NOT_CONVERGED])
+    return Cells(template, wanted, spared, int(np.count_nonzero(kept)), int(np.count_nonzero(failed)))
 
 
 def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]]:
-    """Yield, group by group, the number of the part of so many that each result belongs to: one part to a block."""
+    """Yield for each group the number of the part, of `count`, that each result belongs to."""
     position = itertools.count()
     for template in layout:
         numbers = np.zeros(template.shape, dtype=np.int32)
@@ -84,11 +88,11 @@ def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]
         yield numbers
 
 
-def tasks(url: str, groups: Iterable[Cells], hold: Hold, rounds: Rounds | None) -> Iterator[Work]:
-    """Yield the tasks of a round, lazily, so that only a window of them exists at a time."""
-    place, laid_out = store.absolute(url), store.layout_mark(url)
+def tasks(url: str, groups: Iterable[Cells], lock: Lock) -> Iterator[Work]:
+    """Yield the tasks of a round one by one, so that only a window of them exists at a time."""
+    laid_out = store.layout_mark(url)
     if laid_out is None:
-        raise StoreError(f"{url}: gone since it was laid out")
+        raise StoreError(f"{url}: removed since it was laid out")
     begun = itertools.count(1)
     for cells in groups:
         if not cells.new:
@@ -100,9 +104,9 @@ def tasks(url: str, groups: Iterable[Cells], hold: Hold, rounds: Rounds | None) 
             wanted, spared = cells.wanted[region], cells.spared[region]
             if wanted.any() or spared.any():
                 if next(begun) % RECORDS_TOGETHER == 0:
-                    store.put_together(url, template.series.name)
+                    store.merge_records(url, template.series.name)
                 yield Work(
-                    place=Place(place, template.series.name, index, region, laid_out, hold),
+                    place=Place(url, template.series.name, index, region, laid_out, lock),
                     model=template.campaign.model,
                     versions=versions(template.campaign.model),
                     block=template.block(index),
@@ -110,5 +114,4 @@ def tasks(url: str, groups: Iterable[Cells], hold: Hold, rounds: Rounds | None) 
                     spared=spared,
                     attempt=attempts.get(index, 0) + 1,
                     estimate=cells.seconds(index),
-                    rounds=rounds,
                 )

@@ -1,9 +1,10 @@
-"""Starting a Dask cluster, or finding one that runs."""
+"""Start a Dask cluster, or connect to one that runs."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping
+import sys
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from importlib import import_module
@@ -18,78 +19,100 @@ from distributed.deploy import Cluster
 from distributed.security import Security
 
 from mdr_dask.errors import ClusterError
-from mdr_dask.execute.crew import Crew
 from mdr_dask.execute.events import Event, Tell
 from mdr_dask.execute.resources import Resources
+from mdr_dask.execute.window import TaskWindow
+from mdr_dask.task import one_blas_thread
 
-#: Run in every worker process: Ctrl-C reaches them too, but the driver ends them, and tells what there is to tell.
+#: Run in every worker process: Ctrl-C reaches them too, but the driver ends them.
 QUIET = """\
 import logging, signal
 signal.signal(signal.SIGINT, signal.SIG_IGN)
 logging.getLogger("distributed").setLevel(logging.CRITICAL)
 """
-#: Seconds that a scheduler is given to answer.
+#: Seconds that a scheduler has to answer.
 SCHEDULER_PATIENCE = 10
 #: Where the page of a scheduler is served: to this machine alone.
 DASHBOARD = "127.0.0.1:0"
 #: Seconds of work that a cluster which grows by itself should have for each of its threads: about a block.
 TARGET_DURATION = "1s"
-#: Loggers that complain when workers cannot be started: that ends up in our sentences.
+#: Loggers whose messages explain why workers cannot be started: they are quoted in ours.
 STARTING = ("distributed.deploy", "dask_jobqueue", "tornado")
-#: Loggers whose complaints follow from what is told in one sentence anyhow.
+#: Loggers whose messages follow from an error that is reported anyway.
 ECHOES = ("distributed", "asyncio")
-#: A cluster on this machine does not give up a worker whose nanny is about to start it again. It takes no profile, and
-#: looks twice a second whether it is late: by default that takes four hundredths of a core for each worker.
+#: Settings of a cluster on this machine. A worker that dies is a suspect at the first death, and its nanny starts it
+#: again. There is no profile, which would take four hundredths of a core for each worker.
 ON_THIS_MACHINE = {
     "distributed.deploy.lost-worker-timeout": "1 day",
+    "distributed.scheduler.allowed-failures": 0,
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "500 ms",
 }
 
 
-class _LastWord(logging.Handler):
-    """Keeps the last complaint of a library, in one line."""
+class _LastMessage(logging.Handler):
+    """Keeps the last error message of a library, in one line."""
 
     text = ""
 
     def emit(self, record: logging.LogRecord) -> None:
         error = record.exc_info[1] if record.exc_info else None
-        said = f"{type(error).__name__}: {error}" if error else record.getMessage()
-        self.text = " ".join(said.split())
+        text = f"{type(error).__name__}: {error}" if error else record.getMessage()
+        self.text = " ".join(text.split())
 
 
 @contextmanager
-def crew(resources: Resources, tell: Tell) -> Iterator[Crew]:
-    """Yield the workers of a cluster: of one that is started, or of one that runs.
+def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
+    """Yield the workers of a cluster that is started, or of one that runs.
 
     Raises
     ------
     ClusterError
         If it cannot be started, or does not answer.
     """
-    word = _LastWord(logging.ERROR)
+    message = _LastMessage(logging.ERROR)
     with ExitStack() as stack:
-        for names, handler in ((ECHOES, logging.NullHandler()), (STARTING, word)):
+        for names, handler in ((ECHOES, logging.NullHandler()), (STARTING, message)):
             for logger in _loggers(names):
-                stack.enter_context(_taken(logger, handler))
-        again = _nothing
-        if resources.scheduler is not None:
+                stack.enter_context(_redirected(logger, handler))
+        stack.enter_context(one_blas_thread())  # a client may have its workers in this process
+        most: int = 0
+        replace_lost: Callable[[], None] = _nothing
+        if resources.client is not None:
+            client = resources.client
+        elif resources.scheduler is not None:
             tell(Event("connecting", {"scheduler": resources.scheduler}))
-            client, most = stack.enter_context(_connected(resources.scheduler)), 0
+            client = stack.enter_context(_connected(resources.scheduler))
         else:
+            _require_guard()
             plan = _local(resources.workers) if resources.cluster is None else resources.cluster
             tell(Event("starting", {"cluster": plan["class"]}, f"starting {plan['class']}"))
             is_local = issubclass(cluster_class(plan["class"]), LocalCluster)
             stack.enter_context(dask.config.set(ON_THIS_MACHINE if is_local else {}))
             cluster = stack.enter_context(_started(plan))
             if "scale" in plan and not is_local:  # jobs that have reached their wall time are not replaced otherwise
-                again = partial(cluster.scale, **plan["scale"])
+                replace_lost = partial(cluster.scale, **plan["scale"])
             client, most = stack.enter_context(Client(cluster, set_as_default=False)), _most(plan)
-        yield Crew(client, tell, resources.patience, most, again, lambda: word.text)
+        timeout = resources.case_timeout
+        yield TaskWindow(client, tell, resources.patience, most, replace_lost, lambda: message.text, timeout)
+
+
+def _require_guard() -> None:
+    """Raise ClusterError in a script without the guard that new processes need, because they import the script."""
+    main = sys.modules.get("__main__")
+    source = getattr(main, "__file__", None)
+    frame = sys._getframe()
+    while frame.f_back is not None:
+        frame = frame.f_back
+        is_script = frame.f_code.co_name == "<module>" and main is not None and frame.f_globals is vars(main)
+        text = Path(source).read_text("utf-8", "replace") if is_script and source and Path(source).is_file() else None
+        if text is not None and "__main__" not in text:
+            remedy = "put what it does below 'if __name__ == \"__main__\":', or compute in threads"
+            raise ClusterError(f"{source}: worker processes import this script: {remedy}")
 
 
 def _nothing() -> None:
-    """Leave a cluster to itself."""
+    """Leave a cluster as it is."""
 
 
 def _loggers(names: tuple[str, ...]) -> list[logging.Logger]:
@@ -99,8 +122,8 @@ def _loggers(names: tuple[str, ...]) -> list[logging.Logger]:
 
 
 @contextmanager
-def _taken(logger: logging.Logger, handler: logging.Handler) -> Iterator[None]:
-    """Give what a logger has to say to a handler alone."""
+def _redirected(logger: logging.Logger, handler: logging.Handler) -> Iterator[None]:
+    """Send the messages of a logger to one handler alone."""
     before = logger.handlers[:], logger.propagate, logger.level
     logger.handlers, logger.propagate = [handler], False
     logger.setLevel(logging.ERROR)

@@ -1,4 +1,4 @@
-"""What happens in a run, told as it happens: for its log, and for whoever watches it."""
+"""Events of a run, for its log and for the terminal."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from mdr_dask.task import Outcome, Work
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened.
+    """Something that happened in a run.
 
     Parameters
     ----------
     name : str
-        What it was: ``laid out``, ``block done``, ...
+        Such as ``laid out`` or ``block done``.
     facts : mapping
-        What is to be known of it, as JSON can hold it.
+        Details, as JSON can hold them.
     sentence : str
-        What a user has to be told at once; empty for what goes without saying.
+        A message for the user; empty if there is none.
     """
 
     name: str

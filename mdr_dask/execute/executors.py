@@ -1,76 +1,189 @@
-"""Ways to run tasks: threads of this process, or any Dask cluster."""
+"""Run the blocks of a campaign: in threads or processes of this machine, or on a Dask cluster."""
 
 from __future__ import annotations
 
 import itertools
 import os
-import uuid
+import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
-from functools import partial
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import AbstractContextManager, ExitStack, suppress
+from typing import TYPE_CHECKING
 
-from mdr_dask.execute.events import Settle, Tell, of_block
+from mdr_dask import models, store
+from mdr_dask.errors import ModelError
+from mdr_dask.execute.events import Event, Settle, Tell, of_block
 from mdr_dask.execute.resources import Resources
-from mdr_dask.task import Outcome, Work, run_block
+from mdr_dask.store import Lock
+from mdr_dask.task import Outcome, Work, one_blas_thread, run_block
 
-#: Blocks handed to the threads at a time: the graph never grows with the study.
-THREAD_WINDOW = 64
+if TYPE_CHECKING:
+    from mdr_dask.execute.children import Helper
+    from mdr_dask.execute.window import TaskWindow
 
+#: Blocks that wait for each thread, so that none is idle.
+AHEAD = 2
+#: Seconds for which a model in plain Python is computed in this process, before it is worth while to start others.
+SHORT = 2.0
 
-#: Runs tasks and settles each that has ended, in whatever order.
-Execute = Callable[[Iterable[Work], Settle], None]
+Compute = Callable[[Work], list[tuple[Work, Outcome]]]
 
 
 def check(resources: Resources) -> None:
-    """Refuse a cluster file that names no Dask cluster, before anything is touched.
-
-    Raises
-    ------
-    ClusterError
-        If it does not.
-    """
+    """Raise ClusterError for a cluster file that names no Dask cluster."""
     if resources.cluster is not None:
         from mdr_dask.execute.clusters import cluster_class
 
         cluster_class(resources.cluster["class"])
 
 
-@contextmanager
-def executor(resources: Resources, tell: Tell) -> Iterator[Execute]:
-    """Yield the function that runs tasks on the resources named."""
-    if not resources.remote:
-        yield partial(_run_threads, resources.threads or _cores(), tell)
-        return
-    from mdr_dask.execute.clusters import crew
-    from mdr_dask.execute.crew import run_distributed
+class Executor(AbstractContextManager["Executor"]):
+    """Runs blocks on the resources named. Processes and clusters are started when there is work for them.
 
-    with crew(resources, tell) as workers:
-        yield partial(run_distributed, workers)
+    Parameters
+    ----------
+    resources : Resources
+        Where to run.
+    model : str
+        Name of the model.
+    url : str
+        The store.
+    lock : Lock
+        Lock of the run; blocks that a crashed run had begun are computed in processes of their own.
+    tell : callable
+        Takes events.
+    """
+
+    def __init__(self, resources: Resources, model: str, url: str, lock: Lock, tell: Tell) -> None:
+        self._resources, self._url, self._lock, self._tell = resources, url, lock, tell
+        self._threads = resources.threads or _cores()
+        is_python = getattr(models.load(model).compute, "is_plain_python", False)
+        self._may_fork = hasattr(os, "fork")
+        self._prefers_processes = is_python and resources.threads is None and self._threads > 1
+        self._suspects = set(lock.begun)
+        self._helpers: list[Helper] = []
+        self._begun: set[str] = set(lock.begun)
+        self._noting = threading.Lock()
+        self._stack = ExitStack()
+        self._window: TaskWindow | None = None
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def __call__(self, works: Iterable[Work], settle: Settle) -> None:
+        """Compute blocks, and settle each that has ended, in whatever order."""
+        remaining = iter(works)
+        first = next(remaining, None)
+        if first is None:
+            return
+        remaining = itertools.chain([first], remaining)
+        if self._resources.remote:
+            self._on_cluster(remaining, settle)
+            return
+        self._stack.enter_context(one_blas_thread())
+        ordinary = self._without_suspects(remaining, settle)
+        if self._resources.case_timeout is not None and self._may_fork:
+            self._in_pool(ordinary, self._in_child, settle)
+        elif self._prefers_processes and self._may_fork:
+            self._in_pool(_for_a_while(ordinary), self._here, settle)
+            self._in_pool(ordinary, self._in_child, settle)
+        else:
+            self._in_pool(ordinary, self._here, settle)
+
+    def _without_suspects(self, works: Iterator[Work], settle: Settle) -> Iterator[Work]:
+        """Yield blocks; those that a run had begun when it crashed are computed in a process of their own first."""
+        for work in works:
+            if (key := of_work(work)) in self._suspects and self._may_fork:
+                sentence = f"an earlier run ended while it computed block {key}: it is computed in a process of its own"
+                self._tell(Event("block suspected", {"block": key}, sentence))
+                try:
+                    outcomes = self._in_child(work)
+                except (ImportError, ModelError):  # a model that is known in this process only
+                    outcomes = self._here(work)
+                for part, outcome in outcomes:
+                    settle(part, outcome)
+                self._suspects.discard(key)
+                self._note(key, is_begun=False)
+            else:
+                yield work
+
+    def _on_cluster(self, works: Iterable[Work], settle: Settle) -> None:
+        from mdr_dask.execute.clusters import task_window
+
+        if self._window is None:
+            self._window = self._stack.enter_context(task_window(self._resources, self._tell))
+        self._window.run(works, settle)
+
+    def _in_pool(self, works: Iterable[Work], compute: Compute, settle: Settle) -> None:
+        """Run a window of blocks in threads. However it ends, the blocks that have begun are finished."""
+        remaining = iter(works)
+        running: set[Future[list[tuple[Work, Outcome]]]] = set()
+        with ThreadPoolExecutor(self._threads) as pool:
+            try:
+                while True:
+                    more = itertools.islice(remaining, AHEAD * self._threads - len(running))
+                    running |= {pool.submit(compute, work) for work in more}
+                    if not running:
+                        return
+                    ended, running = wait(running, return_when=FIRST_COMPLETED)
+                    for future in ended:
+                        for work, outcome in future.result():
+                            settle(work, outcome)
+            except BaseException as error:
+                begun = sum(not future.cancel() for future in running)
+                if isinstance(error, KeyboardInterrupt) and begun:
+                    what = f"finishing {begun} blocks that have begun; interrupt once more to drop them"
+                    self._tell(Event("stopping", {"blocks": begun}, what))
+                raise
+
+    def _here(self, work: Work) -> list[tuple[Work, Outcome]]:
+        self._tell(of_block("begun", work))
+        self._note(of_work(work), is_begun=True)
+        try:
+            return [(work, run_block(work))]
+        finally:
+            self._note(of_work(work), is_begun=False)
+
+    def _note(self, key: str, is_begun: bool) -> None:
+        """Write down which blocks have begun: if this process crashes, the next run knows where."""
+        with self._noting:
+            (self._begun.add if is_begun else self._begun.discard)(key)
+            store.note_begun(self._url, self._lock, sorted(self._begun))
+
+    def _in_child(self, work: Work) -> list[tuple[Work, Outcome]]:
+        from mdr_dask.execute.children import compute_apart
+
+        self._tell(of_block("begun", work))
+        helper = self._free_helper()
+        try:
+            return list(compute_apart(helper, work, self._resources.case_timeout))
+        finally:
+            self._helpers.append(helper)
+
+    def _free_helper(self) -> Helper:
+        from mdr_dask.execute.children import Helper
+
+        with self._noting, suppress(IndexError):
+            return self._helpers.pop()
+        helper = Helper()
+        self._stack.callback(helper.close)
+        return helper
+
+
+def _for_a_while(works: Iterator[Work]) -> Iterator[Work]:
+    """Yield the blocks that are begun within `SHORT` seconds."""
+    start = time.monotonic()
+    for work in works:
+        yield work
+        if time.monotonic() - start > SHORT:
+            return
+
+
+def of_work(work: Work) -> str:
+    """Return series and index of a block as text."""
+    return f"{work.place.series or '-'} {'.'.join(map(str, work.place.index))}"
 
 
 def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _run_threads(threads: int, tell: Tell, works: Iterable[Work], settle: Settle) -> None:
-    """Run on Dask's threaded scheduler: no server, no sockets; a window of blocks is a graph.
-
-    However it ends, the blocks that have begun are finished first, for the store is still ours.
-    """
-    from dask import threaded  # its name alone would load the distributed scheduler
-    from dask.callbacks import Callback
-
-    def finished(_key: object, value: object, *_: object) -> None:
-        if isinstance(value, tuple):
-            settle(*value)
-
-    def compute(work: Work) -> tuple[Work, Outcome]:
-        tell(of_block("begun", work))
-        return work, run_block(work)
-
-    remaining = iter(works)
-    with ThreadPoolExecutor(threads) as pool, Callback(posttask=finished):
-        while window := list(itertools.islice(remaining, THREAD_WINDOW * threads)):
-            graph = {f"block-{uuid.uuid4().hex}": (partial(compute, work),) for work in window}
-            threaded.get(graph, list(graph), pool=pool)

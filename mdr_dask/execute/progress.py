@@ -1,4 +1,4 @@
-"""How far a run has come."""
+"""The progress of a run."""
 
 from __future__ import annotations
 
@@ -15,15 +15,17 @@ class Progress:
     Parameters
     ----------
     total, kept, done, failed, not_needed : int
-        All results of the campaign so far, those found in the store, and those of this run.
+        All results of the campaign so far, those that were in the store before, and those of this run.
+    kept_failed : int
+        Those of `kept` that have failed.
     warned : int
-        Those of this run that are done, and have a message: an accuracy that was missed, a law beyond its range.
+        Results of this run that are done and have a warning, such as a missed accuracy.
     blocks, solves : int
-        Blocks run and solutions really computed in this run.
+        Blocks computed and solutions really computed in this run.
     estimated, finished : float
-        Seconds of work by the model's estimate: that of all rounds so far, and that of the blocks run.
+        Work by the model's estimate, in seconds: of all rounds so far, and of the blocks computed.
     compute_seconds, compile_seconds, write_seconds, wall_seconds : float
-        Time in models, the part of it in which kernels were compiled, and time in writing, each summed over threads,
+        Time in models, the part of it in which kernels were compiled, and time for writing, each summed over threads;
         and time since the start.
     """
 
@@ -32,6 +34,7 @@ class Progress:
     done: int = 0
     failed: int = 0
     not_needed: int = 0
+    kept_failed: int = 0
     warned: int = 0
     blocks: int = 0
     solves: int = 0
@@ -49,10 +52,7 @@ class Progress:
 
     @property
     def seconds_left(self) -> float | None:
-        """Time until the end of this round, each block weighted by its estimate; None before any has ended.
-
-        At the pace of the blocks so far, compiling left out, with as many at work side by side as there were.
-        """
+        """Time until the end of this round, from the pace of the blocks so far without compiling; None before any."""
         busy = self.compute_seconds + self.write_seconds
         if not (self.finished > 0 and busy > 0 and self.wall_seconds > 0):
             return None
@@ -65,7 +65,6 @@ class Progress:
         counts = outcome.counts
         return replace(
             self,
-            total=self.total + outcome.further,
             done=self.done + counts[Status.DONE],
             failed=self.failed + counts[Status.FAILED] + counts[Status.NOT_CONVERGED],
             not_needed=self.not_needed + counts[Status.NOT_NEEDED],

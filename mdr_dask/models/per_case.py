@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -9,6 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.models.base import Block, Result, Status
+
+#: Seconds after which a case raises TimeoutError, in a process that has set an alarm for it.
+time_limit: float | None = None
 
 Solve = Callable[[Any, np.random.Generator], Mapping[str, ArrayLike]]
 
@@ -39,6 +43,8 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
         for case in range(block.cases):
             parameters = block.case(case)
             for number, realisation in enumerate(block.realisations):
+                if time_limit:
+                    signal.setitimer(signal.ITIMER_REAL, time_limit)
                 try:
                     outputs = solve(parameters, _stream(block.seed, realisation))
                     found[case, number] = {name: _array(name, outputs) for name in block.outputs}
@@ -51,6 +57,7 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
         values = {name: _gathered(name, found, shape) for name in block.outputs}
         return Result(values, status, messages, solves=status.size)
 
+    compute.is_plain_python = True  # type: ignore[attr-defined]
     return compute
 
 

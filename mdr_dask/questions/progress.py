@@ -16,8 +16,6 @@ from mdr_dask.units import shown
 if TYPE_CHECKING:
     import xarray as xr
 
-    from mdr_dask.store import Look
-
 
 class Group(NamedTuple):
     """Messages of one series that differ in their numbers only.
@@ -39,17 +37,14 @@ class Group(NamedTuple):
     cases: str
 
 
-def looks(url: str) -> list[Look]:
-    """Look at every series of a study, at no chunk but those of the ledger."""
-    names = store.series_names(url)
-    store.require_laid_out(url, names)
-    return [store.look(url, name) for name in names]
-
-
-def counts(look: Look) -> dict[str, Any]:
-    """Return the name of a series, the number of its results, and how many of them are in each state."""
-    counted = {state.name.lower(): int((look.status == state).sum()) for state in Status}
-    return {"series": look.chunks.series or "-", "results": look.status.size, **counted}
+def counts(url: str) -> list[dict[str, Any]]:
+    """Return for each series its name, the number of its results, and how many of them are in each state."""
+    found = []
+    for name in store.series_names(url):
+        status = store.ledger(url, name)
+        states = {state.name.lower(): int((status == state).sum()) for state in Status}
+        found.append({"series": name or "-", "results": status.size, **states})
+    return found
 
 
 def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:

@@ -130,7 +130,7 @@ def _thinned(data: xr.Dataset) -> xr.Dataset:
 def _study(url: str, held: Mapping[str, Any], whole: Mapping[str, xr.Dataset], groups: dict[str, xr.Dataset]) -> Study:
     reduced = any(whole[name]["status"].size > data["status"].size for name, data in groups.items())
     model = str(held["model"])
-    counted = [progress.counts(look) for look in progress.looks(url)]
+    counted = progress.counts(url)
     records = [record for name in groups for record in store.records(url, name)]
     drawn = list(
         drawn_of(

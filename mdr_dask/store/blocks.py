@@ -1,4 +1,4 @@
-"""Blocks: what a task reads and writes."""
+"""Read and write blocks."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from zarr.core.sync import sync
 
 from mdr_dask.errors import StoreError
 from mdr_dask.plan import BlockIndex
-from mdr_dask.store.digests import Checked
-from mdr_dask.store.files import bytes_of, group_name, guarded, read_bytes, write_stages
-from mdr_dask.store.locks import Hold, holding
-from mdr_dask.store.records import digest, name_of, sealed
+from mdr_dask.store.files import bytes_of, chunk_name, digest, group_name, guarded, read_bytes, write_stages
+from mdr_dask.store.locks import Lock, while_locked
+from mdr_dask.store.records import encoded as encode_record
+from mdr_dask.store.records import name_of
 from mdr_dask.store.study import array_of, document
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a block stands.
+    """The place of a block in a store.
 
     Parameters
     ----------
@@ -39,10 +39,9 @@ class Place:
     region : tuple of slice
         The block's place over (axes..., realisation).
     layout : str
-        The `layout_mark` of the store that the driver sees, so that nobody writes into another one, or into a shape of
-        yesterday.
-    hold : Hold
-        That of the runner on whose behalf it is written.
+        The `layout_mark` of the store that the driver sees. A worker that sees another one writes nothing.
+    lock : Lock
+        Lock of the run that the block is computed for.
     """
 
     url: str
@@ -50,7 +49,7 @@ class Place:
     index: BlockIndex
     region: tuple[slice, ...]
     layout: str
-    hold: Hold
+    lock: Lock
 
 
 def write_block(
@@ -60,23 +59,23 @@ def write_block(
     status: NDArray[np.int8],
     record: Mapping[str, Any],
 ) -> None:
-    """Write a block: what is to be told of it, whole chunks of every output, and its part of the ledger last.
+    """Write a block: its record, then whole chunks of every output, and its part of the ledger last.
 
-    The ledger is the only proof that a block is done. The record, with the digest of every chunk, comes first: whatever
-    a killed task leaves behind, each chunk is one that some record knows.
+    A block is done if and only if its part of the ledger says so. The record holds the digest of every chunk and comes
+    first, so that every chunk that a killed task leaves behind is known.
 
     Parameters
     ----------
     place : Place
-        Where it stands, and on whose behalf it is written.
+        Where to write it.
     attempt : int
         How often the block has been begun, this time included.
     values : mapping of str to float array
-        The outputs, each of the shape of the region, further dimensions behind; none if only the ledger changes.
+        The outputs, each of the shape of the region, further dimensions last; none if only the ledger changes.
     status : int8 array, shape of the region
         The block's part of the ledger.
     record : mapping
-        What it has to tell besides its numbers.
+        Its record, without digests.
     """
     arrays, encoded = _in_memory(place.url, place.series, place.layout)
     given = {**values, "status": status}
@@ -86,28 +85,26 @@ def write_block(
 
     with guarded(place.url, f"encoding block {place.index}"):
         sync(encode())
-    keys = {name: chunk_name(arrays[name], place.index) for name in given}
+    keys = {name: _chunk(place, arrays[name], name) for name in given}
     chunks = {name: (key, encoded.pop(key).to_bytes()) for name, key in keys.items()}
-    told = sealed({**record, "chunks": {name: digest(content) for name, (_, content) in chunks.items()}})
+    line = encode_record({**record, "chunks": {name: digest(content) for name, (_, content) in chunks.items()}})
     ledger = dict([chunks.pop("status")])
-    with holding(place.url, place.hold):
-        write_stages(place.url, [{name_of(place.series, place.index, attempt): told}, dict(chunks.values()), ledger])
+    with while_locked(place.url, place.lock):
+        write_stages(place.url, [{name_of(place.series, place.index, attempt): line}, dict(chunks.values()), ledger])
 
 
-def chunk_name(array: Any, index: BlockIndex) -> str:
-    """Return the name under which a block of an array is stored."""
-    further = (0,) * (array.ndim - len(index))
-    return f"{array.path}/{array.metadata.encode_chunk_key((*index, *further))}"
+def _chunk(place: Place, array: Any, name: str) -> str:
+    return chunk_name(place.series, name, place.index, array.ndim - len(place.index))
 
 
 def is_written(place: Place, record: Mapping[str, Any]) -> bool:
-    """Say whether the ledger holds what a record says was written."""
-    content = read_bytes(place.url, chunk_name(_arrays(place.url, place.series, place.layout)["status"], place.index))
+    """Return whether the ledger holds what a record says was written."""
+    content = read_bytes(place.url, chunk_name(place.series, "status", place.index))
     return content is not None and record.get("chunks", {}).get("status") == digest(content)
 
 
 def read_block(place: Place, outputs: tuple[str, ...]) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int8]]:
-    """Return what stands in a block: its values and its part of the ledger, as arrays that may be changed."""
+    """Return the values of a block and its part of the ledger, as arrays that may be changed."""
     arrays = _arrays(place.url, place.series, place.layout)
 
     async def read() -> list[Any]:
@@ -119,17 +116,17 @@ def read_block(place: Place, outputs: tuple[str, ...]) -> tuple[dict[str, NDArra
 
 
 def values(url: str, series: str, output: str) -> NDArray[np.float64]:
-    """Return one output of a group as it stands now, axes in the order of the store."""
-    (held,) = _opened(url, series, Checked(bytes_of(url), url, series), [output]).values()
+    """Return one output of a group as it is now, axes in the order of the store."""
+    (held,) = _opened(url, series, bytes_of(url), [output]).values()
     with guarded(url, f"reading {output}"):
         return np.asarray(held[...])
 
 
 def _opened(url: str, series: str, store: Store, names: Iterable[str] = ()) -> dict[str, Any]:
-    """Return some arrays of a group, or the ledger and all outputs, as its document shows them."""
+    """Return some arrays of a group, or the ledger and all outputs."""
     held = document(url, series)
     if held is None:
-        raise StoreError(f"{url}: gone since it was laid out")
+        raise StoreError(f"{url}: removed since it was laid out")
     shown = held["consolidated_metadata"]["metadata"]
     wanted = names or ("status", *held["attributes"]["outputs"])
     return {name: array_of(shown[name], store, group_name(series, name)) for name in wanted}
@@ -137,7 +134,7 @@ def _opened(url: str, series: str, store: Store, names: Iterable[str] = ()) -> d
 
 @lru_cache(maxsize=64)
 def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
-    """Hold the arrays of a group open for as long as its layout stands."""
+    """Return the arrays of a group; they stay open as long as its layout is the same."""
     seen = layout_mark(url)
     if seen != layout:
         raise StoreError(f"{url}: {_other_store(seen)}")
@@ -146,7 +143,7 @@ def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
 
 @lru_cache(maxsize=64)
 def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict[str, Buffer]]:
-    """Return the same arrays with nothing in them, and their chunks as they are written: each task takes its own."""
+    """Return arrays in memory of the same metadata, and the dictionary in which they put encoded chunks."""
     shown, encoded = _arrays(url, series, layout), dict[str, Buffer]()
     memory = zarr.storage.MemoryStore(encoded)
     empty = {name: array_of(_whole_chunks(array), memory, array.path) for name, array in shown.items()}
@@ -154,7 +151,7 @@ def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict
 
 
 def _whole_chunks(array: Any) -> dict[str, Any]:
-    """Return the metadata of an array as whole chunks: a block may hold more realisations than the study shows."""
+    """Return the metadata of an array, rounded up to whole chunks: a block may go beyond the stored shape."""
     shape = [-(-size // length) * length for size, length in zip(array.shape, array.chunks, strict=True)]
     return {**array.metadata.to_dict(), "shape": shape}
 
@@ -167,6 +164,6 @@ def _other_store(seen: str | None) -> str:
 
 
 def layout_mark(url: str) -> str | None:
-    """Return what tells a layout of a store from every other one; None where there is no store."""
+    """Return a mark that differs between two layouts of a store; None if there is no store."""
     content = read_bytes(url, "zarr.json")
     return None if content is None else hashlib.blake2b(content, digest_size=16).hexdigest()

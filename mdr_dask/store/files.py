@@ -1,4 +1,4 @@
-"""Bytes by name in a local directory or at a URL, the root attributes of a study, and its lock."""
+"""Read and write files by name, in a local folder or at a URL."""
 
 from __future__ import annotations
 
@@ -22,24 +22,19 @@ from zarr.core.sync import sync
 
 from mdr_dask.errors import MdrDaskError, StoreError
 
-#: How the study of a campaign without series is called where series stand beside it.
+#: Name of the study without series in a store that has series as well.
 ROOT = "-"
-
-#: Where the claims of runners lie in a store whose file system, or server, has no locks.
+#: Folder of claims in a store whose file system, or server, has no locks.
 CLAIMS = ".claims/"
-#: How the names of files end that were set aside.
+#: Ending of files that were set aside.
 ASIDE = ".aside"
-#: What clearing a store that was never laid out leaves: its first document, and who is at work on it.
+#: What clearing a store that was never laid out leaves: its first document, and the claims of its runner.
 KEPT = ("zarr.json", CLAIMS.rstrip("/"))
-
-#: Stamps of files that are not there, and of empty ones; and the largest of others.
-GONE, EMPTY, MOST = 0, 1, 2**63 - 1
 #: Requests to a server at a time.
 AT_ONCE = 64
 #: Threads that wait for a disk.
 FLUSHERS = 8
-
-#: Raised when the layout changes so that older code cannot go on with it. 2: chunks have digests, records lie together.
+#: Version of the layout; stores of a later one are refused. Since 2, records hold the digest of every chunk.
 LAYOUT = 2
 
 
@@ -69,7 +64,7 @@ def absolute(url: str) -> str:
 
 @contextmanager
 def guarded(url: str, doing: str) -> Iterator[None]:
-    """Turn what the file system or the network has to complain about into one sentence."""
+    """Turn errors of the file system or the network into one sentence."""
     try:
         yield
     except MdrDaskError:
@@ -82,7 +77,7 @@ def guarded(url: str, doing: str) -> Iterator[None]:
 
 
 def read_bytes(url: str, name: str) -> bytes | None:
-    """Return what stands under a name, or None if nothing does."""
+    """Return the content of a file, or None if there is none."""
     path = local(url)
     with guarded(url, f"reading {name}"):
         if path is None:
@@ -99,7 +94,7 @@ def read_json(url: str, name: str) -> dict[str, Any] | None:
 
 
 def parsed(content: bytes) -> Any:
-    """Return what a JSON document says; ValueError says why it is none."""
+    """Return a JSON document; ValueError if it is none."""
     try:
         return json.loads(content)
     except RecursionError:
@@ -128,7 +123,7 @@ def read_many(url: str, files: Iterable[str]) -> Iterator[tuple[str, bytes | Non
 
 
 def _content(file: str) -> bytes | None:
-    """Return what a file holds, None if there is none; of a hundred thousand, a Path and a stream each are slow."""
+    """Return the content of a file, None if there is none; faster than a Path for a hundred thousand files."""
     try:
         descriptor = os.open(file, os.O_RDONLY)
     except (FileNotFoundError, NotADirectoryError):
@@ -143,47 +138,21 @@ def _content(file: str) -> bytes | None:
     return content if len(content) == size else Path(file).read_bytes()
 
 
-def stamps(url: str, files: Iterable[str]) -> Iterator[int]:
-    """Yield a number for each file, in order, that differs after the file was written: `GONE` and `EMPTY` say so."""
-    path = local(url)
-    if path is None:
-        store = bytes_of(url)
-        with guarded(url, "listing it"):
-            store.fs.invalidate_cache()
-            found = sync(store.fs._find(store.path, detail=True))
-        known = {name.removeprefix(f"{store.path}/"): _stamp_of(told) for name, told in found.items()}
-        yield from (known.get(name, GONE) for name in files)
-        return
-    with guarded(url, "looking at its files"):
-        for name in files:
-            try:
-                told = os.stat(f"{path}/{name}")  # noqa: PTH116 (of a hundred thousand, a Path each is slow)
-            except (FileNotFoundError, NotADirectoryError):
-                yield GONE
-            else:
-                yield hash((told.st_ino, told.st_size, told.st_mtime_ns)) & MOST if told.st_size else EMPTY
-
-
-def _stamp_of(told: Mapping[str, Any]) -> int:
-    """Return a number for what a server says of an object, its ETag and the time of writing among it."""
-    text = repr(sorted(told.items())).encode()
-    return int.from_bytes(hashlib.blake2b(text, digest_size=7).digest()) if told.get("size") else EMPTY
-
-
 def write_bytes(url: str, name: str, content: bytes) -> None:
-    """Replace what stands under a name, at once."""
+    """Replace a file at once."""
     write_stages(url, [{name: content}])
 
 
 def write_stages(url: str, stages: Iterable[Mapping[str, bytes]]) -> None:
-    """Write files, those of each stage after those of the one before, each at once; all last when this returns.
+    """Write files, each at once, and those of each stage after those of the stage before.
 
-    On a disk everything is flushed under other names first. The names are given in order, and flushed in the end: one
-    wait for all contents, and one for all names.
+    On a disk, all contents are written and flushed under temporary names. Then the files of all stages but the last get
+    their names, and the names are flushed before the files of the last stage get theirs.
     """
+    stages = [stage for stage in stages if stage]
     path = local(url)
     if path is not None:
-        _write_local(url, path, [item for stage in stages for item in stage.items()])
+        _write_local(url, path, stages)
         return
 
     async def write(stage: Mapping[str, bytes]) -> None:
@@ -191,48 +160,48 @@ def write_stages(url: str, stages: Iterable[Mapping[str, bytes]]) -> None:
         await asyncio.gather(*[bytes_of(url).set(name, buffer.from_bytes(data)) for name, data in stage.items()])
 
     for stage in stages:
-        if stage:
-            with guarded(url, f"writing {next(iter(stage))}"):
-                sync(write(stage))
+        with guarded(url, f"writing {next(iter(stage))}"):
+            sync(write(stage))
 
 
-def _write_local(url: str, root: Path, files: list[tuple[str, bytes]]) -> None:
-    unnamed: dict[Path, Path] = {}
-    folders: dict[Path, None] = {}
+def _write_local(url: str, root: Path, stages: Sequence[Mapping[str, bytes]]) -> None:
     mark = uuid.uuid4().hex
+    temporary = {root / name: Path(f"{root / name}.{mark}.partial") for stage in stages for name in stage}
+    made: dict[Path, None] = {}
     try:
-        for name, content in files:
-            target = root / name
-            unnamed[target] = Path(f"{target}.{mark}.partial")
-            with guarded(url, f"writing {name}"):
-                if (folder := target.parent) not in folders:
-                    folders |= dict.fromkeys([*_make(folder), folder])
-                put(unnamed[target], content)
-        with guarded(url, f"writing {', '.join(name for name, _ in files)}"):
-            _flush([*unnamed.values()])
-            for target, leftover in unnamed.items():
-                give_name(leftover, target)
-            _flush([*folders])
+        for stage in stages:
+            for name, content in stage.items():
+                with guarded(url, f"writing {name}"):
+                    made |= dict.fromkeys(_make((root / name).parent))
+                    put(temporary[root / name], content)
+        with guarded(url, f"writing {', '.join(name for stage in stages for name in stage)}"):
+            _flush([*temporary.values()])
+            for group in (stages[:-1], stages[-1:]):
+                targets = [root / name for stage in group for name in stage]
+                for target in targets:
+                    give_name(temporary[target], target)
+                _flush([*dict.fromkeys([*(target.parent for target in targets), *made])])
+                made = {}
     except BaseException:
-        for leftover in unnamed.values():
-            with suppress(OSError):  # what went wrong first is what has to be told
+        for leftover in temporary.values():
+            with suppress(OSError):  # the first error is the one to report
                 leftover.unlink()
         raise
 
 
 def put(path: Path, content: bytes) -> None:
-    """Write bytes to a new file."""
+    """Write a new file."""
     with open(path, "wb") as file:  # noqa: PTH123 (of many, Path.open takes longer)
         file.write(content)
 
 
 def give_name(leftover: Path, target: Path) -> None:
-    """Make a file that is complete take the place of what stands under a name."""
+    """Rename a complete file to its name, replacing what was there."""
     os.replace(leftover, target)  # noqa: PTH105 (of many)
 
 
 def _make(folder: Path) -> list[Path]:
-    """Make a folder; return those in which a new one stands."""
+    """Make a folder and its parents; return the folders that have a new entry."""
     if folder.is_dir():
         return []
     above = [*_make(folder.parent), folder.parent]
@@ -241,7 +210,7 @@ def _make(folder: Path) -> list[Path]:
 
 
 def _flush(paths: Sequence[Path]) -> None:
-    """Wait until files, and the names in folders, are on the disk; together, since a disk writes them together."""
+    """Wait until files, and the names in folders, are on the disk; in threads, because a disk flushes many at once."""
     shares = (paths[first::FLUSHERS] for first in range(min(FLUSHERS, len(paths))))
     list(_flushers().map(_flush_in_turn, shares))
 
@@ -268,8 +237,12 @@ def _flushers() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(FLUSHERS, thread_name_prefix="flush")
 
 
+if hasattr(os, "register_at_fork"):  # the threads of a pool do not exist in a forked process
+    os.register_at_fork(after_in_child=_flushers.cache_clear)
+
+
 def create(url: str, name: str, content: bytes) -> bool:
-    """Write bytes under a name that is free, and return True; leave one that is taken, and return False."""
+    """Write a new file and return True; if there is one of that name, leave it and return False."""
     path = local(url)
     with guarded(url, f"writing {name}"):
         try:
@@ -286,7 +259,7 @@ def create(url: str, name: str, content: bytes) -> bool:
 
 
 def conditional(url: str) -> bool:
-    """Say whether `create` is one act of the server, not a look before a write."""
+    """Return whether `create` is one atomic request of the server."""
     if local(url) is not None:
         return True
     from fsspec import AbstractFileSystem
@@ -296,7 +269,7 @@ def conditional(url: str) -> bool:
 
 
 def remove(url: str, files: Iterable[str]) -> None:
-    """Remove files by name; those that are gone are no matter."""
+    """Remove files; missing ones are ignored."""
     path = local(url)
 
     async def delete() -> None:
@@ -312,7 +285,7 @@ def remove(url: str, files: Iterable[str]) -> None:
 
 
 def set_aside(url: str, files: Iterable[str]) -> None:
-    """Rename files, so that nothing reads them and nothing is lost."""
+    """Rename files so that nothing reads them."""
     for name in files:
         content = read_bytes(url, name)
         if content is not None:
@@ -321,7 +294,7 @@ def set_aside(url: str, files: Iterable[str]) -> None:
 
 
 def clear(url: str) -> None:
-    """Remove what a run left that took the place and got no further."""
+    """Remove what a run left that was stopped before it laid the study out."""
 
     async def remove() -> None:
         for name in [name async for name in bytes_of(url).list_dir("") if name not in KEPT]:
@@ -332,7 +305,7 @@ def clear(url: str) -> None:
 
 
 def sweep(url: str) -> None:
-    """Remove the files that killed writers had not yet given their names; only for the holder of the lock."""
+    """Remove the temporary files of killed writers; only for the holder of the lock."""
     path = local(url)
     if path is not None and path.is_dir():
         with guarded(url, "removing what a killed run left"):
@@ -366,3 +339,16 @@ def _raise_unless_gone(error: OSError) -> None:
 def group_name(series: str, member: str = "") -> str:
     """Return the path of a member of a series' group, or of the group itself; arrays without series are at the root."""
     return "/".join(part for part in ("" if series == ROOT else series, member) if part)
+
+
+def chunk_name(series: str, array: str, block: Iterable[int], further: int = 0) -> str:
+    """Return the name of the chunk of a block; `further` counts the dimensions that the array has beyond the ledger."""
+    return group_name(series, "/".join([array, "c", *map(str, block), *["0"] * further]))
+
+
+def digest(content: bytes) -> str:
+    """Return the digest of a file.
+
+    It is not a checksum, because chunks end with theirs, and the CRC of bytes followed by their CRC is a constant.
+    """
+    return hashlib.blake2b(content, digest_size=8).hexdigest()

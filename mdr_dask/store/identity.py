@@ -1,4 +1,4 @@
-"""Is this the store of this campaign? What differs is named; what is new extends what is there."""
+"""Compare a campaign with the store that it extends: name what differs, and put new values behind stored ones."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ from mdr_dask.models.data_file import DataFile
 from mdr_dask.store.files import ROOT
 from mdr_dask.store.layout import plain_values
 from mdr_dask.store.study import attributes, document, series_names
-
 
 @dataclass(frozen=True)
 class Stored:
@@ -71,9 +70,10 @@ def reconcile(url: str, campaign: Campaign) -> Stored:
     for series in campaign.series:
         found = _series_differences(series, held[series.name], campaign.outputs) if series.name in held else []
         differences += [f"{series.name}.{line}" if series.name else line for line in found]
+    _require_version(url, campaign)
     if differences:
         lines = "\n  ".join(dict.fromkeys(differences))
-        raise StoreError(f"{url}: made from another campaign; name another store, or remove this one:\n  {lines}")
+        raise StoreError(f"{url}: made from another campaign; give this one a store of its own (--store):\n  {lines}")
     extended, places = [], {}
     for series in campaign.series:
         if series.name in held:
@@ -88,6 +88,18 @@ def reconcile(url: str, campaign: Campaign) -> Stored:
     )
 
 
+def _require_version(url: str, campaign: Campaign) -> None:
+    """Raise StoreError if another version of the same model made the store: results of two versions do not mix."""
+    held, version = attributes(url), models.load(campaign.model).version
+    if held["model"] == campaign.model and held["model_version"] != version:
+        program = held.get("versions", {}).get("mdr_dask", "another version")
+        raise StoreError(
+            f"{url}: made by mdr_dask {program} with version {held['model_version']} of the model {campaign.model}, "
+            f"this is version {version}. The store can be read, plotted and verified, but not extended. To extend it: "
+            f"pip install mdr_dask=={program}; to compute the study again: --store with another name"
+        )
+
+
 def _group_attributes(url: str, name: str) -> dict[str, Any] | None:
     metadata = document(url, name)
     if metadata is None or "axes" not in metadata["attributes"]:
@@ -100,7 +112,6 @@ def _study_differences(url: str, campaign: Campaign) -> list[str]:
     root = attributes(url)
     now = {
         "model": campaign.model,
-        "model_version": models.load(campaign.model).version,
         "seed": campaign.seed,
         "accuracy": campaign.accuracy,
     }
@@ -206,7 +217,7 @@ def _axis(series: Series, path: str) -> Axis:
 
 
 def _entries(columns: list[list[Any]]) -> dict[tuple[str, int], int]:
-    """Return the position of every entry of a dimension, by the text of its values and how often it was there before.
+    """Return the position of every entry of a dimension, by the text of its values and its number among equal ones.
 
     Values that agree to `SAME_DIGITS` are the same. Designs of whole numbers may have the same case twice.
     """

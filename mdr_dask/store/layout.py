@@ -1,10 +1,12 @@
-"""Laying out a study: arrays from templates, and the one write that makes a new shape visible."""
+"""Lay out a study: arrays from templates, and the one write that makes a new shape visible."""
 
 from __future__ import annotations
 
+import base64
 import json
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache, lru_cache
 from importlib.metadata import version
@@ -19,40 +21,39 @@ from zarr.codecs import Crc32cCodec, ZstdCodec
 
 from mdr_dask import models
 from mdr_dask.campaign import Campaign
+from mdr_dask.errors import StoreError
 from mdr_dask.models.base import Status
 from mdr_dask.models.numbers import numbers_of
 from mdr_dask.plan import Template
-from mdr_dask.store.copies import Copy, signpost
-from mdr_dask.store.files import LAYOUT, clear, group_name, read_many, write_bytes, write_stages
-from mdr_dask.store.records import digest
+from mdr_dask.store.files import LAYOUT, clear, digest, group_name, read_bytes, read_many, write_bytes, write_stages
 from mdr_dask.store.study import document, only_claimed
 from mdr_dask.version import __version__
 
 _COORDINATE_CHUNK = 4096
-#: What `_series_attributes` writes; at the root it outlasts campaigns of which that study is no part.
+#: What `_series_attributes` writes. At the root it is kept when series are added.
 OF_SERIES = ("series", "parameters", "axes", "outputs", "blocks", "notes")
 _Coordinate = tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]
 
 
 def lay_out(url: str, layout: Sequence[Template]) -> None:
-    """Create the arrays of every template, or grow the ones that exist; readers see the old shape or the new one.
+    """Create the arrays of every template, or grow existing ones. Readers see the old shape or the new one.
 
-    Everything is laid out in memory first. Then arrays and coordinates are written, behind them each group, and last
-    of all the root: whoever opens a group sees what its one document says, however far the writing got.
+    Files are written in this order: a copy of the layout of each group, arrays and coordinates, the metadata of groups,
+    and the metadata of the study, which make the new shape visible.
 
     Parameters
     ----------
     url : str
         Path or URL of the store.
     layout : sequence of Template
-        All groups; existing ones only ever grow, at the end of a dimension.
+        All groups; existing ones only grow, at the end of a dimension.
 
     Raises
     ------
     StoreError
         If it cannot be written.
     """
-    if all(_is_laid_out(url, template) for template in layout):
+    if is_laid_out(url, layout):
         return
     held = document(url)
     if held is None:
@@ -62,45 +63,145 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
     members = dict(held["consolidated_metadata"]["metadata"]) if held else {}
     study = _study_attributes(layout[0].campaign, held["attributes"] if held else {})
     root = {name: held["attributes"][name] for name in OF_SERIES if name in held["attributes"]} if held else {}
-    copies = [_copy(url, template, study) for template in layout]
-    for copy in copies:
-        members |= copy.members
-        root = root if copy.series else dict(copy.own)
-    own = {copy.series: group_name(copy.series, "zarr.json") for copy in copies if copy.series}
-    files = {name: content for copy in copies for name, content in copy.files.items() if not copy.stands(name)}
-    groups = {name: files.pop(name) for name in own.values() if name in files}
-    root_document = {"zarr.json": group_document(members, study | root | signpost(members))}
-    write_stages(url, [dict(copy.file() for copy in copies), files, groups, root_document])
+    files: dict[str, dict[str, bytes]] = {}
+    groups = {}
+    for template in layout:
+        series, own = template.series.name, _series_attributes(template)
+        found = _laid_out_files(template)
+        arrays = {name.removesuffix("/zarr.json"): json.loads(found[name]) for name in found if "zarr.json" in name}
+        files[series] = {group_name(series, name): content for name, content in found.items()}
+        members |= {group_name(series, name): array for name, array in arrays.items()}
+        if series:
+            attributes = {**study, **own}
+            members[series] = {"zarr_format": 3, "node_type": "group", "attributes": attributes}
+            groups[group_name(series, "zarr.json")] = group_document(arrays, attributes)
+        else:
+            root = own
+    document_of_root = {"zarr.json": group_document(members, study | root | _signpost(members))}
+    copies: dict[str, bytes] = {}
+    changed: dict[str, bytes] = {}
+    for series, own_files in files.items():
+        group = {name: groups[name] for name in [group_name(series, "zarr.json")] if name in groups}
+        laid_out = {**own_files, **group, **document_of_root}
+        before = {name: digest(content) for name, content in read_many(url, laid_out) if content is not None}
+        copies |= _copy(series, laid_out, before)
+        changed |= {name: content for name, content in own_files.items() if before.get(name) != digest(content)}
+    write_stages(url, [copies, changed, groups, document_of_root])
 
 
-def _copy(url: str, template: Template, study: Mapping[str, Any]) -> Copy:
-    series, own = template.series.name, _series_attributes(template)
-    path = group_name(series, "zarr.json").removesuffix("zarr.json")
-    files = laid_out_files(template)
-    if series:
-        arrays = {file.removesuffix("/zarr.json"): json.loads(files[file]) for file in files if "zarr.json" in file}
-        files["zarr.json"] = group_document(arrays, {**study, **own})
-    held = read_many(url, [f"{path}{name}" for name in files])
-    before = {name: digest(content) for name, content in held if content is not None}
-    return Copy(series, {f"{path}{name}": content for name, content in files.items()}, study, own, before)
+def is_laid_out(url: str, layout: Sequence[Template]) -> bool:
+    """Return whether a store has the shape of some templates already."""
+    root = document(url)
+    return root is not None and all(_has_shape(url, root, template) for template in layout)
 
 
-def _is_laid_out(url: str, template: Template) -> bool:
-    held, root = document(url, template.series.name), document(url)
-    if held is None or root is None or "axes" not in held["attributes"]:
-        return False
-    if root["attributes"]["mdr_dask_layout"] < LAYOUT:
+def _has_shape(url: str, root: Mapping[str, Any], template: Template) -> bool:
+    held = document(url, template.series.name)
+    if held is None or "axes" not in held["attributes"]:
         return False
     if root["attributes"].get("measured") != _measured(template.campaign).get("measured"):
         return False
     wanted = json.loads(json.dumps(_series_attributes(template)))
-    status = group_name(template.series.name, "status")
-    shown = root["consolidated_metadata"]["metadata"].get(status, {"shape": None})
+    shown = root["consolidated_metadata"]["metadata"].get(group_name(template.series.name, "status"), {"shape": None})
     return bool(shown["shape"] == list(template.shape) and wanted.items() <= held["attributes"].items())
 
 
-def laid_out_files(template: Template) -> dict[str, bytes]:
-    """Return the files of a group before anything is computed: metadata of all arrays, chunks of the coordinates."""
+@dataclass(frozen=True)
+class Copy:
+    """A copy of everything that lays a group out: metadata and coordinates.
+
+    It is written before the files themselves. A file is sound if it is as in the copy, or as it was before: a run may
+    have been killed while it laid the study out.
+
+    Parameters
+    ----------
+    files : mapping of str to bytes
+        The files, with the metadata of the study among them, by their names in the store.
+    before : mapping of str to str
+        Digests of the files that were there before.
+    """
+
+    files: Mapping[str, bytes]
+    before: Mapping[str, str]
+
+    def accepts(self, name: str, content: bytes | None, root: bytes | None) -> bool:
+        """Return whether a file is as it was laid out; a new one may be missing as long as `root` is the old one."""
+        if content is None:
+            return name not in self.before and root is not None and digest(root) == self.before.get("zarr.json")
+        return content == self.files[name] or digest(content) == self.before.get(name)
+
+    @property
+    def age(self) -> int:
+        """How often the study had been laid out."""
+        return len(json.loads(self.files["zarr.json"])["attributes"]["history"])
+
+
+def copy_name(series: str) -> str:
+    """Return the name of the copy of the layout of a group."""
+    return group_name(series, "status/layout.json")
+
+
+def _copy(series: str, files: Mapping[str, bytes], before: Mapping[str, str]) -> dict[str, bytes]:
+    encoded = {name: base64.b64encode(content).decode() for name, content in files.items()}
+    held = {"files": encoded, "before": before}
+    stated = digest(json.dumps(held, sort_keys=True).encode())
+    return {copy_name(series): json.dumps({**held, "digest": stated}, sort_keys=True).encode()}
+
+
+def read_copy(url: str, series: str) -> Copy | None:
+    """Return the copy of the layout of a group, None if there is none.
+
+    Raises
+    ------
+    StoreError
+        If it is damaged.
+    """
+    content = read_bytes(url, copy_name(series))
+    if content is None:
+        return None
+    try:
+        held = json.loads(content)
+        stated = held.pop("digest")
+        if stated != digest(json.dumps(held, sort_keys=True).encode()):
+            raise ValueError
+        files = {name: base64.b64decode(text) for name, text in held["files"].items()}
+        if group_name(series, "status/zarr.json") not in files:
+            raise ValueError
+        return Copy(files, dict(held["before"]))
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        raise StoreError(f"{url}: {copy_name(series)} is damaged") from None
+
+
+def damaged_layout(url: str, series: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Yield name and fault (``missing`` or ``damaged``) of every file of a layout that is not as it was made."""
+    root = document(url) or {}
+    copies = []
+    for name in series:
+        try:
+            copy = read_copy(url, name)
+        except StoreError:
+            yield copy_name(name), "damaged"
+            continue
+        if copy is not None:
+            copies.append(copy)
+        elif ((document(url, name) or root).get("attributes", {})).get("mdr_dask_layout", 0) > 1:
+            yield copy_name(name), "missing"
+    names, held = list(dict.fromkeys(name for copy in copies for name in copy.files)), read_bytes(url, "zarr.json")
+    for name, content in read_many(url, names):
+        if not any(copy.accepts(name, content, held) for copy in copies if name in copy.files):
+            yield name, "missing" if content is None else "damaged"
+
+
+def _signpost(members: Mapping[str, Any]) -> dict[str, str]:
+    """Return the comment of a study with series: opened as one dataset, it looks empty."""
+    series = sorted(name for name, member in members.items() if member["node_type"] == "group")
+    groups = " or ".join(f"group={name!r}" for name in series)
+    text = f"the results of each series are in a group: open_datatree, or open_zarr with {groups}"
+    return {"comment": text} if series else {}
+
+
+def _laid_out_files(template: Template) -> dict[str, bytes]:
+    """Return the metadata of all arrays of a group, and the chunks of its coordinates."""
     coordinates = _coordinates(template)
     held = [_coordinate_files(name, _Numbers.of(*coordinate)) for name, coordinate in coordinates.items()]
     along = " ".join(name for name, (dims, _, _) in coordinates.items() if dims != (name,))
@@ -141,7 +242,7 @@ def _array_file(
 
 @lru_cache(maxsize=64)
 def _one_block(chunks: tuple[int, ...], dims: tuple[str, ...], dtype: str, attrs: str) -> bytes:
-    """Return the metadata of an array that is one block; a round changes nothing of them but the shape."""
+    """Return the metadata of an array of one block. They are cached because a round changes the shape alone."""
     files: dict[str, Any] = {}
     zarr.create_array(
         zarr.storage.MemoryStore(files),
@@ -157,7 +258,7 @@ def _one_block(chunks: tuple[int, ...], dims: tuple[str, ...], dtype: str, attrs
 
 
 class _Numbers(NamedTuple):
-    """A coordinate, such that equal ones are known for equal."""
+    """A coordinate that can be hashed."""
 
     dims: tuple[str, ...]
     dtype: np.dtype[Any]
@@ -180,7 +281,7 @@ class _Numbers(NamedTuple):
 
 @lru_cache(maxsize=64)
 def _coordinate_files(name: str, numbers: _Numbers) -> dict[str, bytes]:
-    """Return the files of a coordinate; of all of them a round changes one."""
+    """Return the files of a coordinate. They are cached because a round changes one of them."""
     files: dict[str, Any] = {}
     group = zarr.create_group(zarr.storage.MemoryStore(files))
     array = group.create_array(
@@ -221,7 +322,7 @@ def _attrs(unit: str | None, long_name: str) -> dict[str, Any]:
 
 @cache
 def _packages() -> dict[str, str]:
-    """Return the versions of the packages that a store names: looked up once, which takes as long as laying out."""
+    """Return the versions of the packages that a store names."""
     return {name: version(name) for name in ("numpy", "scipy", "numba", "dask", "zarr", "xarray")}
 
 
@@ -231,7 +332,7 @@ def _study_attributes(campaign: Campaign, earlier: Mapping[str, Any]) -> dict[st
     history = [*earlier.get("history", []), f"{now} {what} on {platform.node()}"]
     return {
         "Conventions": "CF-1.11",
-        "mdr_dask_layout": LAYOUT,
+        "mdr_dask_layout": earlier.get("mdr_dask_layout", LAYOUT),
         "title": campaign.name,
         "model": campaign.model,
         "model_version": models.load(campaign.model).version,
@@ -249,7 +350,7 @@ def _study_attributes(campaign: Campaign, earlier: Mapping[str, Any]) -> dict[st
 
 
 def _measured(campaign: Campaign) -> dict[str, Any]:
-    """Return the table of a campaign as a store holds it: whole, so that it stays with the results."""
+    """Return the table of measured points of a campaign, which is stored with the results."""
     table = campaign.measured
     return {"measured": {"name": table.name, "text": table.read_text()}} if table else {}
 
@@ -275,7 +376,7 @@ def _series_attributes(template: Template) -> dict[str, Any]:
 
 
 def plain_values(values: tuple[Any, ...]) -> list[Any]:
-    """Return axis values as JSON holds them."""
+    """Return axis values as JSON."""
     return [_plain(value) for value in values]
 
 
@@ -286,7 +387,7 @@ def _plain(value: Any) -> Any:
 
 
 def group_document(members: Mapping[str, Any], attrs: Mapping[str, Any]) -> bytes:
-    """Return the metadata of a group, attributes and all: written at once, it is what makes a new shape visible."""
+    """Return the metadata of a group with those of its members: one file, so that a new shape is visible at once."""
     held = {
         "zarr_format": 3,
         "node_type": "group",

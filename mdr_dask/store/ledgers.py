@@ -1,12 +1,11 @@
-"""The ledger of a group, read at once: which results there are, and in which state."""
+"""The ledger of a group: the array ``status``, and where the chunks of its blocks are."""
 
 from __future__ import annotations
 
 import itertools
-import json
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -16,107 +15,132 @@ from zarr.core.buffer import default_buffer_prototype
 
 from mdr_dask.errors import StoreError
 from mdr_dask.models.base import Status
-from mdr_dask.store.files import group_name, guarded, read_many
-from mdr_dask.store.records import digest
-from mdr_dask.store.seals import Chunks, Contents, Seal, read_seal
+from mdr_dask.plan import BlockIndex
+from mdr_dask.store.files import chunk_name, group_name, guarded, listed, read_many
+from mdr_dask.store.layout import damaged_layout
 from mdr_dask.store.study import array_of, document
 
+#: Most faults that a message names.
+NAMED = 3
 
-def ledger(url: str, series: str, shape: tuple[int, ...]) -> NDArray[np.int8]:
-    """Return the ``status`` array of a group as it stands now, with what the shape has beyond it as missing.
 
-    Another part may have grown it beyond the shape meanwhile.
+@dataclass(frozen=True)
+class Blocks:
+    """The blocks of a group.
+
+    Parameters
+    ----------
+    series : str
+        Name of the group.
+    grid, lengths : tuple of int
+        Number of blocks along each dimension, and length of a block.
+    further : mapping of str to int
+        Number of dimensions of each array beyond those of the ledger, which comes first.
     """
+
+    series: str
+    grid: tuple[int, ...]
+    lengths: tuple[int, ...]
+    further: Mapping[str, int]
+
+    @classmethod
+    def of(cls, series: str, metadata: Mapping[str, Any]) -> Blocks:
+        """Find them in the metadata of a group."""
+        arrays = metadata["consolidated_metadata"]["metadata"]
+        status = arrays["status"]
+        lengths = tuple(status["chunk_grid"]["configuration"]["chunk_shape"])
+        grid = tuple(math.ceil(size / length) for size, length in zip(status["shape"], lengths, strict=True))
+        names = ("status", *metadata["attributes"]["outputs"])
+        return cls(series, grid, lengths, {name: len(arrays[name]["shape"]) - len(grid) for name in names})
+
+    @property
+    def indices(self) -> Iterator[BlockIndex]:
+        """All blocks."""
+        return itertools.product(*map(range, self.grid))
+
+    def chunk(self, array: str, block: BlockIndex) -> str:
+        """Return the name of a chunk."""
+        return chunk_name(self.series, array, block, self.further[array])
+
+    def has(self, block: BlockIndex) -> bool:
+        """Return whether a block lies in the grid."""
+        return len(block) == len(self.grid) and all(0 <= i < n for i, n in zip(block, self.grid, strict=True))
+
+
+def ledger(url: str, series: str, shape: tuple[int, ...] | None = None) -> NDArray[np.int8]:
+    """Return the ``status`` array of a group as it is now.
+
+    With a `shape`, results beyond the stored array are missing; another part may also have grown the array beyond it.
+    """
+    metadata = document(url, series)
+    if metadata is None:
+        if shape is None:
+            raise StoreError(f"{url}: {group_name(series, 'zarr.json')} is missing")
+        return np.full(shape, Status.MISSING, dtype=np.int8)
+    if "axes" not in metadata.get("attributes", {}):
+        raise StoreError(f"{url}: {group_name(series, 'zarr.json')} is damaged; 'mdr-dask verify {url}' says more")
+    status = _read(url, Blocks.of(series, metadata), metadata["consolidated_metadata"]["metadata"]["status"])
+    if shape is None:
+        return status
     found = np.full(shape, Status.MISSING, dtype=np.int8)
-    held = document(url, series)
-    if held is None:
-        return found
-    if "axes" not in held.get("attributes", {}):  # of an array, say
-        raise StoreError(f"{url}: {group_name(series, 'zarr.json')} is damaged; 'mdr-dask verify {url}' looks into it")
-    chunks = Chunks.of(series, held)
-    seal = read_seal(url, series)
-    if seal is None:
-        known = read_ledger(url, chunks, Seal.nothing(series, chunks.grid), None)
-    else:
-        known = read_ledger(url, chunks, seal, chunks.stamps(url, "status"))
-    status = known.decoded(url, held)
     common = tuple(map(slice, np.minimum(shape, status.shape)))
     found[common] = status[common]
     return found
 
 
-def read_ledger(url: str, chunks: Chunks, seal: Seal, stamps: NDArray[np.int64] | None) -> Ledger:
-    """Read the ledger of a group: what has not the stamps of a seal, or all of it."""
-    which = seal.contents(chunks.grid)
-    unread = np.ones(chunks.grid, dtype=bool) if stamps is None else stamps != seal.known("status", chunks.grid)
-    different = {content: number for number, content in enumerate(seal.different)}
-    names = itertools.compress(chunks.names("status"), unread.flat)
-    which[unread] = [different.setdefault(content, len(different)) for _, content in read_many(url, names)]
-    return Ledger(tuple(different), which)
+def _read(url: str, blocks: Blocks, metadata: Mapping[str, Any]) -> NDArray[np.int8]:
+    """Read the ledger, decoding each different chunk once: most blocks are alike, and Zarr takes long for each."""
+    different: dict[bytes | None, int] = {None: 0}
+    names = (blocks.chunk("status", block) for block in blocks.indices)
+    numbers = [different.setdefault(content, len(different)) for _, content in read_many(url, names)]
+    which = np.array(numbers, dtype=np.int64).reshape(blocks.grid)
+    buffer, below = default_buffer_prototype().buffer, "/0" * (len(blocks.grid) - 1)
+    files = {f"c/{i}{below}": buffer.from_bytes(content) for content, i in different.items() if content is not None}
+    stacked = [len(different) * blocks.lengths[0], *blocks.lengths[1:]]
+    try:
+        with guarded(url, "reading status"):
+            decoded = array_of({**metadata, "shape": stacked}, zarr.storage.MemoryStore(files))[...]
+    except StoreError as error:
+        raise StoreError(f"{error}; 'mdr-dask verify {url}' names what is damaged") from None
+    parts = np.asarray(decoded).reshape(-1, *blocks.lengths)[which]
+    dims = which.ndim
+    beside = parts.transpose([axis for dim in range(dims) for axis in (dim, dims + dim)])
+    whole = beside.reshape([count * length for count, length in zip(which.shape, blocks.lengths, strict=True)])
+    return np.asarray(whole[tuple(map(slice, metadata["shape"]))])
 
 
-@dataclass(frozen=True)
-class Ledger:
-    """The ledger as it is stored: each different chunk once, since those of blocks that are done are alike.
+def require_sound(url: str, series: Sequence[str]) -> None:
+    """Raise StoreError if the layout of a study is damaged or a chunk of a finished block is missing.
 
-    Parameters
-    ----------
-    different : tuple of bytes or None
-        Each different content; the first is that of chunks that are not there.
-    which : int64 array, shape of the grid of blocks
-        The content of every chunk, by its number.
+    This reads the layout and the ledger, but no values: `mdr_dask.store.verify` compares everything with its digest.
     """
-
-    different: Contents
-    which: NDArray[np.int64]
-
-    @property
-    def digests(self) -> list[str]:
-        """The digest of each different content; empty for that of chunks that are not there."""
-        return ["" if content is None else digest(content) for content in self.different]
-
-    def only(self, mask: NDArray[np.bool_]) -> Ledger:
-        """Return the ledger with some of its chunks alone."""
-        used = np.unique(self.which[mask])
-        numbers = np.zeros(len(self.different), dtype=np.int64)
-        numbers[used[used > 0]] = 1 + np.arange(np.count_nonzero(used))
-        different = [self.different[number] for number in used if number > 0]
-        return Ledger((None, *different), np.where(mask, numbers[self.which], 0))
-
-    def decoded(self, url: str, held: Mapping[str, Any]) -> NDArray[np.int8]:
-        """Return the array that the metadata of its group tell of; its contents are decoded as chunks of one array."""
-        status = held["consolidated_metadata"]["metadata"]["status"]
-        shape, chunk = status["shape"], status["chunk_grid"]["configuration"]["chunk_shape"]
-        try:
-            with guarded(url, "reading status"):
-                parts = _contents(self.different, json.dumps({**status, "shape": None}))[self.which]
-        except StoreError as error:
-            raise StoreError(f"{error}; 'mdr-dask verify {url}' names what is damaged") from None
-        dims = self.which.ndim
-        beside = parts.transpose([axis for dim in range(dims) for axis in (dim, dims + dim)])
-        whole = beside.reshape([count * length for count, length in zip(self.which.shape, chunk, strict=True)])
-        return np.asarray(whole[tuple(map(slice, shape))])
+    faults = _faults(url, series)
+    if any(faults):  # a run may have changed a file in between
+        first = list(itertools.islice(_faults(url, series), NAMED + 1))
+        if first:
+            more = ", and more" if len(first) > NAMED else ""
+            remedy = f"'mdr-dask verify {url}' names everything that is damaged, and repairs it with --repair"
+            raise StoreError(f"{url}: damaged: {'; '.join(first[:NAMED])}{more}; {remedy}")
 
 
-@lru_cache(maxsize=4)
-def _contents(different: Contents, status: str) -> NDArray[np.int8]:
-    """Return what chunks of the ledger hold, decoded as those of one array; a run reads each round's several times."""
-    shown = json.loads(status)
-    chunk = shown["chunk_grid"]["configuration"]["chunk_shape"]
-    if different == (None,):
-        return np.full((1, *chunk), Status.MISSING, dtype=np.int8)
-    buffer = default_buffer_prototype().buffer
-    below = "/0" * (len(chunk) - 1)
-    files = {f"c/{i}{below}": buffer.from_bytes(one) for i, one in enumerate(different) if one is not None}
-    stacked = [len(different) * chunk[0], *chunk[1:]]
-    opened = array_of({**shown, "shape": stacked}, zarr.storage.MemoryStore(files))
-    return np.asarray(opened[...]).reshape(-1, *chunk)
+def _faults(url: str, series: Sequence[str]) -> Iterator[str]:
+    yield from (f"{name} is {kind}" for name, kind in damaged_layout(url, series))
+    for name in series:
+        metadata = document(url, name) or {}
+        blocks = Blocks.of(name, metadata)
+        if metadata["attributes"]["mdr_dask_layout"] < 2:  # version 0.1 wrote no chunks of NaN alone
+            continue
+        done = _has_done(ledger(url, name), blocks.lengths)
+        present = set(listed(url, group_name(name)))  # after the ledger: values are written before it
+        for array in list(blocks.further)[1:]:
+            chunks = (blocks.chunk(array, tuple(block)) for block in np.argwhere(done).tolist())
+            yield from (f"{chunk} is missing" for chunk in chunks if chunk not in present)
 
 
-def done_blocks(status: NDArray[np.int8], chunks: Iterable[int]) -> NDArray[np.bool_]:
-    """Return which blocks have a case that is done."""
+def _has_done(status: NDArray[np.int8], lengths: Sequence[int]) -> NDArray[np.bool_]:
+    """Return which blocks have a result that is done."""
     done = status == Status.DONE
-    for axis, length in enumerate(chunks):
+    for axis, length in enumerate(lengths):
         if done.shape[axis]:
             done = np.logical_or.reduceat(done, range(0, done.shape[axis], length), axis=axis)
     return np.asarray(done)

@@ -1,4 +1,4 @@
-"""A published study: the files of a store that go into its zip, and whether a zip is as it was packed."""
+"""The files of a published study: what goes into its zip, and whether a zip is as it was packed."""
 
 from __future__ import annotations
 
@@ -11,30 +11,39 @@ from pathlib import Path
 
 from mdr_dask.errors import StoreError
 from mdr_dask.store.files import listed, read_many
-from mdr_dask.store.verifying import CHECKSUMS, Finding, Inspection, of_store, verify
+from mdr_dask.store.verification import CHECKSUMS, Finding, Inspection, of_store, verify
 
 
 def contents(url: str) -> Iterator[tuple[str, bytes]]:
-    """Yield name and content of every file of a store, and of nothing that was published or left beside it."""
+    """Yield name and content of every file of a store, without files that were published or set aside."""
     for name, content in read_many(url, of_store(listed(url))):
         if content is not None:
             yield name, content
 
 
+#: Largest ratio of the sizes of a file and of its packed form; chunks are compressed already, metadata to a tenth.
+LARGEST_RATIO = 100
+#: Size below which the ratio does not matter, and size of the pieces in which files are read.
+SMALL, PIECE = 2**20, 2**20
+
+
 def verify_packed(path: Path) -> Inspection:
-    """Read every file of a published study against its checksums, and the store in it as `verify` does.
+    """Compare every file of a published study with its checksum, and verify the store in it.
 
     Raises
     ------
     StoreError
-        If it is no zip that this program wrote.
+        If it is no zip that this program wrote: encrypted, of another compression, or much larger than its packed form.
     """
     try:
         with zipfile.ZipFile(path) as packed, tempfile.TemporaryDirectory() as folder:
             expected = _checksums(path, packed)
             findings = list(_unpack(packed, expected, Path(folder)))
-            inspected = verify(folder)
-    except (zipfile.BadZipFile, zlib.error, EOFError) as error:
+            try:
+                inspected = verify(folder)
+            except StoreError as error:
+                raise StoreError(str(error).replace(folder, str(path))) from None
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError) as error:
         raise StoreError(f"{path}: expected a zip as 'mdr-dask publish' writes it: {error}") from None
     known = {finding.name for finding in findings}
     inspected.findings[:] = [*findings, *(each for each in inspected.findings if each.name not in known)]
@@ -43,28 +52,53 @@ def verify_packed(path: Path) -> Inspection:
 
 
 def _checksums(path: Path, packed: zipfile.ZipFile) -> dict[str, str]:
+    """Return the checksum of every file, after a look at the table of contents."""
+    for entry in packed.infolist():
+        if entry.flag_bits & 1:
+            raise StoreError(f"{path}: {entry.filename!r:.80} is encrypted, expected a zip of 'mdr-dask publish'")
+        if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise StoreError(f"{path}: {entry.filename!r:.80} has an unknown compression ({entry.compress_type})")
+        if entry.file_size > max(SMALL, LARGEST_RATIO * entry.compress_size):
+            size = f"{entry.compress_size} bytes that unpack to {entry.file_size}"
+            raise StoreError(f"{path}: {entry.filename!r:.80} has {size}: no zip of 'mdr-dask publish'")
     if CHECKSUMS not in packed.namelist():
         raise StoreError(f"{path}: a zip without {CHECKSUMS}, expected one that 'mdr-dask publish' wrote")
     lines = packed.read(CHECKSUMS).decode("utf-8", "replace").splitlines()
-    return {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
+    found = {name: checksum for checksum, _, name in (line.partition("  ") for line in lines)}
+    if not all(name and len(checksum) == 64 for name, checksum in found.items()):
+        raise StoreError(f"{path}: {CHECKSUMS} is damaged")
+    return found
 
 
 def _unpack(packed: zipfile.ZipFile, expected: dict[str, str], folder: Path) -> Iterator[Finding]:
-    """Unpack what is as it was packed, and yield what is not."""
+    """Unpack the files inside the store, and yield what is not as it was packed."""
     there = packed.namelist()
     for name in sorted(set(there) - expected.keys() - {CHECKSUMS}):
-        yield Finding("foreign", name, "no checksum is known of it")
-    for name, digest in expected.items():
-        if name not in there:
-            yield Finding("missing", name, "packed once")
-            continue
-        try:
-            content = packed.read(name)
-        except (zipfile.BadZipFile, zlib.error, EOFError):
-            content = b""
-        if hashlib.sha256(content).hexdigest() != digest:
+        yield Finding("foreign", name, "it has no checksum" if _is_inside(name) else "a place outside the store")
+    for name, checksum in expected.items():
+        if not _is_inside(name):
+            yield Finding("foreign", name, "a place outside the store")
+        elif name not in there:
+            yield Finding("missing", name, "it has a checksum")
+        elif _extract(packed, name, folder / name) != checksum:
             yield Finding("damaged", name, "not what was packed")
-        target = folder / name
-        if folder in target.resolve().parents:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes(content)
+
+
+def _is_inside(name: str) -> bool:
+    parts = name.replace("\\", "/").split("/")
+    return not (name.startswith("/") or ":" in parts[0] or ".." in parts)
+
+
+def _extract(packed: zipfile.ZipFile, name: str, target: Path) -> str:
+    """Unpack a file piece by piece, and return its checksum."""
+    checksum = hashlib.sha256()
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with target.open("wb") as file:
+        try:
+            with packed.open(name) as content:
+                while piece := content.read(PIECE):
+                    checksum.update(piece)
+                    file.write(piece)
+        except (zipfile.BadZipFile, zlib.error, EOFError):
+            return ""
+    return checksum.hexdigest()

@@ -1,4 +1,4 @@
-"""A study as labelled arrays."""
+"""Open a study as labelled arrays."""
 
 from __future__ import annotations
 
@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mdr_dask.errors import StoreError
-from mdr_dask.store.digests import Checked
 from mdr_dask.store.files import bytes_of, group_name
-from mdr_dask.store.sound import require_laid_out
+from mdr_dask.store.ledgers import require_sound
 from mdr_dask.store.study import document, series_names
 
 if TYPE_CHECKING:
@@ -26,7 +25,7 @@ LAZY_BYTES = 2**30
 
 @contextmanager
 def readable(url: str) -> Iterator[None]:
-    """Say in one sentence what Zarr has to say of chunks that cannot be read, whenever arrays are loaded."""
+    """Turn errors of Zarr while arrays are loaded into one sentence."""
     try:
         yield
     except Exception as error:
@@ -36,7 +35,7 @@ def readable(url: str) -> Iterator[None]:
 
 
 def is_damage(error: Exception) -> bool:
-    """Return whether it is Zarr that complains: of a chunk that cannot be read."""
+    """Return whether an error comes from Zarr or its codecs: a chunk cannot be read."""
     *_, (innermost, _) = traceback.walk_tb(error.__traceback__)
     room = str(innermost.f_globals.get("__name__", "")).partition(".")[0]
     return not isinstance(error, OSError) and room in ("zarr", "numcodecs")
@@ -64,7 +63,7 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
     """
     with readable(url):
         names = series_names(url)
-        require_laid_out(url, names)
+        require_sound(url, names)
         return {name: _open_sorted(url, name) for name in names}
 
 
@@ -72,13 +71,11 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
     import xarray as xr
 
     document(url, series)
-    store = Checked(bytes_of(url), url, series)
-    opened = partial(xr.open_zarr, store, group=group_name(series) or None, consolidated=True, zarr_format=3)
+    opened = partial(xr.open_zarr, bytes_of(url), group=group_name(series) or None, consolidated=True, zarr_format=3)
     dataset: xr.Dataset = opened(chunks=None)
     if dataset.nbytes > LAZY_BYTES:
         dataset = opened(chunks={})
-    _check_axes(url, dataset)
-    # a coordinate that stays lazy is read anew by every step of a reduction
+    # a lazy coordinate would be read again by every step of a reduction
     dataset = dataset.assign_coords({name: each.copy(data=each.to_numpy()) for name, each in dataset.coords.items()})
     for dim in dataset.dims:
         if (
@@ -89,14 +86,6 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
             dataset = dataset.sortby(dim)
     order = [*dataset.attrs["outputs"], "status"]
     return dataset[order]
-
-
-def _check_axes(url: str, dataset: xr.Dataset) -> None:
-    """Compare axes with the attributes, which hold the same numbers: a chunk that is gone would read as zeros."""
-    for axis in dataset.attrs["axes"]:
-        held = dataset[axis["name"]].to_numpy().tolist()
-        if held != (axis["labels"] or axis["values"]):
-            raise StoreError(f"{url}: damaged, the axis {axis['name']} is not the one that was laid out")
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:

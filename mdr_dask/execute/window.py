@@ -1,0 +1,196 @@
+"""A window of tasks on a Dask cluster, one block each: as many as keep its workers busy."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from functools import lru_cache
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from distributed import Client, Future, KilledWorker, get_worker
+from distributed.client import ClosedClientError
+from distributed.comm import CommClosedError
+
+from mdr_dask.errors import ClusterError
+from mdr_dask.execute.children import Helper, compute_apart
+from mdr_dask.execute.events import Event, Settle, Tell, of_block
+from mdr_dask.task import Outcome, Work, finished, one_blas_thread, run_block
+
+#: Seconds between two looks at the cluster.
+LOOK = 1.0
+#: Seconds between two messages that there is no worker.
+SILENCE = 3.0
+#: Seconds that a scheduler has for a short answer.
+ANSWER = 3.0
+#: Topic under which workers report the blocks that they begin.
+TOPIC = "mdr_dask"
+KEPT = "what is in the store is kept: run the campaign again"
+
+Outcomes = list[tuple[Work, Outcome]]
+
+
+class TaskWindow:
+    """Blocks on the workers of a cluster, a few more than are being computed.
+
+    Parameters
+    ----------
+    client : Client
+        Connection to the cluster.
+    tell : callable
+        Takes events.
+    patience : float
+        Seconds without any worker after which to give up.
+    most : int
+        Threads that the cluster may grow to by itself, 0 if it does not.
+    replace_lost : callable
+        Requests new workers in place of lost ones.
+    last_message : callable
+        Returns the last error message of the cluster, or an empty string.
+    case_timeout : float or None
+        Seconds after which a case has failed.
+    """
+
+    def __init__(
+        self,
+        client: Client,
+        tell: Tell,
+        patience: float,
+        most: int,
+        replace_lost: Callable[[], None],
+        last_message: Callable[[], str],
+        case_timeout: float | None,
+    ) -> None:
+        self._client, self._tell, self._patience, self._most = client, tell, patience, most
+        self._replace_lost, self._last_message, self._case_timeout = replace_lost, last_message, case_timeout
+        self._ended: SimpleQueue[Future] = SimpleQueue()
+        self._running: dict[Future, Work] = {}
+        self._threads = 0
+        self._had_workers = False
+        self._looked = self._seen = self._told = time.monotonic()
+        client.subscribe_topic(TOPIC, lambda event: tell(Event("block begun", event[1])))
+        client.subscribe_topic("all", self._hear_of_worker)
+
+    def run(self, works: Iterable[Work], settle: Settle) -> None:
+        """Compute blocks; those whose worker died are computed once more, in a process that may die.
+
+        Raises
+        ------
+        ClusterError
+            If the scheduler goes away, there is no worker for too long, or a worker cannot do its task.
+        StoreError
+            If the store cannot be read or written.
+        """
+        remaining = iter(works)
+
+        def fill() -> None:
+            room = 2 * max(self._threads, self._most) + 2 - len(self._running)
+            for _, work in zip(range(room), remaining, strict=False):
+                self._submit(_run_apart if self._case_timeout else _run, work)
+
+        try:
+            self._look()
+            fill()
+            while self._running:
+                if time.monotonic() - self._looked > LOOK:
+                    self._look()
+                    fill()
+                try:
+                    future = self._ended.get(timeout=LOOK)
+                    outcomes = _outcomes(future)
+                except Empty:
+                    continue
+                except TimeoutError:  # its worker went away with the result
+                    future.add_done_callback(self._ended.put)
+                    continue
+                work = self._running.pop(future)
+                future.release()
+                if outcomes is None:
+                    self._submit(_run_apart, work)
+                else:
+                    for part, outcome in outcomes:
+                        settle(part, outcome)
+                fill()
+        except (CommClosedError, ClosedClientError):
+            raise ClusterError(f"the scheduler went away; {KEPT}") from None
+
+    def _submit(self, function: Callable[..., Outcomes], work: Work) -> None:
+        future = self._client.submit(function, work, self._case_timeout, pure=False)
+        self._running[future] = work
+        future.add_done_callback(self._ended.put)
+
+    def _look(self) -> None:
+        """Give up when the scheduler is gone, or when there has been no worker for too long."""
+        if self._client.status != "running":
+            raise ClusterError(f"the scheduler went away; {KEPT}")
+        self._replace_lost()
+        try:
+            found = self._client.sync(self._client.scheduler.ncores, callback_timeout=ANSWER)
+            self._threads, what = sum(found.values()), "no worker"
+        except TimeoutError:
+            self._threads, what = 0, "no answer of the scheduler"
+        now = self._looked = time.monotonic()
+        if self._threads:
+            self._seen = self._told = now
+            self._had_workers = True
+            return
+        waited, complaint = now - self._seen, self._last_message()
+        if complaint and not self._had_workers:
+            raise ClusterError(f"the cluster starts no worker: {complaint}")
+        why = f" ({complaint})" if complaint else ""
+        if waited > self._patience:
+            raise ClusterError(f"{what} for {waited:.0f} s{why}; {KEPT}, with more --patience if need be")
+        if now - self._told >= SILENCE:
+            self._told = now
+            what = "all workers are gone" if self._had_workers and what == "no worker" else f"{what} yet"
+            sentence = f"{what}, waiting for {waited:.0f} s{why}; giving up after {self._patience:.0f} s"
+            self._tell(Event("waiting for workers", {"seconds": round(waited, 1), "complaint": complaint}, sentence))
+
+    def _hear_of_worker(self, event: tuple[float, dict[str, Any]]) -> None:
+        facts = event[1]
+        if facts.get("action") == "add-worker":
+            self._tell(Event("worker joined", {"worker": facts["worker"]}))
+        elif facts.get("action") == "remove-worker":
+            self._tell(Event("worker lost", {"worker": facts["worker"], "expected": facts.get("expected", False)}))
+
+
+def _outcomes(future: Future) -> Outcomes | None:
+    """Return the result of a task, None if its workers died; other errors end the run with one sentence."""
+    from concurrent.futures import CancelledError
+
+    try:
+        outcomes: Outcomes = future.result(timeout=ANSWER)
+    except KilledWorker:
+        return None
+    except CancelledError:
+        raise ClusterError(f"the scheduler went away; {KEPT}") from None
+    except ModuleNotFoundError as error:
+        raise ClusterError(f"a worker lacks {error.name!r}; {KEPT}") from None
+    except (AttributeError, TypeError) as error:
+        raise ClusterError(f"a worker has another version of mdr_dask: {error}; install the same on both") from None
+    return outcomes
+
+
+def _run(work: Work, _: float | None) -> Outcomes:
+    """Compute a block in a worker, unless it was finished by a worker that died before it could say so."""
+    outcome = finished(work)
+    if outcome is None:
+        _report(work)
+        one_blas_thread()
+        outcome = run_block(work)
+    return [(work, outcome)]
+
+
+def _run_apart(work: Work, limit: float | None) -> Outcomes:
+    _report(work)
+    return list(compute_apart(_helper(), work, limit))
+
+
+def _report(work: Work) -> None:
+    worker = get_worker()
+    worker.log_event(TOPIC, {**of_block("begun", work).facts, "worker": worker.address})
+
+
+@lru_cache(maxsize=1)
+def _helper() -> Helper:
+    return Helper()
