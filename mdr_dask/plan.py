@@ -30,13 +30,13 @@ LEAST_SECONDS = 0.1
 SHARED_SECONDS = 30.0
 #: and below it where halving them makes the work of a study this much larger at most.
 REPEATED_WORK = 1.15
-#: Records of blocks that lie in one file.
+#: Most blocks of a series whose work is estimated.
+SAMPLED = 1000
+#: Records of blocks that are merged into one file.
 RECORDS_TOGETHER = 1000
 #: Largest chunk of one array.
 CHUNK_BYTES = 64 * 2**20
-#: Blocks that an estimate adds up; of more blocks it takes evenly spread ones.
-MOST_LOOKED_AT = 1000
-#: More cases than this are a mistake in the file, not a study.
+#: More cases than this are a mistake in the file.
 MOST_CASES = 10**9
 
 BlockIndex = tuple[int, ...]
@@ -416,25 +416,25 @@ def _growth(series: Series) -> float:
 
 
 def _estimate_series(template: Template, model: Model[Any]) -> Estimate:
-    """Add up the blocks of the first realisations, of which others are copies; of very many, evenly spread ones."""
-    seconds, solves = 0.0, 0
-    total = math.prod(template.grid[:-1])
-    step = math.ceil(total / MOST_LOOKED_AT)
-    looked_at = range(step // 2, total, step)
-    for place in looked_at:
-        index = tuple(int(part) for part in np.unravel_index(place, template.grid[:-1])) if template.grid[:-1] else ()
-        block = template.block((*index, 0))
-        seconds += template.seconds((*index, 0))
-        alone = replace(block, realisations=block.realisations[:1])
-        solves += model.distinct(alone) if model.distinct else block.cases
-    seconds, solves = seconds * total / len(looked_at), round(solves * total / len(looked_at))
+    """Estimate the blocks of the first realisations, or `SAMPLED` of them; the others are alike."""
+    blocks, lengths = math.prod(template.grid[:-1]), template.grid[:-1]
+    sample = np.linspace(0, blocks - 1, min(blocks, SAMPLED)).round().astype(int)
+    seconds, solves = 0.0, 0.0
+    for index in zip(*np.unravel_index(sample, lengths), strict=True) if lengths else [()]:
+        place = (*map(int, index), 0)
+        seconds += template.seconds(place) * blocks / sample.size
+        if model.distinct is not None:
+            block = template.block(place)
+            alone = replace(block, realisations=block.realisations[:1])
+            solves += model.distinct(alone) * blocks / sample.size
     realisations = template.sizes["realisation"]
+    distinct = template.cases if model.distinct is None else round(solves)
     return Estimate(
         cases=template.cases,
         realisations=realisations,
         at_most=template.campaign.replication.at_most,
         results=template.cases * realisations,
-        solves=solves * realisations,
+        solves=distinct * realisations,
         blocks=math.prod(template.grid),
         bytes=template.bytes,
         files=template.files,

@@ -24,6 +24,7 @@ from mdr_dask.campaign.keys import of_keys
 from mdr_dask.errors import CampaignError, DataError, did_you_mean
 from mdr_dask.execute import Resources
 from mdr_dask.execute import run as execute
+from mdr_dask.models.base import Status
 from mdr_dask.questions import selection
 from mdr_dask.questions.columns import Columns, numbers, states
 from mdr_dask.questions.labelled import labelled
@@ -150,18 +151,27 @@ def run(
 def open_study(url: str | Path) -> xr.Dataset | xr.DataTree:
     """Open a study, finished or not.
 
-    Returns
-    -------
-    Dataset or DataTree
-        Outputs along the axes and ``realisation``, with units, their errors, and ``status``; for a campaign with
-        series a DataTree with a node for each. Arrays are read when they are used.
+        Returns
+        -------
+        Dataset or DataTree
+    <<<<<<< HEAD
+            Outputs along the axes and ``realisation``, with units, their errors, and ``status``; for a campaign with
+            series a DataTree with a node for each. Arrays are read when they are used.
+    =======
+            Outputs over the axes and ``realisation``, with units, companions with errors, and ``status``; a DataTree with a
+            node for each series where there are series. Arrays are read when they are used. The attribute ``complete`` is
+            False as long as results are missing: means then average what is there.
+    >>>>>>> dc93bb1e (store: repair writes a lost copy of the layout again; docs of the store for its users)
 
-    Raises
-    ------
-    StoreError
-        If there is no study at `url`.
+        Raises
+        ------
+        StoreError
+            If there is no study at `url`.
     """
-    groups = store.datasets(str(url))
+    groups = {
+        name: data.assign_attrs(complete=not bool((data["status"] == Status.MISSING).any()))
+        for name, data in store.datasets(str(url)).items()
+    }
     return (
         groups[""] if [*groups] == [""] else xr.DataTree.from_dict({f"/{name}": data for name, data in groups.items()})
     )

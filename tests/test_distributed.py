@@ -97,9 +97,7 @@ def test_within_five_seconds_a_user_is_told_what_is_waited_for_and_within_the_li
 
     central.sync = answer
     central.threads, after = SILENT[what]
-    workers = window.TaskWindow(
-        central, lambda e: told.append((clock.now, e.sentence)), 30.0, 0, lambda: None, str, None
-    )
+    workers = window.TaskWindow(central, lambda e: told.append((clock.now, e.sentence)), 30, 0, lambda: None, str, None)
     workers._look()
     central.threads = after
 

@@ -116,7 +116,7 @@ def test_the_checksum_of_bytes_and_their_checksum_is_no_digest():
 
 def test_records_of_many_blocks_lie_together(toy, url, monkeypatch):
     monkeypatch.setattr("mdr_dask.execute.cells.RECORDS_TOGETHER", 3)
-    monkeypatch.setattr("mdr_dask.execute.executors.THREAD_WINDOW", 1)
+    monkeypatch.setattr("mdr_dask.execute.executors.AHEAD", 1)
     seen = []
     folder = Path(url, "status/records")
 

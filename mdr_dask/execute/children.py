@@ -131,7 +131,7 @@ def serve(read: int, write: int) -> None:
         status = os.waitpid(child, 0)[1]
         if status == 0:
             return
-        _send(write, Death(_describe(status)))
+        _reply(write, Death(_describe(status)))
 
 
 def _describe(status: int) -> str:
@@ -145,14 +145,14 @@ def _describe(status: int) -> str:
 def _compute_blocks(read: int, write: int) -> None:
     """Compute the blocks of a pipe in this process."""
     while (request := _take_bytes(read)) is not None:
-        _send(write, os.getpid())
+        _reply(write, os.getpid())
         try:
             work, limit = pickle.loads(request)
             with _limited(limit):
                 reply: Any = run_block(work)
         except Exception as error:
             reply = error
-        _send(write, reply)
+        _reply(write, reply)
 
 
 class _limited:  # noqa: N801
@@ -180,6 +180,14 @@ def _send(descriptor: int, content: Any) -> None:
     data = len(data).to_bytes(8, "little") + data
     while data:
         data = data[os.write(descriptor, data) :]
+
+
+def _reply(descriptor: int, content: Any) -> None:
+    """Send something to the driver; end this process if the driver has died."""
+    try:
+        _send(descriptor, content)
+    except BrokenPipeError:
+        os._exit(0)
 
 
 def _take(descriptor: int) -> Any:

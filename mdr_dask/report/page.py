@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import html
 import json
 from collections.abc import Sequence
 from functools import lru_cache
@@ -84,9 +85,11 @@ def asset(name: str) -> str:
 
 @lru_cache(maxsize=64)
 def mathml(equation: Equation) -> str:
-    """Return an equation as MathML, which browsers draw and screen readers understand."""
-    from latex2mathml.converter import convert
-
+    """Return an equation as MathML, which browsers draw and screen readers understand; without latex2mathml, as LaTeX."""
+    try:
+        from latex2mathml.converter import convert
+    except ModuleNotFoundError:
+        return f"<code>{html.escape(equation.latex)}</code>"
     return str(convert(equation.latex, display="block"))
 
 

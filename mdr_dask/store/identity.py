@@ -22,6 +22,7 @@ from mdr_dask.store.files import ROOT
 from mdr_dask.store.layout import plain_values
 from mdr_dask.store.study import attributes, document, series_names
 
+
 @dataclass(frozen=True)
 class Stored:
     """What a store holds already of a campaign that is about to run.

@@ -84,7 +84,7 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
         group = {name: groups[name] for name in [group_name(series, "zarr.json")] if name in groups}
         laid_out = {**own_files, **group, **document_of_root}
         before = {name: digest(content) for name, content in read_many(url, laid_out) if content is not None}
-        copies |= _copy(series, laid_out, before)
+        copies |= copy_of(series, laid_out, before)
         changed |= {name: content for name, content in own_files.items() if before.get(name) != digest(content)}
     write_stages(url, [copies, changed, groups, document_of_root])
 
@@ -141,7 +141,8 @@ def copy_name(series: str) -> str:
     return group_name(series, "status/layout.json")
 
 
-def _copy(series: str, files: Mapping[str, bytes], before: Mapping[str, str]) -> dict[str, bytes]:
+def copy_of(series: str, files: Mapping[str, bytes], before: Mapping[str, str]) -> dict[str, bytes]:
+    """Return the file that holds the copy of the layout of a group, by its name."""
     encoded = {name: base64.b64encode(content).decode() for name, content in files.items()}
     held = {"files": encoded, "before": before}
     stated = digest(json.dumps(held, sort_keys=True).encode())

@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -92,11 +93,13 @@ def save(dataset: xr.Dataset, path: Path) -> None:
     """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``; a lazy one piece by piece, lists in attrs as text."""
     plain = dataset.copy()
     plain.attrs = {
-        name: value if isinstance(value, str | int | float) else json.dumps(value)
+        name: value if isinstance(value, str | int | float) and not isinstance(value, bool) else json.dumps(value)
         for name, value in dataset.attrs.items()
         if value is not None and name != "mdr_dask_layout"  # no study that could be run on
     }
     if path.suffix == ".nc":
+        if find_spec("h5netcdf") is None:
+            raise StoreError(f"{path}: netCDF needs h5netcdf: pip install 'mdr_dask[netcdf]', or write FILE.zarr")
         plain.to_netcdf(path, engine="h5netcdf")
         return
     with warnings.catch_warnings():

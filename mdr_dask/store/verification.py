@@ -28,7 +28,7 @@ from mdr_dask.store.files import (
     set_aside,
     write_stages,
 )
-from mdr_dask.store.layout import Copy, copy_name, read_copy
+from mdr_dask.store.layout import Copy, copy_name, copy_of, read_copy
 from mdr_dask.store.ledgers import Blocks
 from mdr_dask.store.locks import at_work, exclusive
 from mdr_dask.store.records import decoded, folder, lines, name_of
@@ -87,6 +87,8 @@ class Inspection:
         Its groups.
     copies : list of Copy
         Copies of their layouts.
+    uncopied : dict of str to set of str
+        Files of the layout of each group without such a copy.
     files, blocks : int
         Number of files and of blocks in the ledgers.
     """
@@ -95,6 +97,7 @@ class Inspection:
     notes: list[str] = field(default_factory=list)
     groups: list[Group] = field(default_factory=list)
     copies: list[Copy] = field(default_factory=list)
+    uncopied: dict[str, set[str]] = field(default_factory=dict)
     files: int = 0
     blocks: int = 0
 
@@ -138,6 +141,10 @@ def repair(url: str) -> tuple[Inspection, Inspection]:
         files = {name: content for copy in latest for name, content in copy.files.items() if name in damaged}
         root = {name: files.pop(name) for name in ["zarr.json"] if name in files}
         write_stages(url, [files, root])
+        for series, names in found.uncopied.items():
+            contents = {name: content for name, content in read_many(url, sorted(names)) if content is not None}
+            if not names & damaged and contents.keys() == names:
+                write_stages(url, [copy_of(series, contents, {})])
         for group in found.groups:
             for block in sorted(group.bad_blocks):
                 remove(url, [group.blocks.chunk(name, block) for name in group.blocks.further])  # the ledger first
@@ -197,6 +204,10 @@ def _check_layout(url: str, found: Inspection, present: set[str]) -> set[str]:
         elif copy_name(name) not in present:
             found.findings.append(Finding("missing", copy_name(name), "the copy of the layout"))
         known |= _unverified(url, name, documents[name], found, present)
+        data = [group_name(name, f"{array}/c/") for array in documents[name].get("attributes", {}).get("outputs", ())]
+        data.append(group_name(name, "status/c/"))
+        found.uncopied[name] = {"zarr.json", *(k for k in known if k in present and not k.startswith(tuple(data)))}
+        found.uncopied[name] -= {copy_name(each) for each in series}
     for name, metadata in documents.items():
         if "status" in metadata.get("consolidated_metadata", {}).get("metadata", {}):
             found.groups.append(Group(Blocks.of(name, metadata)))
