@@ -151,22 +151,17 @@ def run(
 def open_study(url: str | Path) -> xr.Dataset | xr.DataTree:
     """Open a study, finished or not.
 
-        Returns
-        -------
-        Dataset or DataTree
-    <<<<<<< HEAD
-            Outputs along the axes and ``realisation``, with units, their errors, and ``status``; for a campaign with
-            series a DataTree with a node for each. Arrays are read when they are used.
-    =======
-            Outputs over the axes and ``realisation``, with units, companions with errors, and ``status``; a DataTree with a
-            node for each series where there are series. Arrays are read when they are used. The attribute ``complete`` is
-            False as long as results are missing: means then average what is there.
-    >>>>>>> dc93bb1e (store: repair writes a lost copy of the layout again; docs of the store for its users)
+    Returns
+    -------
+    Dataset or DataTree
+        Outputs along the axes and ``realisation``, with units, their errors, and ``status``; for a campaign with
+        series a DataTree with a node for each. Arrays are read when they are used. The attribute ``complete`` is False
+        as long as results are missing: means then average what is there.
 
-        Raises
-        ------
-        StoreError
-            If there is no study at `url`.
+    Raises
+    ------
+    StoreError
+        If there is no study at `url`.
     """
     groups = {
         name: data.assign_attrs(complete=not bool((data["status"] == Status.MISSING).any()))
