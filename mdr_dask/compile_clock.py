@@ -1,4 +1,4 @@
-"""How long numba has compiled in this process: the kernels of a model, the first time on a machine."""
+"""Measure how long numba has compiled kernels in this process."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 
 class CompileClock:
-    """Seconds in which some thread compiled; compilations inside others, and beside them, count once."""
+    """Seconds in which some thread compiled; compilations that overlap count once."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -22,7 +22,7 @@ class CompileClock:
             self._running += 1
 
     def end(self) -> None:
-        """Note that one has ended; one that began before the clock was there counts nothing."""
+        """Note that a compilation has ended; one that began before the clock existed does not count."""
         with self._lock:
             if self._running == 1:
                 self._before += time.perf_counter() - self._since
@@ -42,7 +42,7 @@ class CompileClock:
 
 @lru_cache(maxsize=1)
 def compile_clock() -> CompileClock:
-    """Return the clock of this process, listening to numba from now on."""
+    """Return the clock of this process, which measures from its first use on."""
     from numba.core.event import Event, Listener, register
 
     clock = CompileClock()

@@ -1,4 +1,4 @@
-"""How many realisations each case needs: whole rounds, until its standard error meets every tolerance."""
+"""How many realisations each case needs: in whole rounds, until its standard error meets every tolerance."""
 
 from __future__ import annotations
 
@@ -12,16 +12,15 @@ from numpy.typing import NDArray
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.models.base import Model, Status
 
-#: A round goes to the number that is enough for half of its cases by what is known, within these times the last one:
-#: ``python -m benchmarks friction rounds``.
+#: A round goes to the number that is probably enough for half of its cases, within these multiples of the last one.
 LEAST_GROWTH, MOST_GROWTH = 1.25, 4.0
-#: Where nobody knows how many are needed, for a fitted constant.
+#: Growth of a round for a fitted constant, of which the number needed is not known.
 GROWTH = 1.5
-#: So many results are taken at their word. Fewer do not know their own scatter: stopping by it, 95 % intervals would
-#: cover as little as 89 %. So `FEW` count only where the variance may be so many times as large as they say:
-#: ``python -m benchmarks friction rounds``.
+#: With `FEWEST` or more results, the estimated standard error is used as it is. Fewer results estimate their scatter
+#: badly: stopping by it, 95 % intervals would cover as little as 89 %. So from `FEW` results on, a case may stop if a
+#: variance `DOUBT` times as large would meet the tolerance as well. Measured: ``python -m benchmarks friction``.
 FEWEST, FEW, DOUBT = 12, 7, 2.0
-#: Part of the tolerance that the standard error of fewer must meet, as where every realisation gives the same.
+#: Part of the tolerance that the standard error of fewer results must meet: all realisations give the same.
 NEGLIGIBLE = 1e-3
 
 
@@ -31,11 +30,11 @@ def next_round(replication: Replication, count: int, growth: NDArray[np.float64]
     Parameters
     ----------
     replication : Replication
-        What the campaign says.
+        The rule of the campaign.
     count : int
         Number of realisations so far.
     growth : float array, shape (cases,)
-        How many times as many each case needs; those of at most 1 take no part.
+        How many times as many each case needs; cases of at most 1 have enough.
     """
     more = np.minimum(growth[growth > 1], MOST_GROWTH)
     if not more.size:
@@ -50,7 +49,7 @@ def growth_needed(
     until: Mapping[str, Tolerance],
     scatter: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> NDArray[np.float64]:
-    """Say how many times as many results each case needs as it has.
+    """Return how many times as many results each case needs as it has.
 
     Parameters
     ----------
@@ -61,14 +60,14 @@ def growth_needed(
     until : mapping of str to Tolerance
         Largest standard error of the mean, by output.
     scatter : mapping of str to array, shape (..., realisations), optional
-        The standard errors that single realisations know of themselves, of outputs that have them.
+        Standard errors that single realisations estimate themselves, of outputs that have them.
 
     Returns
     -------
     float array, shape (...)
-        At most 1 where every standard error is known to meet its tolerance: it meets it with `FEWEST` results, or with
-        `FEW` whose variance were `DOUBT` times as large; it meets a small part of it with fewer, or each result knows
-        its own scatter and that meets it, too. A case that never succeeds is not tried for ever.
+        At most 1 if every standard error meets its tolerance with `FEWEST` results, or with `FEW` results and a
+        variance `DOUBT` times as large; with fewer results if it meets a small part of the tolerance, or if each result
+        estimates its own scatter and that meets the tolerance as well. It is 0 for a case without any success.
     """
     done = status == Status.DONE
     count = np.maximum(done.sum(axis=-1), 1)
@@ -77,26 +76,26 @@ def growth_needed(
         mean, error = mean_and_error(values[name], done)
         allowed = np.maximum(tolerance.absolute, tolerance.relative * np.abs(mean))
         enough = count * _times(error, allowed)
-        ways = [
+        sufficient = [
             np.maximum(FEWEST, enough),
             np.maximum(FEW, DOUBT * enough),
             count * _times(error, NEGLIGIBLE * allowed),
         ]
         if scatter and name in scatter:
             within = _error_from_within(scatter[name], done)
-            ways.append(np.maximum(enough, count * _times(within, allowed)))
-        needed = np.maximum(needed, np.minimum.reduce(ways))
+            sufficient.append(np.maximum(enough, count * _times(within, allowed)))
+        needed = np.maximum(needed, np.minimum.reduce(sufficient))
     return np.asarray(np.where(done.any(axis=-1), needed / count, 0.0))
 
 
 def known_scatter(model: Model[Any], until: Collection[str], outputs: Collection[str]) -> dict[str, str]:
-    """Return which of the outputs hold what single realisations know of the scatter of those that have a tolerance."""
+    """Return the outputs that estimate the scatter of outputs with a tolerance from single realisations."""
     scatter = {output: model.output(output).scatter for output in until}
     return {output: own for output, own in scatter.items() if own in outputs}
 
 
 def _times(error: NDArray[np.float64], allowed: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how many times as many results bring an error to what is allowed; infinite where it is not known."""
+    """Return how many times as many results reduce an error to the allowed one; infinite if it is not known."""
     known = np.where(error > 0, error, 0.0)
     with np.errstate(divide="ignore", over="ignore"):
         found = np.divide(known, allowed, out=np.zeros(known.shape), where=known > 0) ** 2

@@ -58,6 +58,11 @@ class Work:
     attempt: int
     estimate: float
 
+    @property
+    def key(self) -> str:
+        """Series and index of the block as text."""
+        return f"{self.place.series or '-'} {'.'.join(map(str, self.place.index))}"
+
     def halves(self) -> tuple[Work, ...]:
         """Return the same work as two tasks, to be run one after the other; none for a single result."""
         cells = np.flatnonzero(self.wanted)

@@ -160,7 +160,7 @@ def test_what_more_realisations_cannot_narrow_ends_the_rounds(own, url):
     run(own(Tolerance(absolute=0.4), at_most=2000, answer="missed.level"), url, tell=told.append)
     assert int(taken(url).max()) < 500
     (event,) = [event for event in told if event.name == "not answered"]
-    assert re.search(r"after \d+ realisations; 0\.5 of it is what the law misses", event.sentence)
+    assert re.search(r"after \d+ realisations; 0\.5 of it comes from the law", event.sentence)
     told.clear()
     run(own(Tolerance(absolute=0.8), at_most=2000, answer="missed.level"), url + "2", tell=told.append)
     assert not [event for event in told if event.name == "not answered"]

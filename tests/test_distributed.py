@@ -10,7 +10,6 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import dask
-import numpy as np
 import psutil
 import pytest
 from test_execute import digests, run, values
@@ -35,23 +34,6 @@ def run_on(resources, campaign, url):
 
 
 TWO = Replication(2, 2, {})
-
-
-@pytest.mark.slow
-def test_only_the_results_that_kill_their_worker_fail(toy, url, workers):
-    """A worker dies once; then the block is computed in a child process, by halves."""
-    positions = [1.0, 2.0, 3.0, 4.0, 5.0, 9.0, 6.0]
-    campaign = toy.campaign(toy.axis("position", positions), realisations=TWO, kill_above=8.0)
-    events = []
-    progress = execute.run(replace(campaign, blocks={"position": 7}), url, workers, lambda _: None, tell=events.append)
-    assert (progress.done, progress.failed, progress.not_needed) == (12, 2, 0)
-    messages = [message for record in store.records(url, "") for message in record["messages"]]
-    assert {(m["case"]["position"], m["realisation"]) for m in messages} == {(9.0, 0), (9.0, 1)}
-    assert all(m["message"] == "its process ended with exit code 1" for m in messages)
-    assert sum(event.name == "worker lost" and not event.facts["expected"] for event in events) <= 1
-    clean = toy.campaign(toy.axis("position", [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]), realisations=TWO)
-    run(clean, url + "2")
-    np.testing.assert_array_equal(values(url).sel(position=values(url + "2").position), values(url + "2"))
 
 
 @pytest.mark.slow

@@ -171,8 +171,10 @@ def test_a_log_tells_what_happened_and_a_watch_until_nobody_is_at_work(toy, camp
         assert main(["run", "toy.yaml", "--part", part, "--quiet", "--log", "log.jsonl"]) == 1
         assert capsys.readouterr().out == f"toy.zarr, part {part}: 2 done, 2 failed\n"
     events = [json.loads(line) for line in Path("log.jsonl").read_text().splitlines()]
-    names = ["run begun", "laying out", "laid out", *2 * ["block begun"], "block done", "block failed"]
-    assert sorted(event["event"] for event in events) == sorted(2 * [*names, "round ended", "run ended"])
+    names = ["run begun", "laid out", *2 * ["block begun"], "block done", "block failed"]
+    assert sorted(event["event"] for event in events) == sorted(
+        ["laying out", *2 * [*names, "round ended", "run ended"]]
+    )
     assert [event["part"] for event in events if event["event"] == "run begun"] == ["1/2", "2/2"]
     assert [event["results"] for event in events if event["event"] == "block failed"] == 2 * [{"failed": 2}]
     (laid_out,) = {json.dumps(event["blocks"]) for event in events if event["event"] == "laid out"}

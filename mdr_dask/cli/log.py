@@ -1,4 +1,4 @@
-"""The log of a run, in JSON lines, and the words that its user has to hear at once."""
+"""The log of a run in JSON lines, and its messages on stderr."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def telling(quiet: bool, log: Path | None, **about: Any) -> Iterator[Tell]:
-    """Yield the function that takes the events of a run: into its log, and what is urgent to stderr.
+    """Yield the function that writes the events of a run to its log, and their messages to stderr.
 
     Parameters
     ----------
@@ -33,19 +33,19 @@ def telling(quiet: bool, log: Path | None, **about: Any) -> Iterator[Tell]:
     log : Path or None
         File that the log is appended to.
     about
-        What its first line tells of the run.
+        Contents of the first line of the log.
     """
     if log is None:
-        yield _speaker(quiet)
+        yield _printer(quiet)
         return
     require_outside(log)
-    say = _speaker(quiet)
+    show = _printer(quiet)
     with log.open("a", encoding="utf-8") as stream:
         write = _writer(stream)
 
         def tell(event: Event) -> None:
             write(event.name, dict(event.facts))
-            say(event)
+            show(event)
 
         write("run begun", {**about, "mdr_dask": __version__, "host": platform.node(), "process": os.getpid()})
         try:
@@ -56,12 +56,12 @@ def telling(quiet: bool, log: Path | None, **about: Any) -> Iterator[Tell]:
         write("run ended", {})
 
 
-def _speaker(quiet: bool) -> Callable[[Event], None]:
-    def say(event: Event) -> None:
+def _printer(quiet: bool) -> Callable[[Event], None]:
+    def show(event: Event) -> None:
         if event.sentence and not quiet:
             click.echo(printable(event.sentence), err=True)
 
-    return say
+    return show
 
 
 def _writer(stream: TextIO) -> Callable[[str, dict[str, Any]], None]:

@@ -1,4 +1,4 @@
-"""Stopping at the answer: which cases take part in the next round for the sake of a fitted constant."""
+"""Rounds for a fitted constant: which cases take part in the next one."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from mdr_dask.models.base import Status
 from mdr_dask.plan import Template
 from mdr_dask.refinement import Mesh, Stage
 
-#: Fewer realisations do not know the interval of a fitted constant.
+#: Fewest realisations for the interval of a fitted constant.
 FEWEST = 10
 
 
 def cases_that_narrow(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, taken: Sequence[IntArray]
 ) -> list[BoolArray]:
-    """Return the cases that constants follow from whose intervals are too wide.
+    """Return the cases that those constants follow from whose intervals are too wide.
 
     Parameters
     ----------
     url, stage, layout, places
         The store, the campaign, and where its cases lie in the store.
     taken : sequence of int array
-        Realisations of every case that count, by group; what else the store holds does not matter here.
+        Number of realisations of every case that count, by group; further ones in the store are ignored.
     """
     answers = stage.campaign.replication.answers
     if max(int(each.max()) for each in taken) < FEWEST:
@@ -45,7 +45,7 @@ def cases_that_narrow(
         try:
             wide = still_wide(fit, constant, groups, tolerance, stage.campaign.replication.at_most)
         except FitError:
-            continue  # `unanswered` says so at the end
+            continue  # `unanswered` reports it at the end
         for result, flags in wide.items():
             for name in [result] if fit.apart else groups:
                 if bool(flags.any()):
@@ -55,7 +55,7 @@ def cases_that_narrow(
 
 
 def unanswered(url: str, stage: Stage, layout: Sequence[Template], taken: Sequence[IntArray]) -> Iterator[str]:
-    """Yield a sentence for every constant that is not known as well as it should be."""
+    """Yield a sentence for every constant that misses its tolerance."""
     answers = stage.campaign.replication.answers
     groups = _groups(url, stage, layout, taken)
     known = fits.available(stage.campaign.model)
@@ -72,9 +72,9 @@ def unanswered(url: str, stage: Stage, layout: Sequence[Template], taken: Sequen
             if bool(wide.notnull().any()):
                 most = max(int(each.max()) for each in taken)
                 rest = float(without_scatter(known[name], constant, groups)[series].where(wide.notnull()).max())
-                told = f"half of the interval is {float(wide.max()):.2g} after {most} realisations"
-                fixed = f"; {rest:.2g} of it is what the law misses and the error of the grid, and stays"
-                yield f"{where}{answer}: {told}{fixed if rest > 0 else ''}"
+                text = f"half of the interval is {float(wide.max()):.2g} after {most} realisations"
+                fixed = f"; {rest:.2g} of it comes from the law and the grid, and more realisations do not reduce it"
+                yield f"{where}{answer}: {text}{fixed if rest > 0 else ''}"
             if not bool(np.isfinite(half).all()):
                 yield f"{where}{answer}: no interval, the law does not hold or its end is not reached"
 

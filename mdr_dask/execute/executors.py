@@ -94,7 +94,7 @@ class Executor(AbstractContextManager["Executor"]):
     def _without_suspects(self, works: Iterator[Work], settle: Settle) -> Iterator[Work]:
         """Yield blocks; those that a run had begun when it crashed are computed in a process of their own first."""
         for work in works:
-            if (key := of_work(work)) in self._suspects and self._may_fork:
+            if (key := work.key) in self._suspects and self._may_fork:
                 sentence = f"an earlier run ended while it computed block {key}: it is computed in a process of its own"
                 self._tell(Event("block suspected", {"block": key}, sentence))
                 try:
@@ -139,11 +139,11 @@ class Executor(AbstractContextManager["Executor"]):
 
     def _here(self, work: Work) -> list[tuple[Work, Outcome]]:
         self._tell(of_block("begun", work))
-        self._note(of_work(work), is_begun=True)
+        self._note(work.key, is_begun=True)
         try:
             return [(work, run_block(work))]
         finally:
-            self._note(of_work(work), is_begun=False)
+            self._note(work.key, is_begun=False)
 
     def _note(self, key: str, is_begun: bool) -> None:
         """Write down which blocks have begun: if this process crashes, the next run knows where."""
@@ -178,11 +178,6 @@ def _for_a_while(works: Iterator[Work]) -> Iterator[Work]:
         yield work
         if time.monotonic() - start > SHORT:
             return
-
-
-def of_work(work: Work) -> str:
-    """Return series and index of a block as text."""
-    return f"{work.place.series or '-'} {'.'.join(map(str, work.place.index))}"
 
 
 def _cores() -> int:

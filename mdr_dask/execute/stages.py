@@ -1,7 +1,7 @@
-"""Stages of a campaign whose axes are refined: what the store holds of one, and which values the next one adds.
+"""Stages of a campaign with adaptive axes: what the store holds of one, and which values the next one adds.
 
-A stage follows from the results of the one before alone. So it can be found again at any time, whatever the store
-holds beyond it.
+A stage follows from the results of the one before alone. So it can be found again at any time, whatever else the store
+holds.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Places = tuple[Mapping[str, IntArray], ...]
 
 
 def stored_layout(stage: Stage, url: str) -> tuple[tuple[Template, ...], Places]:
-    """Lay out a stage together with what is stored of its study, and say where its own cases lie.
+    """Return the layout of a stage together with the stored study, and the places of its own cases in it.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def following(
 
 
 def _short(series: str, mesh: Mesh, number: int, count: int) -> str:
-    """Say why some cases of the other axes miss the tolerance along an adaptive one."""
+    """Return why some cases of the other axes miss the tolerance along an adaptive one."""
     axis, others = mesh.series.axes[number], mesh.used[number][..., 0].size
     most = mesh.refinement(number).at_most
     why = f"{most} values are allowed" if len(axis.values) >= most else "it jumps or bends within a 1000th of the axis"

@@ -12,10 +12,10 @@ from distributed import Client, Future, KilledWorker, get_worker
 from distributed.client import ClosedClientError
 from distributed.comm import CommClosedError
 
-from mdr_dask.errors import ClusterError
+from mdr_dask.errors import ClusterError, ModelError
 from mdr_dask.execute.children import Helper, compute_apart
 from mdr_dask.execute.events import Event, Settle, Tell, of_block
-from mdr_dask.task import Outcome, Work, finished, one_blas_thread, run_block
+from mdr_dask.task import Outcome, Work, finished, one_blas_thread, run_block, write_off
 
 #: Seconds between two looks at the cluster.
 LOOK = 1.0
@@ -82,6 +82,7 @@ class TaskWindow:
             If the store cannot be read or written.
         """
         remaining = iter(works)
+        suspects: set[str] = set()
 
         def fill() -> None:
             room = 2 * max(self._threads, self._most) + 2 - len(self._running)
@@ -105,11 +106,14 @@ class TaskWindow:
                     continue
                 work = self._running.pop(future)
                 future.release()
-                if outcomes is None:
+                if outcomes is None and work.key not in suspects:
+                    suspects.add(work.key)
                     self._submit(_run_apart, work)
-                else:
-                    for part, outcome in outcomes:
-                        settle(part, outcome)
+                    continue
+                if outcomes is None:
+                    outcomes = [(work, write_off(work, "its workers died again and again: often out of memory"))]
+                for part, outcome in outcomes:
+                    settle(part, outcome)
                 fill()
         except (CommClosedError, ClosedClientError):
             raise ClusterError(f"the scheduler went away; {KEPT}") from None
@@ -183,7 +187,10 @@ def _run(work: Work, _: float | None) -> Outcomes:
 
 def _run_apart(work: Work, limit: float | None) -> Outcomes:
     _report(work)
-    return list(compute_apart(_helper(), work, limit))
+    try:
+        return list(compute_apart(_helper(), work, limit))
+    except (ImportError, ModelError):  # a model that only this process has
+        return _run(work, limit)
 
 
 def _report(work: Work) -> None:

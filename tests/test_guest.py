@@ -1,0 +1,244 @@
+"""A run as a guest: in the caller's process, on read-only disks, beside crashes, and with the files of strangers."""
+
+import json
+import multiprocessing
+import os
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from threadpoolctl import threadpool_info, threadpool_limits
+
+import mdr_dask
+from mdr_dask import execute, models, store
+from mdr_dask.cli import main
+from mdr_dask.errors import MachineError, StoreError
+from mdr_dask.execute import Part, Resources
+from mdr_dask.models.per_case import per_case
+
+PAGE = (Path(__file__).parents[1] / "docs/own-model.md").read_text()
+MODULE, CAMPAIGN = (re.search(rf"^```{kind}\n(.*?)^```", PAGE, flags=re.M | re.S)[1] for kind in ("python", "yaml"))
+PLACE = "    coefficient = case"
+
+
+@pytest.fixture
+def example(tmp_path, monkeypatch):
+    """A folder with the model of docs/own-model.md; returns a function that runs the command line in a process."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+    def command(*arguments, line=""):
+        Path("wear_rate.py").write_text(MODULE.replace(PLACE, f"{line}\n{PLACE}"))
+        Path("pin.yaml").write_text(CAMPAIGN.replace("realisations: 20", "realisations: 4"))
+        environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+        words = [sys.executable, "-m", "mdr_dask", *arguments]
+        return subprocess.run(words, env=environment, capture_output=True, text=True, check=False)
+
+    yield command
+    sys.modules.pop("wear_rate", None)
+
+
+CRASH = """    if case.normal_force > 50 and case.sliding_distance > 10:
+        import os, signal
+        os.kill(os.getpid(), signal.SIGSEGV)
+"""
+
+
+def test_a_case_that_crashes_the_process_has_failed_after_the_next_run(example):
+    first = example("run", "pin.yaml", "--quiet", "--threads", "1", line=CRASH)
+    assert first.returncode == -11
+    second = example("run", "pin.yaml", "--threads", "1", line=CRASH)
+    assert second.returncode == 1
+    assert "an earlier run ended while it computed block" in second.stderr
+    assert "36 done, 4 failed" in second.stdout
+    told = example("status", "results/pin.zarr", "--failures", line=CRASH).stdout
+    assert "2 x failed: its process crashed: Segmentation fault" in told
+    assert "2 x failed: other realisations of this case crashed" in told
+    third = example("run", "pin.yaml", "--json", line=CRASH)
+    assert third.returncode == 1
+    assert json.loads(third.stdout)["failed"] == 4
+    assert example("verify", "results/pin.zarr").returncode == 0
+    healed = example("run", "pin.yaml", "--quiet", "--retry-failed")
+    assert (healed.returncode, "36 kept, 4 done, 0 failed" in healed.stdout) == (0, True)
+
+
+@pytest.mark.slow
+def test_a_case_that_crashes_a_worker_has_failed(example):
+    done = example("run", "pin.yaml", "--quiet", "--workers", "1", line=CRASH)
+    assert (done.returncode, "36 done, 4 failed" in done.stdout) == (1, True), done.stderr
+    told = example("status", "results/pin.zarr", "--failures", line=CRASH).stdout
+    assert "2 x failed: its process crashed: Segmentation fault" in told
+
+
+@pytest.mark.parametrize(
+    "hang",
+    [
+        "time.sleep(60)",
+        pytest.param("signal.pthread_sigmask(0, [signal.SIGALRM]); time.sleep(60)", marks=pytest.mark.slow),
+    ],
+)
+def test_a_case_that_takes_too_long_has_failed(example, hang):
+    """Python code raises an exception; a library that does not return is killed with its process."""
+    line = (
+        f"    if case.normal_force > 50 and case.sliding_distance > 10:\n        import signal, time\n        {hang}\n"
+    )
+    done = example("run", "pin.yaml", "--quiet", "--case-timeout", "0.3", line=line)
+    assert done.returncode == 1, done.stderr
+    assert "36 done, 4 failed" in done.stdout
+    assert "took longer than 0.3 s" in example("status", "results/pin.zarr", "--failures").stdout
+
+
+def test_threads_of_blas_are_as_before_a_run(toy, url):
+    with threadpool_limits(limits=2, user_api="blas"):
+        before = [found["num_threads"] for found in threadpool_info() if found["user_api"] == "blas"]
+        execute.run(toy.campaign(toy.axis("position", [1.0])), url, Resources(threads=1), lambda _: None)
+        assert [found["num_threads"] for found in threadpool_info() if found["user_api"] == "blas"] == before
+
+
+def _forked(url, queue):
+    queue.put(sorted(store.datasets(url)[""].sizes.items()))
+    store.files.write_bytes(url, "status/note.partial", b"1")
+    queue.put("written")
+
+
+def test_a_forked_process_can_write_after_a_run(toy, url):
+    execute.run(toy.campaign(toy.axis("position", [1.0])), url, Resources(threads=1), lambda _: None)
+    context = multiprocessing.get_context("fork")
+    queue = context.Queue()
+    child = context.Process(target=_forked, args=(url, queue))
+    child.start()
+    try:
+        assert queue.get(timeout=30)
+        assert queue.get(timeout=30) == "written"
+    finally:
+        child.kill()
+
+
+def test_a_script_without_a_guard_gets_one_sentence(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import mdr_dask\nfrom mdr_dask import Resources\nmdr_dask.run({'model': 'ehl_line', 'parameters': {"
+        "'load_parameter': 1e-5, 'speed_parameter': 1e-11, 'material_parameter': 4500}}, "
+        "resources=Resources(workers=1))\n"
+    )
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.returncode == 1
+    assert "put what it does below 'if __name__ == \"__main__\":'" in done.stderr.splitlines()[-1]
+
+
+def test_a_dask_client_in_this_process_computes_and_stays_open(toy, url):
+    from distributed import Client
+
+    with Client(processes=False, dashboard_address=None, n_workers=1, threads_per_worker=1) as client:
+        campaign = toy.campaign(toy.axis("position", [1.0, 2.0]))
+        assert execute.run(campaign, url, Resources(client=client), lambda _: None).done == 12
+        assert client.submit(lambda: 3).result() == 3
+
+
+def test_a_fault_of_the_machine_is_no_failed_case(toy, url, monkeypatch):
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    from dataclasses import replace
+
+    campaign = toy.campaign(toy.axis("position", [1.0, 2.0]))
+    with monkeypatch.context() as patch:
+        patch.setattr(sys.modules["mdr_dask.models.toy"], "MODEL", replace(toy.MODEL, compute=full))
+        with pytest.raises(MachineError, match="No space left on device"):
+            execute.run(campaign, url, Resources(threads=1), lambda _: None)
+    assert execute.run(campaign, url, Resources(threads=1), lambda _: None).done == 12
+
+
+def test_a_model_that_changes_the_working_directory_is_no_matter(example):
+    assert example("run", "pin.yaml", "--quiet", line="    import os; os.chdir('/')").returncode == 0
+    assert example("verify", "results/pin.zarr").returncode == 0
+
+
+@pytest.fixture
+def read_only(toy, tmp_path, monkeypatch):
+    """A finished study whose folder cannot be written."""
+    study = tmp_path / "mine" / "study.zarr"
+    campaign = toy.campaign(toy.axis("position", [1.0, 2.0]))
+    execute.run(campaign, str(study), Resources(threads=1), lambda _: None)
+    for lock in study.parent.glob(".*lock"):
+        lock.unlink()
+    opened = os.open
+
+    def refuse(path, flags, *more, **options):
+        if flags & (os.O_CREAT | os.O_RDWR | os.O_WRONLY) and str(path).startswith(str(study.parent)):
+            raise OSError(30, os.strerror(30), str(path))
+        return opened(path, flags, *more, **options)
+
+    monkeypatch.setattr(os, "open", refuse)
+    return campaign, str(study)
+
+
+def test_a_finished_study_is_verified_and_run_on_a_disk_that_is_read_only(toy, read_only, capsys):
+    campaign, url = read_only
+    before = sorted(Path(url).parent.iterdir())
+    assert store.verify(url).findings == []
+    assert main(["status", url]) == 0
+    assert "permission" not in capsys.readouterr().out.lower()
+    assert execute.run(campaign, url, Resources(threads=1), lambda _: None).kept == 12
+    more = toy.campaign(toy.axis("position", [1.0, 2.0, 3.0]))
+    with pytest.raises(StoreError, match="nothing can be written here"):
+        execute.run(more, url, Resources(threads=1), lambda _: None)
+    assert sorted(Path(url).parent.iterdir()) == before
+
+
+def test_two_parts_that_were_computed_apart_are_joined_by_a_copy(toy, tmp_path):
+    from dataclasses import replace
+
+    campaign = replace(toy.campaign(toy.axis("position", [1.0, 2.0, 3.0, 4.0])), blocks={"position": 1})
+    one, two = str(tmp_path / "one.zarr"), str(tmp_path / "two.zarr")
+    for number, url in ((1, one), (2, two)):
+        execute.run(campaign, url, Resources(threads=1), lambda _: None, part=Part(number, 2))
+        assert mdr_dask.open(url).attrs["complete"] is False
+    shutil.copytree(two, one, dirs_exist_ok=True)
+    assert store.verify(one).findings == []
+    assert execute.run(campaign, one, Resources(threads=1), lambda _: None).done == 0
+    assert mdr_dask.open(one).attrs["complete"] is True
+    assert not np.isnan(xr.open_zarr(one).height).any()
+
+
+@pytest.mark.parametrize("kind", ["bomb", "encrypted", "compression", "outside"])
+def test_a_zip_of_a_stranger_is_refused_before_it_is_unpacked(tmp_path, capsys, kind):
+    path = tmp_path / "x.zip"
+    name = "../../evil.txt" if kind == "outside" else "zarr.json"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_BZIP2 if kind == "compression" else zipfile.ZIP_DEFLATED) as packed:
+        packed.writestr(name, b"0" * (300 * 2**20 if kind == "bomb" else 10))
+        packed.writestr("published/checksums.sha256", f"{'0' * 64}  {name}\n")
+    if kind == "encrypted":
+        content = bytearray(path.read_bytes())
+        for mark, offset in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+            content[content.index(mark) + offset] |= 1
+        path.write_bytes(bytes(content))
+    assert main(["verify", str(path)]) == 2
+    told = capsys.readouterr().err
+    assert len(told.splitlines()) == 1
+    assert str(path) in told
+    assert not (tmp_path.parent / "evil.txt").exists()
+
+
+def test_a_store_of_another_version_of_its_model_says_how_to_extend_it(toy, url, monkeypatch):
+    from dataclasses import replace
+
+    campaign = toy.campaign(toy.axis("position", [1.0]))
+    execute.run(campaign, url, Resources(threads=1), lambda _: None)
+    monkeypatch.setattr(sys.modules["mdr_dask.models.toy"], "MODEL", replace(toy.MODEL, version=2))
+    with pytest.raises(
+        StoreError, match=r"can be read, plotted and verified, but not extended.*pip install mdr_dask=="
+    ):
+        execute.run(campaign, url, Resources(threads=1), lambda _: None)
+    assert store.verify(url).findings == []
+
+
+def test_models_in_plain_python_are_marked():
+    assert per_case(lambda case, random: {}).is_plain_python
+    assert not hasattr(models.load("ehl_line").compute, "is_plain_python")
