@@ -85,7 +85,7 @@ def asset(name: str) -> str:
 
 @lru_cache(maxsize=64)
 def mathml(equation: Equation) -> str:
-    """Return an equation as MathML, which browsers draw and screen readers understand; without latex2mathml, as LaTeX."""
+    """Return an equation as MathML, for browsers and screen readers; without latex2mathml, as LaTeX."""
     try:
         from latex2mathml.converter import convert
     except ModuleNotFoundError:
