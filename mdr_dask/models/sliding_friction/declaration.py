@@ -9,6 +9,7 @@ from pydantic import Field
 from mdr_dask.models.base import Model, Number, Output, deferred, quantity
 from mdr_dask.models.parts.sliding_body import NUMBERS, SlidingBody, frequency_notes
 from mdr_dask.models.parts.surface import NO_AREA, NO_GAP
+from mdr_dask.models.parts.tested_range import load_notes
 
 
 class SlidingFriction(SlidingBody):
@@ -53,7 +54,7 @@ MODEL = Model(
     seconds=deferred(SOLVE, "seconds"),
     whole=("normal_force", "velocity", "shear_modulus", "relaxation_time", "rms_roughness"),
     distinct=deferred(SOLVE, "distinct"),
-    notes=frequency_notes,
+    notes=lambda sets: (*frequency_notes(sets), *load_notes(sets)),
     memory=deferred(SOLVE, "memory"),
     numbers=(
         *NUMBERS,

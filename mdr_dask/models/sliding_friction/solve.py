@@ -12,7 +12,9 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.models.base import Block, Result, Status
 from mdr_dask.models.parts.accuracy import missed_accuracy
 from mdr_dask.models.parts.material import fit_error
+from mdr_dask.models.parts.rough_line import OfSurface
 from mdr_dask.models.parts.sliding_problem import STATUS, Setting, SlidingProblems, each, sliding_problems
+from mdr_dask.models.parts.tested_range import beyond_tested
 from mdr_dask.models.sliding_friction.declaration import SlidingFriction
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.cases import COLUMNS, Steady
@@ -101,7 +103,8 @@ class _Group:
                 if name in result.values:
                     result.values[name][self.members, r] = np.where(np.isnan(values[output]), np.nan, found)
         for k, message in self._messages(steady, values, absolute):
-            result.messages[int(self.members[k]), r] = message
+            place = int(self.members[k]), r
+            result.messages[place] = f"{result.messages[place]}; {message}" if place in result.messages else message
         return int(self.loads.size)
 
     def _repeat(self, result: Result, r: int) -> None:
@@ -130,7 +133,7 @@ class _Group:
     def _messages(
         self, steady: Steady, values: dict[str, FloatArray], errors: dict[str, FloatArray]
     ) -> Iterator[tuple[int, str]]:
-        """Yield why a member failed, or which of its outputs miss the accuracy and by how much."""
+        """Yield why a member failed, which of its outputs miss the accuracy, and whether it is outside tested loads."""
         status = steady.status[self.which]
         for k in np.flatnonzero(status != Outcome.CONVERGED):
             yield int(k), Outcome(int(status[k])).sentence
@@ -139,6 +142,8 @@ class _Group:
             values, errors = ({name: found[name] for name in asked} for found in (values, errors))
             floors = {"indentation_depth": self._height}
             yield from missed_accuracy(values, errors, self.request.accuracy, floors, " on the finest grid").items()
+        if isinstance(self.setting.roughness, OfSurface) and self.setting.body is None:
+            yield from beyond_tested(self.loads[self.which], values["contact_fraction"]).items()
 
 
 def distinct(block: Block[SlidingFriction]) -> int:
