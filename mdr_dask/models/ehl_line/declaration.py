@@ -17,7 +17,7 @@ STEEL = 210e9 / (2 * (1 - 0.3**2))
 #: Relative error of the films where the campaign names none.
 ACCURACY = 1e-3
 
-#: Each dimensionless number, its dimensional counterpart, and what that one needs beside it.
+#: Each dimensionless number, its dimensional counterpart, and the parameters that the latter needs.
 _PAIRS = (
     ("load_parameter", "line_load", ("radius",)),
     ("speed_parameter", "mean_velocity", ("radius", "viscosity")),

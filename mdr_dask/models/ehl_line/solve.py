@@ -162,7 +162,7 @@ def compute(block: Block[EhlLineParameters]) -> Result:
 
 
 def _warnings(block: Block[EhlLineParameters], index: int, parameters: list[float]) -> list[str]:
-    """Return what a user of the outputs asked for should know about one case."""
+    """Return the warnings of one case about the requested outputs."""
     notes = []
     if {"formula_central_film", "formula_minimum_film"} & set(block.outputs):
         notes.append(PAN_HAMROCK_CENTRAL.outside(*parameters))

@@ -18,7 +18,7 @@ from mdr_dask.tables import Column, read_table
 
 
 class Parabola(Parameters):
-    """A paraboloid, which stands for a sphere."""
+    """A paraboloid, which approximates a sphere."""
 
     shape: Literal["parabola"] = "parabola"
     radius: float | None = quantity("m", "radius of curvature R at the apex", usual="10 mm", gt=0, default=None)
@@ -230,12 +230,12 @@ class FrettingWear(Parameters):
         return self
 
     def notes(self) -> tuple[str, ...]:
-        """Say what a simplified rule leaves out."""
+        """Return a note if the rule is an approximation."""
         if self.wear_rule != "fast":
             return ()
         return (
-            "wear_rule fast is a simplified rule: the errors in the store are those of its own equation; its distance "
-            "from the exact evolution is some hundredths of d0, up to a third at small stick radii (docs/wear.md)",
+            "wear_rule fast is an approximation: it differs from the exact profile by a few hundredths of d0, and "
+            "by up to a third of d0 at small stick radii; stored errors are those of its own equation (docs/wear.md)",
         )
 
     def _check_dimensional(self) -> None:

@@ -63,7 +63,7 @@ def _power_laws(block: Block[FrettingWear]) -> tuple[FloatArray, FloatArray]:
 
 
 def has_tables(block: Block[FrettingWear]) -> bool:
-    """Tell whether an indenter is no power law."""
+    """Return whether an indenter is no power law."""
     return any(isinstance(one, Pressed) for one in indenters(block))
 
 
@@ -96,14 +96,14 @@ def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, i
     with np.errstate(all="ignore"):
         numbers, messages = _reduced(block)
     for case, position in np.argwhere(numbers.level >= 1):
-        told = "nothing slips: the amplitude is below the rounding of mu E* d0 / G*"
-        messages.setdefault((int(case), int(position)), told)
+        text = "nothing slips: the amplitude is below the rounding of mu E* d0 / G*"
+        messages.setdefault((int(case), int(position)), text)
     known = np.isfinite(numbers.level) & np.isfinite(numbers.cycles) & (numbers.cycles <= MOST_CYCLES)
     for unit in (numbers.length, numbers.height, numbers.force):
         known &= (unit > LEAST) & (unit < 1 / LEAST)
     for case, position in np.argwhere(~known):
-        told = "a number of the case is so large or so small that a computer cannot hold what follows from it"
-        messages.setdefault((int(case), int(position)), f"{told}; look at the units")
+        text = "a number of the case is too large or too small for double precision"
+        messages.setdefault((int(case), int(position)), f"{text}; check the units")
     return numbers, messages
 
 

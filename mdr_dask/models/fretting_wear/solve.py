@@ -149,7 +149,7 @@ def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
 
 
 def _is_plain(block: Block[FrettingWear]) -> bool:
-    """Tell whether every case is a power law with scalar outputs by the limit or the fast rule at constant depth."""
+    """Return whether every case is a power law with scalar outputs by the limit or the fast rule at constant depth."""
     simple = set(block.columns.get("wear_rule", [block.parameters.wear_rule])) <= {"limit", "fast"}
     depth = set(block.columns.get("hold", [block.parameters.hold])) == {"depth"}
     wanted = {
@@ -182,7 +182,7 @@ def _solve_plain(
 
 
 def _distinct(rows: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Return the distinct columns and where each column stands among them."""
+    """Return the distinct columns and the index of each column among them."""
     if rows.shape[1] == 0:
         return rows, np.zeros(0, dtype=np.intp)
     order = np.lexsort(rows)
@@ -204,7 +204,7 @@ def _solve_each(
     status: NDArray[np.int8],
     messages: dict[tuple[int, int], str],
 ) -> int:
-    """Solve one task after the other, with all the cycles asked of it."""
+    """Solve one task after the other, each for all its cycles."""
     solves, places = 0, axis(block.parameters)
     for task, wanted in _tasks(block, numbers, status).items():
         try:
@@ -215,12 +215,12 @@ def _solve_each(
                 status[position], messages[position] = kind, str(problem)
             continue
         solves += _solves_of(task, wanted)
-        for positions, (records, told) in zip(wanted.values(), contacts, strict=True):
+        for positions, (records, text) in zip(wanted.values(), contacts, strict=True):
             for name, array in values.items():
                 answer = _answer(records, name, places)
                 for position in positions:
                     array[position] = answer
-            messages.update(dict.fromkeys(positions, told) if told else {})
+            messages.update(dict.fromkeys(positions, text) if text else {})
     return solves
 
 
@@ -240,7 +240,7 @@ def _judged(block: Block[FrettingWear]) -> list[str]:
 
 
 class _Demand:
-    """What a block asks of the accuracy of a solution."""
+    """Accuracy and outputs that a block requests."""
 
     def __init__(self, block: Block[FrettingWear], places: FloatArray) -> None:
         self.accuracy, self.places = block.accuracy, places

@@ -71,7 +71,7 @@ class MixedLubrication(Parameters):
     longest_wavelength: Positive | Literal["auto"] = quantity(
         "m",
         "wavelength above which there is no roughness; auto is 2a at cutoff_force. Of measured lines only the "
-        "load on their asperities asks for it",
+        "load on their asperities needs it",
         usual="0.4 mm",
         default="auto",
     )
@@ -165,7 +165,7 @@ class MixedLubrication(Parameters):
         return self.longest_wavelength
 
     def problem(self) -> str:
-        """Say why the case cannot be computed, in one sentence; an empty string if it can."""
+        """Return why the case cannot be computed, an empty string if it can."""
         problem = self._problem_of_surfaces()
         problem = problem or self._problem_of_points()
         if problem:
@@ -210,8 +210,8 @@ class MixedLubrication(Parameters):
         length = source.points * source.spacing(self.perimeter)
         width = 2 * float(self.dry_contact(self.normal_force).half_width)
         if width > length:
-            told, most = distinguishable(width, length, digits=4)
-            return f"the contact is wider than the line: expected 2a of at most {most} m, got {told} m"
+            got, most = distinguishable(width, length, digits=4)
+            return f"the contact is wider than the line: expected 2a of at most {most} m, got {got} m"
         return ""
 
     def oil_data(self) -> Oil:

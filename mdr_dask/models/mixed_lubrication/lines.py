@@ -32,7 +32,7 @@ class _Random:
         return perimeter / self.points
 
     def problem(self, perimeter: float) -> str:
-        """Say why there are no such lines around a roller of a perimeter in m; an empty string if there are."""
+        """Return why there are no such lines around a roller of a perimeter in m, an empty string if there are."""
         if self.longest > self.modes:
             longest, shortest = distinguishable(perimeter / self.longest, perimeter / max(self.modes, 1), digits=4)
             return f"expected the longest wavelength above the shortest, got {longest} m and {shortest} m"
@@ -61,7 +61,7 @@ class _Random:
         return spline(first, self.points), spline(second, self.points)
 
     def together(self, seed: int, realisation: int, other: bool = False) -> FloatArray:
-        """Return the spline of the sum of both lines, all that pure rolling asks for."""
+        """Return the spline of the sum of both lines, which is enough for pure rolling."""
         from mdr_dask.physics.surfaces.splines import closest, through
 
         spline = through if other else closest
@@ -121,7 +121,7 @@ class OfSurfaces(_Random):
         return first, second
 
     def problem(self, perimeter: float) -> str:
-        """Say why there are no such lines; an empty string if there are."""
+        """Return why there are no such lines, an empty string if there are."""
         flat = "expected waves of both surfaces between longest_wavelength and shortest_wavelength"
         return super().problem(perimeter) or (
             "" if all(np.any(line) for both in self._both() for line in both) else flat
@@ -151,7 +151,7 @@ class Measured:
 
     @property
     def per_wave(self) -> float:
-        """Points of the shortest wave: any number, the lines are what their points tell."""
+        """Points of the shortest wave: infinite, since measured lines are defined by their points."""
         return np.inf
 
     def spacing(self, _: float) -> float:
@@ -159,7 +159,7 @@ class Measured:
         return line_of(self.file_1).spacing
 
     def problem(self, _: float) -> str:
-        """Say why the lines do not fit each other; an empty string if they do."""
+        """Return why the lines do not fit each other, an empty string if they do."""
         one, two = (line_of(file).spacing for file in (self.file_1, self.file_2))
         if abs(one - two) > 1e-3 * one:
             return f"expected profiles of the same spacing, got {one:.6g} m and {two:.6g} m; resample one of them"

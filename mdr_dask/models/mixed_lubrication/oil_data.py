@@ -81,14 +81,14 @@ class OilData(Parameters):
         return Oil(*data, self.density, self.density_temperature, self.correlation, low, high, "campaign file")
 
     def notes(self) -> tuple[str, ...]:
-        """Say how the law fits a table, and how far the oil is extrapolated."""
-        told = []
+        """Return how well the law fits a table, and how far the oil is extrapolated."""
+        notes = []
         if self.viscosities is not None:
             found = _fitted(self.viscosities, self.density, self.density_temperature)
             temperature, off = found.temperature, 100 * found.departures
             worst = int(np.argmax(abs(off)))
             first, last = (found.at(float(temperature[end])) * 1e6 for end in (0, -1))
-            told.append(
+            notes.append(
                 f"table {self.viscosities.name}: ASTM D341 through {off.size} kinematic viscosities, {first:.4g} to "
                 f"{last:.4g} mm^2/s; {off[worst]:+.2g} % off at {shown(float(temperature[worst]), 'K')}, less elsewhere"
             )
@@ -97,8 +97,8 @@ class OilData(Parameters):
         for wanted, end, side in ends:
             if wanted is not None and (wanted < end if side == "below" else wanted > end):
                 reached, known = shown_apart("K", wanted, end)
-                told.append(f"oil: its viscosity is extrapolated {side} {known}, to {reached}")
-        return tuple(told)
+                notes.append(f"oil: its viscosity is extrapolated {side} {known}, to {reached}")
+        return tuple(notes)
 
 
 class _Fit(NamedTuple):

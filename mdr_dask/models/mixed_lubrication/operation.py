@@ -32,7 +32,7 @@ class Film(NamedTuple):
 
 @dataclass(frozen=True)
 class Operation:
-    """What a case is before any roughness: contact, film, and how the layer stands to the unit lines.
+    """Contact, film and boundary layer of a case, in units of its rough lines.
 
     `shared` has the film in m; `film_error` is its relative error, and `strength` that of the layer for lines in units
     of `scale`, the heights of the lines in m. `width` is that of the contact in m.
@@ -103,7 +103,7 @@ def operation_of(case: MixedLubrication, accuracy: float | None = None) -> Opera
     Raises
     ------
     NoFilmError
-        If the EHL solution is asked for and not found.
+        If the EHL solution is requested and not found.
     """
     data, source = case.oil_data(), case.source()
     viscosity = float(data.dynamic(case.temperature))

@@ -4,7 +4,7 @@ The two lines are held apart by the film ``h0``; where the sum of their heights 
 overlaps in one piece is a cluster, of length ``D`` and force ``F = E* int (z - h0) dx`` (eq. 5.5). It breaks the layer
 if ``pi tau0 D^3/(12 F) < h_c`` (eq. 5.6), that is if ``int (z - h0) dx > s D^3`` with the layer strength
 ``s = pi tau0/(12 E* h_c)``, the only place where tau0, E* and h_c appear. Lines are closed (periodic) cubic splines, on
-which all this is exact; the contact is a window that begins at each node in turn.
+which all this is exact; the contact is a window that begins at each node, one after the other.
 """
 
 from __future__ import annotations
@@ -212,24 +212,24 @@ def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work
     Returns length and force there.
     """
     overlap, found = work[:4], work[4:]
-    way = 1 if most > 0 else -1
+    direction = 1 if most > 0 else -1
     at, force = edge, 0.0
-    k = int(edge) if way > 0 else int(np.ceil(edge)) - 1
+    k = int(edge) if direction > 0 else int(np.ceil(edge)) - 1
     ended = most == 0
     while not ended:
         _fill(pair, position[0] + k, position[1] + k, overlap)
         count = zeros(overlap, 0, found, 0)
-        stop = float(k + max(way, 0))
+        stop = float(k + max(direction, 0))
         for number in range(count):
-            place = k + found[number if way > 0 else count - 1 - number]
-            if not ended and (place - at) * way > 0:
+            place = k + found[number if direction > 0 else count - 1 - number]
+            if not ended and (place - at) * direction > 0:
                 stop, ended = place, True
-        if (stop - edge - most) * way >= 0:
+        if (stop - edge - most) * direction >= 0:
             stop, ended = edge + most, True
         of = piece(overlap, 0)
-        force += way * (integral(of, stop - k) - integral(of, at - k))
+        force += direction * (integral(of, stop - k) - integral(of, at - k))
         at = stop
-        k += way
+        k += direction
     return abs(at - edge), force
 
 
@@ -273,7 +273,7 @@ def _windows(
 
 
 def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray], rule: str = "part") -> IntArray:
-    """Judge windows one by one: the reference for pure rolling, and the way of rolling with creep.
+    """Judge windows one by one: the reference for pure rolling, and the method for rolling with creep.
 
     Parameters
     ----------
@@ -297,25 +297,25 @@ def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray
     return contact
 
 
-def creep_positions(way: ArrayLike, points: int, slide_roll_ratio: float) -> tuple[IntArray, IntArray]:
-    """Return where the window stands on each line after some way of the mean surface.
+def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> tuple[IntArray, IntArray]:
+    """Return the first node of the window on each line after some travel of the mean surface.
 
     Parameters
     ----------
-    way : array_like, shape (n,)
-        In points. For mean values, ways an eighth of the window apart lose nothing: closer windows tell the same.
+    travel : array_like, shape (n,)
+        In points. For mean values, steps of an eighth of the window are small enough.
     points : int
         Points of each line.
     slide_roll_ratio : float
-        ``S = (v1 - v2)/u`` with the mean velocity u: the lines move by ``1 + S/2`` and ``1 - S/2`` of the way.
+        ``S = (v1 - v2)/u`` with the mean velocity u: the lines move by ``1 + S/2`` and ``1 - S/2`` of the travel.
 
     Returns
     -------
     two int arrays, shape (n,)
         First point of the window on each line.
     """
-    ways = np.asarray(way, dtype=np.float64)
-    first, second = (np.round(ways * (1 + sign * slide_roll_ratio / 2)).astype(np.int64) % points for sign in (1, -1))
+    steps = np.asarray(travel, dtype=np.float64)
+    first, second = (np.round(steps * (1 + sign * slide_roll_ratio / 2)).astype(np.int64) % points for sign in (1, -1))
     return first, second
 
 
@@ -334,7 +334,7 @@ def _occupied(contact: NDArray[np.int32] | IntArray, windows: IntArray, lengths:
 
 
 class Occupied(NamedTuple):
-    """What equal parts of a turn meet, each of shape (parts,).
+    """Intimate contact in equal parts of a revolution, each of shape (parts,).
 
     Parameters
     ----------
@@ -352,7 +352,7 @@ class Occupied(NamedTuple):
 
 
 def occupied(contact: NDArray[np.int32] | IntArray, parts: int = 1) -> Occupied:
-    """Return what equal parts of a turn meet.
+    """Count intimate contact in equal parts of a revolution.
 
     Parameters
     ----------

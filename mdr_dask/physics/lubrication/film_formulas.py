@@ -101,7 +101,7 @@ THICKEST_FILM = 0.1
 
 
 def thick_film(film: float) -> str:
-    """Say that a film h/R is too thick for lubrication theory; an empty string if it is not."""
+    """Return a message if a film h/R is too thick for lubrication theory, else an empty string."""
     if not film > THICKEST_FILM:
         return ""
     return (
@@ -181,7 +181,7 @@ class FilmFormula:
         )
 
     def outside(self, W: float, U: float, G: float) -> str:
-        """Say which of W, U, G lie outside the range of the formula; an empty string if none does."""
+        """Return which of W, U, G lie outside the range of the formula, an empty string if none does."""
         ranges = (("W", W, self.load_range), ("U", U, self.speed_range), ("G", G, self.material_range))
         outside = [
             f"{symbol} lies outside {low:g} to {high:g}"
@@ -269,7 +269,7 @@ def limiting_films(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:
 
 
 def expected_film(M: float, L: float) -> float:
-    """Return the film in ``a^2/R`` that the four limiting regimes let expect; good for a first guess."""
+    """Return the film in ``a^2/R`` expected from the four limiting regimes; good for a first guess."""
     rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(M, 0.5, L) * np.pi / (8 * M)
     return float(max(min(rigid_piezo, elastic_piezo), max(rigid_iso, elastic_iso)))
 

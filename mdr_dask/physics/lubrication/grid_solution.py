@@ -53,7 +53,8 @@ class GridSolution:
     def pressure_carried(self, nodes: FloatArray, front: float) -> FloatArray:
         """Return the pressure at the nodes of another grid, on which it falls behind its spike at `front` (or NaN).
 
-        The nodes beside that place get what this grid has half a cell from its own, as finer grids find much the same.
+        The nodes on either side of the front get the pressures half a cell from the front of this grid, which are
+        nearly the same on finer grids.
         """
         if np.isnan(front + self.front):
             return self.pressure_between(nodes)
@@ -65,7 +66,7 @@ class GridSolution:
 
     @cached_property
     def density(self) -> FloatArray:
-        """The density of nodes that the solution asks for, at its own."""
+        """The density of nodes that the solution needs, at its nodes."""
         return adapted_density(self.nodes, self.pressure, self.film, self.central)
 
     @cached_property

@@ -6,9 +6,6 @@ errors compare (Richardson). Positions in half widths, films in ``a^2/R``.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
-
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
@@ -142,12 +139,6 @@ def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:
     return sample(positions, np.maximum(density, np.where(np.abs(positions) < 1.5 * length, 8 / length, 0.0)), count)
 
 
-def ladder(nodes: Sequence[int]) -> list[int]:
-    """Return these numbers of nodes, and between each two the one half way in equal ratios."""
-    halfway = [round(np.sqrt(fewer * more)) for fewer, more in pairwise(nodes)]
-    return sorted((*nodes, *halfway))
-
-
 def first_pressure(nodes: FloatArray, central: float) -> FloatArray:
     """Return half an ellipse: Hertz' pressure, or a wider and flatter one upstream for a thick film."""
     reach = float(np.sqrt(2 * central))
@@ -163,7 +154,7 @@ def second_derivative(nodes: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def adapted_density(nodes: FloatArray, pressure: FloatArray, film: FloatArray, central_film: float) -> FloatArray:
-    """Return the density of nodes that a solution asks for, shape (n,).
+    """Return the density of nodes that a solution needs, shape (n,).
 
     The curvature of the film relative to the film itself gives the error of the flow (square root: second order), that
     of the pressure the error of the deformation (cube root: integrated over an element); a floor keeps the contact and

@@ -39,7 +39,7 @@ ADAPTED_NODES = 161
 
 
 class Attempt(NamedTuple):
-    """A way to the first solution.
+    """Guess and steps for the first solution.
 
     Parameters
     ----------

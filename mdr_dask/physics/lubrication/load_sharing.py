@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 
 #: A share of the load so small that the film does not notice: it would thicken by a quarter of that.
 _NEGLIGIBLE = 1e-9
-#: Logarithm of the smallest share of the load that a film is asked for.
+#: Logarithm of the smallest share of the load on the film.
 _LEAST_LOGARITHM = -256.0
 #: Greatest lack of balance of the load, over the tolerance.
 _BALANCE = 100.0
@@ -74,12 +74,12 @@ class Asperities(NamedTuple):
     E_star: float
 
     def pressure(self, film: float) -> float:
-        """Return the mean pressure in Pa that the asperities carry beside a film in m."""
+        """Return the mean pressure in Pa on the asperities at a film thickness in m."""
         return self.E_star * self.rms / self.wavelength * mean_overlap(distance_of_means(film / self.rms))
 
 
 class SharedLoad(NamedTuple):
-    """Film thickness in the unit of the film asked for, and the shares of the load on film and asperities."""
+    """Film thickness in the unit of `film_at`, and the shares of the load on film and asperities."""
 
     film: float
     film_share: float

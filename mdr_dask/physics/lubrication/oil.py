@@ -29,7 +29,7 @@ GOLD: dict[str, tuple[float, float]] = {
     "gold_ester": (6.605, 0.1360),
     "gold_polyglycol": (5.489, 0.1485),
 }
-#: Names that :func:`pressure_viscosity` knows.
+#: Names for :func:`pressure_viscosity`.
 CORRELATIONS: tuple[str, ...] = (*GOLD, "wooster")
 
 
@@ -160,7 +160,7 @@ def pressure_viscosity(correlation: str, kinematic: ArrayLike, dynamic: ArrayLik
 
 @dataclass(frozen=True)
 class Oil:
-    """An oil by what its data sheet says.
+    """An oil by the numbers of its data sheet.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ class Oil:
     lowest, highest : float
         Temperatures in K between which the data hold.
     source : str
-        Where the numbers stand.
+        Source of the numbers.
 
     Examples
     --------
@@ -206,11 +206,11 @@ class Oil:
         return pressure_viscosity(self.correlation, self.kinematic(temperature), self.dynamic(temperature))
 
     def outside(self, temperature: float) -> str:
-        """Say that a temperature lies outside the oil's data; an empty string if it does not."""
+        """Return a message if a temperature lies outside the oil's data, else an empty string."""
         if self.lowest <= temperature <= self.highest:
             return ""
-        told, lowest, highest = distinguishable(temperature, self.lowest, self.highest, digits=6)
-        return f"expected a temperature within the oil's data, {lowest} to {highest} K, got {told} K"
+        got, lowest, highest = distinguishable(temperature, self.lowest, self.highest, digits=6)
+        return f"expected a temperature within the oil's data, {lowest} to {highest} K, got {got} K"
 
 
 #: Oils by name.

@@ -227,9 +227,9 @@ def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfi
     image = forward_transform(slope, nodes, breaks=tuple(r[1:-1]), tolerance=1e-12).value
     image_curve = _monotone(nodes, image)
     if image[-1] < depth:
-        told, end = distinguishable(depth, image[-1], digits=4)
+        got, end = distinguishable(depth, image[-1], digits=4)
         raise ValueError(
-            f"the contact reaches beyond the table: its image ends at the height {end}, got depth {told}; "
+            f"the contact reaches beyond the table: its image ends at the height {end}, got depth {got}; "
             "extend the table or press less deep"
         )
     a0 = bisect(lambda x: float(image_curve(x)) - depth, 0.0, float(r[-1]))

@@ -1,7 +1,7 @@
 """The transforms of the method of dimensionality reduction for bodies of revolution, with an error estimate.
 
 Every integral is rewritten in the angle or hyperbolic angle that removes its square-root singularity, cut at the kinks
-and jumps of the profile, and summed by Gauss-Legendre rules whose number of nodes doubles until the answer stands.
+and jumps of the profile, and summed by Gauss-Legendre rules whose number of nodes doubles until two results agree.
 """
 
 from __future__ import annotations

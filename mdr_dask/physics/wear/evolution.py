@@ -1,6 +1,6 @@
 """How a worn contact evolves: steps of backward differentiation along fixed radii, for any kind of slip.
 
-Every radius remembers what it has gathered (see `Problem`). The contact is mapped onto graded panels in r^2, which
+Every radius keeps what it has accumulated (see `Problem`). The contact is mapped onto graded panels in r^2, which
 follow the moving edge; each step is a stiff backward differentiation formula of order 1 to 3, solved for the image and
 the edge together by a Newton iteration that keeps its Jacobian as long as it converges.
 """
@@ -42,7 +42,7 @@ class Settings(NamedTuple):
         Longest first step, over the time in which a contact changes: little wear is right to 2 %.
     shortest, beginning : float
         Step at which a march gives up, over the longest so far, or the first one if that is shorter; and over the first
-        one while none has been taken. Of those that got through, none took one below 0.13 later, some 1e-5 to begin.
+        one while none has been taken. Marches that reach their end take no later step below 0.13, some begin with 1e-5.
     """
 
     most_steps: int = 20000
@@ -75,7 +75,7 @@ class Resolution(NamedTuple):
     order : int, optional
         Nodes of a panel; by default four, or six for the finest accuracies.
     rough : tuple of float
-        How much wider the accuracy of two rougher solutions is, which tell the error.
+        How much larger the tolerance of the two rougher solutions is from which the error is estimated.
     slowness : float
         How much more slowly than usual the error falls from them.
     second : float
@@ -149,13 +149,13 @@ class Moment:
     unknowns : array, shape (n,)
         The unknowns of the problem: values of the image at all nodes but the last, the squared width of the panels over
         that of the virgin contact, in some problems more. All are of the order of one.
-    gathered : array, shape (n,)
-        What the radii of the nodes have gathered; zero at the edge.
+    accumulated : array, shape (n,)
+        What the radii of the nodes have accumulated; zero at the edge.
     """
 
     time: float
     unknowns: FloatArray
-    gathered: FloatArray
+    accumulated: FloatArray
 
 
 class Problem(Protocol):
@@ -170,19 +170,19 @@ class Problem(Protocol):
         """Return the panels between the inner border and the edge."""
 
     def holds(self, unknowns: FloatArray) -> bool:
-        """Tell whether unknowns describe a contact."""
+        """Return whether unknowns describe a contact."""
 
     def start(self) -> Moment:
         """Return the virgin contact."""
 
     def memory(self, past: Sequence[Any], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """Return, as a function of the unknowns, what past moments in these shares had gathered at the nodes."""
+        """Return, as a function of the unknowns, what past moments in these shares had accumulated at the nodes."""
 
     def moment(self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Any]) -> Moment:
         """Return the moment that a solved step ends in."""
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return gathered - known - theta * rate at every node, and the conditions at the edge."""
+        """Return accumulated - known - theta * rate at every node, and the conditions at the edge."""
 
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
         """Return its derivatives by the nodal unknowns."""
@@ -285,10 +285,10 @@ class Dense:
         moments, weights = self.near(time)
         return np.asarray(weights @ np.array([moment.unknowns for moment in moments]))
 
-    def gathered(self, time: float) -> FloatArray:
-        """Return what the nodes have gathered at a time."""
+    def accumulated(self, time: float) -> FloatArray:
+        """Return what the nodes have accumulated at a time."""
         moments, weights = self.near(time)
-        return np.asarray(weights @ np.array([moment.gathered for moment in moments]))
+        return np.asarray(weights @ np.array([moment.accumulated for moment in moments]))
 
     def number(self, time: float, numbers: FloatArray) -> float:
         """Return a number known at all moments at a time."""

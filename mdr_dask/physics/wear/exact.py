@@ -1,7 +1,7 @@
 """Worn contacts by the exact evolution, with their errors: fretting at constant depth or force, and sliding.
 
 One front end for the three conditions. Each is solved three times, on ever coarser panels in ever longer steps, and the
-distances tell the error.
+error is estimated from their distances.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ WIDER, THIN, SECOND = ((1e-4, 1.0), (3e-4, 1.5), (1e-3, 4.0), (3e-3, 5.0), (1e-2
 COARSER, COARSER_UNTIL = 1.6, 5e-3
 #: In gross slip at constant depth: as `WIDER`; all of the error is that of the edge where panels are fine enough.
 SLID_WIDER = (1e-3, 1.0), (3e-3, 3.0), (1e-2, 1.0)
-#: In gross slip: where the power of a body at its axis is told, and how many times as many halvings the sharpest takes.
+#: In gross slip: radius at which the exponent of a body is read, and largest factor on the halvings for sharp bodies.
 NEAR_AXIS, SHARPEST = 1e-5, 8.0
 Found = TypeVar("Found")
 Solver = Callable[[Profile, float, Sequence[float], Resolution], dict[float, Worn]]
@@ -64,7 +64,7 @@ def exact(
     amounts : sequence of float
         Cycles N >= 0 in units of N0, or sliding paths s = k E* l / (sigma0 a0); any order.
     accuracy : float
-        Error of f wanted, in eta d0, the scale of what can wear; below 1e-5 round-off gathered over the steps grows.
+        Error of f wanted, in eta d0, the scale of what can wear; below 1e-5 round-off accumulated over the steps grows.
     constant_force : bool
         Keep the force of the virgin contact instead of its depth.
     errors : bool
@@ -73,7 +73,7 @@ def exact(
     Returns
     -------
     list of Worn
-        In the order of `amounts`; one does not depend on what else is asked for.
+        In the order of `amounts`; each is independent of the others.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def exact(
 def _evolved(
     solve: Callable[[Resolution], dict[float, Worn]], resolution: Resolution, least: float, *, errors: bool
 ) -> dict[float, Worn]:
-    """Return contacts with what tells their errors."""
+    """Return contacts with the rougher solutions from which their errors are estimated."""
     found, *rougher = _solutions(solve, resolution, errors)
     return {
         amount: replace(
@@ -128,8 +128,8 @@ def _evolved(
 def limit_under_force(profile: Profile, stick_radius: float, accuracy: float = 1e-3, *, errors: bool = True) -> Worn:
     """Return the shape that ends all wear under constant force.
 
-    Once the image jumps at the border, the border stands and what sticks is frozen, so that the end is known. Only the
-    way to the jump needs the evolution. Parameters and errors are those of `exact`.
+    Once the image jumps at the border, the border no longer moves and the shape inside it is frozen, so that the end is
+    known. The evolution is needed up to the jump only. Parameters and errors are those of `exact`.
     """
     check_stick_radius(stick_radius)
     if not border_moves(stick_radius, accuracy):
@@ -155,18 +155,18 @@ def _solutions(solve: Callable[[Resolution], Found], resolution: Resolution, err
     return found
 
 
-def _first_of(solve: Callable[[Resolution], Found], ways: Sequence[Resolution]) -> Found:
+def _first_of(solve: Callable[[Resolution], Found], resolutions: Sequence[Resolution]) -> Found:
     """Solve at the first resolution at which the evolution can be advanced."""
-    for way in ways[:-1]:
+    for resolution in resolutions[:-1]:
         try:
-            return solve(way)
+            return solve(resolution)
         except NotConvergedError:
             continue
-    return solve(ways[-1])
+    return solve(resolutions[-1])
 
 
 def _resolution(solve: Solver, stick_radius: float, accuracy: float) -> Resolution:
-    """Return the resolution that a way of solving needs for an accuracy."""
+    """Return the resolution that a solver needs for an accuracy."""
     at_most = min(accuracy, COARSEST)
     if solve is forced_contacts:
         return forced_resolution(at_most)
@@ -204,17 +204,17 @@ def _fretted(profile: Profile, c: float, wanted: Sequence[float], resolution: Re
 def _fretted_contact(problem: PartialSlip, dense: Dense, time: float, energy: float) -> Worn:
     """Turn the nodal values at one time into a worn contact.
 
-    What is worn is eta s0 (exp(gathered) - 1), free of cancellation however little it is, and eta (s - s0) where that
-    is much: what long steps gather late is not as well known as the slip. Over the root of r^2 - c^2 it is smooth next
-    to c, before and after the image has jumped there.
+    The worn depth is eta s0 (exp(accumulated) - 1), which is free of cancellation, or eta (s - s0) where it is large,
+    because late long steps accumulate a larger error than the slip has. Over the root of r^2 - c^2 it is smooth next to
+    c, before and after the image has jumped there.
     """
     profile, panels, c, eta = problem.profile, problem.panels, problem.inner_radius, problem.eta
     unknowns = dense.unknowns(time) if time > 0.0 else problem.start().unknowns
     width, (y, factor), root = problem.width(unknowns), problem.image(unknowns), np.sqrt(panels.nodes)
     a = float(np.sqrt(c * c + width))
-    virgin, gathered = np.exp(problem.virgin_slip(width * panels.nodes)), dense.gathered(time)
-    little = virgin * np.expm1(np.minimum(gathered, 1.0))
-    rooted = eta * np.where(gathered < 1.0, little, problem.slip(unknowns) - virgin) / root
+    virgin, accumulated = np.exp(problem.virgin_slip(width * panels.nodes)), dense.accumulated(time)
+    little = virgin * np.expm1(np.minimum(accumulated, 1.0))
+    rooted = eta * np.where(accumulated < 1.0, little, problem.slip(unknowns) - virgin) / root
     slope = panels.slope @ y
 
     def place(x: FloatArray) -> FloatArray:
@@ -291,8 +291,9 @@ def _slid_contacts(problem: GrossSlip, wanted: Sequence[float], step: float, fir
 def _slid_contact(problem: GrossSlip, dense: Dense, path: float, energy: float) -> Worn:
     """Turn the nodal values after one path into a worn contact; its image is not known beyond the contact."""
     profile, panels = problem.profile, problem.panels
-    unknowns, gathered = (dense.unknowns(path), dense.gathered(path)) if path > 0.0 else (problem.start().unknowns, 0.0)
-    worn = np.zeros(panels.nodes.size) + gathered
+    unknowns, worn = problem.start().unknowns, np.zeros(panels.nodes.size)
+    if path > 0.0:
+        unknowns, worn = dense.unknowns(path), dense.accumulated(path)
     (image, depth), width, radii = problem.image(unknowns), problem.width(unknowns), problem.radii(unknowns)
 
     def inside(values: FloatArray, beyond: float) -> Callable[[FloatArray], FloatArray]:

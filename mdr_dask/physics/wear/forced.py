@@ -1,4 +1,4 @@
-"""The exact evolution under constant force: while the border moves, while it stands, and the end.
+"""The exact evolution under constant force: while the border moves, after it has stopped, and the end.
 
 See `mdr_dask.physics.wear.forced_slip` for the equations; the force kept is that of the virgin contact.
 """
@@ -26,15 +26,15 @@ class Settings(NamedTuple):
     Parameters
     ----------
     jump : float
-        The border stands when y rises so far in the panel next to it, or a tenth of it and the border would return.
+        The border stops when y rises by this much in the panel next to it, or by a tenth of it if it would return.
     nearest : float
         Stick radius below which the panels become no finer: the border soon leaves it.
     finer : int
         How many more halvings the border needs than at constant depth.
     latest_jump : float
         N by which the image jumps at the border, with much to spare.
-    torn : float
-        The image is torn where y falls below minus this: the border stands from the moment before.
+    lowest : float
+        A step with y below minus this is rejected, and the border stops at the moment before.
     coarsest : float
         Accuracy beyond which steps do not follow the border: more of them fail, so that less accuracy takes longer.
     rougher : tuple of float
@@ -52,7 +52,7 @@ class Settings(NamedTuple):
     nearest: float = 0.1
     finer: int = 5
     latest_jump: float = 1e3
-    torn: float = 1e-2
+    lowest: float = 1e-2
     coarsest: float = 3e-4
     rougher: tuple[float, float] = (4.0, 8.0)
     thinned: int = 1
@@ -72,18 +72,18 @@ def forced_contacts(
     moving, first = _until_jump(profile, stick_radius, resolution, until)
     if tabulated:
         _end(moving, first[-1])  # the table must hold it, however few cycles are wanted
-    standing, start = moving.stand(first[-1])
-    second = march(standing, max(wanted), resolution.step, _first(moving, resolution), start)
+    stopped, start = moving.stop(first[-1])
+    second = march(stopped, max(wanted), resolution.step, _first(moving, resolution), start)
     early, late = Dense(first), Dense(second)
     energy = integral_along(first, [moving.wear_rate(moment.unknowns) for moment in first])
-    more = energy[-1] + integral_along(second, [standing.wear_rate(moment.unknowns) for moment in second])
+    more = energy[-1] + integral_along(second, [stopped.wear_rate(moment.unknowns) for moment in second])
     contacts = {}
     for time in wanted:
         if time <= first[-1].time:
             contacts[time] = _contact(moving, early, time, early.number(time, energy), early.steps(time))
         else:
             steps = len(first) + late.steps(time)
-            contacts[time] = _contact(standing, late, time, late.number(time, more), steps)
+            contacts[time] = _contact(stopped, late, time, late.number(time, more), steps)
     return contacts
 
 
@@ -98,14 +98,14 @@ def forced_end(profile: Profile, stick_radius: float, resolution: Resolution) ->
 
 
 def forced_resolution(accuracy: float) -> Resolution:
-    """Return the resolution for an accuracy under constant force: the border asks for more than the edge."""
+    """Return the resolution for an accuracy under constant force: the border needs more panels than the edge."""
     finest = min(accuracy, SETTINGS.coarsest)
     order = 4 if finest > 2e-4 else 5 if finest > 3e-5 else 6
     return Resolution(finest, thinned=SETTINGS.thinned, order=order, rough=SETTINGS.rougher, slowness=SETTINGS.slowness)
 
 
 def border_moves(stick_radius: float, accuracy: float) -> bool:
-    """Tell whether constant force is not constant depth to an accuracy: next to full stick the border hardly moves.
+    """Return whether constant force differs from constant depth: next to full stick the border hardly moves.
 
     The depth grows by up to (1 - c) eta / 2, the square of the border by the same share of 1 - c^2, and f next to it by
     the root of that share.
@@ -146,17 +146,17 @@ def _until_jump(
     moving, start = problem.move(settled(problem))
     last, size = panels.mesh.order - 1, panels.nodes.size
 
-    def is_torn(moment: Pressed) -> bool:
-        return bool(np.min(moment.unknowns[: size - 1]) < -SETTINGS.torn)
+    def is_rejected(moment: Pressed) -> bool:
+        return bool(np.min(moment.unknowns[: size - 1]) < -SETTINGS.lowest)
 
     def stops(moment: Pressed) -> bool:
         returns = moment.border < np.max(moment.path[0]) - 5e-2 * resolution.step
         jumps = moment.unknowns[last] > (0.1 * SETTINGS.jump if returns else SETTINGS.jump)
         beyond = problem.radius(moment.border + moment.unknowns[size - 1]) > profile.largest_radius
-        return bool(jumps or beyond or is_torn(moment))
+        return bool(jumps or beyond or is_rejected(moment))
 
     moments = march(moving, end, resolution.step, _first(problem, resolution), start, stops)
-    return moving, moments[:-1] if is_torn(moments[-1]) else moments
+    return moving, moments[:-1] if is_rejected(moments[-1]) else moments
 
 
 class _Frozen(NamedTuple):
@@ -180,7 +180,7 @@ def _frozen(problem: ForcedSlip, path: FloatArray) -> _Frozen:
 
 
 def _end(problem: ForcedSlip, moment: Pressed) -> Worn:
-    """Return what a contact ends in whose border stands from a moment on."""
+    """Return the end of a contact whose border no longer moves after a moment."""
     profile, c, eta = problem.profile, problem.virgin.inner_radius, problem.eta
     border, frozen = problem.radius(moment.border), _frozen(problem, moment.path)
     # the load of the virgin slip zone is carried by what sticks: b d = ... - int_c^b (d' - eta) db'
@@ -219,7 +219,7 @@ def _contact(problem: ForcedSlip, dense: Dense, time: float, energy: float, step
     y, (place, width, deeper) = problem.image(unknowns), problem.place(unknowns)
     before, after = dense.around(time)
     path = onward(before.path, problem.place(unknowns))
-    moment = replace(before, time=time, unknowns=unknowns, gathered=dense.gathered(time), path=path)
+    moment = replace(before, time=time, unknowns=unknowns, accumulated=dense.accumulated(time), path=path)
     frozen, slope = _frozen(problem, path), panels.slope @ y
     border, a, depth = problem.radius(max(place, 0.0)), problem.radius(place + width), 1.0 + eta * deeper
     square = problem.virgin.virgin_width
@@ -259,7 +259,7 @@ def _contact(problem: ForcedSlip, dense: Dense, time: float, energy: float, step
         stick_border=border,
         depth=depth,
         normal_force=2.0 * (virgin_load(profile, c) + eta * load),
-        wear_volume=float(np.pi * square * (annulus + width * eta * panels.weights @ moment.gathered)),
+        wear_volume=float(np.pi * square * (annulus + width * eta * panels.weights @ moment.accumulated)),
         worn_depth=float(np.max(height(fine) - profile.height(fine))),
         height=height,
         image=worn_image(profile, scar),

@@ -1,12 +1,12 @@
 """Partial slip under constant force as the equations of one step for `evolution.march`.
 
-The depth d grows, and the stick border b moves outwards until the image jumps there; then it stands. The image of what
-sticks is frozen: g(b) = d - eta at the time when the border passed. The slip is s = (f - f_star) / eta, and f_star, the
-plateau behind the border, only changes as df_star = (2/pi) arccos(b / r) dd, so that the path (b, d) is all there is to
-remember of the annulus between the first border c and the present one.
+The depth d grows, and the stick border b moves outwards until the image jumps there; then it no longer moves. Inside
+the border the image is frozen: g(b) = d - eta at the time when the border passed. The slip is s = (f - f_star) / eta.
+The plateau f_star behind the border changes as df_star = (2/pi) arccos(b / r) dd only, so that only the path (b, d)
+has to be kept of the annulus between the first border c and the present one.
 
-Every radius gathers its worn depth over eta. Squared radii are counted from c^2 in units of the virgin 1 - c^2, and the
-depth from 1 in units of eta: all unknowns are of the order of one, next to full stick too.
+Every radius accumulates its worn depth over eta. Squared radii are counted from c^2 in units of the virgin 1 - c^2, and
+the depth from 1 in units of eta: all unknowns are of the order of one, next to full stick too.
 """
 
 from __future__ import annotations
@@ -15,28 +15,74 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.mdr.half_integrals import Mesh, Panels, interpolate
+from mdr_dask.physics.jit import jit, jit_inline
+from mdr_dask.physics.mdr.half_integrals import Mesh, Panels, interpolate, value_at
 from mdr_dask.physics.mdr.revolution import Profile
+from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear.evolution import Moment, settled
-from mdr_dask.physics.wear.remembered import (
-    Past,
-    Place,
-    VirginBody,
-    frozen_depth,
-    plateau_rise,
-    remember,
-    sticking_load,
-)
-from mdr_dask.physics.wear.slip import PartialSlip, partial_slip
+from mdr_dask.physics.wear.slip import LogTable, PartialSlip, log_slip, partial_slip
 
 #: How much more closely steps follow the border than the depth: f rises beyond it as a root.
 BORDER_WEIGHT = 30.0
 #: How far beyond the edge, over the width, the rise of the plateau is kept.
 BEYOND = 1.25
+
+
+#: Floor of (r^2 - c^2) / (1 - c^2).
+SMALLEST = 1e-30
+#: Half the spread of the roots along a piece, over their mean, below which its middle represents it.
+SHORT = 0.02
+_ABSCISSA, _WEIGHT = gauss(3)
+
+
+class VirginBody(NamedTuple):
+    """The virgin body: its slip, c^2 and 1 - c^2."""
+
+    slip: LogTable
+    square: float
+    width: float
+
+
+class Place(NamedTuple):
+    """Border b and width of the slip zone in squared radii, and depth over eta, from 1."""
+
+    border: float
+    width: float
+    depth: float
+
+
+class Past(NamedTuple):
+    """What past moments had worn, in the shares of one step.
+
+    Parameters
+    ----------
+    shares, borders, widths : array, shape (m,)
+        One for each moment.
+    worn : array, shape (m, n)
+        The worn depth over eta at the nodes; less `frozen` and over the root of z if the border no longer moves.
+    frozen : float
+        The worn depth at the border if it no longer moves, else NaN.
+    moved : array, shape (n + order,)
+        `plateau_rise` along the path at the places of the last moment, and beyond.
+    path : array, shape (2, k)
+        Border and depth up to where the border moved last.
+    carried : float
+        See `Pressed`.
+    """
+
+    shares: FloatArray
+    borders: FloatArray
+    widths: FloatArray
+    worn: FloatArray
+    frozen: float
+    moved: FloatArray
+    path: FloatArray
+    carried: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +114,7 @@ class ForcedSlip:
     """Slip outside the stick border under constant force.
 
     Unknowns: y = 1 - (d - g) / eta at the nodes but the last, the width of the panels, the depth, and the border unless
-    `border` says where it stands; `stood` is then the number of the pair of the path that it stands from, and
+    `border` is given, because it no longer moves; `since` is then the number of the pair of the path since which, and
     `frozen` the worn depth at it; `newton` is the error of a step's equations over that of the step. Loads are half
     forces over eta; `virgin_load` is that of the virgin slip zone.
     """
@@ -76,7 +122,7 @@ class ForcedSlip:
     virgin: PartialSlip
     virgin_load: float
     border: float | None = None
-    stood: int = 0
+    since: int = 0
     frozen: float = np.nan
     newton: float = 1e-5
 
@@ -117,12 +163,12 @@ class ForcedSlip:
         return y
 
     def place(self, unknowns: FloatArray) -> Place:
-        """Return where the contact stands."""
+        """Return border, width and depth of the contact."""
         border = float(unknowns[-1]) if self.border is None else self.border
         return Place(border, float(unknowns[self.size - 1]), float(unknowns[self.size]))
 
     def holds(self, unknowns: FloatArray) -> bool:
-        """Tell whether unknowns describe a contact."""
+        """Return whether unknowns describe a contact."""
         place = self.place(unknowns)
         return place.width > 0.0 and self.body.width * place.border > -0.5 * self.body.square
 
@@ -133,7 +179,7 @@ class ForcedSlip:
     def start(self) -> Pressed:
         """Return the virgin contact."""
         first, nodes = self.virgin.start(), self.mesh.nodes.size
-        return Pressed(0.0, np.append(first.unknowns, 0.0), first.gathered, np.zeros((2, 1)), np.zeros(nodes), 0.0)
+        return Pressed(0.0, np.append(first.unknowns, 0.0), first.accumulated, np.zeros((2, 1)), np.zeros(nodes), 0.0)
 
     def move(self, moment: Pressed) -> tuple[ForcedSlip, Pressed]:
         """Return the problem, and its first moment, in which the border moves."""
@@ -141,30 +187,30 @@ class ForcedSlip:
             moment, unknowns=np.append(moment.unknowns, moment.border)
         )
 
-    def stand(self, moment: Pressed) -> tuple[ForcedSlip, Pressed]:
+    def stop(self, moment: Pressed) -> tuple[ForcedSlip, Pressed]:
         """Return the problem, and its first moment, in which the border stays where it is."""
         frozen = float(self.frozen_depth(moment.path, np.array([moment.border]))[0])
-        still = replace(self, border=moment.border, stood=moment.path.shape[1] - 1, frozen=frozen)
+        still = replace(self, border=moment.border, since=moment.path.shape[1] - 1, frozen=frozen)
         return still, replace(moment, unknowns=moment.unknowns[:-1])
 
     def memory(self, past: Sequence[Pressed], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
         """Return, as a function of the unknowns, what is known of s, of the worn depth, and of the load that sticks."""
         places = [self.place(moment.unknowns) for moment in past]
-        worn = np.array([moment.gathered for moment in past])
-        remembered = Past(
+        worn = np.array([moment.accumulated for moment in past])
+        earlier = Past(
             shares,
             np.array([place.border for place in places]),
             np.array([place.width for place in places]),
             worn if self.border is None else (worn - self.frozen) / np.sqrt(self.panels.nodes),
             self.frozen,
             past[0].moved,
-            np.ascontiguousarray(past[0].path[:, : self._turn(past[0].path) + 1]),
+            np.ascontiguousarray(past[0].path[:, : self._last_move(past[0].path) + 1]),
             past[0].carried,
         )
 
         def known(unknowns: FloatArray) -> FloatArray:
             result = np.empty(2 * self.size + 1)
-            remember(self.mesh, self.body, remembered, self.place(unknowns), result)
+            fill_known(self.mesh, self.body, earlier, self.place(unknowns), result)
             return result
 
         return known
@@ -181,17 +227,17 @@ class ForcedSlip:
         frozen_depth(self.body, np.stack(rising(path)), place, result)
         return result
 
-    def _turn(self, path: FloatArray) -> int:
+    def _last_move(self, path: FloatArray) -> int:
         """Return the number of the last pair of the path on which the border moved."""
-        return path.shape[1] - 1 if self.border is None else self.stood
+        return path.shape[1] - 1 if self.border is None else self.since
 
     def worn_depth(self, moment: Pressed, q: FloatArray) -> FloatArray:
         """Return the worn depth of a moment over eta, between its border and its edge, 0 beyond."""
         place = self.place(moment.unknowns)
         z = (q - place.border) / place.width
         if self.border is None:
-            return interpolate(self.panels.mesh, moment.gathered, z)
-        rooted = (moment.gathered - self.frozen) / np.sqrt(self.panels.nodes)
+            return interpolate(self.panels.mesh, moment.accumulated, z)
+        rooted = (moment.accumulated - self.frozen) / np.sqrt(self.panels.nodes)
         inside = np.maximum(z, 0.0)
         return np.where(z < 1.0, self.frozen + np.sqrt(inside) * interpolate(self.panels.mesh, rooted, inside), 0.0)
 
@@ -270,7 +316,7 @@ class ForcedSlip:
         size, place, before = self.size, self.place(unknowns), past[0]
         worn = known[size : 2 * size] + theta * self.rate(unknowns) * self.slip(unknowns)
         path = onward(before.path, place)
-        moved = self.plateau_rise(path[:, : self._turn(path) + 1], place.border + place.width * self.mesh.nodes)
+        moved = self.plateau_rise(path[:, : self._last_move(path) + 1], place.border + place.width * self.mesh.nodes)
         further = self.radius(place.border) - self.radius(before.border)
         carried = before.carried + further * (1.0 - 0.5 * (before.path[1, -1] + place.depth))
         return Pressed(time, unknowns, worn, path, moved, carried)
@@ -302,3 +348,91 @@ def rising(path: FloatArray) -> tuple[FloatArray, FloatArray]:
 def onward(path: FloatArray, place: Place) -> FloatArray:
     """Return a path with one more pair."""
     return np.append(path, [[place.border], [place.depth]], axis=1)
+
+
+@jit
+def fill_known(mesh: Mesh, body: VirginBody, past: Past, place: Place, result: FloatArray) -> None:
+    """Put what is known of s and of the worn depth at the nodes, and the load that sticks."""
+    nodes, path, stopped = result.size // 2, past.path, past.frozen == past.frozen
+    last = path.shape[1] - 1
+    for i in range(nodes):
+        q = place.border + place.width * mesh.nodes[i]
+        worn = 0.0
+        for k in range(past.shares.size if i < nodes - 1 else 0):  # nothing is worn at the edge
+            z = (q - past.borders[k]) / past.widths[k]
+            if z < 1.0:
+                value = value_at(mesh, past.worn[k], z)
+                worn += past.shares[k] * (past.frozen + math.sqrt(z) * value if stopped else value)
+        z = (q - past.borders[0]) / past.widths[0]
+        rise = value_at(mesh, past.moved, z) if z < mesh.edges[-1] else _rise(body, path, last, q)
+        square = body.square + body.width * q
+        angle = _mean_angle(square, body.width, _root(q, path[0, last]), _root(q, place.border))
+        rise += 2.0 / math.pi * angle * (place.depth - path[1, last])
+        result[i] = math.exp(log_slip(body.slip, body.width * max(q, SMALLEST))) - rise + worn
+        result[nodes + i] = worn
+    result[2 * nodes] = sticking_load(body, path[0, last], path[1, last], past.carried, place)
+
+
+@jit_inline
+def sticking_load(body: VirginBody, border: float, depth: float, carried: float, place: Place) -> float:
+    """Return int_0^b (d - g) dx - int_0^c (1 - g) dx over eta, on what sticks."""
+    radius = math.sqrt(body.square + body.width * border)
+    further = body.width * (place.border - border) / (radius + math.sqrt(body.square + body.width * place.border))
+    return radius * place.depth + carried + further * (0.5 * (place.depth - depth) + 1.0)
+
+
+@jit
+def plateau_rise(body: VirginBody, path: FloatArray, place: FloatArray, result: FloatArray) -> None:
+    """Put (2/pi) int arccos(b / r) dd along a path of straight pieces, at places beyond it."""
+    for i in range(place.size):
+        result[i] = _rise(body, path, path.shape[1] - 1, place[i])
+
+
+@jit
+def frozen_depth(body: VirginBody, path: FloatArray, place: FloatArray, result: FloatArray) -> None:
+    """Put the worn depth over eta that the border left at places it passed, on a path on which it never returned."""
+    for i in range(place.size):
+        q = place[i]
+        if q <= 0.0:
+            result[i] = 0.0
+            continue
+        before = np.searchsorted(path[0], q) - 1
+        rise = _rise(body, path, before, q)
+        if before + 1 < path.shape[1]:
+            share = (q - path[0, before]) / (path[0, before + 1] - path[0, before])
+            angle = _mean_angle(body.square + body.width * q, body.width, _root(q, path[0, before]), 0.0)
+            rise += 2.0 / math.pi * angle * share * (path[1, before + 1] - path[1, before])
+        result[i] = rise - math.exp(log_slip(body.slip, body.width * max(q, SMALLEST)))
+
+
+@jit
+def _rise(body: VirginBody, path: FloatArray, last: int, q: float) -> float:
+    """Return the rise of the plateau along the first pieces of a path."""
+    square, total = body.square + body.width * q, 0.0
+    first = _root(q, path[0, 0])
+    for k in range(1, last + 1):
+        end = _root(q, path[0, k])
+        total += _mean_angle(square, body.width, first, end) * (path[1, k] - path[1, k - 1])
+        first = end
+    return 2.0 / math.pi * total
+
+
+@jit_inline
+def _root(q: float, border: float) -> float:
+    return math.sqrt(max(q - border, 0.0))
+
+
+@jit_inline
+def _mean_angle(square: float, width: float, first: float, last: float) -> float:
+    """Return the mean of arccos(b / r) along a straight piece, in the root of r^2 - b^2, in which it is smooth."""
+    scale = math.sqrt(width / square)
+    whole = first + last
+    spread = (first - last) / whole if whole > 0.0 else 0.0
+    if abs(spread) < SHORT:
+        return math.asin(min(0.5 * scale * whole, 1.0)) * (1.0 + spread * spread / 3.0)
+    mean, weights = 0.0, 0.0
+    for node in range(_ABSCISSA.size):
+        root = first + (last - first) * _ABSCISSA[node]
+        mean += _WEIGHT[node] * root * math.asin(min(scale * root, 1.0))
+        weights += _WEIGHT[node] * root
+    return mean / weights

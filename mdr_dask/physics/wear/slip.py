@@ -24,14 +24,14 @@ from mdr_dask.physics.wear.evolution import Moment
 
 
 class FixedBorder(ABC):
-    """What problems with a fixed inner border share: the memory of a radius is a value of a function on the panels."""
+    """Base of the problems with a fixed inner border, in which accumulated values are functions on the panels."""
 
     panels: Panels
     inner_radius: float
     newton = 1e-2
 
     def holds(self, unknowns: FloatArray) -> bool:
-        """Tell whether unknowns describe a contact."""
+        """Return whether unknowns describe a contact."""
         return bool(unknowns[self.panels.nodes.size - 1] > 0.0)
 
     @property
@@ -49,12 +49,12 @@ class FixedBorder(ABC):
 
     @abstractmethod
     def rate(self, unknowns: FloatArray) -> FloatArray:
-        """Return the rate at which the radii gather."""
+        """Return the rate at which the radii accumulate."""
 
     def memory(self, past: Sequence[Moment], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """Return, as a function of the unknowns, what past moments in these shares had gathered at the nodes."""
+        """Return, as a function of the unknowns, what past moments in these shares had accumulated at the nodes."""
         last = self.panels.nodes.size - 1
-        memories = np.array([moment.gathered for moment in past])
+        memories = np.array([moment.accumulated for moment in past])
         widths = np.array([moment.unknowns[last] for moment in past])
 
         def known(unknowns: FloatArray) -> FloatArray:
@@ -66,9 +66,9 @@ class FixedBorder(ABC):
         self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Moment]
     ) -> Moment:
         """Return the moment that a solved step ends in, from what was known and what the step added."""
-        gathered = known + theta * self.rate(unknowns)
-        gathered[-1] = 0.0
-        return Moment(time, unknowns, gathered)
+        accumulated = known + theta * self.rate(unknowns)
+        accumulated[-1] = 0.0
+        return Moment(time, unknowns, accumulated)
 
 
 class LogTable(NamedTuple):
@@ -126,7 +126,7 @@ def _slip_rows(table: LogTable, step: _Step, stress: FloatArray, slip: FloatArra
 class PartialSlip(FixedBorder):
     """Slip outside the stick radius c at constant depth; unknowns y = (g - g_c) / eta at the nodes, and the edge.
 
-    The slip is s = (f - f_star) / eta, f_star the profile of the plateau g = g_c beyond c. A radius gathers
+    The slip is s = (f - f_star) / eta, f_star the profile of the plateau g = g_c beyond c. A radius accumulates
     ln(s / s0) = int p dN / eta, s0 the slip of the virgin body.
     """
 
@@ -160,7 +160,7 @@ class PartialSlip(FixedBorder):
         return np.asarray(self.panels.outer @ y / np.sqrt(self.width(unknowns)))
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return ln s - ln s0 - known - theta p / eta; the last row says that s is continuous at the edge."""
+        """Return ln s - ln s0 - known - theta p / eta; the last row is the continuity of s at the edge."""
         y, factor = self.image(unknowns)
         slip, stress, width = self.panels.inner @ (y * factor), self.panels.outer @ y, self.width(unknowns)
         _slip_rows(self.virgin_slip, _Step(theta / np.sqrt(width), width * self.panels.nodes, known), stress, slip)
@@ -205,7 +205,7 @@ def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: f
 class GrossSlip(FixedBorder):
     """Slip everywhere; unknowns g at the nodes but the last, the edge, and the depth d if the force is given.
 
-    A radius gathers its worn depth, int p ds.
+    A radius accumulates its worn depth, int p ds.
     """
 
     profile: Profile
@@ -244,9 +244,9 @@ class GrossSlip(FixedBorder):
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
         """Return f - f0 - known - theta p; then continuity at the edge, and the force."""
-        gathered = known + theta * self.rate(unknowns)
-        gathered[-1] = 0.0
-        rows = self.worn(unknowns) - self.profile.height(self.radii(unknowns)) - gathered
+        accumulated = known + theta * self.rate(unknowns)
+        accumulated[-1] = 0.0
+        rows = self.worn(unknowns) - self.profile.height(self.radii(unknowns)) - accumulated
         return rows if self.force is None else np.append(rows, self.normal_force(unknowns) - self.force)
 
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:

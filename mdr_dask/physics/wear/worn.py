@@ -1,4 +1,4 @@
-"""A worn contact: what every rule and every evolution gives back, its error, and the transforms that make its shape.
+"""A worn contact, the result of every rule and every evolution: its error, and the transforms that give its shape.
 
 Units: lengths a0, heights d0, pressure E* d0 / a0, volume a0^2 d0, cycles N0 = a0 sigma0 / (4 U0 k E*), with a0 and d0
 of the virgin contact. Wear raises f, which is measured upwards from the virgin apex.
@@ -39,11 +39,11 @@ class Settings(NamedTuple):
     safety : float
         Error over the distance from rougher solutions.
     step : float
-        Error of the contact radius over the way that it moves in a step, at least.
+        Least error of the contact radius over its change in a step.
     shape : float
         Share of the profile's largest error that force and worn depth have at constant depth, at least.
     volumes : float
-        Share of the distances of shape and energy that counts for volumes, beside that between the two.
+        Share of the distances of shape and energy that is added to their difference, for volumes.
     reach : int
         Places to both sides, of those that crowd at borders, over which a distance spreads.
     floor : float
@@ -82,7 +82,7 @@ class Worn:
     steps : int
         Time steps taken.
     rougher : tuple of Worn
-        Two rougher solutions of the same contact, which tell its error.
+        Two rougher solutions of the same contact, from which its error is estimated.
     slowness : float
         How much more slowly than usual the error falls from the rougher solutions to this one.
     second : float

@@ -79,11 +79,11 @@ def test_every_step_conserves_energy_while_the_border_moves():
     whole = np.pi * problem.virgin.virgin_width * problem.eta
     for moment in moments:
         border, width, _ = moving.place(moment.unknowns)
-        slipping = width * (moving.panels.weights @ moment.gathered)
+        slipping = width * (moving.panels.weights @ moment.accumulated)
         stuck = max(border, 0.0) * float(weight @ moving.frozen_depth(moment.path, max(border, 0.0) * abscissa))
         volumes.append(whole * (slipping + stuck))
     np.testing.assert_allclose(np.diff(volumes), np.diff(energy), atol=5e-6)  # of steps of 2e-5
-    np.testing.assert_allclose(volumes, energy, atol=1e-5)  # gathered over them
+    np.testing.assert_allclose(volumes, energy, atol=1e-5)  # accumulated over them
 
 
 def test_the_rise_of_the_plateau_is_the_integral_along_the_path():

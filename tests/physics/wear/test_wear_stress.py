@@ -50,7 +50,7 @@ def test_exact_evolution(exponent, c, cycles):
     profile = PowerProfile(exponent)
     worn = exact(profile, c, [cycles], accuracy=1e-3)[0]
     limit = wear.limit(profile, c)
-    # steps of 1e-3 eta, gathered; the energy knows the width of the ring that slips to 1e-6 of the contact
+    # steps of 1e-3 eta, accumulated; the energy knows the width of the ring that slips to 1e-6 of the contact
     share = (0.03 + 1e-6 / (1 - c)) * worn.energy_volume + 3e-3 * limit.wear_volume
     assert abs(worn.wear_volume - worn.energy_volume) <= share
     assert 1.0 - 1e-4 <= worn.contact_radius <= limit.contact_radius * (1.0 + 2e-3)  # to a tenth of what was asked
