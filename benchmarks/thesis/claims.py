@@ -434,7 +434,12 @@ LUBRICATION = (
         measures.stribeck,
         "At 800 N friction comes within 5 % of boundary friction below 1e-4 rpm only.",
     ),
-    Claim("(5.1)", "Resistance of the contact", run("rolling2013_trace"), "yes: an output, for the whole width"),
+    Claim(
+        "(5.1)",
+        "Resistance of the contact",
+        run("rolling2013_trace"),
+        "yes: an output, for all squares side by side on the width",
+    ),
     Claim(
         "5.3",
         "A resistance below 100 ohm means contact",
@@ -466,8 +471,8 @@ LUBRICATION = (
         "Contact switches on and off often at 800 N, 100 rpm, 40 degC",
         run("rolling2013"),
         measures.switching,
-        "One line stands for the whole width in the thesis; a width of 10 mm holds 24 lines. Rougher rollers or a "
-        "thinner film would give more.",
+        "One line stands for the whole width in the thesis. By the load sharing a line stands for a square of its length, "
+        "and a width of 10 mm holds 24 of them (`rig_probability`). Rougher rollers or a thinner film would give more.",
     ),
     Claim(
         "fig. 5.9a",
@@ -528,9 +533,10 @@ WEAR = (
         "(6.11), xi = 0.8",
         "0.8 is the best factor of the fast rule",
         "",
-        "yes: if the radius a in (6.11) is the current contact radius, 0.8 is within 1 % of the least rms error of the "
-        "profile (0.85 parabola, 0.80 cone; an independent study)",
-        "The printed a has no argument. With a(c) of the limiting shape, as here, the best factor is 0.95 to 1.",
+        "yes: with the current contact radius for the a of (6.11), 0.8 is within 1 % of the least rms error of the "
+        "profile (best 0.85 for the parabola, 0.80 for the cone; two independent studies)",
+        "The printed a has no argument. With a(c) of the limiting shape, as in the code, the best factor is 0.95 for the "
+        "parabola and 1 for the cone.",
     ),
     Claim(
         "(6.11)-(6.15)",
