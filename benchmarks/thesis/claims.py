@@ -471,8 +471,9 @@ LUBRICATION = (
         "Contact switches on and off often at 800 N, 100 rpm, 40 degC",
         run("rolling2013"),
         measures.switching,
-        "One line stands for the whole width in the thesis. By the load sharing a line stands for a square of its length, "
-        "and a width of 10 mm holds 24 of them (`rig_probability`). Rougher rollers or a thinner film would give more.",
+        "One line stands for the whole width in the thesis. By the load sharing a line stands for a square of its "
+        "length, and a width of 10 mm holds 24 of them (`rig_probability`). Rougher rollers or a thinner film "
+        "would give more.",
     ),
     Claim(
         "fig. 5.9a",
@@ -535,8 +536,8 @@ WEAR = (
         "",
         "yes: with the current contact radius for the a of (6.11), 0.8 is within 1 % of the least rms error of the "
         "profile (best 0.85 for the parabola, 0.80 for the cone; two independent studies)",
-        "The printed a has no argument. With a(c) of the limiting shape, as in the code, the best factor is 0.95 for the "
-        "parabola and 1 for the cone.",
+        "The printed a has no argument. With a(c) of the limiting shape, as in the code, the best factor is 0.95 for "
+        "the parabola and 1 for the cone.",
     ),
     Claim(
         "(6.11)-(6.15)",

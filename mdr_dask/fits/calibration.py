@@ -276,8 +276,9 @@ def summary(found: Calibration) -> xr.Dataset:
     elif found.measured.errors is None:
         about = {"units": found.units[output], "long_name": "estimated from the residuals"}
         variables["measurement_error"] = ((), float(errors[0]), about)
+    if np.isfinite(found.residuals.chi_squared):
+        variables["chi_squared"] = ((), found.residuals.chi_squared, pure)
     variables |= {
-        "chi_squared": ((), found.residuals.chi_squared, pure),
         "degrees_of_freedom": ((), found.residuals.freedom, pure),
         "rms_residual": ((), found.residuals.relative, {**pure, "long_name": "rms residual over rms measured"}),
         "determined": ((), sentence(found), {**pure, "long_name": "what the data determine"}),

@@ -13,10 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from mdr_dask.aggregation import aggregate
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.fits.interpolation import FEWEST, Scale, bent, cubic, dense, linear, missed
+from mdr_dask.fits.interpolation import FEWEST, LEFT, Scale, bent, cubic, dense, linear, missed
 from mdr_dask.models.base import Status
 from mdr_dask.questions.selection import written_apart
-from mdr_dask.refinement import departure
 
 #: Largest size of a table, and largest number of its intervals per interval of the study.
 LARGEST, PIECES = 2_000_000, 16
@@ -131,13 +130,10 @@ def _between(scale: Scale, places: FloatArray, line: FloatArray, error: FloatArr
     """Return a line with interpolated values between the known ones, and its errors."""
     known = np.isfinite(line)
     filled = cubic(places[known], line[known], places, 0, Scale.of(places))
-    places = Scale.of(places).of_values(places)
-    apart = departure(places[known], line[None, None, known], np.zeros((1, int(known.sum()))))[0]
-    space = np.clip(np.searchsorted(places[known], places) - 1, 0, apart.size - 1)
-    beside = np.where(known, 0.0, apart[space]) * (scale.back(filled) if scale.logarithmic else 1.0)
+    left_out = missed(scale, line[known], places[known], 0) / LEFT  # the spaces are as wide as with values left out
+    between = np.interp(places, places[known], error[known] + left_out)
     inside = (places >= places[known][0]) & (places <= places[known][-1])
-    around = np.interp(places, places[known], error[known]) + beside
-    return np.where(inside, filled, np.nan), np.where(known, error, around)
+    return np.where(inside, filled, np.nan), np.where(known, error, between)
 
 
 def _is_numeric(mean: xr.DataArray, dim: str) -> bool:

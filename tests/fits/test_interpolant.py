@@ -138,4 +138,4 @@ def test_cases_that_adaptive_axes_left_out_have_the_error_of_what_lies_between(s
     rows = table.sel(force=data.force[1], velocity=data.velocity[left_out[1, :, 0]])
     error = np.abs(rows.mu - study(shape).mu[1, left_out[1, :, 0], 0].to_numpy())
     assert np.all(error <= rows.mu_error)
-    assert np.all(rows.mu_error < np.maximum(50 * error, 0.05))
+    assert np.all(rows.mu_error < np.maximum(50 * error, 0.1))
