@@ -32,8 +32,6 @@ FEWEST = 3
 TESTED = 3
 #: Where predictions are compared in an interval, from its later end on.
 COMPARED = (0.0, 0.25, 0.5, 0.75)
-#: For `departure`: places within an interval where interpolations are compared, and the order at which they converge.
-INSIDE, ORDER = np.array([0.25, 0.5, 0.75]), 2.5
 
 
 @dataclass(frozen=True)
@@ -320,56 +318,3 @@ def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray
     widely = ndtri(1 - CHASED / (2 * groups.shape[1]))
     largest = (np.abs(missed[:, 0]) - widely * scatter).max(axis=(0, 2))
     return np.asarray(largest - error[:, last])
-
-
-def departure(places: FloatArray, groups: FloatArray, error: FloatArray) -> FloatArray:
-    """Return by how much interpolation may err in each space, less what scatter and grid explain.
-
-    Parameters
-    ----------
-    places : array, shape (values,)
-        Ascending.
-    groups : array, shape (1 + groups, lines, values)
-        As `Mean` has them.
-    error : array, shape (lines, values)
-        Discretisation errors.
-
-    Returns
-    -------
-    array, shape (lines, values - 1)
-        The largest of both ways to see it.
-    """
-    from scipy.special import ndtri
-
-    seen = np.concatenate([_beside_spline(places, groups), _left_out(places, groups)], axis=-2)
-    count = max(len(groups) - 1, 1)
-    around = seen[1:] - seen[0]
-    scatter = np.sqrt((count - 1) / count * (around**2).sum(axis=0))  # jackknife; none for one realisation
-    widely = ndtri(1 - CHASED / (2 * groups.shape[1]))
-    found: FloatArray = (np.abs(seen[0]) - widely * scatter).max(axis=-2)
-    return found - np.maximum(error[:, 1:], error[:, :-1])
-
-
-def _beside_spline(places: FloatArray, groups: FloatArray) -> FloatArray:
-    """Return how a monotone cubic differs from a cubic spline in each space, shape (..., places inside, spaces)."""
-    from scipy.interpolate import CubicSpline, PchipInterpolator
-
-    inside = (places[:-1] + INSIDE[:, None] * np.diff(places)).ravel()
-    spline = CubicSpline(places, groups, axis=-1, bc_type="natural")
-    apart = np.asarray(spline(inside) - PchipInterpolator(places, groups, axis=-1)(inside))
-    return apart.reshape(*groups.shape[:-1], INSIDE.size, -1)
-
-
-def _left_out(places: FloatArray, groups: FloatArray) -> FloatArray:
-    """Return how values are missed that are left out, scaled to the spaces on both sides, shape (..., 2, spaces)."""
-    from scipy.interpolate import PchipInterpolator
-
-    width = np.diff(places)
-    found = np.zeros((*groups.shape[:-1], 2, width.size))
-    for k in range(1, places.size - 1):
-        kept = np.delete(np.arange(places.size), k)
-        missed = PchipInterpolator(places[kept], groups[..., kept], axis=-1)(places[k]) - groups[..., k]
-        both = width[k - 1] + width[k]
-        found[..., 0, k - 1] = missed * (width[k - 1] / both) ** ORDER
-        found[..., 1, k] = missed * (width[k] / both) ** ORDER
-    return found
