@@ -22,7 +22,7 @@ from mdr_dask.cli.writing import require_suffix, writing
 def law(store: str, output: str, series: str | None, selections: tuple[str, ...], path: Path) -> None:
     """Write an output as a dense table over the axes of its study, with its error, for other programs.
 
-    The table is to be interpolated linearly: with xarray, with mdr_dask.Law, or by a program of your own.
+    Interpolate the table linearly: with xarray, with mdr_dask.Law, or in your own program.
 
     \b
     mdr-dask law results/quickstart.zarr friction_coefficient -o mu.nc

@@ -7,7 +7,7 @@ from importlib.metadata import entry_points
 
 from mdr_dask.fits.base import Fit
 
-#: Modules of this room that hold ``FITS``.
+#: Modules of this package with a tuple ``FITS``.
 SUBJECTS: tuple[str, ...] = (
     "calibration",
     "ehl",

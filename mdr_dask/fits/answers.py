@@ -41,7 +41,7 @@ def require_known(campaign: Campaign) -> None:
             has = ", ".join(known[name].constants_of(campaign)) or "none"
             wrong = f"expected a constant with an interval of the fit {name} ({has}), got {constant!r}"
         elif campaign.replication.until and is_adaptive:
-            wrong = "expected outputs alone or constants alone beside an adaptive axis, got both"
+            wrong = "with an adaptive axis expected either outputs or constants, got both"
         else:
             continue
         problems.append(f"{tolerance.place or campaign.source}: realisations.until.{answer}: {wrong}")

@@ -231,7 +231,7 @@ def law_holds(departures: FloatArray, chance: float | None, constants: int = 0, 
     if chance is None:
         return f"no: {departs}; {limits}"
     if np.isnan(chance):
-        return f"not tested: too few realisations to know the scatter; {departs}"
+        return f"not tested: too few realisations for the scatter; {departs}"
     likely = f"{chance:.2g}" if chance else f"below {1 / bootstrap.RESAMPLES:g}"
     return f"no: {departs}; scatter alone would cause this with probability {likely}"
 

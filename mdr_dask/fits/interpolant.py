@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from mdr_dask.aggregation import aggregate
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.fits.interpolation import FEWEST, LEFT, Scale, bent, cubic, dense, linear, missed
+from mdr_dask.fits.interpolation import FEWEST, LEFT, Scale, chord_error, cubic, dense, left_out_error, linear
 from mdr_dask.models.base import Status
 from mdr_dask.questions.selection import written_apart
 
@@ -63,13 +63,15 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     half = half.transpose(*mean.transpose(..., *axes).dims)
     grids = [dense(mean[axis].to_numpy(), _pieces(mean, axes)) for axis in axes]
     table, error = scale.of_values(values), half.to_numpy()
-    error = error + sum(missed(scale, table, mean[axis].to_numpy(), k - len(axes)) for k, axis in enumerate(axes))
+    error = error + sum(
+        left_out_error(scale, table, mean[axis].to_numpy(), k - len(axes)) for k, axis in enumerate(axes)
+    )
     for k, (axis, grid) in enumerate(zip(axes, grids, strict=True)):
         place = mean[axis].to_numpy()
         table = cubic(place, table, grid, k - len(axes))
         error = linear(place, error, grid, k - len(axes))
     table = scale.back(table)
-    error = error + sum(bent(table, grid, k - len(axes)) for k, grid in enumerate(grids))
+    error = error + sum(chord_error(table, grid, k - len(axes)) for k, grid in enumerate(grids))
     found = mean.transpose(..., *axes)
     coords: dict[str, Any] = {
         str(dim): found[dim] for dim in found.dims if str(dim) not in axes and dim in found.coords
@@ -130,7 +132,9 @@ def _between(scale: Scale, places: FloatArray, line: FloatArray, error: FloatArr
     """Return a line with interpolated values between the known ones, and its errors."""
     known = np.isfinite(line)
     filled = cubic(places[known], line[known], places, 0, Scale.of(places))
-    left_out = missed(scale, line[known], places[known], 0) / LEFT  # the spaces are as wide as with values left out
+    left_out = (
+        left_out_error(scale, line[known], places[known], 0) / LEFT
+    )  # the spaces are as wide as with values left out
     between = np.interp(places, places[known], error[known] + left_out)
     inside = (places >= places[known][0]) & (places <= places[known][-1])
     return np.where(inside, filled, np.nan), np.where(known, error, between)

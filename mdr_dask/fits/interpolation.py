@@ -70,7 +70,7 @@ def linear(
     return np.asarray(make_interp_spline(scale.of_values(places), values, k=1, axis=axis)(scale.of_values(wanted)))
 
 
-def missed(scale: Scale, table: FloatArray, places: FloatArray, axis: int) -> FloatArray:
+def left_out_error(scale: Scale, table: FloatArray, places: FloatArray, axis: int) -> FloatArray:
     """Return the error of interpolation along an axis at every place, from predictions of values that are left out."""
     values, truth = np.moveaxis(table, axis, -1), np.moveaxis(scale.back(table), axis, -1)
     most = np.zeros_like(truth)
@@ -83,7 +83,7 @@ def missed(scale: Scale, table: FloatArray, places: FloatArray, axis: int) -> Fl
     return np.moveaxis(LEFT * _largest(around), -1, axis)
 
 
-def bent(table: FloatArray, grid: FloatArray, axis: int) -> FloatArray:
+def chord_error(table: FloatArray, grid: FloatArray, axis: int) -> FloatArray:
     """Return the error of straight lines between the values of a table: second derivative times h^2 / 8."""
     values, steps = np.moveaxis(table, axis, -1), np.diff(grid)
     bend = np.abs(np.diff(np.diff(values) / steps)) / (steps[1:] + steps[:-1])

@@ -15,7 +15,7 @@ from mdr_dask import aggregation, bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.campaign.measured import Measured
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.fits.interpolation import FEWEST, Scale, cubic, dense, linear, missed
+from mdr_dask.fits.interpolation import FEWEST, Scale, cubic, dense, left_out_error, linear
 from mdr_dask.questions.selection import written_apart
 
 #: Largest number of unknowns, and largest size of the dense table that is interpolated linearly.
@@ -135,10 +135,10 @@ def _at_fixed(dataset: xr.Dataset, measured: Measured) -> xr.Dataset:
             off = (wanted < low - slack) | (wanted > high + slack)
         if off.any():
             worst = int(np.flatnonzero(off)[0])
-            told, *known = written_apart(str(held.attrs.get("units", "1")), wanted[worst], *ends)
+            measured_at, *known = written_apart(str(held.attrs.get("units", "1")), wanted[worst], *ends)
             place = f"{measured.source}:{measured.lines[worst]}"
             has = f"has it from {' to '.join(known)}" if held.ndim else f"holds it at {known[0]}"
-            raise DataError(f"{place}: {name} of {told}: this study {has}")
+            raise DataError(f"{place}: {name} of {measured_at}: this study {has}")
     return dataset
 
 
@@ -195,7 +195,7 @@ def _fields(
     between_values = np.zeros_like(mean)
     for k, axis in enumerate(order):
         if axis in unknowns or between[axis]:
-            between_values += missed(scale, table, _long_enough(dataset, axis), k)
+            between_values += left_out_error(scale, table, _long_enough(dataset, axis), k)
     alone, modes = _scatter(values - mean[..., None], number, mean)
     return np.concatenate(
         [np.stack([table, absent, alone, grid + between_values], axis=-1), modes], axis=-1

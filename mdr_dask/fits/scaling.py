@@ -259,8 +259,8 @@ def _collapse(data: xr.Dataset) -> Variables:
     start = -np.log(laws.crossover(loads, laws.alpha(one_value(data, "hurst")), laws.BETA))
     found = collapse(x, stack, curve, start, reference)
     if not bootstrap.chance(found.residuals, count) >= DOUBTFUL:
-        missed = np.concatenate([stack[:1], bootstrap.moved(stack[0], found.residuals[0])])
-        further = collapse(x, missed, curve, start, reference).shifts[1:]
+        moved = np.concatenate([stack[:1], bootstrap.moved(stack[0], found.residuals[0])])
+        further = collapse(x, moved, curve, start, reference).shifts[1:]
         found = found._replace(shifts=np.concatenate([found.shifts, further]))
 
     where = at_load(force[used])

@@ -206,8 +206,8 @@ def _advice(result: xr.Dataset) -> str:
     if widest <= NARROW:
         return f"enough points: every interval is narrower than +-{NARROW:g}"
     more = int(np.ceil(cases * ((widest / NARROW) ** 2 - 1)))
-    told, narrow = distinguishable(widest, NARROW, digits=2)
+    width, narrow = distinguishable(widest, NARROW, digits=2)
     return (
-        f"not enough points: the widest interval is +-{told}; about {float(f'{more:.2g}'):g} cases more would "
+        f"not enough points: the widest interval is +-{width}; about {float(f'{more:.2g}'):g} cases more would "
         f"make all of them +-{narrow}"
     )

@@ -249,7 +249,7 @@ def test_an_indenter_of_another_law_and_one_without_a_case_are_named(lines):
 def test_one_line_alone_has_no_interval_and_no_verdict_but_by_its_departure():
     data = planted(bent, ZONE, 1, (0.0, 0.0), studies=1)
     found = FIT["zone_one"].compute({"": data}).squeeze()
-    assert found["fitted_law_holds"].item().startswith("not tested: too few realisations to know the scatter")
+    assert found["fitted_law_holds"].item().startswith("not tested: too few realisations for the scatter")
     assert np.isfinite(found["alpha"])
     assert np.isnan(found["alpha_low"])
     found = FIT["zone_one"].compute({"": planted(zone, ZONE, 1, (0.0, 0.0), studies=1)}).squeeze()

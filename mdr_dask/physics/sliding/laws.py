@@ -1,7 +1,6 @@
-"""Closed-form laws of sliding friction (thesis chapter 3) and the dimensionless numbers that they are written in.
+"""Closed-form laws of sliding friction (thesis chapter 3) and their dimensionless numbers.
 
-All functions are arithmetic on whatever broadcasts: numbers, numpy arrays, labelled arrays. "Slope" is the spectral rms
-slope.
+Arguments may be numbers, numpy arrays or xarray arrays that broadcast. "Slope" is the spectral rms slope of the line.
 """
 
 from __future__ import annotations
