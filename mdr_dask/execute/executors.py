@@ -78,6 +78,8 @@ class Executor(AbstractContextManager["Executor"]):
         if first is None:
             return
         remaining = itertools.chain([first], remaining)
+        with store.while_locked(self._url, self._lock):
+            pass  # raises where nothing can be written
         if self._resources.remote:
             self._on_cluster(remaining, settle)
             return
