@@ -11,11 +11,10 @@ from pydantic import ValidationError
 from benchmarks.mixed import honesty
 from mdr_dask.models import load
 from mdr_dask.models.base import Block, Status
-from mdr_dask.models.mixed_lubrication import solve
 from mdr_dask.models.mixed_lubrication.declaration import STEEL
 from mdr_dask.models.mixed_lubrication.oil_data import OilData
 from mdr_dask.models.mixed_lubrication.operation import operation_of
-from mdr_dask.models.mixed_lubrication.revolution import Revolution, creeping, with_first_points
+from mdr_dask.models.mixed_lubrication.revolution import creeping, with_first_points
 from mdr_dask.physics.lubrication import breakthrough, oil
 from mdr_dask.physics.lubrication.line_contact import line_contact, solve_film
 from mdr_dask.units import to_si
@@ -163,6 +162,7 @@ def test_pure_rolling_has_no_friction_and_creep_has_the_film_s():
     assert np.isinf(values["contact_resistance"]).all()
 
 
+@pytest.mark.slow
 def test_creep_keeps_the_probability_of_the_rig():
     """800 N, 100 rpm, 80 C: both means of 4 turns have a standard error of about a point."""
     rig = MODEL.parameters(normal_force=800.0, rotation_speed=100 * RPM, temperature=353.15, rms_roughness=2e-7)
@@ -270,14 +270,6 @@ def test_where_lines_overlap_and_nothing_breaks_the_error_is_that_of_a_cluster(c
     assert found["breakthrough_probability"] == apart["breakthrough_probability"] == 0.0
     assert apart["breakthrough_probability_error"] == apart["contact_length_error"] == 0.0
     assert found["breakthrough_probability_error"] == pytest.approx(18 / 645**1.5 * 53 / 20_000, rel=0.1)
-
-
-@pytest.mark.parametrize("per_wave", [2.5, 7.9, 645.0])
-def test_a_contact_that_no_line_has_would_be_as_long_as_a_wave_or_eight_points(per_wave):
-    none = Revolution(np.zeros(20_000, np.int32), 3e-7, per_wave, 53, 16, overlaps=True)
-    of_probability, off = none.errors(none)
-    assert of_probability == pytest.approx(18 / per_wave**1.5 * 53 / 20_000)
-    assert off == pytest.approx(of_probability * 3e-7 * min(per_wave, 8), rel=1e-9, abs=0)
 
 
 @pytest.mark.parametrize(("force", "apart"), [(5.0, 1), (100.0, 5), (200.0, 8), (400.0, 11)])
@@ -432,6 +424,7 @@ def test_the_film_is_never_thinner_for_its_asperities(formula):
     assert rough["film"][0] > 1.05 * smooth["film"][0]
 
 
+@pytest.mark.slow
 def test_at_the_thesis_s_points_sharing_the_load_changes_little():
     """800 N, 100 rpm: the film by less than 0.7 %, the probability by less than 0.3 points, downwards."""
     temperatures = np.array([313.15, 333.15, 353.15])
@@ -624,6 +617,7 @@ def test_bad_profiles_give_one_error(tmp_path):
     assert "wider than the line" in refused(**files | {"normal_force": 1e7})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radius", [0.05, 0.01])
 def test_without_points_or_shortest_wavelength_there_are_as_many_waves_as_on_a_million_points(radius):
     given = {"roller_radius": radius, "cutoff_force": 200.0}
@@ -710,18 +704,3 @@ def test_error_within_a_revolution_is_the_scatter_between_revolutions():
     between = result.values["breakthrough_probability"][0].std(ddof=1)
     within = np.sqrt(np.mean(result.values["revolution_error"][0] ** 2))
     assert within == pytest.approx(between, rel=0.8)
-
-
-def test_what_has_no_error_misses_no_accuracy():
-    """The half width of a contact is a closed form; beside it the contact of a turn has an error, and may miss."""
-    asked = dataclasses.replace(block(["contact_half_width", "contact_length"]), accuracy=0.01)
-    found = {"contact_half_width": 1e-4, "contact_length": 1e-5, "contact_length_error": 0.5e-7}
-    assert solve._missed(asked, found) == ""
-    told = solve._missed(asked, found | {"contact_length_error": 3e-7})
-    assert "contact_length" in told
-    assert "contact_half_width" not in told
-    for name, value in (("film", 1e-7), ("contact_length", 1e-5), ("friction_coefficient", 0.03)):
-        one = dataclasses.replace(block([name]), accuracy=0.01)
-        assert solve._missed(one, {name: value, f"{name}_error": 0.009 * value}) == ""
-        for missing in (0.011, 2.0):
-            assert name in solve._missed(one, {name: value, f"{name}_error": missing * value})

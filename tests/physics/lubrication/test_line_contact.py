@@ -111,6 +111,7 @@ def test_heavy_load_gives_the_pressure_of_hertz() -> None:
     np.testing.assert_allclose(found.finest.pressure_between(inside), np.sqrt(1 - inside**2), atol=5e-3)
 
 
+@pytest.mark.slow
 def test_flow_is_the_same_everywhere() -> None:
     """The flow rho H^3/eta P' - K rho H, by differences of the result, is constant where the film is full."""
     case = LineContact(8.0, 4.0)
@@ -192,6 +193,7 @@ def test_error_estimate_covers_the_error(index: int) -> None:
 BOX = ((2e-6, 5e-4), (1e-13, 1e-9), (500.0, 8000.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["barus", "roelands"])
 @pytest.mark.parametrize("W", [2e-6, 3e-5, 5e-4])
 @pytest.mark.parametrize("U", [1e-13, 1e-11, 1e-9])
@@ -331,6 +333,7 @@ def test_impossible_case_says_why() -> None:
     assert found.grids == ()
 
 
+@pytest.mark.slow
 def test_missed_accuracy_is_in_the_error() -> None:
     found = solve_film(LineContact(5000.0, 0.0), accuracy=1e-10)
     assert found.outcome == Outcome.CONVERGED

@@ -29,6 +29,7 @@ def cases():
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("accuracy", [1e-1, 1e-2, 1e-3, 1e-4])
 def test_stated_errors_hold_at_every_accuracy(cases, accuracy):
     """With the estimate of before, from one run that shared panels and first steps, 62, 3, 98 and 68 % held."""
@@ -94,6 +95,7 @@ def slid(request):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("accuracy", [1e-2, 1e-3])
 def test_stated_errors_hold_in_gross_slip(slid, accuracy):
     """Under constant force 67 % of the contact radii held, sharp tips were worn up to six times more than stated."""
@@ -117,6 +119,7 @@ def test_a_sharp_tip_is_worn_to_the_accuracy_asked(exponent):
     assert abs(rough.worn_depth / fine.worn_depth - 1.0) < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("exponent", [0.9, 1.0])
 def test_a_sharp_tip_under_force_is_worn_to_fine_accuracies(exponent):
     """It was off by 1.8 to 2.6 times the accuracy: panels at the axis were halved too few times for it."""
@@ -145,6 +148,7 @@ def test_few_cycles_of_the_review_state_their_error():
         assert np.max(fine.error("worn_profile", PLACES)) < np.max(rough.error("worn_profile", PLACES))
 
 
+@pytest.mark.slow
 def test_the_estimate_under_constant_force_falls_with_the_accuracy():
     """It grew from 4.9e-3 to 1.3e-2 at N = 8 when the accuracy went from 1e-3 to 1e-4, then stayed from 4e-4 on."""
     cycles, accuracies = [0.5, 2.0, 8.0], (3e-4, 1e-4, 3e-5)
@@ -160,6 +164,7 @@ def test_the_estimate_under_constant_force_falls_with_the_accuracy():
             assert stated[1] < stated[0] or name != "stick_border"  # the others agree by chance now and then
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hold", ["depth", "force"])
 @pytest.mark.parametrize(("exponent", "c"), [(2.0, 0.455), (1.0, 0.4), (3.0, 0.6)])
 def test_estimates_of_histories_hold_before_and_after_the_image_jumps(exponent, c, hold):
@@ -174,6 +179,7 @@ def test_estimates_of_histories_hold_before_and_after_the_image_jumps(exponent, 
         assert np.mean(gap <= worn.error("worn_profile", PLACES)) > 0.95
 
 
+@pytest.mark.slow
 def test_the_border_next_to_full_stick_is_not_known_better_than_it_moves():
     """It stops at one place in all rougher solutions: errors of zero were stated, and 60 % of these held."""
     rng, held = np.random.default_rng(33), []
@@ -189,6 +195,7 @@ def test_the_border_next_to_full_stick_is_not_known_better_than_it_moves():
     assert np.mean(held) >= 0.95
 
 
+@pytest.mark.slow
 def test_radii_of_histories_are_not_known_better_than_half_a_cell():
     """Grids agree by chance: 76 % of these borders held, and 94 % of the contact radii."""
     rng, held = np.random.default_rng(32), []

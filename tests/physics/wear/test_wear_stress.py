@@ -9,6 +9,8 @@ from mdr_dask.physics.mdr.revolution import PowerProfile, from_table
 from mdr_dask.physics.wear import rules as wear
 from mdr_dask.physics.wear.exact import exact, limit_under_force
 
+pytestmark = pytest.mark.slow
+
 EXPONENTS = st.floats(0.3, 20.0)
 #: Stick radii, to a millionth beside 0 and 1.
 SMALL = st.floats(-6.0, -1.0).map(lambda power: 10.0**power)
