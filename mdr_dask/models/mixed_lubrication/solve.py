@@ -25,6 +25,7 @@ _OF_LINES = {"breakthrough_probability", "revolution_error"} | revolution.OF_LEN
 #: Absolute size below which an error is not relative to its output.
 _FLOORS = {"asperity_load_share": 1.0}
 _PROFILES = {"upper_profile", "lower_profile"}
+_ELECTRICAL = {"contact_conductance", "contact_resistance"}
 
 
 def compute(block: Block[MixedLubrication]) -> Result:
@@ -139,7 +140,11 @@ def _realise(
             continue
         found: dict[str, Any] = revolution.values(operation, window, errors, block.outputs)
         advice = "" if operation.case.points == "auto" else "; raise points"
-        _note(result, index, position, _missed(block, found, advice, window.sizes()))
+        sizes = window.sizes()
+        if window.length:  # conductance and resistance have the relative error of the length
+            factor = sizes["contact_length"] / window.length
+            sizes |= {name: factor * found[name] for name in _ELECTRICAL & found.keys()}
+        _note(result, index, position, _missed(block, found, advice, sizes))
         if "contact_length_trace" in block.outputs:
             found["contact_length_trace"] = revolution.trace(operation, window, partial(lines, False))
         if _PROFILES & set(block.outputs):
