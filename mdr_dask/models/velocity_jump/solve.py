@@ -29,10 +29,10 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.cubic_line import without_kinks
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.waves import Waves
-from mdr_dask.physics.transients.accuracy import JumpAim, JumpProblem, Jumps, solve_jumps
+from mdr_dask.physics.transients.accuracy import JumpProblem, JumpRequest, Jumps, solve_jumps
 from mdr_dask.physics.transients.elements.foundation import foundation
 from mdr_dask.physics.transients.elements.loading_history import Trace, trace
-from mdr_dask.physics.transients.velocity_jump import Transient
+from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
 ACCURACY = 0.01  # of the ends, where the campaign does not say
 SECONDS_NODE, SECONDS_MOMENT = 6.2e-8, 3.3e-9  # for every node of a line, and of a moment
@@ -177,9 +177,9 @@ class _Marched(_Group):
         loads, deborah, which = self.different
         is_wanted = any(name in self.outputs for name in TRANSIENT)
         times, wavenumber = np.array(self.block.parameters.relaxation_times), np.pi * waves.points
-        transient = Transient(times, wavenumber, self.steps, self.block.accuracy or 0.0) if is_wanted else None
+        transient = MarchRequest(times, wavenumber, self.steps, self.block.accuracy or 0.0) if is_wanted else None
         with_errors = any(f"{name}_error" in self.block.outputs for name in LEVELS)
-        aim = JumpAim(
+        aim = JumpRequest(
             {LEVELS[name] for name in self.outputs},
             self.block.accuracy or (ACCURACY if with_errors else None),
             self.oversampling,

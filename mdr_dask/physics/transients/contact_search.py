@@ -1,4 +1,27 @@
-"""Who touches what at one moment after a jump: one pass along the stretches of the line where contact is possible."""
+"""Find the contact patches at one instant after a velocity jump.
+
+The search walks along the line from its highest point, in the direction in which the elements move, and carries along
+the place where contact ended last and the places where free elements may have separated (`FreeRecovery`). The force on
+an element in contact is lift + h + D h', where the lift is depth plus rate. In each cell that has to be examined:
+
+* In contact, it ends where the force falls through zero, or where free elements overtake the line, because they were
+  pressed further than the line presses there (contact is then lost under a positive force).
+* Outside, contact begins where the line rises above the free elements and the force would be positive.
+
+A patch is added to the sums when its end is found. Three bounds, all of them safe, let most cells be skipped:
+
+* A pressed cell needs no examination if the force has been positive in all of it while any element now ahead passed
+  it, and free elements cannot overtake the line there: along the line u' = (drift - u) / D, so that u stays below
+  w wherever w + D h' exceeds the largest drift.
+* A free cell needs none if the displacement of its free elements has a lower bound above its highest point. That bound
+  follows along the line from the last displacement computed, by the least drift.
+* A free cell in which the gap was found to be wider than it can have opened since elements left is skipped until the
+  line has come nearer by that gap. The gap closes at most at the rate of the depth plus the largest drift; the sum of
+  that over time is the *approach*, the same for all cells.
+
+Elements that travel more than a whole period of the line can pass over the highest point. In that case the search is
+repeated with the places of separation of the period before.
+"""
 
 from __future__ import annotations
 
@@ -10,24 +33,21 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
-from mdr_dask.physics.transients.clearance import APPROACH, TIME, Clearance, approached, rests
-from mdr_dask.physics.transients.contact_loss import (
-    Motion,
-    loss,
-    may_have_left,
-    motion_at,
-    overtaking,
-    turned,
-)
-from mdr_dask.physics.transients.free_flight import (
+from mdr_dask.physics.transients.free_recovery import (
+    MARGIN,
+    WINDOW,
+    WINDOWS,
+    FreeRecovery,
     Instant,
-    Wakes,
-    crest,
-    foreseen,
+    PathBounds,
+    contact_begin,
+    displacement_at,
+    from_before,
     gap_at,
-    meeting,
-    wake_at,
-    worth_keeping,
+    nearest_approach,
+    prune,
+    window,
+    write_bounds,
 )
 from mdr_dask.physics.transients.patches import (
     DRAG_GROWTH,
@@ -37,6 +57,7 @@ from mdr_dask.physics.transients.patches import (
     STIFFNESS,
     SUMS,
     TILT,
+    Track,
     add_patch,
     force_at,
     height_at,
@@ -44,13 +65,19 @@ from mdr_dask.physics.transients.patches import (
     loading,
     unloading,
 )
-from mdr_dask.physics.transients.recent import WINDOW, WINDOWS, Recent, over, write_recent
 
-CANDIDATES = 1024  # most places of leaving whose wakes are compared
-NEARBY = 64.0  # cells more than twice the way, over which contact may have been where it is not now
-ROUNDING = 1e-9  # of a displacement
-TURNS = 3  # of the line that an element may fly over
-VISITS = 6  # of one cell: a force that is a cubic changes sign three times at most
+SEPARATIONS = 1024  # most places of separation at a time
+PERIODS = 3  # most periods of the line that an element is followed for
+VISITS = 6  # most changes of contact in a cell: a force that is a cubic changes sign three times at most
+ROUNDING = 1e-9  # part of a displacement
+CLOSE = 1e-9  # cells: accuracy of the place where contact is lost
+FULL = -1  # instead of a number of patches: no capacity for more, or a patch does not end within its stretch
+DEPTH_CHANGES = 4.0  # most by which a displacement changes with the last depth, a guess at first
+
+# Entries of `Workspace.scan`, the state of the walk
+BEGIN, FREE_FROM, HELD, FIRM_LIFT, FIRM_UNTIL, LOWEST, LOWEST_PASSED, PASSED = range(8)
+# Entries of `SkipBounds.state`
+APPROACH, LARGEST, TIME, DEPTH, DRIFT = range(5)
 
 
 class Reachable(NamedTuple):
@@ -61,9 +88,9 @@ class Reachable(NamedTuple):
     runs : int array, shape (m, 2)
         First and last node of the stretches in which contact is possible.
     from_depth : array, shape (n + 2,)
-        Depth up to which the line touches no element in a cell.
+        Depth up to which the line is below all elements in a cell.
     second : float
-        Height of the highest point outside of the patch of the highest of all.
+        Height of the highest point outside the patch around the highest point of all.
     """
 
     runs: IntArray
@@ -71,262 +98,534 @@ class Reachable(NamedTuple):
     second: float
 
 
+class SkipBounds(NamedTuple):
+    """Cells that need no examination until the line has come nearer.
+
+    Parameters
+    ----------
+    skip_until : array, shape (n + 2,)
+        Approach up to which the line is below all elements in a cell.
+    state : array, shape (5,)
+        Approach so far, the largest entry of `skip_until`, and time, depth and largest drift of the last search.
+    """
+
+    skip_until: FloatArray
+    state: FloatArray
+
+
 class Workspace(NamedTuple):
-    """What a search writes: patches and their sums, the places of leaving now and the farthest, bounds, barriers."""
+    """Arrays of a search, and what it finds.
+
+    Parameters
+    ----------
+    start, end : array
+        Where the patches begin and end.
+    sums : array, shape (SUMS,)
+        Sums over the patches, and their derivatives.
+    scan : array
+        State of the walk: where the current patch begins, where contact ended last, up to where contact is known to
+        hold, the barrier below which cells in contact need no examination and up to where that is so, the least
+        displacement of free elements at the end of the cell before, the same of those only that passed the end of the
+        last patch after the jump, and how far these have come.
+    recovery : FreeRecovery
+    skip : SkipBounds
+    barriers : Barriers
+        Of the cells at the Deborah number after the jump.
+    """
 
     start: FloatArray
     end: FloatArray
     sums: FloatArray
-    earliest: FloatArray
-    places: FloatArray
-    farthest: FloatArray
-    barrier: FloatArray
-    recent: Recent
-    clearance: Clearance
+    scan: FloatArray
+    recovery: FreeRecovery
+    skip: SkipBounds
     barriers: Barriers
 
 
-def workspace_for(patches: int, barriers: Barriers, clearance: Clearance) -> Workspace:
-    """Return the workspace of a number of patches and some more, with what is known of the cells."""
-    most = 4 * patches + 4096
-    start, end = np.empty((2, most))
-    earliest, places, farthest, barrier = np.empty((4, CANDIDATES))
-    recent = Recent(*np.empty((5, WINDOWS)))
-    return Workspace(start, end, np.zeros(SUMS), earliest, places, farthest, barrier, recent, clearance, barriers)
+def workspace_for(patches: int, barriers: Barriers, below: FloatArray) -> Workspace:
+    """Return a workspace with a capacity of four times as many patches as given, and 4096 more.
 
-
-@jit_inline
-def _remember(place: float, farthest: float, work: Workspace, known: int) -> int:
-    """Write down where contact was left; count the places."""
-    work.earliest[known], work.places[known], work.farthest[known], work.barrier[known] = place, place, farthest, np.inf
-    return known + 1
-
-
-@jit_inline
-def _remember_cell(cell: float, barrier: float, work: Workspace, known: int) -> int:
-    """Write down that contact may have been left in a cell where the force is positive now; count the places."""
-    last = known - 1
-    if known > 0 and work.earliest[last] < work.places[last] and work.places[last] == cell:
-        work.places[last], work.farthest[last] = cell + 1, cell + 1
-        work.barrier[last] = max(work.barrier[last], barrier)
-        return known
-    work.earliest[known], work.places[known], work.farthest[known], work.barrier[known] = (
-        cell,
-        cell + 1,
-        cell + 1,
-        barrier,
-    )
-    return known + 1
-
-
-@jit_inline
-def _farthest(now: Instant, place: float, highest: float, barriers: Barriers) -> float:
-    """Return how far from where contact is left it can have reached, at the highest of depth and rate so far."""
-    i = min(int(place), int(now.track.cells))
-    h, slope, _ = height_at(now.track, i + 1.0)
-    if highest + h + now.deborah * slope <= 0:
-        return i + 1.0
-    i += 1
-    while i < int(now.track.cells) and keeps_pressed(now.track, barriers, now.deborah, i, highest):
-        i += 1
-    return i + 1.0
-
-
-@jit_inline
-def _add_edge(now: Instant, lift: float, place: float, gap: tuple[float, float, float], sums: FloatArray) -> None:
-    """Add what load and drag gain by depth and time where a patch grows at an edge: the force there is not zero.
-
-    The gap is that of line and wake: its slope into the patch, its derivative by the depth, and its rate.
+    `below` is by how much the depth can increase before the line reaches elements in each cell.
     """
-    steep, gain, opening = gap
-    h, slope, _ = height_at(now.track, place)
-    force = lift + h + now.deborah * slope
-    if force > 0 and steep > 0:
-        edge = force / steep
-        sums[STIFFNESS] += edge * gain
-        sums[DRAG_STIFFNESS] += edge * gain * slope
-        sums[GROWTH] += edge * opening
-        sums[DRAG_GROWTH] += edge * opening * slope
+    start, end = np.empty((2, 4 * patches + 4096))
+    bounds = PathBounds(*np.empty((5, WINDOWS)))
+    recovery = FreeRecovery(*np.empty((4, SEPARATIONS)), np.zeros(1, np.int64), bounds)
+    state = np.zeros(5)
+    state[TIME] = np.nan
+    return Workspace(start, end, np.zeros(SUMS), np.empty(8), recovery, SkipBounds(below, state), barriers)
+
+
+class Motion(NamedTuple):
+    """How the depth has moved until an instant.
+
+    Parameters
+    ----------
+    rise, fall : float
+        Largest mean rate at which the lift has risen until now, and largest rate at which it has fallen.
+    shallowest, deepest, highest : float
+        Least depth, largest depth and largest lift so far.
+    passes_top : bool
+        Whether elements from before the patch of the highest point may have passed over it.
+    """
+
+    rise: float
+    fall: float
+    shallowest: float
+    deepest: float
+    highest: float
+    passes_top: bool
+
+
+@jit_inline
+def motion_until(now: Instant, second: float) -> Motion:
+    """Return how the depth has moved; `second` is the highest point outside the patch of the highest point of all."""
+    history, deborah, last = now.history, now.deborah, now.history.count - 1
+    depth, rate = history.depth[last], history.rate[last]
+    lift, rise, fall, passes_top = depth + rate, 0.0, 0.0, False
+    shallowest, deepest, highest = depth, depth, lift
+    carried, before, lift_before = -np.inf, 0.0, history.depth[0] + history.rate[0]
+    for moment in range(last + 1):
+        time, then = history.time[moment], history.depth[moment]
+        lift_then = then + history.rate[moment]
+        shallowest, deepest, highest = min(shallowest, then), max(deepest, then), max(highest, lift_then)
+        if moment < last:
+            rise = max(rise, (lift - lift_then) / (now.time - time))
+        if moment > 0:
+            fall = max(fall, (lift_before - lift_then) / (time - before))
+            carried *= np.exp(before - time)
+        passes_top |= carried > then and deborah * (now.time - time) < now.track.cells
+        carried, before, lift_before = max(carried, then + second), time, lift_then
+    if last > 0:
+        step = history.time[last] - history.time[last - 1]
+        fallen = (history.depth[last - 1] - depth) / step
+        rise = max(rise, rate + (6 * fallen + 2 * history.rate[last - 1] + 4 * rate) / step)
+    return Motion(rise, fall, shallowest, deepest, highest, passes_top)
+
+
+@jit_inline
+def add_approach(now: Instant, bounds: PathBounds, state: FloatArray) -> None:
+    """Add to the approach what has come since the last search, or end all skipping if that was at another instant."""
+    history, last = now.history, now.history.count - 1
+    depth, drift = history.depth[last], bounds.most_drift[WINDOWS - 1]
+    if now.time == state[TIME]:  # another guess of the depth
+        state[APPROACH] += DEPTH_CHANGES * abs(depth - state[DEPTH])
+    elif last > 0 and history.time[last - 1] == state[TIME]:
+        before = history.depth[last - 1]
+        nearer = depth - before + (now.time - state[TIME]) * max(drift, state[DRIFT])
+        state[APPROACH] += DEPTH_CHANGES * abs(before - state[DEPTH]) + max(nearer, 0.0)
+    else:
+        state[APPROACH] = state[LARGEST] + max(depth - history.depth[0], 0.0)
+    state[TIME], state[DEPTH], state[DRIFT] = now.time, depth, drift
+
+
+@jit_inline
+def skip_until(skip: SkipBounds, cell: int, gap: float) -> None:
+    """Skip a cell until the line has come nearer by a gap."""
+    until = skip.state[APPROACH] + gap
+    skip.skip_until[np.uintp(cell)] = until
+    skip.state[LARGEST] = max(skip.state[LARGEST], until)
 
 
 @jit
-def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
-    """Find the patches in contact at a moment, at the last depth and rate of its history, and add up their forces.
+def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
+    """Find the patches in contact at an instant, at the last depth and rate of its history, and add up their forces.
 
     Parameters
     ----------
     now : Instant
     reachable : Reachable
-        Its stretches must hold the patches at the depth.
+        Its stretches must hold the patches at this depth.
     work : Workspace
         Written: the patches, and in `sums` load and drag over 4 G dx, length in contact, rise over it, the derivatives
-        of load and drag by the depth, and what they gain by time where patches begin.
+        of load and drag by the depth, and what they gain in time where patches begin.
 
     Returns
     -------
     int
-        Number of patches, or -1 if a patch does not end within its stretch, or if there are more patches or more places
-        of leaving than fit.
+        Number of patches, or `FULL`.
     """
-    motion = motion_at(now, reachable.second)
-    write_recent(now.history, now.first, now.deborah, work.recent)
-    state = work.clearance.state
-    approached(now, work.recent, state)
-    found, known = _turn(now, motion, reachable, work, 0)
-    if motion.overflown:
-        state[TIME] = np.nan  # what a turn knows does not hold for the next moment
-        for _ in range(min(int(now.deborah * now.time / now.track.cells) + 1, TURNS)):
-            known = turned(
-                now, Wakes(work.earliest, work.places, work.farthest, work.barrier, work.recent, known), motion
-            )
-            if known == 0:
+    motion = motion_until(now, reachable.second)
+    write_bounds(now.history, now.first, now.deborah, work.recovery.bounds)
+    add_approach(now, work.recovery.bounds, work.skip.state)
+    work.recovery.count[0] = 0
+    found = _search_period(now, motion, reachable, work)
+    if motion.passes_top:
+        work.skip.state[TIME] = np.nan  # what free elements do in one period is no bound for the next instant
+        for _ in range(min(int(now.deborah * now.time / now.track.cells) + 1, PERIODS)):
+            _move_back_one_period(now, work.recovery, motion)
+            if work.recovery.count[0] == 0:
                 break
-            found, known = _turn(now, motion, reachable, work, known)
+            found = _search_period(now, motion, reachable, work)
     return found
 
 
-@jit
-def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, known: int) -> tuple[int, int]:
-    """Do what `touch` does on one turn of the line, with some places of leaving known; return how many are known then.
+@jit_inline
+def _move_back_one_period(now: Instant, recovery: FreeRecovery, motion: Motion) -> None:
+    """Move all places of separation to before the highest point, and keep those that matter behind it."""
+    for k in range(recovery.count[0]):
+        recovery.earliest[k] -= now.track.cells
+        recovery.place[k] -= now.track.cells
+        recovery.farthest[k] -= now.track.cells
+    prune(now, recovery, now.track.origin, now.history.depth[now.history.count - 1], motion.deepest)
 
-    Where none is, the highest point is taken for touched.
+
+@jit
+def _search_period(now: Instant, motion: Motion, reachable: Reachable, work: Workspace) -> int:
+    """Search one period of the line; return the number of patches, or `FULL`.
+
+    Places of separation that are in the workspace already belong to the period before. Without any, the highest point
+    is taken to be in contact.
     """
-    track, history, deborah = now.track, now.history, now.deborah
-    height, enter, leave, peak = track.height, track.enter, track.leave, track.peak
-    runs, from_depth = reachable.runs, reachable.from_depth
-    start, end, sums, earliest, places, farthest, least_lift, recent, clearance, barriers = work
-    until_approach, approach = clearance.until, clearance.state[APPROACH]
-    depth = history.depth[history.count - 1]
-    lift = depth + history.rate[history.count - 1]
-    deepest, highest = motion.deepest, motion.highest  # elements may fly from where the line is no longer touched
-    found = 0
-    n, finish, begin = int(track.cells), track.cells + track.origin, track.origin
-    free_from = held = begin
-    firm, firm_until = 0.0, 0.0
-    contact = depth >= wake_at(now, Wakes(earliest, places, farthest, least_lift, recent, known), begin)[0]
-    fade, pull = np.exp(-1 / min(deborah, now.first.deborah)), recent.pull[WINDOWS - 1]
-    slow, gone, risen = np.exp(-1 / deborah), deborah * now.time, depth - motion.shallowest
-    oldest = earliest[0] if known > 0 else begin
-    lowest = 0.0  # what a free element has at least at the end of a cell
-    least, passed = 0.0, begin  # and one that passed the end of the last patch after the jump: those up to `passed` did
+    track, history, scan, sums, recovery = now.track, now.history, work.scan, work.sums, work.recovery
+    last, runs = history.count - 1, reachable.runs
+    lift, origin = history.depth[last] + history.rate[last], track.origin
     sums[:] = 0.0
-    if not contact:  # it may have been left there
-        known = _remember(begin, _farthest(now, begin, highest, barriers), work, known)
+    scan[BEGIN] = scan[FREE_FROM] = scan[HELD] = scan[PASSED] = origin
+    scan[FIRM_UNTIL] = scan[LOWEST] = scan[LOWEST_PASSED] = 0.0
+    contact, found = history.depth[last] >= displacement_at(now, recovery, origin)[0], 0
+    if not contact:
+        _add_separation(now, motion, work, origin)
     for run in range(runs.shape[0]):
         i, stop = runs[run, 0], runs[run, 1]
         if not contact:
-            lowest = least = 0.0  # nothing is known of what is left between the stretches
-        while i < stop:
-            if not contact:
-                least = least * slow if i < passed else 0.0
-                lowest = max((lowest - pull) * fade + pull, least)
-                if approach < until_approach[np.uintp(i)] or deepest <= from_depth[np.uintp(i)]:
-                    i += 1
-                    continue
-                clear = lowest - depth - peak[np.uintp(i)]
-                if clear > 0 and clear > recent.apart[over(2 * (i + 1 - oldest) + NEARBY)]:
-                    rests(clearance, i, clear)
-                    i += 1
-                    continue
-            positive = i < n and keeps_pressed(track, barriers, deborah, i, lift)
-            if not contact and i < n and lift <= barriers.idle[np.uintp(i)]:
-                i += 1
-                continue
-            if contact and i + 1 > firm_until:
-                oldest = earliest[0] if known > 0 else begin
-                k = over(2 * (i + 1 - oldest))
-                firm, firm_until = min(depth - recent.push[k], recent.lowest[k]), oldest + WINDOW * 2.0**k
-            if contact and positive and begin <= i and barriers.cell[np.uintp(i)] < firm:
-                whole = i % BLOCK == 0 and i + BLOCK < min(stop, firm_until) and i + BLOCK <= n
-                i += BLOCK if whole and barriers.block[i // BLOCK] < firm else 1
-                continue
-            if known + VISITS > places.size:
-                return -1, 0
-            cell, x1 = i, min(i + 1.0, finish)
+            scan[LOWEST] = scan[LOWEST_PASSED] = 0.0  # nothing is known of free elements between the stretches
+        while True:
+            if contact:
+                i = _skip_pressed(now, work, lift, i, stop)
+            else:
+                i = _skip_free(now, motion, reachable.from_depth, work, lift, i, stop)
+            if i >= stop:
+                break
+            contact, found = _examine(now, motion, work, lift, i, contact, found)
+            if found < 0:
+                return FULL
             i += 1
-            c0, c1, c2, c3 = cubic(height, enter, leave, cell)
-            barrier = barriers.cell[np.uintp(cell)] if cell < n else lift
-            weak = (contact or positive) and barrier >= recent.lowest[WINDOWS - 1]
-            leaves = contact and weak and may_have_left(track, motion, deborah, cell)
-            if leaves:
-                known = _remember_cell(float(cell), barrier, work, known)
-            x, pulled = max(float(cell), begin if contact else free_from), False
-            for _ in range(VISITS):
-                if contact:
-                    y = x - cell
-                    place = NONE
-                    if not positive:
-                        pressed = force_at(c0, c1, c2, c3, lift, deborah, y) > 0
-                        place = unloading(c0, c1, c2, c3, lift, deborah, y) if pressed else y
-                    pulls = cell + place < x1
-                    off = cell + place if pulls else x1
-                    wakes = Wakes(earliest, places, farthest, least_lift, recent, known)
-                    if leaves:
-                        held = off
-                    u = overtaking(now, wakes, held, off)
-                    lost, until = depth + height_at(track, off)[0] < u * (1 - ROUNDING), off
-                    if not (pulls or lost):
-                        break
-                    if lost:
-                        until = loss(now, wakes, x, off)
-                        _, rise, _, gain, opening = gap_at(now, until, wake_at(now, wakes, until))
-                        _add_edge(now, lift, until, (-rise, gain, opening), sums)
-                    if found + 1 >= start.size:
-                        return -1, 0
-                    add_patch(track, begin, until, lift, deborah, sums)
-                    start[found], end[found] = begin, until
-                    found += 1
-                    w = depth + height_at(track, until)[0]
-                    known = worth_keeping(now, wakes, until, w, deepest)
-                    passed = until + gone - 1
-                    least = max(w - risen, 0.0) * slow if cell < passed else 0.0
-                    lowest, oldest = max((w - pull) * fade + pull, least), earliest[0] if known > 0 else until
-                    contact, free_from, x, pulled = False, off, off, True
-                    if not pulls:
-                        break
-                    known = _remember(off, _farthest(now, off, highest, barriers), work, known)
-                # the line comes nearer to free elements while the force on them would be positive
-                low, high = x - cell, NONE
-                if not positive:
-                    if pulled or force_at(c0, c1, c2, c3, lift, deborah, low) <= 0:
-                        low = loading(c0, c1, c2, c3, lift, deborah, low)
-                    if cell + low >= x1:
-                        break
-                    high = unloading(c0, c1, c2, c3, lift, deborah, low)
-                pulls = cell + high < x1
-                probe = cell + high if pulls else x1
-                h, slope, _ = height_at(track, probe)
-                if not (pulls or weak) and depth + peak[np.uintp(cell)] <= lowest:
-                    break
-                wakes = Wakes(earliest, places, farthest, least_lift, recent, known)
-                u, u_slope, _ = wake_at(now, wakes, probe)
-                lowest = max((u - pull) * fade + pull if pulls else u, least)
-                clear = lowest - depth - peak[np.uintp(cell)]
-                if clear > 0 and clear > recent.apart[over(2 * (i - oldest) + NEARBY)]:
-                    rests(clearance, cell, clear)
-                    break
-                gap, rise = depth + h - u, slope - u_slope
-                if gap <= 0 and gap > rise * (probe - cell - low):
-                    top, above = crest(now, wakes, cell + low, probe)
-                    probe, gap = (top, above) if above > 0 else (probe, gap)
-                if weak and may_have_left(track, motion, deborah, cell):
-                    known = _remember_cell(float(cell), barrier, work, known)
-                if gap > 0:
-                    guess = cell + foreseen((c0, c1, c2, c3), depth, (u, u_slope), low, probe - cell)
-                    begin, rise, gain, opening = meeting(now, wakes, cell + low, probe, guess)
-                    _add_edge(now, lift, begin, (rise, gain, opening), sums)
-                    contact, x, held, firm_until = True, begin, begin, 0.0
-                    continue
-                if not pulls:
-                    break
-                known = worth_keeping(now, wakes, probe, depth + h, deepest)
-                known = _remember(probe, _farthest(now, probe, highest, barriers), work, known)
-                free_from, x, pulled = probe, probe, True
         if contact and run + 1 < runs.shape[0]:
-            return -1, 0
-    begin = begin if contact else finish
-    add_patch(track, begin, finish, lift, deborah, sums)
-    start[found], end[found] = begin, finish
+            return FULL
+    finish = track.cells + origin
+    begin = scan[BEGIN] if contact else finish
+    add_patch(track, begin, finish, lift, now.deborah, sums)
+    work.start[found], work.end[found] = begin, finish
     sums[STIFFNESS] += sums[LENGTH] * (1 + history.stiff)
     sums[DRAG_STIFFNESS] += sums[TILT] * (1 + history.stiff)
-    return found + 1, known
+    return found + 1
+
+
+@jit_inline
+def _oldest(recovery: FreeRecovery, otherwise: float) -> float:
+    """Return the first place at which elements ahead can have separated."""
+    return recovery.earliest[0] if recovery.count[0] > 0 else otherwise
+
+
+@jit_inline
+def _skip_pressed(now: Instant, work: Workspace, lift: float, i: int, stop: int) -> int:
+    """Return the first cell from i on in which contact may end or elements may have separated."""
+    track, scan, barriers, bounds = now.track, work.scan, work.barriers, work.recovery.bounds
+    n, depth = int(track.cells), now.history.depth[now.history.count - 1]
+    firm, until, begin = scan[FIRM_LIFT], scan[FIRM_UNTIL], scan[BEGIN]
+    while i < stop:
+        if i + 1 > until:
+            oldest = _oldest(work.recovery, begin)
+            k = window(2 * (i + 1 - oldest))
+            firm, until = min(depth - bounds.most_drift[k], bounds.least_lift[k]), oldest + WINDOW * 2.0**k
+        pressed = i < n and keeps_pressed(track, barriers, now.deborah, i, lift)
+        if not (pressed and begin <= i and barriers.cell[np.uintp(i)] < firm):
+            break
+        whole = i % BLOCK == 0 and i + BLOCK < min(stop, until) and i + BLOCK <= n
+        i += BLOCK if whole and barriers.block[i // BLOCK] < firm else 1
+    scan[FIRM_LIFT], scan[FIRM_UNTIL] = firm, until
+    return i
+
+
+@jit_inline
+def _skip_free(
+    now: Instant, motion: Motion, from_depth: FloatArray, work: Workspace, lift: float, i: int, stop: int
+) -> int:
+    """Return the first cell from i on in which contact may begin."""
+    track, scan, barriers, bounds, skip = now.track, work.scan, work.barriers, work.recovery.bounds, work.skip
+    n, depth, approach = int(track.cells), now.history.depth[now.history.count - 1], skip.state[APPROACH]
+    drift, fade = bounds.least_drift[WINDOWS - 1], np.exp(-1 / min(now.deborah, now.first.deborah))
+    fade_passed, passed, oldest = np.exp(-1 / now.deborah), scan[PASSED], _oldest(work.recovery, scan[FREE_FROM])
+    lowest, lowest_passed = scan[LOWEST], scan[LOWEST_PASSED]
+    while i < stop:
+        lowest_passed = lowest_passed * fade_passed if i < passed else 0.0
+        lowest = max((lowest - drift) * fade + drift, lowest_passed)
+        if not (approach < skip.skip_until[np.uintp(i)] or motion.deepest <= from_depth[np.uintp(i)]):
+            gap = lowest - depth - track.peak[np.uintp(i)]
+            if gap > 0 and gap > bounds.opened[window(2 * (i + 1 - oldest) + MARGIN)]:
+                skip_until(skip, i, gap)
+            elif i >= n or keeps_pressed(track, barriers, now.deborah, i, lift) or lift > barriers.idle[np.uintp(i)]:
+                break
+        i += 1
+    scan[LOWEST], scan[LOWEST_PASSED] = lowest, lowest_passed
+    return i
+
+
+@jit_inline
+def _examine(
+    now: Instant, motion: Motion, work: Workspace, lift: float, cell: int, contact: bool, found: int
+) -> tuple[bool, int]:
+    """Follow contact through a cell; return whether there is contact at its end, and the number of patches so far."""
+    track, scan, recovery, barriers = now.track, work.scan, work.recovery, work.barriers
+    n, finish = int(track.cells), track.cells + track.origin
+    if recovery.count[0] + VISITS > recovery.place.size or found + VISITS > work.start.size:
+        return contact, FULL
+    line, stop = cubic(track.height, track.enter, track.leave, cell), min(cell + 1.0, finish)
+    pressed = cell < n and keeps_pressed(track, barriers, now.deborah, cell, lift)
+    barrier = barriers.cell[np.uintp(cell)] if cell < n else lift
+    weak = (contact or pressed) and barrier >= recovery.bounds.least_lift[WINDOWS - 1]
+    separated = weak and _may_have_separated(track, motion, now.deborah, cell)
+    if separated:
+        _add_stretch(recovery, float(cell), barrier)
+    x, ended = max(float(cell), scan[BEGIN] if contact else scan[FREE_FROM]), False
+    for _ in range(VISITS):
+        if contact:
+            until, off, is_lost, by_force = _contact_end(now, work, line, lift, cell, x, stop, pressed, separated)
+            if not (is_lost or by_force):
+                break
+            _close_patch(now, motion, work, lift, cell, until, is_lost, found)
+            contact, found, x, ended = False, found + 1, off, True
+            scan[FREE_FROM] = off
+            if not by_force:
+                break
+            _add_separation(now, motion, work, off)
+        contact, x = _contact_begin(now, motion, work, line, lift, cell, x, stop, pressed, weak, ended)
+        if contact:
+            scan[BEGIN] = scan[HELD] = x
+            scan[FIRM_UNTIL] = 0.0
+        elif x >= stop:
+            break
+        else:  # elements that left the line here before would be pulled from here on
+            scan[FREE_FROM], ended = x, True
+    return contact, found
+
+
+@jit_inline
+def _contact_end(
+    now: Instant,
+    work: Workspace,
+    line: tuple[float, float, float, float],
+    lift: float,
+    cell: int,
+    x: float,
+    stop: float,
+    pressed: bool,
+    separated: bool,
+) -> tuple[float, float, bool, bool]:
+    """Return where contact ends in a cell from x on, where elements are free from, and why it ends, if it does.
+
+    Contact ends at the latest where the force falls to zero, and earlier where free elements overtake the line.
+    """
+    scan, place = work.scan, NONE
+    c0, c1, c2, c3 = line
+    if not pressed:
+        place = x - cell
+        if force_at(c0, c1, c2, c3, lift, now.deborah, place) > 0:
+            place = unloading(c0, c1, c2, c3, lift, now.deborah, place)
+    by_force = cell + place < stop
+    off = cell + place if by_force else stop
+    if separated:
+        scan[HELD] = off
+    u = _overtaking(now, work.recovery, scan[HELD], off)
+    is_lost = now.history.depth[now.history.count - 1] + height_at(now.track, off)[0] < u * (1 - ROUNDING)
+    return _contact_loss(now, work.recovery, x, off) if is_lost else off, off, is_lost, by_force
+
+
+@jit_inline
+def _overtaking(now: Instant, recovery: FreeRecovery, held: float, x: float) -> float:
+    """Return the displacement at x of free elements that may overtake a patch, or 0 if the line surely presses further.
+
+    Contact is known to hold in the patch up to `held`, and no element has separated in it from there on.
+    """
+    if x > held:
+        depth = now.history.depth[now.history.count - 1]
+        w, w_held = depth + height_at(now.track, x)[0], depth + height_at(now.track, held)[0]
+        drift = recovery.bounds.most_drift[window(x - recovery.earliest[0]) if recovery.count[0] > 0 else 0]
+        slowest = max(now.deborah, now.first.deborah)
+        if w >= max(w_held, drift) or w >= drift + (w_held - drift) * np.exp((held - x) / slowest):
+            return from_before(now, x, w)[0] if x - now.deborah * now.time > held else 0.0
+    return displacement_at(now, recovery, x)[0]
+
+
+@jit
+def _contact_loss(now: Instant, recovery: FreeRecovery, low: float, high: float) -> float:
+    """Return where between two places free elements overtake the line, by bisection."""
+    depth = now.history.depth[now.history.count - 1]
+    while high - low > CLOSE:
+        x = 0.5 * (low + high)
+        if depth + height_at(now.track, x)[0] < displacement_at(now, recovery, x)[0]:
+            high = x
+        else:
+            low = x
+    return high
+
+
+@jit_inline
+def _close_patch(
+    now: Instant, motion: Motion, work: Workspace, lift: float, cell: int, end: float, is_lost: bool, found: int
+) -> None:
+    """Write down the current patch, which ends in a cell, and begin the bounds of the free elements behind it."""
+    scan, recovery = work.scan, work.recovery
+    if is_lost:
+        _, slope, _, by_depth, opening = gap_at(now, recovery, end)
+        _add_edge(now, lift, end, -slope, by_depth, opening, work.sums)
+    add_patch(now.track, scan[BEGIN], end, lift, now.deborah, work.sums)
+    work.start[found], work.end[found] = scan[BEGIN], end
+    depth = now.history.depth[now.history.count - 1]
+    w = depth + height_at(now.track, end)[0]
+    prune(now, recovery, end, w, motion.deepest)
+    scan[PASSED] = end + now.deborah * now.time - 1
+    least = max(w - (depth - motion.shallowest), 0.0) * np.exp(-1 / now.deborah)
+    scan[LOWEST_PASSED] = least if cell < scan[PASSED] else 0.0
+    scan[LOWEST] = max(_lowest_behind(now, recovery.bounds, w), scan[LOWEST_PASSED])
+
+
+@jit_inline
+def _lowest_behind(now: Instant, bounds: PathBounds, u: float) -> float:
+    """Return the least displacement that free elements have one cell behind a place where they have u."""
+    drift, fade = bounds.least_drift[WINDOWS - 1], np.exp(-1 / min(now.deborah, now.first.deborah))
+    return float((u - drift) * fade + drift)
+
+
+@jit_inline
+def _contact_begin(
+    now: Instant,
+    motion: Motion,
+    work: Workspace,
+    line: tuple[float, float, float, float],
+    lift: float,
+    cell: int,
+    x: float,
+    stop: float,
+    pressed: bool,
+    weak: bool,
+    ended: bool,
+) -> tuple[bool, float]:
+    """Return whether contact begins in a cell from x on, and where; if not, from where the search in it goes on.
+
+    It can begin only between `low`, where the force becomes positive, and `high`, where it falls to zero again. At
+    `high` elements may have separated earlier.
+    """
+    track, scan, recovery, (c0, c1, c2, c3) = now.track, work.scan, work.recovery, line
+    low, high, depth = x - cell, NONE, now.history.depth[now.history.count - 1]
+    if not pressed:
+        if ended or force_at(c0, c1, c2, c3, lift, now.deborah, low) <= 0:
+            low = loading(c0, c1, c2, c3, lift, now.deborah, low)
+        if cell + low >= stop:
+            return False, stop
+        high = unloading(c0, c1, c2, c3, lift, now.deborah, low)
+    by_force = cell + high < stop
+    probe, peak = cell + high if by_force else stop, depth + track.peak[np.uintp(cell)]
+    if not (by_force or weak) and peak <= scan[LOWEST]:
+        return False, stop
+    u, u_slope, _ = displacement_at(now, recovery, probe)
+    scan[LOWEST] = max(_lowest_behind(now, recovery.bounds, u) if by_force else u, scan[LOWEST_PASSED])
+    clear = scan[LOWEST] - peak
+    if clear > 0:
+        oldest = _oldest(recovery, scan[FREE_FROM])
+        if clear > recovery.bounds.opened[window(2 * (cell + 1 - oldest) + MARGIN)]:
+            skip_until(work.skip, cell, clear)
+            return False, stop
+    h, slope, _ = height_at(track, probe)
+    gap, top = depth + h - u, probe
+    if gap <= 0 and gap > (slope - u_slope) * (probe - cell - low):
+        top, gap = nearest_approach(now, recovery, cell + low, probe)
+    if gap > 0:
+        guess = cell + _guess_begin(line, depth, u, u_slope, low, top - cell)
+        begin, rise, by_depth, opening = contact_begin(now, recovery, cell + low, top, guess)
+        _add_edge(now, lift, begin, rise, by_depth, opening, work.sums)
+        return True, begin
+    if not by_force:
+        return False, stop
+    prune(now, recovery, probe, depth + h, motion.deepest)
+    _add_separation(now, motion, work, probe)
+    return False, probe
+
+
+@jit_inline
+def _guess_begin(
+    line: tuple[float, float, float, float], depth: float, u: float, u_slope: float, low: float, high: float
+) -> float:
+    """Return about where in a cell the line rises above free elements that have u and its slope at `high`."""
+    c0, c1, c2, c3 = line
+    bend, y = u_slope * u_slope / u if u > 0 else 0.0, high
+    for _ in range(5):
+        free = u + (y - high) * (u_slope + (y - high) * 0.5 * bend)
+        rise = c1 + y * (2 * c2 + y * 3 * c3) - u_slope - (y - high) * bend
+        if rise <= 0:
+            break
+        step = (free - depth - c0 - y * (c1 + y * (c2 + y * c3))) / rise
+        y = min(max(y + step, low), high)
+        if abs(step) < 0.01:
+            break
+    return y
+
+
+@jit_inline
+def _add_edge(
+    now: Instant, lift: float, place: float, steep: float, by_depth: float, opening: float, sums: FloatArray
+) -> None:
+    """Add what load and drag gain by depth and time where a patch grows at an edge: the force there is not zero.
+
+    The gap between line and free elements has the slope `steep` into the patch, a derivative by the depth, and a rate.
+    """
+    h, slope, _ = height_at(now.track, place)
+    force = lift + h + now.deborah * slope
+    if force > 0 and steep > 0:
+        edge = force / steep
+        sums[STIFFNESS] += edge * by_depth
+        sums[DRAG_STIFFNESS] += edge * by_depth * slope
+        sums[GROWTH] += edge * opening
+        sums[DRAG_GROWTH] += edge * opening * slope
+
+
+@jit_inline
+def _add_separation(now: Instant, motion: Motion, work: Workspace, place: float) -> None:
+    """Add a place where the force falls to zero now, and up to where it can have done so since the jump."""
+    track, recovery, n = now.track, work.recovery, int(now.track.cells)
+    i = min(int(place), n)
+    h, slope, _ = height_at(track, i + 1.0)
+    if motion.highest + h + now.deborah * slope > 0:
+        i += 1
+        while i < n and keeps_pressed(track, work.barriers, now.deborah, i, motion.highest):
+            i += 1
+    k = recovery.count[0]
+    recovery.earliest[k] = recovery.place[k] = place
+    recovery.farthest[k], recovery.barrier[k] = i + 1.0, np.inf
+    recovery.count[0] = k + 1
+
+
+@jit_inline
+def _add_stretch(recovery: FreeRecovery, cell: float, barrier: float) -> None:
+    """Add a cell in which elements can have separated although the force is positive now, or lengthen a stretch."""
+    k, last = recovery.count[0], recovery.count[0] - 1
+    if k > 0 and recovery.earliest[last] < recovery.place[last] and recovery.place[last] == cell:
+        recovery.place[last] = recovery.farthest[last] = cell + 1
+        recovery.barrier[last] = max(recovery.barrier[last], barrier)
+    else:
+        recovery.earliest[k], recovery.barrier[k] = cell, barrier
+        recovery.place[k] = recovery.farthest[k] = cell + 1
+        recovery.count[0] = k + 1
+
+
+@jit_inline
+def _force_slopes(track: Track, deborah: float, i: int) -> tuple[float, float, float]:
+    """Return three slopes that bound the slope of the force in a cell: at its start, a control point, at its end."""
+    _, c1, c2, c3 = cubic(track.height, track.enter, track.leave, i)
+    enter, bend, turn = c1 + 2 * deborah * c2, c2 + 3 * deborah * c3, 3 * c3
+    return enter, enter + bend, enter + 2 * bend + turn
+
+
+@jit_inline
+def _may_have_separated(track: Track, motion: Motion, deborah: float, i: int) -> bool:
+    """Return whether elements can have separated in or just before cell i, where the force is positive now.
+
+    The force on such an element has fallen through zero and risen again on its way.
+    """
+    start, middle, end = _force_slopes(track, deborah, i)
+    if deborah * max(start, middle, end) <= -motion.rise:
+        return False
+    least = min(start, middle, end)
+    if i > 0:
+        least = min(least, _force_slopes(track, deborah, i - 1)[2])
+    return bool(deborah * least < motion.fall)

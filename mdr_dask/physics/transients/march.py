@@ -9,8 +9,8 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.transients.contact_search import Reachable, Workspace, touch
-from mdr_dask.physics.transients.free_flight import Instant
+from mdr_dask.physics.transients.contact_search import Reachable, Workspace, find_contact
+from mdr_dask.physics.transients.free_recovery import Instant
 from mdr_dask.physics.transients.patches import (
     DRAG,
     DRAG_GROWTH,
@@ -25,15 +25,16 @@ from mdr_dask.physics.transients.patches import (
     Track,
 )
 
-TRIALS = 80
+TRIALS = 80  # most Newton steps for the depth at a moment
 ORDER = 3  # of the backward differentiation
-EXACT, TRUSTED = 1e-11, 0.03  # of the load
-SETTLED = 1.5  # times the time since when a march has been near its end: where it ends
-LEFT_LIMITS = -1  # outcome of a march whose depth leaves the limits it was prepared for
+EXACT = 1e-11  # part of the load: the load is met
+NEWTON_LOAD = 0.03  # part of the load that may be missing before a Newton step is taken as the last one
+SETTLED = 1.5  # a march ends when depth and drag have been settled for this ratio of times
+LEFT_LIMITS = -1  # outcome of a march whose depth leaves the limits for which the reachable cells were found
 
 
 class Stepping(NamedTuple):
-    """How the steps of a march go.
+    """Steps of a march.
 
     Parameters
     ----------
@@ -42,9 +43,9 @@ class Stepping(NamedTuple):
     growth : float
         Largest ratio of one step to the one before.
     miss : float
-        Largest difference, in depth, of what a parabola foretells from what is found.
+        Largest difference between the extrapolated and the solved depth.
     close : float
-        Largest change of depth that one step of Newton is trusted with.
+        Largest Newton step of the depth after which the next one is left out.
     until : float
         Last time.
     """
@@ -57,32 +58,41 @@ class Stepping(NamedTuple):
 
 
 class Finish(NamedTuple):
-    """Where a march ends: final depth and drag, and how near to both, the drag as a part of its largest distance."""
+    """End of a march: final depth and drag, and allowed distances, of the drag relative to its largest distance."""
 
     depth: float
     drag: float
-    close: float
-    settled: float
+    depth_distance: float
+    drag_distance: float
 
 
 class Marching(NamedTuple):
-    """What stays the same during a march: the line, the state before the jump, Deborah number, load, limits, onset.
+    """What is constant during a march.
 
-    From `onset` on steps grow in a constant ratio, so that all of them are alike in log(1 + t / onset).
+    Parameters
+    ----------
+    track, first, reachable
+        The line, the contact before the jump, and where contact is possible between `low` and `high`.
+    deborah, load : float
+        After the jump, and F_N / (4 G dx).
+    low, high : float
+        Limits of the depth.
+    onset : float
+        Time from which on steps grow in a constant ratio: all of them are alike in log(1 + t / onset).
     """
 
     track: Track
     first: Patches
     reachable: Reachable
     deborah: float
-    load: float  # over 4 G dx
+    load: float
     low: float
     high: float
     onset: float
 
 
 class Trajectory(NamedTuple):
-    """Time, log(1 + t / onset), depth, drag and their rates at every moment, from right after the jump on."""
+    """Time, log(1 + t / onset), depth, drag and their rates at every moment, beginning just after the jump."""
 
     time: FloatArray
     place: FloatArray
@@ -94,9 +104,9 @@ class Trajectory(NamedTuple):
 
 @jit
 def _drag_rate(sums: FloatArray, stiff: float, step: float) -> float:
-    """Return the rate of the drag at constant load: patches grow where they begin, the lift falls to make up for it.
+    """Return the rate of the drag at constant load: patches grow where they begin, and the lift falls to balance that.
 
-    With a last step of the depth goes one of its rate, at which edges move.
+    A last Newton step of the depth changes its rate as well, and with it the growth at the edges.
     """
     edges = sums[STIFFNESS] - sums[LENGTH] * (1 + stiff)
     edges_drag = sums[DRAG_STIFFNESS] - sums[TILT] * (1 + stiff)
@@ -124,8 +134,7 @@ def _balance(
     low, high = marching.low, marching.high
     for trial in range(TRIALS):
         history.depth[now], history.rate[now] = guess, a * guess + b
-        found = touch(moment, marching.reachable, work)
-        if found < 0:
+        if find_contact(moment, marching.reachable, work) < 0:
             return LEFT_LIMITS, 0.0, 0.0
         off = sums[LOAD] - load
         step = -off / sums[STIFFNESS] if sums[STIFFNESS] > 0 else 0.5 * (low + high) - guess
@@ -133,13 +142,13 @@ def _balance(
             low = guess
         else:
             high = guess
-        if (abs(step) <= close and abs(off) <= TRUSTED * load) or abs(off) <= EXACT * load:
+        if (abs(step) <= close and abs(off) <= NEWTON_LOAD * load) or abs(off) <= EXACT * load:
             guess += step
             history.depth[now], history.rate[now] = guess, a * guess + b
             drag = sums[DRAG] + step * sums[DRAG_STIFFNESS]
             return Outcome.CONVERGED, drag, _drag_rate(sums, a, step)
         if high - low <= 1e-13 * (abs(low) + abs(high)):
-            # the load jumps here, as a grid lets it where a patch comes or goes
+            # the load is discontinuous in the depth, where a single asperity comes into contact
             return Outcome.CONVERGED, sums[DRAG], _drag_rate(sums, a, 0.0)
         guess += step
         if not marching.low <= guess <= marching.high:
@@ -153,8 +162,7 @@ def _balance(
 def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
     """Return a and b of d_dot = a d + b at moment `now` of a march that begins with a known rate.
 
-    They are those of the polynomial through the last depths, over the places (BDF): what relaxes is smooth there, and
-    steps are alike.
+    This is backward differentiation over log(1 + t / onset), where a relaxation is smooth and steps are alike.
     """
     time, place, depth = found.time, found.place, found.depth
     if now == 1:
@@ -173,8 +181,8 @@ def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
 
 
 @jit
-def _foretold(found: Trajectory, now: int) -> float:
-    """Extrapolate the depth to moment `now`: by a parabola over the places, as soon as there are three of them."""
+def _extrapolated(found: Trajectory, now: int) -> float:
+    """Extrapolate the depth to moment `now` by a parabola over log(1 + t / onset), if there are three depths."""
     time, place, depth, rate, _, _ = found
     taken = time[now] - time[now - 1]
     if now == 1:
@@ -188,17 +196,19 @@ def _foretold(found: Trajectory, now: int) -> float:
 
 
 @jit
-def march_depth(marching: Marching, pace: Stepping, aim: Finish, found: Trajectory, work: Workspace) -> tuple[int, int]:
+def march_depth(
+    marching: Marching, pace: Stepping, finish: Finish, found: Trajectory, work: Workspace
+) -> tuple[int, int]:
     """March the depth at constant load by backward differentiation of order three over log(1 + t / onset).
 
     Parameters
     ----------
-    marching, pace, aim
-        What stays the same, how the steps go, and where the march ends.
+    marching, pace, finish
+        What is constant, the steps, and the end of the march.
     found : Trajectory
         Written from the second entry on.
     work : Workspace
-        Its barriers are those of the Deborah number after the jump.
+        With the barriers of the Deborah number after the jump.
 
     Returns
     -------
@@ -208,7 +218,7 @@ def march_depth(marching: Marching, pace: Stepping, aim: Finish, found: Trajecto
         An `Outcome`, or `LEFT_LIMITS`.
     """
     time, place, depth, rate, drag, drag_rate = found
-    near, step, now, farthest = 0.0, pace.first, 1, abs(drag[0] - aim.drag)
+    near, step, now, farthest = 0.0, pace.first, 1, abs(drag[0] - finish.drag)
     while time[now - 1] < pace.until:
         if now == time.size:
             return now, Outcome.TOO_MANY_STEPS
@@ -216,19 +226,22 @@ def march_depth(marching: Marching, pace: Stepping, aim: Finish, found: Trajecto
         if pace.until - time[now] < 0.1 * step:
             time[now] = pace.until
         place[now], taken = np.log1p(time[now] / marching.onset), time[now] - time[now - 1]
-        weights, foretold = _weights(found, now, marching.onset), _foretold(found, now)
-        depth[now] = min(max(foretold, marching.low), marching.high)
+        weights, expected = _weights(found, now, marching.onset), _extrapolated(found, now)
+        depth[now] = min(max(expected, marching.low), marching.high)
         history = History(time, depth, rate, now + 1, weights[0])
         outcome, drag[now], drag_rate[now] = _balance(marching, history, weights, pace.close, work)
-        miss = abs(depth[now] - foretold) if outcome == Outcome.CONVERGED else 8 * pace.miss
+        miss = abs(depth[now] - expected) if outcome == Outcome.CONVERGED else 8 * pace.miss
         if miss > 2 * pace.miss or outcome != Outcome.CONVERGED:
             if step < 1e-3 * pace.first or (outcome == LEFT_LIMITS and step < 1e-2 * time[now - 1]):
                 return now, outcome if outcome != Outcome.CONVERGED else Outcome.DEPTH_NOT_FOUND
             step = taken * max(0.25, 0.8 * (pace.miss / miss) ** (1 / 3))
             continue
         step = taken * min(pace.growth, 0.9 * (pace.miss / max(miss, 1e-300)) ** (1 / 3))
-        farthest = max(farthest, abs(drag[now] - aim.drag))
-        settled = abs(drag[now] - aim.drag) <= aim.settled * farthest and abs(depth[now] - aim.depth) <= aim.close
+        farthest = max(farthest, abs(drag[now] - finish.drag))
+        settled = (
+            abs(drag[now] - finish.drag) <= finish.drag_distance * farthest
+            and abs(depth[now] - finish.depth) <= finish.depth_distance
+        )
         near = near if settled else time[now]
         now += 1
         if settled and time[now - 1] > SETTLED * near:
@@ -238,16 +251,16 @@ def march_depth(marching: Marching, pace: Stepping, aim: Finish, found: Trajecto
 
 @jit
 def retrace(marching: Marching, depths: FloatArray, found: Trajectory, work: Workspace) -> int:
-    """March through given moments along depths that are nearly right, by one step of Newton for each.
+    """March through given moments along depths that are nearly right, with one Newton step for each.
 
     Parameters
     ----------
     marching, work
         As in `march_depth`.
     depths : array, shape (moments,)
-        Depths on another grid; those found depart from them slowly.
+        Depths on another grid.
     found : Trajectory
-        Its times and places are given; written from the second entry on.
+        With times and places; the rest is written from the second entry on.
 
     Returns
     -------

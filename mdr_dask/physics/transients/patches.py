@@ -1,7 +1,8 @@
-"""The pieces of a line in contact and the forces on them.
+"""Patches of a line in contact, and the forces on them.
 
-Lengths are in cells of the line and slopes are rises over a cell, as in the sweep; heights are in any one unit and
-times in relaxation times. The Deborah number is v tau in cells.
+Lengths are in cells of the line and slopes are rises over a cell, as in the steady sweep; heights are in any one unit
+and times in relaxation times. The Deborah number D is v tau in cells. The lift is the sum of the depth and its rate, so
+that the force on an element in contact is lift + h + D h', over 4 G dx.
 """
 
 from __future__ import annotations
@@ -16,27 +17,27 @@ from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, leaving, write_barr
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
 ROOT_STEPS = 60
-CLOSE = 1e-2  # of a cell: a last step, whose cube is left; the load depends on the square of that
-NEARBY = 8  # patches to look at one by one before halving
+CLOSE = 1e-2  # cells: the last step towards a zero of the force; the error is its cube
+NEARBY = 8  # patches that are tried one by one before bisection
 LOAD, DRAG, LENGTH, TILT, STIFFNESS, DRAG_STIFFNESS, GROWTH, DRAG_GROWTH = range(8)
 SUMS = 8
 
 
 class Track(NamedTuple):
-    """The cells of a periodic line from its highest point on, with their integrals up to every node.
+    """The cells of a periodic line and their integrals up to every node.
 
     Parameters
     ----------
     height : array, shape (n + 2,)
-        Heights at the nodes, from the highest point: a light contact loses no digits.
+        Heights at the nodes above the highest point, so that a light contact loses no digits.
     enter, leave, peak : array, shape (n + 1,)
-        Slopes at the start and the end of each cell, and its highest point; the last cell is the first one again.
+        Slopes at the start and the end of each cell, and its maximum; the last cell repeats the first one.
     area, square : array, shape (n + 2,)
         Integrals of the height and of the slope squared up to each node.
     cells : float
         n, the length of the line.
     origin : float
-        The highest point, in the first cell, where a turn begins.
+        Place of the highest point, in the first cell, where the period begins.
     """
 
     height: FloatArray
@@ -57,9 +58,9 @@ def track_of(cells: Cells) -> Track:
 
 
 class Patches(NamedTuple):
-    """Where the elements touch: patch k from ``start[k]`` to ``end[k]``, at one depth and Deborah number.
+    """Patches of a steady state: patch k reaches from ``start[k]`` to ``end[k]``.
 
-    ``pressed`` is the displacement with which elements leave a patch, ``cursor`` where one of them was found last.
+    ``pressed`` is the displacement with which elements leave a patch, ``cursor`` the patch that was found last.
     """
 
     start: FloatArray
@@ -72,7 +73,7 @@ class Patches(NamedTuple):
 
 
 class History(NamedTuple):
-    """The depth and its rate at the moments so far, ``count`` of them; ``stiff`` is d(last rate) / d(last depth)."""
+    """Depth and its rate at ``count`` moments; ``stiff`` is the derivative of the last rate by the last depth."""
 
     time: FloatArray
     depth: FloatArray
@@ -96,7 +97,7 @@ def height_at(track: Track, x: float) -> tuple[float, float, float]:
 
 @jit_inline
 def patch_before(patches: Patches, s: float) -> int:
-    """Return the last patch that begins at s or before, or the first one; those near the last one found come first."""
+    """Return the last patch that begins at s or before, or the first; the search begins at the last one found."""
     low, high = int(patches.cursor[0]), patches.count
     if patches.start[low] <= s:
         for _ in range(NEARBY):
@@ -154,7 +155,7 @@ def add_patch(track: Track, start: float, end: float, lift: float, deborah: floa
 def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
     """Return where from y to 1 the cubic p + q y + r y^2 + c y^3, not negative at y, falls through zero, or `NONE`.
 
-    Where its control points over that part fall, so does the cubic, and Newton's steps find its only zero.
+    Where its Bernstein coefficients over that part decrease, so does the cubic, and Newton's method finds the zero.
     """
     width = 1 - y
     begin, end = p + y * (q + y * (r + y * c)), p + q + r + c
@@ -209,7 +210,7 @@ def keeps_pressed(track: Track, barriers: Barriers, deborah: float, i: int, lift
 
 @jit
 def released(track: Track, first: Patches, barriers: Barriers, deborah: float, rate: float, sums: FloatArray) -> None:
-    """Add up the forces at the very moment of a jump: what touched before touches on where f > 0 at the new rates.
+    """Add up the forces just after a jump: contact continues where the force is positive at the new rates.
 
     Parameters
     ----------

@@ -1,4 +1,9 @@
-"""Friction after a jump of the velocity at constant load, marched from one steady state to the next on one line."""
+"""Friction after a jump of the velocity at constant load, marched from one steady state to the next on one line.
+
+The start is steady sliding at v_1. From the jump on the depth is marched by backward differentiation of order three
+over the logarithm of the time, and every edge of contact is solved at every moment (thesis 4.2, with the rate of the
+depth in the velocity of the elements).
+"""
 
 from __future__ import annotations
 
@@ -11,104 +16,116 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.kelvin import DRAG_RATE
-from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
-from mdr_dask.physics.transients.clearance import clearance_from
 from mdr_dask.physics.transients.contact_search import Reachable, Workspace, workspace_for
-from mdr_dask.physics.transients.curve import curve_through
-from mdr_dask.physics.transients.ends import Ends, PreparedLine, ends_on
+from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits, steady_limits
 from mdr_dask.physics.transients.march import LEFT_LIMITS, Finish, Marching, Stepping, Trajectory, march_depth, retrace
 from mdr_dask.physics.transients.patches import Patches, Track
 
-
-class Settings(NamedTuple):
-    """Numbers of the march, chosen by ``python -m benchmarks kinetics grid`` and ``benchmarks.kinetics.honesty``.
-
-    Parameters
-    ----------
-    first_step : float
-        Of the time in which 1 / q_max is passed, and of tau, at 24 steps per decade.
-    few : float
-        Steps per decade below which the first one, of the time in which 1 / q_max is passed, grows as their cube: early
-        steps cost most, and what they tell then is less than what the others leave out.
-    miss : float
-        Of the change of depth: what a step may differ from a parabola through the ones before, at 24 steps per decade.
-    negligible : float
-        Of the mean displacement: changes of depth that need no finer steps.
-    newton : float
-        Of the change of depth: the step of Newton whose square is left out, at 24 steps per decade.
-    equilibrium : float
-        Of depth and drag, where the march ends, at 24 steps per decade.
-    share : float
-        Of the accuracy: how near to its end friction is left.
-    long, stray, leap : float
-        Relaxation times after which friction has come so near to its end, of all its changes, or of itself, at 24 steps
-        per decade: it leaps where a cell comes to touch as a whole, whose slope is summed otherwise than that of parts.
-    margin : float
-        Of the change of depth, by which a depth may leave its ends.
-    widenings : int
-        Times that those limits are widened.
-    moments : int
-        Most moments of a march.
-    """
-
-    first_step: float = 0.02
-    few: float = 8.0
-    miss: float = 0.01
-    negligible: float = 1e-5
-    newton: float = 1.5e-3
-    equilibrium: float = 5e-5
-    share: float = 0.1
-    long: float = 15.0
-    stray: float = 0.02
-    leap: float = 1e-5
-    margin: float = 0.25
-    widenings: int = 3
-    moments: int = 3000
+ONSET = 0.5  # of the time in which the line travels 1 / q_max: steps grow in a constant ratio from then on
+ROOT = 10.0  # times earlier after a fall of the velocity: contact then grows as the square root of the time
+# The next three are divided by the steps per decade
+MISS = 1.0  # of the change of depth: a step is shortened if the extrapolated depth is wrong by more
+NEWTON = 0.2  # of the change of depth: the last Newton step; the error is its square
+SETTLED = 0.04  # of the change of depth, and of the largest change of drag: distances at the end of a march
+OF_ACCURACY = 0.1  # of the accuracy: the same, where that is larger
+NEGLIGIBLE = 1e-5  # of the mean displacement: least change of depth that the numbers above are measured by
+LONG, NOT_STEADY = 15.0, (0.02, 1e-3)  # then drag must be as near to its end, in parts of its changes and of itself
+MARGIN, WIDENINGS = 0.25, 3  # of the change of depth that a march may leave it by; four times more at each try
+SHALLOW = 0.01  # of the least depth of the steady states: no march goes below
+MOMENTS = 3000  # most moments of a march
+STEEPEST = 3.0  # times the lesser secant beside a moment: a cubic with a steeper tangent would overshoot
+EVERY = 2  # moments of a path in a step of the same path on another grid
 
 
-SETTINGS = Settings()
-WHOLE = 1 - 1e-12  # of a line in contact, but for rounding
-SHALLOW = 0.01  # of the least depth of the ends: no march goes below
-FINE_STEPS = 24.0  # steps per decade of which the settings speak
-EVERY = 2  # of the moments of a path that are marched on another grid
-
-
-class Transient(NamedTuple):
-    """What is asked of a march.
+class MarchRequest(NamedTuple):
+    """What is wanted of a march.
 
     Parameters
     ----------
     times : array, shape (m,)
         (t - t_0) / tau at which friction and depth are wanted, increasing.
     wavenumber : float
-        q_max L, which fixes the first step.
+        q_max L, which decides the first step.
     per_decade : float
         Steps in a factor ten of the time.
     accuracy : float
-        Error allowed for the trace, over the friction at the end: a transient that is smaller is not marched, another
-        one ends when drag and depth have stayed within a tenth of it.
+        Error allowed for friction relative to the friction at the end. A smaller transient is not marched; another
+        march ends when drag and depth are within a tenth of it.
     """
 
     times: FloatArray
     wavenumber: float
-    per_decade: float = FINE_STEPS
+    per_decade: float = 24.0
     accuracy: float = 0.0
 
 
+class Path(NamedTuple):
+    """Drag and depth at the moments of a march, and their rates.
+
+    Parameters
+    ----------
+    time : array, shape (moments,)
+    values, rates : array, shape (2, moments)
+        The first rate of the drag is NaN: it is not known.
+    falls : bool
+        Whether the velocity falls.
+    """
+
+    time: FloatArray
+    values: FloatArray
+    rates: FloatArray
+    falls: bool
+
+    def at(self, times: FloatArray, after: FloatArray) -> FloatArray:
+        """Return drag and depth at increasing times, shape (2, times); `after` the last moment they are constant.
+
+        Between moments they are cubic in log(1 + t / t_1), where t_1 is the first moment. Up to t_1 they go as the
+        time, or as its square root if the velocity falls, because contact then grows behind every patch.
+        """
+        power = 0.5 if self.falls else 1.0
+        moments, wanted = (self.time / self.time[1]) ** power, (times / self.time[1]) ** power
+        pace = self.time[1] / power * (1 + moments) * moments ** (1 / power - 1)
+        curve = _limited_cubic(np.log1p(moments), self.values, self.rates * pace, np.log1p(wanted))
+        return np.where(times > self.time[-1], after[:, None], curve)
+
+
+def _limited_cubic(x: FloatArray, rows: FloatArray, slopes: FloatArray, places: FloatArray) -> FloatArray:
+    """Return cubics through rows of points with known slopes; where the first one is NaN, a parabola begins there.
+
+    A slope far steeper than the secants beside its point belongs to a single asperity that comes into contact or loses
+    it. It is reduced, so that the cubic does not overshoot. (scipy's splines would take a tenth of the time of a jump.)
+    """
+    step, rise = np.diff(x), np.diff(rows)
+    sizes = np.abs(rise / step)[:, [0, *range(step.size), -1]]
+    most = STEEPEST * np.minimum(sizes[:, :-1], sizes[:, 1:])
+    tangents = np.minimum(np.maximum(slopes, -most), most)
+    begins = 2 * rise[:, 0] / step[0] - tangents[:, 1]
+    tangents[:, 0] = np.where(np.isnan(slopes[:, 0]), begins, tangents[:, 0])
+    i = np.clip(np.searchsorted(x, places, "right") - 1, 0, step.size - 1)
+    t, enter, leave, rise = (
+        (places - x[i]) / step[i],
+        tangents[:, i] * step[i],
+        tangents[:, i + 1] * step[i],
+        rise[:, i],
+    )
+    curve: FloatArray = rows[:, i] + t * (enter + t * (3 * rise - 2 * enter - leave + t * (enter + leave - 2 * rise)))
+    return curve
+
+
 class Jump(NamedTuple):
-    """Friction before, at and after a jump of the velocity; drags are F_x / (4 G L), in height squared over length.
+    """Friction before, at and after a jump of the velocity; drags are F_x / (4 G L) in height squared over length.
 
     Parameters
     ----------
     before, at, after : float
-        Steady at v_1, at t_0+, and steady at v_2.
+        Steady at v_1, just after the jump, and steady at v_2.
     trace, depth : array, shape (times,)
-        Drag and depth at the times asked for.
-    path : array, shape (3, moments)
-        Time, drag and depth at the moments computed; the rest is in equilibrium.
+        Drag and depth at the requested times.
+    path : Path or None
+        Of the march; None if nothing was marched.
     left_out : float
-        Estimated size of a transient that is not computed, because all of it lies within the accuracy.
+        Estimated size of a transient that was not marched because all of it is within the accuracy.
     outcome : Outcome
     """
 
@@ -117,44 +134,18 @@ class Jump(NamedTuple):
     after: float
     trace: FloatArray
     depth: FloatArray
-    path: FloatArray
+    path: Path | None
     left_out: float
     outcome: Outcome
 
     @property
     def moments(self) -> int:
         """Number of moments computed."""
-        return int(self.path.shape[1])
+        return 0 if self.path is None else self.path.time.size
 
 
-def pace_after(asked: Transient, deborah: FloatArray, change: float, load: float) -> Stepping:
-    """Return steps from a part of the time in which 1 / q_max is passed, growing in a constant ratio.
-
-    It is passed at v_2, or at v_1 - v_2: so fast does contact grow behind a patch when the velocity falls.
-
-    Parameters
-    ----------
-    asked : Transient
-    deborah : array, shape (2,)
-        v_1 tau / L and v_2 tau / L.
-    change, load : float
-        Difference of the depths before and after, and F_N / (4 G L), in the same unit.
-    """
-    finer = FINE_STEPS / asked.per_decade
-    fastest = max(deborah[1], deborah[0] - deborah[1])
-    passed = max(1.0, SETTINGS.few / asked.per_decade) ** 2 / (asked.wavenumber * float(fastest))
-    first = SETTINGS.first_step * finer * min(1.0, passed)
-    scale = max(abs(change), SETTINGS.negligible * load)
-    close = SETTINGS.newton * finer**2
-    last = float(asked.times[-1])
-    return Stepping(first, 10 ** (1 / asked.per_decade), SETTINGS.miss * finer**3 * scale, close * scale, last)
-
-
-def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], asked: Transient) -> Jump:
+def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], request: MarchRequest) -> Jump:
     """Return the friction of a Kelvin foundation on a periodic line through a jump of the velocity at constant load.
-
-    The start is steady sliding at v_1; then the depth is marched by backward differentiation of order three over the
-    logarithm of time, with every contact edge solved at every moment (thesis 4.2 with the indentation rate kept).
 
     Parameters
     ----------
@@ -164,219 +155,175 @@ def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], as
         F_N / (4 G L), in the unit of height.
     deborah : tuple of float
         v_1 tau / L and v_2 tau / L.
-    asked : Transient
+    request : MarchRequest
     """
     prepared, loads, numbers = PreparedLine.of(line), np.array([load]), np.array([deborah])
-    return velocity_jumps(prepared, loads, numbers, ends_on(prepared, loads, numbers), asked)[0]
+    return jump_between(prepared, load, numbers[0], steady_limits(prepared, loads, numbers)[0], request)
 
 
-def velocity_jumps(
-    line: PreparedLine,
-    loads: FloatArray,
-    deborah: FloatArray,
-    ends: Ends,
-    asked: Transient,
-) -> list[Jump]:
-    """Return the jumps of many cases on one line, of which none depends on the others.
-
-    Parameters
-    ----------
-    line, loads, deborah
-        As in :func:`~mdr_dask.physics.transients.ends.ends_on`.
-    ends : Ends
-        Of the same line.
-    asked : Transient
-        What is asked of the march.
-    """
-    jumps = []
-    for k in range(loads.size):
-        if ends.outcome[k] != Outcome.CONVERGED:
-            jumps.append(_failed(asked.times, Outcome(ends.outcome[k])))
-        else:
-            jumps.append(_Relaxation.of(line, loads[k], deborah[k], ends, k, asked).solve())
-    return jumps
+def jump_between(
+    line: PreparedLine, load: float, deborah: FloatArray, limits: SteadyLimits, request: MarchRequest
+) -> Jump:
+    """Return one jump between steady states that are known; the parameters are as in :func:`velocity_jump`."""
+    times = request.times
+    if limits.outcome != Outcome.CONVERGED:
+        return _failed(times, limits.outcome)
+    after = np.full(times.size, limits.after)
+    settled = Jump(
+        limits.before, limits.at, limits.after, after, np.full(times.size, limits.depth[1]), None, 0.0, limits.outcome
+    )
+    if limits.is_full:  # then u = d + h, the depth is constant and nothing relaxes
+        return settled
+    relaxation = _Relaxation(line, load * line.track.cells, deborah * line.track.cells, limits, request)
+    transient = relaxation.transient() if request.accuracy > 0 else np.inf
+    if transient <= request.accuracy * limits.after:
+        trace = np.where(times > 0, limits.after, limits.at)
+        return settled._replace(trace=trace, depth=limits.depth[np.int64(times > 0)], left_out=transient)
+    path, outcome = relaxation.march(transient)
+    if path is None:
+        return _failed(times, outcome)
+    trace, depth = path.at(times, np.array([limits.after, limits.depth[1]]))
+    return settled._replace(trace=trace, depth=depth, path=path)
 
 
 def retraced(
-    line: PreparedLine, loads: FloatArray, deborah: FloatArray, ends: Ends, jumps: list[Jump], asked: Transient
-) -> list[FloatArray]:
-    """Return the paths of jumps on another grid at every second of their moments, with NaN where none is found.
+    line: PreparedLine, load: float, deborah: FloatArray, limits: SteadyLimits, path: Path, request: MarchRequest
+) -> Path | None:
+    """Return a path on another grid at every second of its moments, or None if there is no solution.
 
-    Parameters
-    ----------
-    line, loads, deborah, ends, asked
-        As in :func:`velocity_jumps`, on the other grid.
-    jumps : list of Jump
-        The same cases, whose paths are followed.
+    The parameters are as in :func:`jump_between`, on the other grid.
     """
-    paths = []
-    for k, jump in enumerate(jumps):
-        path = jump.path[:, ::EVERY].copy()
-        path[1:] = np.nan
-        if jump.outcome == Outcome.CONVERGED == ends.outcome[k] and jump.moments:
-            path = _Relaxation.of(line, loads[k], deborah[k], ends, k, asked).retrace(jump.path[:, ::EVERY])
-        paths.append(path)
-    return paths
+    if limits.outcome != Outcome.CONVERGED:
+        return None
+    return _Relaxation(line, load * line.track.cells, deborah * line.track.cells, limits, request).retrace(path)
 
 
 def _failed(times: FloatArray, outcome: Outcome) -> Jump:
     nothing = np.full(times.size, np.nan)
-    return Jump(np.nan, np.nan, np.nan, nothing, nothing, np.empty((3, 0)), 0.0, outcome)
+    return Jump(np.nan, np.nan, np.nan, nothing, nothing, None, 0.0, outcome)
 
 
 class _Relaxation(NamedTuple):
-    """One case between its ends, in units of cells; depths from the highest point of the line."""
+    """One jump in units of cells: load, Deborah numbers, and the steady states before and after."""
 
     line: PreparedLine
     load: float
     deborah: FloatArray
-    before: float
-    at: float
-    after: float
-    rate: float
-    tilt: float
-    depth: FloatArray
-    first: Patches
-    slower: Patches
-    is_full: bool
-    asked: Transient
-    pace: Stepping
+    limits: SteadyLimits
+    request: MarchRequest
 
-    @classmethod
-    def of(
-        cls, line: PreparedLine, load: float, deborah: FloatArray, ends: Ends, k: int, asked: Transient
-    ) -> _Relaxation:
-        """Take the k-th case of some ends."""
-        n, depth = line.track.cells, ends.depth[k]
-        return cls(
-            line,
-            float(load * n),
-            deborah * n,
-            float(ends.before[k]),
-            float(ends.at[k]),
-            float(ends.after[k]),
-            float(ends.rate[k]),
-            float(ends.tilt[k]),
-            depth + line.cells.top,
-            ends.first[k],
-            ends.slower[k],
-            bool(np.all(ends.contact[k] >= WHOLE)),
-            asked,
-            pace_after(asked, deborah, float(depth[1] - depth[0]), float(load)),
-        )
+    @property
+    def ends(self) -> FloatArray:
+        """Depth of the highest point before and long after the jump."""
+        ends: FloatArray = self.limits.depth + self.line.cells.top
+        return ends
 
-    def solve(self) -> Jump:
-        """March from end to end, within limits of the depth that may widen."""
-        times, constant = self.asked.times, np.ones(self.asked.times.size)
-        jump = Jump(
-            self.before,
-            self.at,
-            self.after,
-            self.after * constant,
-            (self.depth[1] - self.line.cells.top) * constant,
-            np.empty((3, 0)),
-            0.0,
-            Outcome.CONVERGED,
-        )
-        if self.is_full:  # then u = d + h, d is constant and nothing relaxes
-            return jump
-        transient = self.transient() if self.asked.accuracy > 0 else np.inf
-        if transient <= self.asked.accuracy * self.after:
-            trace = np.where(times > 0, self.after, self.at)
-            sinking = np.where(times > 0, self.depth[1], self.depth[0]) - self.line.cells.top
-            return jump._replace(trace=trace, depth=sinking, left_out=transient)
-        for limits in self.limits(self.depth):
-            found = self.march(jump, limits, transient)
-            if found is not None:
-                return found
-        return _failed(times, Outcome.DEPTH_NOT_FOUND)
+    @property
+    def change(self) -> float:
+        """Change of the depth, by which errors of it are measured."""
+        return max(abs(float(np.diff(self.limits.depth)[0])), NEGLIGIBLE * self.load / self.line.track.cells)
 
-    def limits(self, depths: FloatArray) -> Iterator[tuple[float, float]]:
-        """Yield wider and wider limits around depths."""
+    @property
+    def stepping(self) -> Stepping:
+        """Steps that grow in a constant ratio from a part of the time in which the line travels 1 / q_max.
+
+        It travels at v_2, and contact behind a patch grows at v_1 - v_2 if the velocity falls.
+        """
+        before, after = self.deborah / self.line.track.cells
+        growth = 10 ** (1 / self.request.per_decade)
+        onset = ONSET * min(1.0, 1 / (self.request.wavenumber * max(after, before - after)))
+        onset /= ROOT if after < before else 1.0
+        times = self.request.times
+        part = self.change / self.request.per_decade
+        return Stepping(onset * (growth - 1), growth, MISS * part, NEWTON * part, float(times[-1]))
+
+    def transient(self) -> float:
+        """Estimate the size of the transient, with a safety factor of two.
+
+        The difference of its ends alone is no bound, because friction may cross its end. Added are the friction of the
+        rate of the depth just after the jump, and that of the change of depth.
+        """
+        _, sums = self.line.patches(self.ends[1], self.deborah[1])
+        by_depth = abs(sums[DRAG_RATE] * (self.ends[1] - self.ends[0]))
+        limits = self.limits
+        return float(2 * (abs(limits.at - limits.after) + abs(limits.rate * limits.tilt) + by_depth))
+
+    def intervals(self, depths: FloatArray) -> Iterator[tuple[float, float]]:
+        """Yield wider and wider intervals around depths."""
         low, high = float(depths.min()), float(depths.max())
-        margin = SETTINGS.margin * (high - low) + SETTINGS.negligible * self.load / self.line.track.cells
-        for _ in range(SETTINGS.widenings):
+        margin = MARGIN * (high - low) + NEGLIGIBLE * self.load / self.line.track.cells
+        for _ in range(WIDENINGS):
             yield max(low - margin, SHALLOW * low), high + margin
             margin *= 4
 
-    def transient(self) -> float:
-        """Estimate the size of the transient: the difference of its ends alone does not bound one that crosses its end.
+    def march(self, transient: float) -> tuple[Path | None, Outcome]:
+        """March from one steady state to the next; return the path, or the reason why there is none."""
+        after, request = self.limits.after, self.request
+        near = max(SETTLED / request.per_decade, OF_ACCURACY * request.accuracy * after / max(transient, 1e-300))
+        finish = Finish(float(self.ends[1]), after, near * self.change, near)
+        for interval in self.intervals(self.ends):
+            marching, found, work = self.begun(interval, MOMENTS)
+            count, outcome = march_depth(marching, self.stepping, finish, found, work)
+            if outcome != LEFT_LIMITS:
+                break
+        else:
+            return None, Outcome.DEPTH_NOT_FOUND
+        path = self.path(Trajectory(*(column[:count] for column in found)))
+        if outcome != Outcome.CONVERGED:
+            return None, Outcome(outcome)
+        drag = path.values[0]
+        if path.time[-1] >= LONG and abs(drag[-1] - after) > NOT_STEADY[0] * np.ptp(drag) + NOT_STEADY[1] * after:
+            return None, Outcome.NOT_STEADY
+        return path, Outcome.CONVERGED
 
-        To it come the friction of the depth's rate, and that of its change.
-        """
-        sums = np.empty(SWEEP_SUMS)
-        self.line.patches(self.depth[1], self.deborah[1], sums)
-        by_depth = abs(sums[DRAG_RATE] * (self.depth[1] - self.depth[0]))
-        return float(abs(self.at - self.after) + abs(self.rate * self.tilt) + by_depth)
-
-    def march(self, jump: Jump, limits: tuple[float, float], transient: float) -> Jump | None:
-        """Return the jump with what a march between two depths finds, or None if it leaves them."""
-        accuracy, asked = self.asked.accuracy, self.asked
-        coarse = (FINE_STEPS / asked.per_decade) ** 3
-        equilibrium = SETTINGS.equilibrium * coarse
-        settled = max(equilibrium, SETTINGS.share * accuracy * self.after / max(transient, 1e-300))
-        close = max(10 * equilibrium, settled) * abs(self.depth[1] - self.depth[0])
-        marching, found, work = self.begun(limits, SETTINGS.moments)
-        count, outcome = march_depth(
-            marching, self.pace, Finish(self.depth[1], self.after, close, settled), found, work
-        )
-        if outcome == LEFT_LIMITS:
-            return None
-        time, _, depth, rate, drag, drag_rate = (column[:count] for column in found)
-        near = max(SETTINGS.stray * np.ptp(drag), SETTINGS.leap * coarse * self.after)
-        strayed = time[-1] >= SETTINGS.long and abs(drag[-1] - self.after) > near
-        if outcome != Outcome.CONVERGED or strayed:
-            return _failed(asked.times, Outcome(outcome) if outcome else Outcome.NOT_STEADY)
-        ends = np.array([self.after, self.depth[1]])
-        path = np.stack([time, drag, depth])
-        rates, falls = np.stack([drag_rate, rate]), bool(self.deborah[1] < self.deborah[0])
-        trace, sinking = _at_times(time, path[1:], rates, asked.times, ends, falls)
-        path[2] -= self.line.cells.top
-        return jump._replace(trace=trace, depth=sinking - self.line.cells.top, path=path)
-
-    def begun(self, limits: tuple[float, float], moments: int) -> tuple[Marching, Trajectory, Workspace]:
-        """Return a march between two depths at its first moment, with room for all of them."""
+    def begun(self, interval: tuple[float, float], moments: int) -> tuple[Marching, Trajectory, Workspace]:
+        """Return a march between two depths at its first moment."""
+        line, limits, stepping = self.line, self.limits, self.stepping
+        assert limits.first is not None
+        assert limits.slower is not None
         found = Trajectory(*np.empty((6, moments)))
-        for column, value in zip(found, (0.0, 0.0, self.depth[0], self.rate, self.at, np.nan), strict=True):
+        for column, value in zip(found, (0.0, 0.0, self.ends[0], limits.rate, limits.at, np.nan), strict=True):
             column[0] = value
-        reachable = _reachable(self.line.track, self.slower, limits)
-        onset = self.pace.first / (self.pace.growth - 1)
-        marching = Marching(self.line.track, self.first, reachable, self.deborah[1], self.load, *limits, onset)
-        barriers, clearance = self.line.barriers(self.deborah[1]), clearance_from(reachable.from_depth - self.depth[0])
-        return marching, found, workspace_for(self.first.count, barriers, clearance)
+        reachable = _reachable(line.track, limits.slower, interval)
+        onset = stepping.first / (stepping.growth - 1)
+        marching = Marching(line.track, limits.first, reachable, self.deborah[1], self.load, *interval, onset)
+        below = reachable.from_depth - self.ends[0]
+        return marching, found, workspace_for(limits.first.count, line.barriers(self.deborah[1]), below)
 
-    def retrace(self, path: FloatArray) -> FloatArray:
-        """Return the path on this grid at the moments of a path on another one, NaN where none is found."""
-        top, found = self.line.cells.top, path.copy()
-        depths = path[2] + top
-        for limits in self.limits(np.append(depths + (self.depth[0] - depths[0]), self.depth)):
-            marching, trajectory, work = self.begun(limits, path.shape[1])
-            trajectory.time[:], trajectory.place[:] = path[0], np.log1p(path[0] / marching.onset)
-            outcome = retrace(marching, depths, trajectory, work)
-            if outcome == Outcome.CONVERGED:
-                found[1], found[2] = trajectory.drag, trajectory.depth - top
-                return found
-        found[1:] = np.nan
-        return found
+    def path(self, found: Trajectory) -> Path:
+        """Return the path of a trajectory, with depths of the mean line."""
+        values = np.stack([found.drag, found.depth - self.line.cells.top])
+        falls = bool(self.deborah[1] < self.deborah[0])
+        return Path(found.time, values, np.stack([found.drag_rate, found.rate]), falls)
+
+    def retrace(self, path: Path) -> Path | None:
+        """Return the path on this grid at every second moment of a path on another one, or None."""
+        time, depths = path.time[::EVERY], path.values[1, ::EVERY] + self.line.cells.top
+        for interval in self.intervals(np.append(depths + (self.ends[0] - depths[0]), self.ends)):
+            marching, found, work = self.begun(interval, time.size)
+            found.time[:], found.place[:] = time, np.log1p(time / marching.onset)
+            if retrace(marching, depths, found, work) == Outcome.CONVERGED:
+                return self.path(found)
+        return None
 
 
-def _reachable(track: Track, slower: Patches, limits: tuple[float, float]) -> Reachable:
+def _reachable(track: Track, slower: Patches, interval: tuple[float, float]) -> Reachable:
     """Return where elements can be in contact between two depths."""
     begin, end = int(np.ceil(slower.end[0])), int(slower.start[-1])
-    return Reachable(*_runs(track, slower, limits), float(np.max(track.peak[begin:end], initial=-np.inf)))
+    return Reachable(*_runs(track, slower, interval), float(np.max(track.peak[begin:end], initial=-np.inf)))
 
 
 @jit
-def _runs(track: Track, slower: Patches, limits: tuple[float, float]) -> tuple[IntArray, FloatArray]:
+def _runs(track: Track, slower: Patches, interval: tuple[float, float]) -> tuple[IntArray, FloatArray]:
     """Return where elements can be in contact between two depths, and up to which depth those of a cell are not.
 
     The steady state at the lower velocity bounds them: where the depth is less by some length, displacements are less
     by that length at most.
     """
-    (low, high), cells, decay = limits, track.peak.size, np.exp(-1 / slower.deborah)
+    (low, high), cells, decay = interval, track.peak.size, np.exp(-1 / slower.deborah)
     from_depth = np.full(cells + 1, -np.inf)
     for k in range(slower.count):
-        first = int(slower.end[k]) + 1  # node in flight
+        first = int(slower.end[k]) + 1  # first node behind the patch
         last = int(np.ceil(slower.start[k + 1])) - 1 if k + 1 < slower.count else cells
         free = slower.pressed[k] * np.exp(-(first - slower.end[k]) / slower.deborah)
         for i in range(first, last):
@@ -392,21 +339,3 @@ def _runs(track: Track, slower: Patches, limits: tuple[float, float]) -> tuple[I
                 runs[count, 0], runs[count, 1] = begin, end
                 count += 1
     return runs[:count], from_depth
-
-
-def _at_times(
-    moments: FloatArray, rows: FloatArray, rates: FloatArray, times: FloatArray, after: FloatArray, falls: bool
-) -> FloatArray:
-    """Interpolate rows of values and their rates over log time.
-
-    In the first step friction goes as the time; where the velocity falls as its root, as contact grows behind a patch.
-    """
-    scale, power = moments[1], 0.5 if falls else 1.0
-    x, places = (np.log1p((each / scale) ** power) for each in (moments, times))
-    grown = (moments / scale) ** power
-    pace = scale / power * (1 + grown) * grown ** (1 / power - 1)
-    traces = np.empty((len(rows), times.size))
-    for row, rate, trace in zip(rows, rates, traces, strict=True):
-        curve_through(x, row, rate * pace, places, trace)
-    traces[:, times > moments[-1]] = after[:, None]
-    return traces

@@ -1,0 +1,346 @@
+"""The displacement of elements that recover freely after a jump.
+
+An element at x came along the path x' = x - D (t - t') with the Deborah number D = v tau in cells. Its displacement is
+the largest to which the line can have pressed it, faded since then:
+
+    u(x, t) = max over t' <= t of (d(t') + h(x')) exp(-(t - t'))
+
+so that only the depth d(t) has a history. Free elements are never followed one by one: the place where an element
+separated from the line is the one where this expression is stationary, which is where the force on it was zero.
+`FreeRecovery` holds the places near which elements can have separated.
+
+Along the line the *drift* D u' + u of free elements is minus the rate of the depth when they separated, faded since
+then. Its extremes over the recent past (`PathBounds`) bound how fast u can fall or rise along the line.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mdr_dask.arrays import FloatArray, IntArray
+from mdr_dask.physics.jit import jit, jit_inline, last_until
+from mdr_dask.physics.transients.patches import History, Patches, Track, height_at, patch_before
+
+ITERATIONS = 60  # most iterations of Newton's method with bisection
+NEAR = 0.02  # cells: the last Newton step towards a place of separation; the error is its cube
+STRIDE = 2.0  # cells: the longest step towards a place of separation
+MET = 1e-3  # cells: the last step towards the begin of contact; the error is its cube
+CREST = 1e-3  # cells: resolution of the place where line and free elements are nearest inside a cell
+FARTHEST = 200  # cells behind x in which elements of a weak stretch are searched for
+MARGIN = 64.0  # cells added to twice a distance, over which the depth may change what is kept
+WINDOW, WINDOWS = 8.0, 16  # cells travelled in the shortest window of `PathBounds`; each next one is twice as long
+_DOUBLINGS = np.frexp(np.arange(1024))[1]  # how often `WINDOW` is doubled to exceed so many windows
+
+
+class Instant(NamedTuple):
+    """An instant after the jump.
+
+    Parameters
+    ----------
+    track, first : Track, Patches
+        The line, and the contact before the jump.
+    history : History
+        Depth and rate up to this instant.
+    time, deborah : float
+        Time since the jump, and the Deborah number since then.
+    left : float
+        exp(-time), the part of a displacement at the jump that is left.
+    """
+
+    track: Track
+    first: Patches
+    history: History
+    time: float
+    deborah: float
+    left: float
+
+
+class PathBounds(NamedTuple):
+    """Bounds over the time in which the line travelled `WINDOW` cells, twice that, and so on; shape (WINDOWS,) each.
+
+    Parameters
+    ----------
+    spread : array
+        Range of the depth.
+    opened : array
+        Most by which the gap between line and free elements has opened at one place.
+    least_lift : array
+        Least sum of depth and rate, the lift.
+    most_drift, least_drift : array
+        Largest and least drift (or 0) of elements that separated in that time or have been free since before the jump.
+    """
+
+    spread: FloatArray
+    opened: FloatArray
+    least_lift: FloatArray
+    most_drift: FloatArray
+    least_drift: FloatArray
+
+
+class FreeRecovery(NamedTuple):
+    """Where elements can have separated from the line, `count[0]` places or stretches, ordered along the line.
+
+    Parameters
+    ----------
+    earliest, place, farthest : array
+        Where ``earliest == place``, contact ends there now, and ended between `place` and `farthest` since the jump.
+        Otherwise no contact ends there now, but elements can have separated in the cells from `earliest` to `place`.
+    barrier : array
+        Such a stretch can only have let elements go while the lift was below this.
+    count : int array, shape (1,)
+    bounds : PathBounds
+    """
+
+    earliest: FloatArray
+    place: FloatArray
+    farthest: FloatArray
+    barrier: FloatArray
+    count: IntArray
+    bounds: PathBounds
+
+
+@jit_inline
+def write_bounds(history: History, first: Patches, deborah: float, bounds: PathBounds) -> None:
+    """Write the bounds at the last instant of a history."""
+    last = history.count - 1
+    time, depth, rate = history.time[last], history.depth[last], history.rate[last]
+    left, back = np.exp(-time), last
+    shallowest, deepest, least_lift = depth, depth, depth + rate
+    most, least = max(-rate, -history.rate[0] * left, 0.0), min(-rate, -history.rate[0] * left, 0.0)
+    if first.deborah > deborah:  # elements that were free at the jump recover over a longer way
+        most = max(most, min(depth, first.depth * left) * (1 - deborah / first.deborah))
+    # when the line is faster, elements that were free at the jump arrive with more displacement, for half a window
+    rise, gains = 0.0, first.depth * (deborah / first.deborah - 1)
+    for k in range(WINDOWS):
+        duration = WINDOW / deborah * 2.0**k
+        since = time - duration
+        while back > 0 and history.time[back] > since:
+            back -= 1
+            then, drift = history.depth[back], -history.rate[back]
+            shallowest, deepest = min(shallowest, then), max(deepest, then)
+            least_lift, rise = min(least_lift, then - drift), max(rise, deepest - then)
+            if drift > most or drift < least:
+                drift *= np.exp(history.time[back] - time)
+                most, least = max(most, drift), min(least, drift)
+        bounds.spread[k], bounds.least_lift[k] = deepest - shallowest, least_lift
+        bounds.most_drift[k], bounds.least_drift[k] = most, least
+        bounds.opened[k] = deepest - depth + rise
+        if gains > 0 and since < 0.5 * duration:
+            bounds.opened[k] += gains * (np.exp(-max(since, 0.0)) - np.exp(-min(time, 0.5 * duration)))
+
+
+@jit_inline
+def window(distance: float) -> int:
+    """Return the index of the bounds that hold over a distance in cells."""
+    windows = max(distance * (1 / WINDOW), 0.0)
+    return int(_DOUBLINGS[np.uintp(windows)]) if windows < _DOUBLINGS.size else WINDOWS - 1
+
+
+@jit_inline
+def _depth_at(history: History, t: float) -> tuple[float, float, float]:
+    """Return depth, rate and its derivative at time t by the cubic through values and rates."""
+    last = history.count - 1
+    if last <= 0 or t >= history.time[last]:
+        return history.depth[last], history.rate[last], 0.0
+    low, high, back = last - 1, last, 1
+    while history.time[low] > t and low > 0:
+        high, low, back = low, max(low - back, 0), 2 * back
+    low = last_until(history.time, t, low, high)
+    high = low + 1
+    step = history.time[high] - history.time[low]
+    y = (t - history.time[low]) / step
+    rise = history.depth[high] - history.depth[low]
+    enter, leave = history.rate[low] * step, history.rate[high] * step
+    c2, c3 = 3 * rise - 2 * enter - leave, enter + leave - 2 * rise
+    return (
+        history.depth[low] + y * (enter + y * (c2 + y * c3)),
+        (enter + y * (2 * c2 + 3 * y * c3)) / step,
+        (2 * c2 + 6 * y * c3) / (step * step),
+    )
+
+
+@jit_inline
+def _by_last_depth(history: History, t: float) -> float:
+    """Return the derivative of the depth at time t by the last depth."""
+    last = history.count - 1
+    if last <= 0 or t >= history.time[last]:
+        return 1.0
+    if t <= history.time[last - 1]:
+        return 0.0
+    step = history.time[last] - history.time[last - 1]
+    y = (t - history.time[last - 1]) / step
+    return float(y * y * (3 - 2 * y + history.stiff * step * (y - 1)))
+
+
+@jit_inline
+def _in_period(now: Instant, s: float) -> float:
+    """Return the place in the first period of the line that repeats at s."""
+    track = now.track
+    return float(s - np.floor((s - track.origin) / track.cells) * track.cells)
+
+
+@jit_inline
+def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tuple[float, float, float]:
+    """Return displacement, slope and derivative by the depth at x of an element that separated near a place.
+
+    It separated after the jump where the force on it vanished, between the place where the force vanishes now and the
+    farthest such place so far. The displacement is stationary there, so that few steps of Newton's method suffice. It
+    is -1 if no element at x separated there.
+    """
+    deborah = now.deborah
+    first = x - deborah * now.time
+    low, high, s = first, min(x, farthest), max(place, first)
+    for _ in range(ITERATIONS):
+        if s > high:
+            break
+        since = (x - s) / deborah
+        d, rate, change = _depth_at(now.history, max(now.time - since, 0.0))
+        h, slope, curvature = height_at(now.track, s if s > 0 else _in_period(now, s))
+        force = d + h + rate + deborah * slope
+        falls = (rate + change) / deborah + slope + deborah * curvature
+        step = -force / falls if falls < 0 else STRIDE if force > 0 else -STRIDE
+        if abs(step) < NEAR:
+            if s + step > x:  # the element has not arrived there yet
+                break
+            fade = np.exp(-since)
+            u = (d + h + 0.5 * force * step / deborah) * fade
+            return u, -(u + rate * fade) / deborah, _by_last_depth(now.history, now.time - since) * fade
+        if force > 0:
+            low = s
+        elif s > first:
+            high = s
+        else:
+            break
+        s += min(max(step, -STRIDE), STRIDE)
+        if not low < s < high:
+            s = 0.5 * (low + high)
+        if high - low < NEAR:
+            break
+    return -1.0, 0.0, 0.0
+
+
+@jit
+def _separated_within(now: Instant, x: float, low: float, high: float) -> tuple[float, float, float]:
+    """Return the same for an element that separated anywhere in a stretch of cells; the nodes are searched first."""
+    most, place, s = 0.0, x, min(high, np.ceil(x) - 1)
+    low = max(low, x - now.deborah * now.time, s - FARTHEST)
+    while s >= low:
+        since = (x - s) / now.deborah
+        height = now.track.height[int(s if s >= 0 else _in_period(now, s))]
+        u = (_depth_at(now.history, now.time - since)[0] + height) * np.exp(-since)
+        if u > most:
+            most, place = u, s
+        s -= 1
+    return _separated_near(now, x, place, place + 1) if most > 0 else (-1.0, 0.0, 0.0)
+
+
+@jit_inline
+def _from_separation(now: Instant, recovery: FreeRecovery, k: int, x: float) -> tuple[float, float, float]:
+    """Return displacement, slope and derivative by the depth at x of elements that separated at the k-th place."""
+    if recovery.earliest[k] < recovery.place[k]:
+        if recovery.bounds.least_lift[window(x - recovery.earliest[k])] > recovery.barrier[k]:
+            return -1.0, 0.0, 0.0
+        return _separated_within(now, x, recovery.earliest[k], recovery.place[k])
+    return _separated_near(now, x, recovery.place[k], recovery.farthest[k])
+
+
+@jit_inline
+def from_before(now: Instant, x: float, least: float) -> tuple[float, float]:
+    """Return displacement and slope at x that the state before the jump has left; 0 if that is at most `least`."""
+    first, s = now.first, _in_period(now, x - now.deborah * now.time)
+    low = patch_before(first, s)
+    if s <= first.end[low]:
+        h, slope, _ = height_at(now.track, s)
+        return (first.depth + h) * now.left, slope * now.left
+    u = first.pressed[low] * now.left
+    if u <= least:
+        return 0.0, 0.0
+    u *= np.exp(-(s - first.end[low]) / first.deborah)
+    return u, -u / first.deborah
+
+
+@jit_inline
+def displacement_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float, float]:
+    """Return displacement, slope along the line and derivative by the depth of free elements at x."""
+    u, slope, by_depth = 0.0, 0.0, 0.0
+    for k in range(recovery.count[0]):
+        value, value_slope, value_by_depth = _from_separation(now, recovery, k, x)
+        if value > u:
+            u, slope, by_depth = value, value_slope, value_by_depth
+    if now.first.depth * now.left > u:  # no element had more at the jump: heights are below the highest point
+        value, value_slope = from_before(now, x, u)
+        if value > u:
+            u, slope, by_depth = value, value_slope, 0.0
+    return u, slope, by_depth
+
+
+@jit_inline
+def gap_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float, float, float, float]:
+    """Return by how much the line is above free elements at x, its slope, curvature, derivative by depth, and rate.
+
+    Free elements fade and move on, so that their displacement at x changes at the rate -u - D u'. It bends along the
+    line as an exponential does.
+    """
+    u, u_slope, by_depth = displacement_at(now, recovery, x)
+    last = now.history.count - 1
+    h, h_slope, h_bend = height_at(now.track, x)
+    bend = h_bend - (u_slope * u_slope / u if u > 0 else 0.0)
+    opening = now.history.rate[last] + u + now.deborah * u_slope
+    return now.history.depth[last] + h - u, h_slope - u_slope, bend, 1 - by_depth, opening
+
+
+@jit_inline
+def contact_begin(
+    now: Instant, recovery: FreeRecovery, low: float, high: float, x: float
+) -> tuple[float, float, float, float]:
+    """Return where the line rises above free elements, and slope, derivative by depth and rate of the gap there."""
+    slope, by_depth, opening = 1.0, 1.0, 0.0
+    for _ in range(ITERATIONS):
+        if not low < x < high:
+            x = 0.5 * (low + high)
+        gap, slope, bend, by_depth, opening = gap_at(now, recovery, x)
+        if gap > 0:
+            high = x
+        else:
+            low = x
+        step = -gap / slope if slope > 0 else 2.0
+        if abs(step) < MET or high - low < 1e-9:
+            if 2 * abs(bend * step) < slope:
+                step /= 1 + 0.5 * bend * step / slope
+                slope += bend * step
+            return min(max(x + step, low), high), slope, by_depth, opening
+        x += step
+    return x, slope, by_depth, opening
+
+
+@jit
+def nearest_approach(now: Instant, recovery: FreeRecovery, low: float, high: float) -> tuple[float, float]:
+    """Return where between two places the line is nearest to free elements or above them, and the gap there."""
+    x, gap = high, -1.0
+    while gap <= 0 and high - low > CREST:
+        x = 0.5 * (low + high)
+        gap, slope, _, _, _ = gap_at(now, recovery, x)
+        if slope > 0:
+            low = x
+        else:
+            high = x
+    return x, gap
+
+
+@jit_inline
+def prune(now: Instant, recovery: FreeRecovery, x: float, pressed: float, deepest: float) -> None:
+    """Keep only places of separation whose elements can still exceed those that separate at x with `pressed`."""
+    kept = 0
+    for k in range(recovery.count[0]):
+        place, farthest = recovery.place[k], recovery.farthest[k]
+        u = _from_separation(now, recovery, k, x)[0]
+        if u < 0 and x - now.deborah * now.time < farthest:  # none at x separated there; some farther on may have
+            height = height_at(now.track, _in_period(now, place))[0]
+            u = (deepest + height) * np.exp(-max(x - farthest, 0.0) / now.deborah)
+        if u + 2 * recovery.bounds.spread[window(2 * (x - place) + MARGIN)] >= pressed:
+            recovery.earliest[kept], recovery.place[kept] = recovery.earliest[k], place
+            recovery.farthest[kept], recovery.barrier[kept] = farthest, recovery.barrier[k]
+            kept += 1
+    recovery.count[0] = kept

@@ -1,0 +1,164 @@
+"""Steady sliding before and after a velocity jump on one line, and the instant at which the velocity changes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.jit import jit
+from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.sliding.kelvin import DRAG as SWEEP_DRAG
+from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
+from mdr_dask.physics.sliding.kelvin import Barriers, Blocks, barriers_for, blocks_of, patches_at
+from mdr_dask.physics.sliding.steady import steady_on_cells
+from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
+from mdr_dask.physics.transients.patches import (
+    DRAG,
+    LENGTH,
+    LOAD,
+    SUMS,
+    TILT,
+    Patches,
+    Track,
+    height_at,
+    released,
+    track_of,
+)
+
+KEPT_CELLS, KEPT_SPEEDS = 2**21, 4  # most cells whose barriers are kept (16 bytes each), but those of four speeds
+WHOLE = 1 - 1e-12  # fraction of the line in full contact, within rounding
+NEWTON_STEPS = 60
+NEARLY = 1e-6  # part of the load that the last Newton step may still find missing; the error is its square
+
+
+class PreparedLine(NamedTuple):
+    """One periodic line as the steady sweep and the march need it, with the barriers of some Deborah numbers."""
+
+    cells: Cells
+    blocks: Blocks
+    track: Track
+    known: dict[float, Barriers]
+
+    @classmethod
+    def of(cls, line: CubicLine) -> PreparedLine:
+        """Prepare a line."""
+        cells = cut(line)
+        return cls(cells, blocks_of(cells), track_of(cells), {})
+
+    def barriers(self, deborah: float) -> Barriers:
+        """Return the barriers at a Deborah number in cells; successive cases often have the same."""
+        if deborah not in self.known:
+            if len(self.known) >= max(KEPT_CELLS // self.cells.mean.size, KEPT_SPEEDS):
+                self.known.clear()
+            self.known[deborah] = barriers_for(int(self.track.cells))
+        return self.known[deborah]
+
+    def patches(self, depth: float, deborah: float) -> tuple[Patches, FloatArray]:
+        """Return the contact in steady sliding at a depth of the highest point, and the sums of the sweep."""
+        sums = np.empty(SWEEP_SUMS)
+        start, end = patches_at(self.cells, self.blocks, self.barriers(deborah), deborah, depth, sums)
+        pressed = _pressed(self.track, end, depth)
+        return Patches(start, end, pressed, start.size, depth, deborah, np.zeros(1, np.int64)), sums
+
+
+class SteadyLimits(NamedTuple):
+    """Steady states before and after a jump, and the instant between; drags are F_x / (4 G L), height^2 over length.
+
+    Parameters
+    ----------
+    before, at, after : float
+        Drag in steady sliding at v_1, just after the jump, and in steady sliding at v_2.
+    rate, tilt : float
+        Rate of the depth by t / tau just after the jump, and the derivative of `at` by it.
+    depth : array, shape (2,)
+        Depth before and long after the jump.
+    first, slower : Patches or None
+        Contact before the jump, and in steady sliding at the lower velocity; None without a solution.
+    is_full : bool
+        Whether the whole line is in contact before and after.
+    outcome : Outcome
+    """
+
+    before: float
+    at: float
+    after: float
+    rate: float
+    tilt: float
+    depth: FloatArray
+    first: Patches | None
+    slower: Patches | None
+    is_full: bool
+    outcome: Outcome
+
+
+def steady_limits(
+    line: PreparedLine, loads: FloatArray, deborah: FloatArray, guesses: FloatArray | None = None
+) -> list[SteadyLimits]:
+    """Solve the steady states before and after jumps on one line, and the instants of the jumps.
+
+    At the instant of a jump displacements and depth do not change, but the rate of the depth does, and elements whose
+    force would be negative separate.
+
+    Parameters
+    ----------
+    line : PreparedLine
+    loads : array, shape (cases,)
+        F_N / (4 G L), in the unit of height.
+    deborah : array, shape (cases, 2)
+        v_1 tau / L and v_2 tau / L.
+    guesses : array, shape (cases, 2), optional
+        Depths, such as those on another grid, where the searches begin; the results do not depend on them.
+    """
+    guess = None if guesses is None else guesses.ravel()
+    steady = steady_on_cells(line.cells, line.blocks, deborah.ravel(), np.repeat(loads, 2), guess)
+    depths, contacts, outcomes = (
+        each.reshape(-1, 2) for each in (steady.depth, steady.contact_fraction, steady.status)
+    )
+    found = []
+    for load, speeds, depth, contact, outcome in zip(
+        loads, deborah, depths, contacts, outcomes.max(axis=1), strict=True
+    ):
+        if outcome != Outcome.CONVERGED:
+            nothing = np.full(5, np.nan)
+            found.append(SteadyLimits(*nothing, np.full(2, np.nan), None, None, False, Outcome(outcome)))
+            continue
+        n, is_full = line.track.cells, bool(np.all(contact >= WHOLE))
+        both, drags = [], []
+        for sinking, speed in zip(depth, speeds * n, strict=True):
+            patches, sums = line.patches(float(sinking + line.cells.top), float(speed))
+            both.append(patches)
+            drags.append(float(sums[SWEEP_DRAG]))
+        fast = float(speeds[1] * n)
+        at, rate, tilt, end = _release(line.track, both[0], line.barriers(fast), fast, float(load * n))
+        slower = both[int(np.argmin(speeds))]
+        found.append(SteadyLimits(drags[0], at, drags[1], rate, tilt, depth, both[0], slower, is_full, Outcome(end)))
+    return found
+
+
+@jit
+def _pressed(track: Track, end: FloatArray, depth: float) -> FloatArray:
+    """Return the displacements with which elements leave patches."""
+    pressed = np.empty(end.size)
+    for k in range(end.size):
+        pressed[k] = depth + height_at(track, end[k])[0]
+    return pressed
+
+
+@jit
+def _release(
+    track: Track, first: Patches, barriers: Barriers, deborah: float, load: float
+) -> tuple[float, float, float, int]:
+    """Return the drag just after a jump, the rate of the depth that carries the load, their slope, and the outcome."""
+    rate, sums = 0.0, np.empty(SUMS)
+    for _ in range(NEWTON_STEPS):
+        released(track, first, barriers, deborah, rate, sums)
+        if sums[LENGTH] <= 0:
+            break
+        miss = load - sums[LOAD]
+        step = miss / sums[LENGTH]
+        rate += step
+        if abs(miss) <= NEARLY * load:
+            return sums[DRAG] + step * sums[TILT], rate, sums[TILT], Outcome.CONVERGED
+    return sums[DRAG], rate, sums[TILT], Outcome.DEPTH_NOT_FOUND
