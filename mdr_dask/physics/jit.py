@@ -23,7 +23,30 @@ def jit(function: Kernel) -> Kernel:
 
     A cache that cannot be written or read costs compile time only: the function is then compiled in this process.
     """
-    kernel: Any = numba.njit(**OPTIONS)(function)
+    return _cached(function)
+
+
+def jit_uncounted(function: Kernel) -> Kernel:
+    """Compile a function that creates no arrays, without counting references to arrays.
+
+    Functions that read arrays from named tuples inside their loops, and pass such tuples on, take several times as long
+    with the counts.
+    """
+    return _cached(function, _nrt=False)
+
+
+def jit_inline(function: Kernel) -> Kernel:
+    """Compile a function into each kernel that calls it."""
+    return cast(Kernel, numba.njit(forceinline=True, **OPTIONS)(function))
+
+
+def jit_inline_uncounted(function: Kernel) -> Kernel:
+    """Compile a function that creates no arrays into each kernel that calls it, without counting references."""
+    return cast(Kernel, numba.njit(forceinline=True, _nrt=False, **OPTIONS)(function))
+
+
+def _cached(function: Kernel, **options: Any) -> Kernel:
+    kernel: Any = numba.njit(**OPTIONS, **options)(function)
     if hasattr(kernel, "enable_caching"):  # not so where NUMBA_DISABLE_JIT is set
         try:
             kernel.enable_caching()
@@ -32,11 +55,6 @@ def jit(function: Kernel) -> Kernel:
         else:
             _survive_faults(kernel._cache)
     return cast(Kernel, kernel)
-
-
-def jit_inline(function: Kernel) -> Kernel:
-    """Compile a function into each kernel that calls it."""
-    return cast(Kernel, numba.njit(forceinline=True, **OPTIONS)(function))
 
 
 def _survive_faults(stored: Any) -> None:

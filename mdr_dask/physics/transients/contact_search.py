@@ -30,7 +30,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.jit import jit, jit_inline
+from mdr_dask.physics.jit import jit_uncounted, jit_inline_uncounted
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
 from mdr_dask.physics.transients.free_recovery import (
@@ -176,7 +176,7 @@ class Motion(NamedTuple):
     passes_top: bool
 
 
-@jit_inline
+@jit_inline_uncounted
 def motion_until(now: Instant, second: float) -> Motion:
     """Return how the depth has moved; `second` is the highest point outside the patch of the highest point of all."""
     history, deborah, last = now.history, now.deborah, now.history.count - 1
@@ -202,7 +202,7 @@ def motion_until(now: Instant, second: float) -> Motion:
     return Motion(rise, fall, shallowest, deepest, highest, passes_top)
 
 
-@jit_inline
+@jit_inline_uncounted
 def add_approach(now: Instant, bounds: PathBounds, state: FloatArray) -> None:
     """Add to the approach what has come since the last search, or end all skipping if that was at another instant."""
     history, last = now.history, now.history.count - 1
@@ -218,7 +218,7 @@ def add_approach(now: Instant, bounds: PathBounds, state: FloatArray) -> None:
     state[TIME], state[DEPTH], state[DRIFT] = now.time, depth, drift
 
 
-@jit_inline
+@jit_inline_uncounted
 def skip_until(skip: SkipBounds, cell: int, gap: float) -> None:
     """Skip a cell until the line has come nearer by a gap."""
     until = skip.state[APPROACH] + gap
@@ -226,7 +226,7 @@ def skip_until(skip: SkipBounds, cell: int, gap: float) -> None:
     skip.state[LARGEST] = max(skip.state[LARGEST], until)
 
 
-@jit
+@jit_uncounted
 def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
     """Find the patches in contact at an instant, at the last depth and rate of its history, and add up their forces.
 
@@ -259,7 +259,7 @@ def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
     return found
 
 
-@jit_inline
+@jit_inline_uncounted
 def _move_back_one_period(now: Instant, recovery: FreeRecovery, motion: Motion) -> None:
     """Move all places of separation to before the highest point, and keep those that matter behind it."""
     for k in range(recovery.count[0]):
@@ -269,7 +269,7 @@ def _move_back_one_period(now: Instant, recovery: FreeRecovery, motion: Motion) 
     prune(now, recovery, now.track.origin, now.history.depth[now.history.count - 1], motion.deepest)
 
 
-@jit
+@jit_uncounted
 def _search_period(now: Instant, motion: Motion, reachable: Reachable, work: Workspace) -> int:
     """Search one period of the line; return the number of patches, or `FULL`.
 
@@ -311,13 +311,13 @@ def _search_period(now: Instant, motion: Motion, reachable: Reachable, work: Wor
     return found + 1
 
 
-@jit_inline
+@jit_inline_uncounted
 def _oldest(recovery: FreeRecovery, otherwise: float) -> float:
     """Return the first place at which elements ahead can have separated."""
     return recovery.earliest[0] if recovery.count[0] > 0 else otherwise
 
 
-@jit_inline
+@jit_inline_uncounted
 def _skip_pressed(now: Instant, work: Workspace, lift: float, i: int, stop: int) -> int:
     """Return the first cell from i on in which contact may end or elements may have separated."""
     track, scan, barriers, bounds = now.track, work.scan, work.barriers, work.recovery.bounds
@@ -337,7 +337,7 @@ def _skip_pressed(now: Instant, work: Workspace, lift: float, i: int, stop: int)
     return i
 
 
-@jit_inline
+@jit_inline_uncounted
 def _skip_free(
     now: Instant, motion: Motion, from_depth: FloatArray, work: Workspace, lift: float, i: int, stop: int
 ) -> int:
@@ -361,7 +361,7 @@ def _skip_free(
     return i
 
 
-@jit_inline
+@jit_inline_uncounted
 def _examine(
     now: Instant, motion: Motion, work: Workspace, lift: float, cell: int, contact: bool, found: int
 ) -> tuple[bool, int]:
@@ -400,7 +400,7 @@ def _examine(
     return contact, found
 
 
-@jit_inline
+@jit_inline_uncounted
 def _contact_end(
     now: Instant,
     work: Workspace,
@@ -431,7 +431,7 @@ def _contact_end(
     return _contact_loss(now, work.recovery, x, off) if is_lost else off, off, is_lost, by_force
 
 
-@jit_inline
+@jit_inline_uncounted
 def _overtaking(now: Instant, recovery: FreeRecovery, held: float, x: float) -> float:
     """Return the displacement at x of free elements that may overtake a patch, or 0 if the line surely presses further.
 
@@ -447,7 +447,7 @@ def _overtaking(now: Instant, recovery: FreeRecovery, held: float, x: float) -> 
     return displacement_at(now, recovery, x)[0]
 
 
-@jit
+@jit_uncounted
 def _contact_loss(now: Instant, recovery: FreeRecovery, low: float, high: float) -> float:
     """Return where between two places free elements overtake the line, by bisection."""
     depth = now.history.depth[now.history.count - 1]
@@ -460,7 +460,7 @@ def _contact_loss(now: Instant, recovery: FreeRecovery, low: float, high: float)
     return high
 
 
-@jit_inline
+@jit_inline_uncounted
 def _close_patch(
     now: Instant, motion: Motion, work: Workspace, lift: float, cell: int, end: float, is_lost: bool, found: int
 ) -> None:
@@ -480,14 +480,14 @@ def _close_patch(
     scan[LOWEST] = max(_lowest_behind(now, recovery.bounds, w), scan[LOWEST_PASSED])
 
 
-@jit_inline
+@jit_inline_uncounted
 def _lowest_behind(now: Instant, bounds: PathBounds, u: float) -> float:
     """Return the least displacement that free elements have one cell behind a place where they have u."""
     drift, fade = bounds.least_drift[WINDOWS - 1], np.exp(-1 / min(now.deborah, now.first.deborah))
     return float((u - drift) * fade + drift)
 
 
-@jit_inline
+@jit_inline_uncounted
 def _contact_begin(
     now: Instant,
     motion: Motion,
@@ -542,7 +542,7 @@ def _contact_begin(
     return False, probe
 
 
-@jit_inline
+@jit_inline_uncounted
 def _guess_begin(
     line: tuple[float, float, float, float], depth: float, u: float, u_slope: float, low: float, high: float
 ) -> float:
@@ -561,7 +561,7 @@ def _guess_begin(
     return y
 
 
-@jit_inline
+@jit_inline_uncounted
 def _add_edge(
     now: Instant, lift: float, place: float, steep: float, by_depth: float, opening: float, sums: FloatArray
 ) -> None:
@@ -579,7 +579,7 @@ def _add_edge(
         sums[DRAG_GROWTH] += edge * opening * slope
 
 
-@jit_inline
+@jit_inline_uncounted
 def _add_separation(now: Instant, motion: Motion, work: Workspace, place: float) -> None:
     """Add a place where the force falls to zero now, and up to where it can have done so since the jump."""
     track, recovery, n = now.track, work.recovery, int(now.track.cells)
@@ -595,7 +595,7 @@ def _add_separation(now: Instant, motion: Motion, work: Workspace, place: float)
     recovery.count[0] = k + 1
 
 
-@jit_inline
+@jit_inline_uncounted
 def _add_stretch(recovery: FreeRecovery, cell: float, barrier: float) -> None:
     """Add a cell in which elements can have separated although the force is positive now, or lengthen a stretch."""
     k, last = recovery.count[0], recovery.count[0] - 1
@@ -608,7 +608,7 @@ def _add_stretch(recovery: FreeRecovery, cell: float, barrier: float) -> None:
         recovery.count[0] = k + 1
 
 
-@jit_inline
+@jit_inline_uncounted
 def _force_slopes(track: Track, deborah: float, i: int) -> tuple[float, float, float]:
     """Return three slopes that bound the slope of the force in a cell: at its start, a control point, at its end."""
     _, c1, c2, c3 = cubic(track.height, track.enter, track.leave, i)
@@ -616,7 +616,7 @@ def _force_slopes(track: Track, deborah: float, i: int) -> tuple[float, float, f
     return enter, enter + bend, enter + 2 * bend + turn
 
 
-@jit_inline
+@jit_inline_uncounted
 def _may_have_separated(track: Track, motion: Motion, deborah: float, i: int) -> bool:
     """Return whether elements can have separated in or just before cell i, where the force is positive now.
 

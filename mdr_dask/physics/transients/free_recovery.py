@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.jit import jit, jit_inline, last_until
+from mdr_dask.physics.jit import jit_uncounted, jit_inline_uncounted, last_until
 from mdr_dask.physics.transients.patches import History, Patches, Track, height_at, patch_before
 
 ITERATIONS = 60  # most iterations of Newton's method with bisection
@@ -101,7 +101,7 @@ class FreeRecovery(NamedTuple):
     bounds: PathBounds
 
 
-@jit_inline
+@jit_inline_uncounted
 def write_bounds(history: History, first: Patches, deborah: float, bounds: PathBounds) -> None:
     """Write the bounds at the last instant of a history."""
     last = history.count - 1
@@ -131,14 +131,14 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
             bounds.opened[k] += gains * (np.exp(-max(since, 0.0)) - np.exp(-min(time, 0.5 * duration)))
 
 
-@jit_inline
+@jit_inline_uncounted
 def window(distance: float) -> int:
     """Return the index of the bounds that hold over a distance in cells."""
     windows = max(distance * (1 / WINDOW), 0.0)
     return int(_DOUBLINGS[np.uintp(windows)]) if windows < _DOUBLINGS.size else WINDOWS - 1
 
 
-@jit_inline
+@jit_inline_uncounted
 def _depth_at(history: History, t: float) -> tuple[float, float, float]:
     """Return depth, rate and its derivative at time t by the cubic through values and rates."""
     last = history.count - 1
@@ -161,7 +161,7 @@ def _depth_at(history: History, t: float) -> tuple[float, float, float]:
     )
 
 
-@jit_inline
+@jit_inline_uncounted
 def _by_last_depth(history: History, t: float) -> float:
     """Return the derivative of the depth at time t by the last depth."""
     last = history.count - 1
@@ -174,14 +174,14 @@ def _by_last_depth(history: History, t: float) -> float:
     return float(y * y * (3 - 2 * y + history.stiff * step * (y - 1)))
 
 
-@jit_inline
+@jit_inline_uncounted
 def _in_period(now: Instant, s: float) -> float:
     """Return the place in the first period of the line that repeats at s."""
     track = now.track
     return float(s - np.floor((s - track.origin) / track.cells) * track.cells)
 
 
-@jit_inline
+@jit_inline_uncounted
 def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tuple[float, float, float]:
     """Return displacement, slope and derivative by the depth at x of an element that separated near a place.
 
@@ -221,7 +221,7 @@ def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tu
     return -1.0, 0.0, 0.0
 
 
-@jit
+@jit_uncounted
 def _separated_within(now: Instant, x: float, low: float, high: float) -> tuple[float, float, float]:
     """Return the same for an element that separated anywhere in a stretch of cells; the nodes are searched first."""
     most, place, s = 0.0, x, min(high, np.ceil(x) - 1)
@@ -236,7 +236,7 @@ def _separated_within(now: Instant, x: float, low: float, high: float) -> tuple[
     return _separated_near(now, x, place, place + 1) if most > 0 else (-1.0, 0.0, 0.0)
 
 
-@jit_inline
+@jit_inline_uncounted
 def _from_separation(now: Instant, recovery: FreeRecovery, k: int, x: float) -> tuple[float, float, float]:
     """Return displacement, slope and derivative by the depth at x of elements that separated at the k-th place."""
     if recovery.earliest[k] < recovery.place[k]:
@@ -246,7 +246,7 @@ def _from_separation(now: Instant, recovery: FreeRecovery, k: int, x: float) -> 
     return _separated_near(now, x, recovery.place[k], recovery.farthest[k])
 
 
-@jit_inline
+@jit_inline_uncounted
 def from_before(now: Instant, x: float, least: float) -> tuple[float, float]:
     """Return displacement and slope at x that the state before the jump has left; 0 if that is at most `least`."""
     first, s = now.first, _in_period(now, x - now.deborah * now.time)
@@ -261,7 +261,7 @@ def from_before(now: Instant, x: float, least: float) -> tuple[float, float]:
     return u, -u / first.deborah
 
 
-@jit_inline
+@jit_inline_uncounted
 def displacement_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float, float]:
     """Return displacement, slope along the line and derivative by the depth of free elements at x."""
     u, slope, by_depth = 0.0, 0.0, 0.0
@@ -276,7 +276,7 @@ def displacement_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[flo
     return u, slope, by_depth
 
 
-@jit_inline
+@jit_inline_uncounted
 def gap_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float, float, float, float]:
     """Return by how much the line is above free elements at x, its slope, curvature, derivative by depth, and rate.
 
@@ -291,7 +291,7 @@ def gap_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float
     return now.history.depth[last] + h - u, h_slope - u_slope, bend, 1 - by_depth, opening
 
 
-@jit_inline
+@jit_inline_uncounted
 def contact_begin(
     now: Instant, recovery: FreeRecovery, low: float, high: float, x: float
 ) -> tuple[float, float, float, float]:
@@ -315,7 +315,7 @@ def contact_begin(
     return x, slope, by_depth, opening
 
 
-@jit
+@jit_uncounted
 def nearest_approach(now: Instant, recovery: FreeRecovery, low: float, high: float) -> tuple[float, float]:
     """Return where between two places the line is nearest to free elements or above them, and the gap there."""
     x, gap = high, -1.0
@@ -329,7 +329,7 @@ def nearest_approach(now: Instant, recovery: FreeRecovery, low: float, high: flo
     return x, gap
 
 
-@jit_inline
+@jit_inline_uncounted
 def prune(now: Instant, recovery: FreeRecovery, x: float, pressed: float, deepest: float) -> None:
     """Keep only places of separation whose elements can still exceed those that separate at x with `pressed`."""
     kept = 0

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.jit import jit
+from mdr_dask.physics.jit import jit_uncounted
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.transients.contact_search import Reachable, Workspace, find_contact
 from mdr_dask.physics.transients.free_recovery import Instant
@@ -102,7 +102,7 @@ class Trajectory(NamedTuple):
     drag_rate: FloatArray
 
 
-@jit
+@jit_uncounted
 def _drag_rate(sums: FloatArray, stiff: float, step: float) -> float:
     """Return the rate of the drag at constant load: patches grow where they begin, and the lift falls to balance that.
 
@@ -115,7 +115,7 @@ def _drag_rate(sums: FloatArray, stiff: float, step: float) -> float:
     return float(lift * sums[TILT] + drag_growth)
 
 
-@jit
+@jit_uncounted
 def _balance(
     marching: Marching, history: History, weights: tuple[float, float], close: float, work: Workspace
 ) -> tuple[int, float, float]:
@@ -158,7 +158,7 @@ def _balance(
     return Outcome.DEPTH_NOT_FOUND, 0.0, 0.0
 
 
-@jit
+@jit_uncounted
 def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
     """Return a and b of d_dot = a d + b at moment `now` of a march that begins with a known rate.
 
@@ -180,7 +180,7 @@ def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
     return a * pace, b * pace
 
 
-@jit
+@jit_uncounted
 def _extrapolated(found: Trajectory, now: int) -> float:
     """Extrapolate the depth to moment `now` by a parabola over log(1 + t / onset), if there are three depths."""
     time, place, depth, rate, _, _ = found
@@ -195,7 +195,7 @@ def _extrapolated(found: Trajectory, now: int) -> float:
     return float(depth[now - 1] + ahead * (to_one + (ahead - one) * (to_two - to_one) / (two - one)))
 
 
-@jit
+@jit_uncounted
 def march_depth(
     marching: Marching, pace: Stepping, finish: Finish, found: Trajectory, work: Workspace
 ) -> tuple[int, int]:
@@ -249,7 +249,7 @@ def march_depth(
     return now, Outcome.CONVERGED
 
 
-@jit
+@jit_uncounted
 def retrace(marching: Marching, depths: FloatArray, found: Trajectory, work: Workspace) -> int:
     """March through given moments along depths that are nearly right, with one Newton step for each.
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.jit import jit, jit_inline, last_until
+from mdr_dask.physics.jit import jit_uncounted, jit_inline_uncounted, last_until
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, leaving, write_barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
@@ -82,7 +82,7 @@ class History(NamedTuple):
     stiff: float
 
 
-@jit_inline
+@jit_inline_uncounted
 def height_at(track: Track, x: float) -> tuple[float, float, float]:
     """Return height, slope and curvature at x."""
     i = min(max(int(x), 0), track.enter.size - 1)
@@ -95,7 +95,7 @@ def height_at(track: Track, x: float) -> tuple[float, float, float]:
     )
 
 
-@jit_inline
+@jit_inline_uncounted
 def patch_before(patches: Patches, s: float) -> int:
     """Return the last patch that begins at s or before, or the first; the search begins at the last one found."""
     low, high = int(patches.cursor[0]), patches.count
@@ -114,7 +114,7 @@ def patch_before(patches: Patches, s: float) -> int:
     return low
 
 
-@jit_inline
+@jit_inline_uncounted
 def _part(c0: float, c1: float, c2: float, c3: float, y: float) -> tuple[float, float, float]:
     """Return the height at y of a cubic over 0..1, and the integrals of it and of its slope squared from 0 to y."""
     height = c0 + y * (c1 + y * (c2 + y * c3))
@@ -125,7 +125,7 @@ def _part(c0: float, c1: float, c2: float, c3: float, y: float) -> tuple[float, 
     return height, area, square
 
 
-@jit_inline
+@jit_inline_uncounted
 def add_patch(track: Track, start: float, end: float, lift: float, deborah: float, sums: FloatArray) -> None:
     """Add the forces of a patch in contact, f = lift + h + deborah h' with lift = d + d_dot, exactly.
 
@@ -151,7 +151,7 @@ def add_patch(track: Track, start: float, end: float, lift: float, deborah: floa
     sums[TILT] += rise
 
 
-@jit
+@jit_uncounted
 def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
     """Return where from y to 1 the cubic p + q y + r y^2 + c y^3, not negative at y, falls through zero, or `NONE`.
 
@@ -181,25 +181,25 @@ def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
     return x
 
 
-@jit_inline
+@jit_inline_uncounted
 def unloading(c0: float, c1: float, c2: float, c3: float, lift: float, deborah: float, y: float) -> float:
     """Return where in a cell, from y on, the force lift + h + deborah h' falls through zero first, or `NONE`."""
     return _zero(lift + c0 + deborah * c1, c1 + 2 * deborah * c2, c2 + 3 * deborah * c3, c3, y)
 
 
-@jit_inline
+@jit_inline_uncounted
 def loading(c0: float, c1: float, c2: float, c3: float, lift: float, deborah: float, y: float) -> float:
     """Return where in a cell, from y on, the force rises through zero first, or `NONE`."""
     return _zero(-lift - c0 - deborah * c1, -c1 - 2 * deborah * c2, -c2 - 3 * deborah * c3, -c3, y)
 
 
-@jit_inline
+@jit_inline_uncounted
 def force_at(c0: float, c1: float, c2: float, c3: float, lift: float, deborah: float, y: float) -> float:
     """Return the force lift + h + deborah h' at y in a cell."""
     return lift + c0 + y * (c1 + y * (c2 + y * c3)) + deborah * (c1 + y * (2 * c2 + y * 3 * c3))
 
 
-@jit_inline
+@jit_inline_uncounted
 def keeps_pressed(track: Track, barriers: Barriers, deborah: float, i: int, lift: float) -> bool:
     """Return whether the force is positive in all of cell i."""
     block = np.uintp(i) // np.uintp(BLOCK)
@@ -208,7 +208,7 @@ def keeps_pressed(track: Track, barriers: Barriers, deborah: float, i: int, lift
     return bool(barriers.cell[np.uintp(i)] < lift)
 
 
-@jit
+@jit_uncounted
 def released(track: Track, first: Patches, barriers: Barriers, deborah: float, rate: float, sums: FloatArray) -> None:
     """Add up the forces just after a jump: contact continues where the force is positive at the new rates.
 
