@@ -22,8 +22,6 @@ from mdr_dask.models.base import Block
 from mdr_dask.physics.sliding import kelvin, steady
 from mdr_dask.physics.surfaces import roughness, waves
 from mdr_dask.physics.surfaces.cubic_line import cut, periodic_line
-from mdr_dask.physics.transients import ends
-from mdr_dask.physics.transients.velocity_jump import Transient, velocity_jumps
 from mdr_dask.store import files
 
 HEAVY = {"dask", "distributed", "matplotlib", "numba", "pandas", "pint", "scipy", "xarray", "zarr"}
@@ -176,19 +174,6 @@ def test_nodes_visited_at_light_load(monkeypatch):
     kelvin.sweep_cells.py_func(cells._replace(peak=peak), every, barriers, 1e-5 * nodes, 1e-2, sums, unwritten)
     assert 0 < sums[kelvin.LENGTH] < 0.05 * nodes
     assert len(peak.seen) < 0.25 * nodes
-
-
-def test_barriers_of_a_velocity_are_made_once(monkeypatch):
-    """The steady ends, the instant of the jump and the march share them: 6 velocities, of which 4 stand twice."""
-    made, barriers_for = [], ends.barriers_for
-    monkeypatch.setattr(ends, "barriers_for", lambda cells: made.append(1) or barriers_for(cells))
-    before = np.repeat(1e-2 * 1.5 ** np.arange(5), 2)
-    loads, deborah = np.tile([0.1, 0.3], 5), np.column_stack([before, 1.5 * before])
-    prepared = ends.PreparedLine.of(line(200, 4))
-    at = ends.ends_on(prepared, loads, deborah)
-    jumps = velocity_jumps(prepared, loads, deborah, at, Transient(np.geomspace(1e-2, 10, 5), 200 * np.pi, 6))
-    assert all(jump.outcome == 0 for jump in jumps)
-    assert len(made) == np.unique(deborah).size < 10
 
 
 LINE = {"length": 0.02, "points": 200, "rms_roughness": 5e-7, "shear_modulus": 1e7, "relaxation_time": 1e-3}

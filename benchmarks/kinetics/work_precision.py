@@ -21,9 +21,9 @@ from benchmarks.measures import draw_errors, print_table, timed
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.waves import Waves
-from mdr_dask.physics.transients.accuracy import JumpAim, JumpProblem, solve_jumps
+from mdr_dask.physics.transients.accuracy import JumpProblem, JumpRequest, solve_jumps
 from mdr_dask.physics.transients.elements.steps import Schedule
-from mdr_dask.physics.transients.velocity_jump import Transient
+from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 from references.followed_kelvin import follow_kelvin
@@ -59,8 +59,8 @@ def line(oversampling: int) -> tuple[np.ndarray, np.ndarray]:
 def march(case: Case, oversampling: int, per_decade: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the course of friction and its stated errors."""
     problem = JumpProblem(RoughLine(WAVES), np.array([case.load]), np.array([[case.before, case.after]]))
-    asked = Transient(TIMES, np.pi * POINTS, per_decade)
-    found = solve_jumps(problem, JumpAim((), 1.0, oversampling, asked, True))
+    asked = MarchRequest(TIMES, np.pi * POINTS, per_decade)
+    found = solve_jumps(problem, JumpRequest(1.0, oversampling, asked, True))
     last = found.levels.after
     return ((found.trace[0] - last) / last, found.trace_error[0] / last)
 

@@ -16,6 +16,7 @@ import numba
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+UNCOUNTED = OPTIONS | {"_nrt": False}  # numba counts no references to arrays in a function without its runtime
 
 
 def jit(function: Kernel) -> Kernel:
@@ -23,7 +24,7 @@ def jit(function: Kernel) -> Kernel:
 
     A cache that cannot be written or read costs compile time only: the function is then compiled in this process.
     """
-    return _cached(function)
+    return _cached(function, OPTIONS)
 
 
 def jit_uncounted(function: Kernel) -> Kernel:
@@ -32,7 +33,7 @@ def jit_uncounted(function: Kernel) -> Kernel:
     Functions that read arrays from named tuples inside their loops, and pass such tuples on, take several times as long
     with the counts.
     """
-    return _cached(function, _nrt=False)
+    return _cached(function, UNCOUNTED)
 
 
 def jit_inline(function: Kernel) -> Kernel:
@@ -42,11 +43,11 @@ def jit_inline(function: Kernel) -> Kernel:
 
 def jit_inline_uncounted(function: Kernel) -> Kernel:
     """Compile a function that creates no arrays into each kernel that calls it, without counting references."""
-    return cast(Kernel, numba.njit(forceinline=True, _nrt=False, **OPTIONS)(function))
+    return cast(Kernel, numba.njit(forceinline=True, **UNCOUNTED)(function))
 
 
-def _cached(function: Kernel, **options: Any) -> Kernel:
-    kernel: Any = numba.njit(**OPTIONS, **options)(function)
+def _cached(function: Kernel, options: dict[str, Any]) -> Kernel:
+    kernel: Any = numba.njit(**options)(function)
     if hasattr(kernel, "enable_caching"):  # not so where NUMBA_DISABLE_JIT is set
         try:
             kernel.enable_caching()

@@ -6,7 +6,7 @@ from pydantic import ValidationError
 
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.parts.loading_history import pieces
-from mdr_dask.models.velocity_jump import MODEL, VelocityJump, solve
+from mdr_dask.models.velocity_jump import MODEL, VelocityJump
 from mdr_dask.models.velocity_jump.solve import compute
 from mdr_dask.physics.surfaces import roughness
 
@@ -250,18 +250,6 @@ def test_a_table_that_contradicts_the_state_before_it_is_a_failed_case(tmp_path:
     found = compute(block(protocol=protocol, normal_force=600.0))
     assert np.all(found.status == Status.FAILED)
     assert all("load.csv" in text and "600 N" in text and "640 N" in text for text in found.messages.values())
-
-
-def test_the_error_of_a_history_is_that_of_half_the_nodes_in_half_the_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = []
-    real = solve.trace
-    monkeypatch.setattr(
-        solve, "trace", lambda line, *rest: asked.append((line.enter.size, rest[-1])) or real(line, *rest)
-    )
-    compute(block(protocol=STEP, oversampling=4).part(0, 0))
-    (fine, coarse) = sorted(asked, reverse=True)
-    assert fine[0] == pytest.approx(2 * coarse[0], abs=2)
-    assert fine[1] == 2 * coarse[1]
 
 
 @pytest.mark.parametrize(

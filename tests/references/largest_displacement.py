@@ -1,4 +1,4 @@
-"""Who touches after a jump, by the largest displacement of every element over all times so far, on a fine sampling."""
+"""Contact after a jump, by the largest displacement of every element over all times so far, on a fine sampling."""
 
 from typing import NamedTuple
 
@@ -9,12 +9,12 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.waves import Waves
-from mdr_dask.physics.transients.contact_search import Workspace, touch
-from mdr_dask.physics.transients.ends import PreparedLine, ends_on
-from mdr_dask.physics.transients.free_flight import Instant
+from mdr_dask.physics.transients.contact_search import Workspace, find_contact
+from mdr_dask.physics.transients.free_recovery import Instant
+from mdr_dask.physics.transients.limits import PreparedLine, steady_limits
 from mdr_dask.physics.transients.march import Finish, Marching, Trajectory, march_depth
 from mdr_dask.physics.transients.patches import LOAD, History
-from mdr_dask.physics.transients.velocity_jump import Transient, _Relaxation
+from mdr_dask.physics.transients.velocity_jump import MarchRequest, _Relaxation
 
 SAMPLES = 12  # of a cell
 SHORT = 3.0  # samples: what is shorter cannot be judged
@@ -66,10 +66,10 @@ def load_by_largest(marching: Marching, found: Trajectory, now: int, line: Sampl
 
 def marched(relaxation) -> tuple[Marching, Trajectory, Workspace, int]:
     """March a case of `velocity_jump` to its very end; return how many moments that took, too."""
-    for limits in relaxation.limits(relaxation.depth):
-        marching, found, work = relaxation.begun(limits, 3000)
-        aim = Finish(relaxation.depth[1], relaxation.after, 1e-9, 1e-9)
-        count, outcome = march_depth(marching, relaxation.pace, aim, found, work)
+    for interval in relaxation.intervals(relaxation.ends):
+        marching, found, work = relaxation.begun(interval, 3000)
+        finish = Finish(relaxation.ends[1], relaxation.limits.after, 1e-9, 1e-9)
+        count, outcome = march_depth(marching, relaxation.stepping, finish, found, work)
         if outcome >= 0:
             break
     return marching, found, work, count
@@ -79,9 +79,9 @@ def searched_afresh(marching: Marching, found: Trajectory, now: int, work: Works
     """Search the contact at a moment of a march, with nothing known of any cell; return the number of patches."""
     time = found.time[now]
     history = History(found.time, found.depth, found.rate, now + 1, 0.0)
-    work.clearance.until.fill(-np.inf)
+    work.skip.skip_until.fill(-np.inf)
     instant = Instant(marching.track, marching.first, history, time, marching.deborah, np.exp(-time))
-    return touch(instant, marching.reachable, work)
+    return find_contact(instant, marching.reachable, work)
 
 
 def worst_moment(relaxation, moments: int, generator: np.random.Generator) -> float:
@@ -114,10 +114,11 @@ def judged(seed: int, number: int, moments: int) -> tuple[float, dict[str, float
     deborah = 10 ** random.uniform(-2.5, 1.5) / roughness.spectral_slope(amplitude)
     prepared = PreparedLine.of(line.cubic(points * grid))
     loads, numbers = np.array([load]), np.array([[deborah, deborah * ratio]])
-    ends = ends_on(prepared, loads, numbers)
+    limits = steady_limits(prepared, loads, numbers)[0]
     case = {"points": points, "grid": grid, "hurst": hurst, "load": load, "deborah": deborah, "ratio": ratio}
-    if ends.outcome[0] != Outcome.CONVERGED:
+    if limits.outcome != Outcome.CONVERGED:
         return np.nan, case
-    asked = Transient(np.geomspace(0.01, 3, 20), np.pi * points, float(random.choice([6, 8, 24])))
-    relaxation = _Relaxation.of(prepared, load, numbers[0], ends, 0, asked)
-    return (np.nan if relaxation.is_full else worst_moment(relaxation, moments, random)), case
+    request = MarchRequest(np.geomspace(0.01, 3, 20), np.pi * points, float(random.choice([6, 8, 24])))
+    cells = prepared.track.cells
+    relaxation = _Relaxation(prepared, load * cells, numbers[0] * cells, limits, request)
+    return (np.nan if limits.is_full else worst_moment(relaxation, moments, random)), case

@@ -1,4 +1,4 @@
-"""Kinetics of a block of cases: jumps of a Kelvin body are marched, each different one once; all else is followed."""
+"""Solve a block of cases: jumps of a Kelvin body by a march of the depth, everything else element by element."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ from mdr_dask.models.parts.sliding_problem import (
 )
 from mdr_dask.models.velocity_jump.declaration import VelocityJump
 from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.refine import Solution, refine
 from mdr_dask.physics.surfaces.cubic_line import without_kinks
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.waves import Waves
@@ -34,20 +35,21 @@ from mdr_dask.physics.transients.elements.foundation import foundation
 from mdr_dask.physics.transients.elements.loading_history import Trace, trace
 from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
-ACCURACY = 0.01  # of the ends, where the campaign does not say
-SECONDS_NODE, SECONDS_MOMENT = 6.2e-8, 3.3e-9  # for every node of a line, and of a moment
-MOMENTS = 4  # of a march, for every step in a decade
-SECONDS_STEPPED = 3.5e-8  # for every node in square: a history of some turns of the line
-FLAT = 1e-12  # of the largest height
+ACCURACY = 0.01  # of friction before and after and of the jump, if the campaign states none
+SECONDS_NODE, SECONDS_MOMENT = 6.2e-8, 3.3e-9  # per node of a line, and per node and moment of a march
+MOMENTS = 4  # of a march, per step in a decade
+SECONDS_STEPPED = 3.5e-8  # per node squared: a history that travels a few lengths of the line
+FLAT = 1e-12  # part of the largest height: a smaller scatter is rounding
+HISTORY_ORDER = 2  # of a history in nodes and steps
 
-#: Outputs that have errors, and the level of a jump that decides the accuracy of each.
-LEVELS = {
-    "friction_coefficient_before": "before",
-    "friction_coefficient_jump": "jump",
-    "friction_coefficient_after": "after",
-    "friction_coefficient": "after",
-    "indentation_depth": "depth",
-}
+#: Outputs that have errors.
+WITH_ERROR = (
+    "friction_coefficient_before",
+    "friction_coefficient_jump",
+    "friction_coefficient_after",
+    "friction_coefficient",
+    "indentation_depth",
+)
 TRANSIENT = ("friction_coefficient", "indentation_depth")
 
 
@@ -81,7 +83,7 @@ def compute(block: Block[VelocityJump]) -> Result:
 
 
 def _groups(block: Block[VelocityJump], problems: SlidingProblems) -> Iterator[_Group]:
-    """Yield the cases that are solved together: marched on one grid of a line, or each followed alone."""
+    """Yield groups of cases: those of one line and grid that are marched, and each other case by itself."""
     alone = [
         j if setting.terms is not None or setting.body is not None or protocol.shape != "jump" else None
         for j, (setting, protocol) in enumerate(zip(problems.settings, each(block, "protocol"), strict=True))
@@ -105,11 +107,11 @@ class _Group:
 
     @property
     def outputs(self) -> list[str]:
-        """The outputs asked for that have errors."""
-        return [name for name in LEVELS if name in self.block.outputs]
+        """The requested outputs that have errors."""
+        return [name for name in WITH_ERROR if name in self.block.outputs]
 
     def found(self, waves: Waves) -> tuple[_Found, int]:
-        """Solve the cases on one realisation of the roughness; return how many were solved, too."""
+        """Solve the cases on one realisation of the roughness; return also how many different ones were solved."""
         raise NotImplementedError
 
     def solve(self, result: Result, r: int, realisation: int) -> int:
@@ -138,7 +140,7 @@ class _Group:
         return solves
 
     def _sentences(self, found: _Found) -> Iterator[tuple[int, str]]:
-        """Yield why a case failed, or which outputs miss the accuracy and by how much."""
+        """Yield the reason of a failed case, or which outputs miss the accuracy and by how much."""
         shares = {name: self._shares(found, name) for name in self.outputs}
         accuracy = self.block.accuracy or ACCURACY
         for k, outcome in enumerate(found.outcome):
@@ -151,15 +153,16 @@ class _Group:
                 yield k, sentence
 
     def _shares(self, found: _Found, name: str) -> FloatArray:
-        """Return the relative errors of an output, of every case at the worst time; 0 of unknown.
+        """Return the relative error of an output in every case, at the worst time; 0 if it is not known.
 
-        A transient counts only where the campaign states an accuracy. What is zero within its error, as a jump that
-        no dashpot makes or the friction of a body at rest, counts beside the largest friction of the case.
+        A transient counts only if the campaign states an accuracy. A value that is zero within its error, such as the
+        jump of a body without a dashpot or the friction of a body at rest, is compared with the largest friction of
+        the case.
         """
         cases = found.outcome.size
         if self.block.accuracy is None and name in TRANSIENT:
             return np.zeros(cases)
-        beside = [name] if name == "indentation_depth" else [each for each in LEVELS if each != "indentation_depth"]
+        beside = [name] if name == "indentation_depth" else [each for each in WITH_ERROR if each != "indentation_depth"]
         known = [
             np.nan_to_num(np.abs(found.values[each])).reshape(cases, -1) for each in beside if each in found.values
         ]
@@ -170,7 +173,7 @@ class _Group:
 
 
 class _Marched(_Group):
-    """Jumps of a Kelvin body on one line: each different one is solved once."""
+    """Jumps of a Kelvin body on one line, of which equal ones are solved once."""
 
     def found(self, waves: Waves) -> tuple[_Found, int]:
         """Solve the different cases together."""
@@ -178,22 +181,21 @@ class _Marched(_Group):
         is_wanted = any(name in self.outputs for name in TRANSIENT)
         times, wavenumber = np.array(self.block.parameters.relaxation_times), np.pi * waves.points
         transient = MarchRequest(times, wavenumber, self.steps, self.block.accuracy or 0.0) if is_wanted else None
-        with_errors = any(f"{name}_error" in self.block.outputs for name in LEVELS)
-        aim = JumpRequest(
-            {LEVELS[name] for name in self.outputs},
+        with_errors = any(f"{name}_error" in self.block.outputs for name in WITH_ERROR)
+        request = JumpRequest(
             self.block.accuracy or (ACCURACY if with_errors else None),
             self.oversampling,
             transient,
             any(f"{name}_error" in self.block.outputs for name in TRANSIENT),
         )
-        jumps = solve_jumps(JumpProblem(RoughLine(waves), loads, deborah), aim)
+        jumps = solve_jumps(JumpProblem(RoughLine(waves), loads, deborah), request)
         return self._of(jumps, loads, which), loads.size
 
     @cached_property
     def different(self) -> tuple[FloatArray, FloatArray, IntArray]:
         """Loads and Deborah numbers of the different cases, and the entry of every member.
 
-        Those of a speed come one after the other: what a line does at a Deborah number is worked out once for them.
+        They are sorted by velocity, so that data of the line at a Deborah number are computed once.
         """
         before = self.problems.deborah[self.members]
         change = np.asarray(self.block.column("velocity_change"), dtype=np.float64)[self.members]
@@ -217,26 +219,27 @@ class _Marched(_Group):
 
 
 class _Followed(_Group):
-    """One case whose elements are all followed: any history, solid and indenter."""
+    """One case in which all elements are followed: any history, solid and indenter."""
 
     def found(self, waves: Waves) -> tuple[_Found, int]:
-        """Follow it on the grid given, and on half the nodes with twice the steps: their difference is the error."""
-        fine, coarse = (self._trace(waves, every) for every in (1, 2))
-        outcome = fine.outcome if fine.outcome != Outcome.CONVERGED else coarse.outcome
-        levels = [np.array([t.before, t.at - t.before, t.after]) for t in (fine, coarse)]
-        frictions = [np.concatenate([[t.before, t.at], t.friction]) for t in (fine, coarse)]
-        error = float(np.max(np.abs(frictions[0] - frictions[1])))
-        sinking = np.max(np.abs(fine.depth - coarse.depth))
-        names = list(LEVELS)
-        values = {name: level[None] for name, level in zip(names, levels[0], strict=False)}
-        values |= {"friction_coefficient": fine.friction[None], "indentation_depth": fine.depth[None]}
-        changes = np.maximum(np.abs(levels[0] - levels[1]), error)
-        errors = {name: change[None] for name, change in zip(names, changes, strict=False)}
-        errors |= {
-            "friction_coefficient": np.full_like(values["friction_coefficient"], error),
-            "indentation_depth": np.full_like(values["indentation_depth"], sinking),
-        }
-        return _Found(values, errors, np.array([outcome], np.int8)), 1
+        """Follow it on a quarter and half of the nodes with as many times the steps, and on all nodes."""
+        nodes = waves.points * self.oversampling
+        grids = [nodes // every for every in (4, 2, 1) if nodes % every == 0 and nodes // every >= waves.points]
+
+        def solve(grid: int, _: IntArray) -> Solution:
+            found = self._trace(waves, nodes // grid)
+            friction = np.concatenate([[found.before, found.at], found.friction])
+            values = [friction[None], np.array([found.after]), found.depth[None]]
+            return Solution(values, np.array([found.outcome], np.int8))
+
+        # depths are relative to the rms height at least, which is 1 here
+        refined = refine(solve, 1, grids, 0.0, HISTORY_ORDER, floors=[0.0, 0.0, 1.0], shared=False)
+        (friction, after, depth), (error, after_error, depth_error) = refined.values, refined.errors[:, 0]
+        before, at = friction[:, 0], friction[:, 1]
+        values = dict(zip(WITH_ERROR, (before, at - before, after, friction[:, 2:], depth), strict=True))
+        largest = error, error, max(after_error, error), error, depth_error
+        errors = {n: np.where(np.isnan(values[n]), np.nan, each) for n, each in zip(WITH_ERROR, largest, strict=True)}
+        return _Found(values, errors, refined.outcome), 1
 
     def _trace(self, waves: Waves, every: int) -> Trace:
         """Follow the case on every so many of its nodes."""
@@ -264,7 +267,7 @@ def _check_rough(roughness: Roughness) -> None:
 
 
 def distinct(block: Block[VelocityJump]) -> int:
-    """Return how many different cases a block holds, over all realisations."""
+    """Return the number of different cases in a block, over all realisations."""
     different = 0
     for group in _groups(block, sliding_problems(block)):
         different += group.different[0].size if isinstance(group, _Marched) else 1
@@ -272,7 +275,7 @@ def distinct(block: Block[VelocityJump]) -> int:
 
 
 def seconds(block: Block[VelocityJump]) -> float:
-    """Estimate the time of a block from nodes and moments."""
+    """Estimate the time of a block, in seconds, from its nodes and moments."""
     total = 1e-3
     for group in _groups(block, sliding_problems(block)):
         nodes = group.setting.roughness.points * group.oversampling

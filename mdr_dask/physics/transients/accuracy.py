@@ -8,7 +8,6 @@ on half the nodes with half the steps.
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -48,10 +47,8 @@ class JumpRequest(NamedTuple):
 
     Parameters
     ----------
-    levels : collection of str
-        Fields of `Levels` that are wanted to the accuracy; the others are not computed.
     accuracy : float or None
-        Error allowed for each of them, relative to its value, for the depth at least to h. None if neither an accuracy
+        Error allowed for every level, relative to its value, for the depth at least to h. None if neither an accuracy
         nor errors are wanted: the steady states are then those of the grid of the march.
     oversampling : int
         Even number of nodes for every Nyquist point, for the march, and at least for the steady states.
@@ -61,7 +58,6 @@ class JumpRequest(NamedTuple):
         Whether the error of the transient is wanted; it takes an accuracy.
     """
 
-    levels: Collection[str]
     accuracy: float | None
     oversampling: int
     march: MarchRequest | None
@@ -120,34 +116,33 @@ def solve_jumps(problem: JumpProblem, request: JumpRequest) -> Jumps:
         if oversampling <= grid:
             lines[oversampling] = line
             limits.update({(oversampling, int(k)): each for k, each in zip(which, found, strict=True)})
-        levels = Levels.of(found)
-        outcome = np.array([each.outcome for each in found], np.int8)
-        return Solution([getattr(levels, name) for name in names], outcome)
+        return Solution(Levels.of(found), np.array([each.outcome for each in found], np.int8))
 
-    names = [name for name in Levels._fields if name in request.levels]
     grids = [grid] if request.accuracy is None else [grid // 2]
     while request.accuracy is not None and (grids[-1] < grid or 2 * grids[-1] <= FINEST):
         grids.append(2 * grids[-1])
-    floors = [1.0 if name == "depth" else 0.0 for name in names]
+    floors = [0.0, 0.0, 0.0, 1.0]
     refined = refine(solve, cases, grids, request.accuracy or np.inf, ORDER, floors=floors)
-    nothing = np.full(cases, np.nan)
-    levels = Levels(**dict.fromkeys(Levels._fields, nothing) | dict(zip(names, refined.values, strict=True)))
-    errors = Levels(**dict.fromkeys(Levels._fields, nothing) | dict(zip(names, refined.errors, strict=True)))
-    shape = cases, request.march.times.size if request.march else 0
+    levels = Levels(*refined.values)
+    errors = Levels(*refined.errors if request.accuracy is not None else np.full((4, cases), np.nan))
+    march = request.march
+    shape = cases, march.times.size if march else 0
     trace, depth, trace_error, depth_error = (np.full(shape, np.nan) for _ in range(4))
     jumps = Jumps(levels, errors, trace, depth, trace_error, depth_error, refined.outcome)
-    for k in np.flatnonzero(refined.outcome == Outcome.CONVERGED) if request.march else ():
+    if march is None:
+        return jumps
+    for k in np.flatnonzero(refined.outcome == Outcome.CONVERGED):
         fine, load, deborah = limits[grid, int(k)], problem.loads[k], problem.deborah[k]
-        jump = jump_between(lines[grid], load, deborah, fine, request.march)
+        jump = jump_between(lines[grid], load, deborah, fine, march)
         jumps.outcome[k] = jump.outcome
         trace[k] = levels.after[k] + (jump.trace - jump.after)
         depth[k] = levels.depth[k] + (jump.depth - fine.depth[1])
         if request.with_errors and jump.outcome == Outcome.CONVERGED:
-            error = _left_out(jump, fine, request.march)
+            error = _left_out(jump, fine, march)
             if jump.path is not None:
                 coarse = limits[grid // 2, int(k)]
-                other = retraced(lines[grid // 2], load, deborah, coarse, jump.path, request.march)
-                error = TRANSIENT * _change(jump.path, fine, other, coarse, request.march.times)
+                other = retraced(lines[grid // 2], load, deborah, coarse, jump.path, march)
+                error = TRANSIENT * _change(jump.path, fine, other, coarse, march.times)
             trace_error[k], depth_error[k] = error + np.array([[errors.after[k]], [errors.depth[k]]])
     return jumps
 

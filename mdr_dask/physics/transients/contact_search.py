@@ -30,7 +30,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.jit import jit_uncounted, jit_inline_uncounted
+from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
 from mdr_dask.physics.transients.free_recovery import (
@@ -149,7 +149,8 @@ def workspace_for(patches: int, barriers: Barriers, below: FloatArray) -> Worksp
     """
     start, end = np.empty((2, 4 * patches + 4096))
     bounds = PathBounds(*np.empty((5, WINDOWS)))
-    recovery = FreeRecovery(*np.empty((4, SEPARATIONS)), np.zeros(1, np.int64), bounds)
+    earliest, place, farthest, barrier = np.empty((4, SEPARATIONS))
+    recovery = FreeRecovery(earliest, place, farthest, barrier, np.zeros(1, np.int64), bounds)
     state = np.zeros(5)
     state[TIME] = np.nan
     return Workspace(start, end, np.zeros(SUMS), np.empty(8), recovery, SkipBounds(below, state), barriers)

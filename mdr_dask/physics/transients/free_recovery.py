@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.jit import jit_uncounted, jit_inline_uncounted, last_until
+from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted, last_until
 from mdr_dask.physics.transients.patches import History, Patches, Track, height_at, patch_before
 
 ITERATIONS = 60  # most iterations of Newton's method with bisection
@@ -97,7 +97,7 @@ class FreeRecovery(NamedTuple):
     place: FloatArray
     farthest: FloatArray
     barrier: FloatArray
-    count: IntArray
+    count: IntArray  # type: ignore[assignment]
     bounds: PathBounds
 
 

@@ -116,24 +116,23 @@ def steady_limits(
     depths, contacts, outcomes = (
         each.reshape(-1, 2) for each in (steady.depth, steady.contact_fraction, steady.status)
     )
-    found = []
-    for load, speeds, depth, contact, outcome in zip(
-        loads, deborah, depths, contacts, outcomes.max(axis=1), strict=True
-    ):
+    found, n = [], line.track.cells
+    for k, load in enumerate(loads):
+        outcome = Outcome(int(outcomes[k].max()))
         if outcome != Outcome.CONVERGED:
-            nothing = np.full(5, np.nan)
-            found.append(SteadyLimits(*nothing, np.full(2, np.nan), None, None, False, Outcome(outcome)))
+            no = np.nan
+            found.append(SteadyLimits(no, no, no, no, no, np.full(2, no), None, None, False, outcome))
             continue
-        n, is_full = line.track.cells, bool(np.all(contact >= WHOLE))
         both, drags = [], []
-        for sinking, speed in zip(depth, speeds * n, strict=True):
-            patches, sums = line.patches(float(sinking + line.cells.top), float(speed))
+        for depth, speed in zip(depths[k], deborah[k] * n, strict=True):
+            patches, sums = line.patches(float(depth + line.cells.top), float(speed))
             both.append(patches)
             drags.append(float(sums[SWEEP_DRAG]))
-        fast = float(speeds[1] * n)
+        fast = float(deborah[k, 1] * n)
         at, rate, tilt, end = _release(line.track, both[0], line.barriers(fast), fast, float(load * n))
-        slower = both[int(np.argmin(speeds))]
-        found.append(SteadyLimits(drags[0], at, drags[1], rate, tilt, depth, both[0], slower, is_full, Outcome(end)))
+        slower, is_full = both[int(np.argmin(deborah[k]))], bool(np.all(contacts[k] >= WHOLE))
+        outcome = Outcome(end)
+        found.append(SteadyLimits(drags[0], at, drags[1], rate, tilt, depths[k], both[0], slower, is_full, outcome))
     return found
 
 

@@ -17,7 +17,7 @@ from mdr_dask.physics.transients.elements.follow import (
 from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation, foundation
 from mdr_dask.physics.transients.elements.loading_history import SETTINGS, STEPS_PER_DECADE, Piece
 from mdr_dask.physics.transients.elements.steps import Schedule
-from mdr_dask.physics.transients.velocity_jump import Transient, velocity_jump
+from mdr_dask.physics.transients.velocity_jump import MarchRequest, velocity_jump
 
 POINTS = 50
 STANDARD = foundation([3.0], [0.25], 0.0)
@@ -109,7 +109,7 @@ def test_second_order_in_the_grid(solid: Foundation) -> None:
 def test_second_order_in_the_grid_against_the_march(change: float) -> None:
     """The solver for one jump shares nothing with this one but the line; the immediate value at its own."""
     deborahs = 0.1, 0.1 * (1 + change)
-    march = velocity_jump(periodic_line(*rough(64)), 0.3, deborahs, Transient(TIMES, np.pi * POINTS, 96))
+    march = velocity_jump(periodic_line(*rough(64)), 0.3, deborahs, MarchRequest(TIMES, np.pi * POINTS, 96))
     exact = np.append(march.at, march.trace)
     found = [np.abs(at_times(periodic_line(*rough(o)), KELVIN, deborahs) / exact - 1) for o in (4, 16)]
     assert found[1][0] < 2e-4
