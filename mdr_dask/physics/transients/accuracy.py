@@ -21,7 +21,8 @@ from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits, stead
 from mdr_dask.physics.transients.velocity_jump import Jump, MarchRequest, Path, jump_between, retraced
 
 FINEST = 64  # most nodes for every Nyquist point in steady states
-ORDER = 2  # of the steady states: less than three, because contact of few nodes begins and ends irregularly
+ORDER = 2  # of the steady states, at least
+CAUTION = 2 * SAFETY  # for steady states: contact of a few nodes changes irregularly from grid to grid
 TRANSIENT = SAFETY  # times the change of a transient: first order, because single asperities come and go
 
 
@@ -122,7 +123,7 @@ def solve_jumps(problem: JumpProblem, request: JumpRequest) -> Jumps:
     while request.accuracy is not None and (grids[-1] < grid or 2 * grids[-1] <= FINEST):
         grids.append(2 * grids[-1])
     floors = [0.0, 0.0, 0.0, 1.0]
-    refined = refine(solve, cases, grids, request.accuracy or np.inf, ORDER, floors=floors)
+    refined = refine(solve, cases, grids, request.accuracy or np.inf, ORDER, safety=CAUTION, floors=floors)
     levels = Levels(*refined.values)
     errors = Levels(*refined.errors if request.accuracy is not None else np.full((4, cases), np.nan))
     march = request.march

@@ -15,7 +15,7 @@ from mdr_dask.physics.transients.elements.follow import (
     untouched,
 )
 from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation, foundation
-from mdr_dask.physics.transients.elements.loading_history import SETTINGS, STEPS_PER_DECADE, Piece
+from mdr_dask.physics.transients.elements.loading_history import PART, STEPS_PER_DECADE, Piece
 from mdr_dask.physics.transients.elements.steps import Schedule
 from mdr_dask.physics.transients.velocity_jump import MarchRequest, velocity_jump
 
@@ -261,8 +261,8 @@ def test_steps_resolve_what_changes(velocity, force, swing, time):
     piece = Piece(5.0, 8.0, velocity, force, swing)
     assert piece.changes_in == pytest.approx(time)
     longest = np.max(np.diff(piece.moments(5.0, 8.0, 1, STEPS_PER_DECADE)))
-    assert longest <= max(SETTINGS.part * time, 0) + 1e-12
-    assert np.isinf(time) or longest > 0.2 * SETTINGS.part * time
+    assert longest <= max(PART * time, 0) + 1e-12
+    assert np.isinf(time) or longest > 0.2 * PART * time
 
 
 def test_a_steady_start_that_does_not_bear_the_load_is_told(monkeypatch):

@@ -1,8 +1,8 @@
 """A line over the elements at one moment: heights, the depth for a mean displacement, and the forces.
 
-The edges of the contact lie inside the cells between elements: where touched by the gap to the displacement that an
-element would have without contact, where let go by the force, and where neither decides (the force of a dashpot has
-jumped since) where the edge was when the force decided last.
+The edges of the contact lie inside the cells between elements. Where contact grows, the edge is where the gap to the
+displacement without contact vanishes; where it shrinks, where the force vanishes. If neither decides, because the force
+of a dashpot has jumped since, the edge stays where the force put it last.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
 
 class Edges(NamedTuple):
-    """Where the force last put an edge in the cell before each element, and the gap outside then; -1 for nowhere."""
+    """Place in the cell before each element where the force last put an edge, -1 for none, and the gap outside then."""
 
     place: FloatArray
     gap: FloatArray
 
 
 class Contact(NamedTuple):
-    """Elements under a line at one moment, shape (n,) each, and where the edges of their contact are.
+    """Elements under a line at one moment, shape (n,) each, and the edges of their contact.
 
     Parameters
     ----------
     gaps, slope : array
-        From the line to where an element would be without contact, and the slope of the line.
+        From the line to the displacement that an element would have without contact, and the slope of the line.
     pulls, force, power : array
-        Force of springs and arms of elements at the line; the whole force, and that times the slope, are overwritten.
+        Force of springs and Prony terms of elements at the line; the whole force, and that times the slope (written).
     touching : bool array
     edges : Edges
     """
@@ -55,7 +55,7 @@ class Drive(NamedTuple):
 
 @jit
 def under_elements(line: CubicLine, travel: float, under: FloatArray, slope_under: FloatArray) -> int:
-    """Write height and slope (over the line's length) above every element after a travel; return its whole cells."""
+    """Write height and slope over the line's length above every element after a travel; return its whole cells."""
     n = under.size
     cells = travel * n
     shift = int(np.floor(cells))
@@ -120,7 +120,7 @@ def _limit(inner: float, outer: float, place: float, gap: float) -> float:
 def _cell(
     j: int, gaps: FloatArray, force: FloatArray, touching: BoolArray, edges: Edges, keep: bool
 ) -> tuple[float, float]:
-    """Return from where to where there is contact in the cell before element j, as parts of it."""
+    """Return begin and end of contact in the cell before element j, as parts of the cell."""
     f0, f1 = force[j - 1], force[j]
     before, after = touching[j - 1], touching[j]
     if keep and before == after:
@@ -145,7 +145,7 @@ def _cell(
 
 @jit
 def _forces(contact: Contact, first: int, keep: bool) -> tuple[float, float, float]:
-    """Return mean load, drag and fraction in contact; there is nothing before element `first`. Note edges if `keep`."""
+    """Return mean load, drag and fraction in contact; `first` has no element before it. Write the edges if `keep`."""
     force, power, slope, touching, edges = contact.force, contact.power, contact.slope, contact.touching, contact.edges
     n = force.size
     load, drag, length = 0.0, 0.0, 0.0
@@ -170,7 +170,7 @@ def _forces(contact: Contact, first: int, keep: bool) -> tuple[float, float, flo
 
 @jit
 def _pressing_rate(contact: Contact, weight: float, deborah: float) -> float:
-    """Return the rate from which on every element that touches presses."""
+    """Return the least rate at which the force on every element in contact is positive."""
     rate = -np.inf
     for j in range(contact.force.size):
         if contact.touching[j]:
@@ -180,19 +180,19 @@ def _pressing_rate(contact: Contact, weight: float, deborah: float) -> float:
 
 @jit
 def carrying_rate(contact: Contact, weight: float, rate: float, drive: Drive) -> tuple[float, float, float]:
-    """Return the rate at which the load is carried, drag and fraction in contact; note the edges.
+    """Return the rate of the depth at which the load is carried, drag and fraction in contact; write the edges.
 
     The force of an element pressed to the line is `pulls` and `weight` times ``rate + deborah * slope``: with a dashpot
     its viscosity and the rate of the depth, without one the glass modulus and a correction of the depth, deborah 0.
     """
     force, power, slope = contact.force, contact.power, contact.slope
     drag, length = 0.0, 0.0
-    for turn in range(60):
+    for iteration in range(60):
         for j in range(force.size):
             force[j] = contact.pulls[j] + weight * (rate + drive.deborah * slope[j])
             power[j] = force[j] * slope[j]
         carried, drag, length = _forces(contact, drive.first, False)
-        if abs(carried - drive.load) <= 1e-11 * drive.load or turn == 59:
+        if abs(carried - drive.load) <= 1e-11 * drive.load or iteration == 59:
             break
         if length > 0:
             rate += (drive.load - carried) / (length * weight)

@@ -1,6 +1,6 @@
 """Friction under any loading history: every element followed in time, at second order in the step.
 
-This is the general and slow way; a single jump on a periodic line is solved by `velocity_jump`.
+A single jump of a Kelvin body on a periodic line is solved much faster by `velocity_jump`.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from mdr_dask.physics.transients.elements.foundation import (
     advance,
     element_workspace,
     fading,
-    flight,
-    fly,
+    free_after,
+    recover,
     release,
 )
 from mdr_dask.physics.transients.elements.steps import (
@@ -36,9 +36,9 @@ from mdr_dask.physics.transients.elements.steps import (
     note_edges,
 )
 
-TURNS = 3000  # of an element around the line before it is as it was
-STEADY = 1e-14  # of the depth at the start
-NEARLY = 1e-6  # of the load: what the steady state at the start may miss
+PERIODS = 3000  # most periods of the line until an element repeats its state
+STEADY = 1e-14  # part of the depth at the start: accuracy of the search
+NEARLY = 1e-6  # part of the load that the steady state at the start may miss
 
 
 class Response(NamedTuple):
@@ -51,9 +51,9 @@ class Response(NamedTuple):
     stored : array, shape (moments,)
         Energy stored over 4 G L.
     work, dissipated : array, shape (moments,)
-        Work done on the elements and energy dissipated since the first moment, over 4 G L; their difference is what the
-        stored energy has grown by, but for rounding. An element that leaves a line that does not close counts with
-        all that it will lose.
+        Work done on the elements and energy dissipated since the first moment, over 4 G L. Their difference is the
+        increase of the stored energy, within rounding. An element that leaves a line that is not periodic counts with
+        all that it will dissipate.
     displacement : array, shape (n,)
         Of every element at the end.
     status : Outcome
@@ -74,7 +74,7 @@ class Response(NamedTuple):
 
 
 def untouched(elements: int, arms: int) -> State:
-    """Return elements that have never been touched."""
+    """Return elements that have never been in contact."""
     edges = Edges(np.full(elements, -1.0), np.zeros(elements))
     strains = np.zeros((2, elements, arms))
     touching = np.zeros(elements, np.bool_)
@@ -82,7 +82,7 @@ def untouched(elements: int, arms: int) -> State:
 
 
 def _copy(state: State) -> State:
-    """Return a state that may be moved on."""
+    """Return a copy of a state."""
     return State(
         state.displacement.copy(),
         state.arms.copy(),
@@ -96,8 +96,8 @@ def _copy(state: State) -> State:
 def steady_start(line: CubicLine, solid: Foundation, deborah: float, load: float) -> tuple[State, float, Outcome]:
     """Return the steady state of the elements at the nodes, sliding at constant speed under a constant load.
 
-    One element is carried around the line until it comes back as it was, in steps of half a cell by the method of
-    :func:`follow_line`; the depth is the root of a mean displacement that increases with it. At ``deborah = 0`` the
+    One element is carried around the line until its state repeats, in steps of half a cell by the method of
+    :func:`follow_line`. The depth is the root of the mean displacement, which increases with it. At ``deborah = 0`` the
     elements have rested under the load for ever.
 
     Returns
@@ -129,7 +129,7 @@ def steady_start(line: CubicLine, solid: Foundation, deborah: float, load: float
 
 
 def _halved(line: CubicLine) -> CubicLine:
-    """Return the same line with a node more in the middle of every cell."""
+    """Return the same line with an additional node in the middle of every cell."""
     n = line.enter.size
     height, enter, leave = np.empty(2 * n + 1), np.empty(2 * n), np.empty(2 * n)
     height[::2] = line.height
@@ -140,7 +140,7 @@ def _halved(line: CubicLine) -> CubicLine:
 
 
 def _resting(line: CubicLine, state: State, depth: float) -> float:
-    """Fill all elements of a body at rest; return the load."""
+    """Write the state of all elements of a body at rest; return the load."""
     w = depth + line.height[:-1]
     state.displacement[:] = np.maximum(w, 0)
     state.arms[:] = state.displacement[:, None]
@@ -151,11 +151,11 @@ def _resting(line: CubicLine, state: State, depth: float) -> float:
 
 
 def _sliding(line: CubicLine, solid: Foundation, state: State, deborah: float, depth: float) -> float:
-    """Fill all elements in the steady state at a depth; return the load that makes their mean what it is."""
+    """Write the steady state of all elements at a depth; return the load that has their mean displacement."""
     if depth + line.height[:-1].max() <= 0:
         return 0.0
     n = state.displacement.size
-    good, last = _orbit(solid, line, deborah, depth, state, TURNS)
+    good, last = _orbit(solid, line, deborah, depth, state, PERIODS)
     if not good:
         return np.nan
     step, modes = 1 / (n * deborah), np.empty(solid.rates.size)
@@ -166,13 +166,12 @@ def _sliding(line: CubicLine, solid: Foundation, state: State, deborah: float, d
 
 @jit
 def _orbit(
-    solid: Foundation, line: CubicLine, deborah: float, depth: float, state: State, turns: int
+    solid: Foundation, line: CubicLine, deborah: float, depth: float, state: State, periods: int
 ) -> tuple[bool, float]:
-    """Carry one element along the line at constant depth until it comes back as it was; fill all elements from it.
+    """Carry one element along the line at constant depth until its state repeats, and write the state of all elements.
 
-    The line may have a multiple of the nodes that there are elements.
-
-    Return whether it did, and its displacement at the end.
+    The number of nodes may be a multiple of the number of elements. Return whether the state repeats, and the
+    displacement at the end.
     """
     n = line.height.size - 1
     every, step = n // state.displacement.size, 1 / (n * deborah)
@@ -183,7 +182,7 @@ def _orbit(
     w0 = depth + line.height[top]
     u, touching = max(w0, 0.0), w0 > 0
     free = 0.0
-    for _ in range(turns if line.periodic else 1):
+    for _ in range(periods if line.periodic else 1):
         last[:] = arms[0]
         before = u
         for cell in range(n):
@@ -201,8 +200,8 @@ def _orbit(
             if touching:
                 rise = Rise(w0, w1, deborah * n * line.enter[i], deborah * n * line.leave[i])
                 part, leaves = release(solid, lapse, rise, arms, 0)
-            after = flight(solid, lapse, u, part if part < 1 else 0.0, leaves, arms, 0)
-            free = fly(solid, free, free_arms, 0, lapse.decay, lapse.workspace.modes)
+            after = free_after(solid, lapse, u, part if part < 1 else 0.0, leaves, arms, 0)
+            free = recover(solid, free, free_arms, 0, lapse.decay, lapse.workspace.modes)
             u, touching, _, _ = advance(solid, lapse, (w0, w1), (u, touching), Release(part, leaves, after), arms, 0)
         change = abs(u - before)
         for m in range(arms.size):
@@ -221,14 +220,14 @@ def follow_line(
 ) -> Response:
     """Follow every element of any linear foundation under any line through a loading history.
 
-    Within a step an element in contact is moved at constant speed, one in flight recovers by the modes of the solid,
-    and it is let go or touched inside the step where force or gap vanish. The total of the loads decides the mean
-    displacement, whatever is in contact, so that the depth is the root of a convex sum.
+    Within a step an element in contact moves at constant speed, and a free one recovers by the modes of the solid.
+    Contact begins or ends inside the step, where gap or force vanish. The load decides the mean displacement, whatever
+    is in contact, so that the depth is the root of a convex sum.
 
     Parameters
     ----------
     line : CubicLine
-        Elements enter one that does not close undeformed. Forces are straight between elements: a line
+        Elements enter a line that is not periodic undeformed. Forces are linear between elements: a line
         :func:`~mdr_dask.physics.surfaces.cubic_line.without_kinks` is followed with the smallest error.
     solid : Foundation
     schedule : Schedule

@@ -1,8 +1,9 @@
 """One element of a viscoelastic foundation through one step: pressed at constant speed, or recovering without force.
 
-Functions take the arms of all elements, shape (n, arms), and the number i of theirs: a view costs more than most do.
+The arms of a solid are its Prony terms, a spring and a dashpot in series each. Functions take the strains of the arms
+of all elements, shape (n, arms), and the index i of one: passing an index is cheaper than slicing.
 
-Units: the static modulus is 1, heights are free, lengths over that of the line, times over one time of the material.
+Units: the static modulus is 1, heights are in any unit, lengths in that of the line, times in one time of the material.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ class Foundation(NamedTuple):
     viscosity : float
         eta / G_inf of the dashpot, 0 for none.
     rates : array, shape (modes,)
-        Rates of decay of the modes, positive. There is one mode an arm, and one more for a dashpot.
+        Rates of decay of the modes, positive. There is one mode for each arm, and one more for a dashpot.
     outward, inward : array, shape (modes, modes)
         From modes to the state (u of a solid with a dashpot, a_1, ...), and back.
     push : array, shape (modes,)
@@ -93,7 +94,7 @@ def element_workspace(solid: Foundation) -> ElementWorkspace:
 
 
 class Lapse(NamedTuple):
-    """A time that passes: how long it is, how modes decay and arms fade over it, and the workspace of one element."""
+    """A lapse of time, the decay of modes and arms over it, and the workspace of one element."""
 
     time: float
     decay: FloatArray
@@ -102,7 +103,7 @@ class Lapse(NamedTuple):
 
 
 class Rise(NamedTuple):
-    """The line over one element while a time passes: where it begins and ends, and its rates there."""
+    """Height of the line over one element at the begin and the end of a lapse of time, and its rates there."""
 
     w0: float
     w1: float
@@ -111,7 +112,7 @@ class Rise(NamedTuple):
 
 
 class Release(NamedTuple):
-    """After which part of a time an element is let go if it is, where, and where it would then end."""
+    """Part of a time after which an element separates (1: not), where, and its displacement at the end then."""
 
     part: float
     leaves: float
@@ -120,7 +121,7 @@ class Release(NamedTuple):
 
 @jit
 def fading(solid: Foundation, step: float, decay: FloatArray, fades: FloatArray) -> None:
-    """Write how modes decay and arms fade over a time."""
+    """Write the decay of modes and arms over a time."""
     for k in range(decay.size):
         decay[k] = np.exp(-solid.rates[k] * step)
     for m in range(fades.size):
@@ -128,7 +129,7 @@ def fading(solid: Foundation, step: float, decay: FloatArray, fades: FloatArray)
 
 
 @jit
-def fly(solid: Foundation, u: float, arms: FloatArray, i: int, decay: FloatArray, modes: FloatArray) -> float:
+def recover(solid: Foundation, u: float, arms: FloatArray, i: int, decay: FloatArray, modes: FloatArray) -> float:
     """Let an element recover without force; `arms` is overwritten."""
     if solid.times.size == 0:
         return float(u * decay[0])
@@ -166,10 +167,10 @@ def at_rest(solid: Foundation, arms: FloatArray, i: int) -> float:
 def press(
     solid: Foundation, u0: float, u1: float, arms: FloatArray, i: int, step: float, fades: FloatArray
 ) -> tuple[float, float]:
-    """Move an element from u0 to u1 at constant speed; return work and loss, whose difference is stored exactly.
+    """Move an element from u0 to u1 at constant speed; return work and dissipation, whose difference is stored.
 
-    The stretch q = u - a of an arm is A + B exp(-t / tau) with A = tau du/dt; work is the integral of f du, loss that
-    of G q^2 / tau and of eta (du/dt)^2.
+    The stretch q = u - a of an arm is A + B exp(-t / tau) with A = tau du/dt. Work is the integral of f du, dissipation
+    that of G q^2 / tau and of eta (du/dt)^2.
     """
     if step <= 0:
         return 0.0, 0.0
@@ -197,7 +198,7 @@ def stored(solid: Foundation, u: float, arms: FloatArray, i: int) -> float:
 
 @jit
 def pull(solid: Foundation, u: float, arms: FloatArray, i: int) -> float:
-    """Return the force of springs and arms."""
+    """Return the force of spring and arms."""
     force = 1.0 * u
     for m in range(solid.times.size):
         force += solid.moduli[m] * (u - arms[i, m])
@@ -206,7 +207,7 @@ def pull(solid: Foundation, u: float, arms: FloatArray, i: int) -> float:
 
 @jit_inline
 def release(solid: Foundation, lapse: Lapse, rise: Rise, arms: FloatArray, i: int) -> tuple[float, float]:
-    """Return the part of a time after which an element pressed to its rise is let go, and where; 1 if it is not.
+    """Return the part of a time after which an element in contact separates, and where; 1 if it does not.
 
     The force is taken as linear in time, the rise as cubic.
     """
@@ -226,17 +227,19 @@ def release(solid: Foundation, lapse: Lapse, rise: Rise, arms: FloatArray, i: in
 
 
 @jit_inline
-def flight(solid: Foundation, lapse: Lapse, u0: float, part: float, leaves: float, arms: FloatArray, i: int) -> float:
-    """Return where an element ends if it is pressed to `leaves` for a part of a time and free for the rest."""
+def free_after(
+    solid: Foundation, lapse: Lapse, u0: float, part: float, leaves: float, arms: FloatArray, i: int
+) -> float:
+    """Return the displacement at the end if an element is pressed to `leaves` for a part of a time and then free."""
     workspace = lapse.workspace
     for m in range(solid.times.size):
         workspace.arms[0, m] = arms[i, m]
     if part <= 0:
-        return fly(solid, u0, workspace.arms, 0, lapse.decay, workspace.modes)
+        return recover(solid, u0, workspace.arms, 0, lapse.decay, workspace.modes)
     fading(solid, part * lapse.time, workspace.decay, workspace.fades)
     press(solid, u0, leaves, workspace.arms, 0, part * lapse.time, workspace.fades)
     fading(solid, (1 - part) * lapse.time, workspace.decay, workspace.fades)
-    return fly(solid, leaves, workspace.arms, 0, workspace.decay, workspace.modes)
+    return recover(solid, leaves, workspace.arms, 0, workspace.decay, workspace.modes)
 
 
 @jit_inline
@@ -245,35 +248,35 @@ def advance(
     lapse: Lapse,
     w: tuple[float, float],
     element: tuple[float, bool],
-    let_go: Release,
+    separation: Release,
     arms: FloatArray,
     i: int,
 ) -> tuple[float, bool, float, float]:
-    """Move one element through a time; return displacement, contact, work and loss. `arms` is overwritten.
+    """Move one element through a time; return displacement, contact, work and dissipation. `arms` is overwritten.
 
-    `w` is where the line begins and ends, `element` the displacement and contact at the start.
+    `w` is the height of the line at begin and end, `element` displacement and contact at the begin.
     """
     (w0, w1), (u0, touching), step, workspace = w, element, lapse.time, lapse.workspace
     before = stored(solid, u0, arms, i)
-    if w1 > let_go.after:
+    if w1 > separation.after:
         if touching:
             work, dissipated = press(solid, u0, w1, arms, i, step, lapse.fades)
             return w1, True, work, dissipated
-        part = (u0 - w0) / ((u0 - w0) + (w1 - let_go.after)) if u0 > w0 else 0.0
+        part = (u0 - w0) / ((u0 - w0) + (w1 - separation.after)) if u0 > w0 else 0.0
         fading(solid, part * step, workspace.decay, workspace.fades)
-        u = fly(solid, u0, arms, i, workspace.decay, workspace.modes) if part > 0 else u0
+        u = recover(solid, u0, arms, i, workspace.decay, workspace.modes) if part > 0 else u0
         loss = before - stored(solid, u, arms, i) if part > 0 else 0.0
         rest = (1 - part) * step
         fading(solid, rest, workspace.decay, workspace.fades)
         work, dissipated = press(solid, u, w1, arms, i, rest, workspace.fades)
         return w1, True, work, dissipated + loss
-    part, leaves = let_go.part, let_go.leaves
+    part, leaves = separation.part, separation.leaves
     if not touching or part <= 0:
-        u = fly(solid, u0, arms, i, lapse.decay, workspace.modes)
+        u = recover(solid, u0, arms, i, lapse.decay, workspace.modes)
         return u, False, 0.0, before - stored(solid, u, arms, i)
     fading(solid, part * step, workspace.decay, workspace.fades)
     work, dissipated = press(solid, u0, leaves, arms, i, part * step, workspace.fades)
     fading(solid, (1 - part) * step, workspace.decay, workspace.fades)
     before = stored(solid, leaves, arms, i)
-    u = fly(solid, leaves, arms, i, workspace.decay, workspace.modes)
+    u = recover(solid, leaves, arms, i, workspace.decay, workspace.modes)
     return u, False, work, dissipated + before - stored(solid, u, arms, i)

@@ -1,6 +1,6 @@
-"""Any history of velocity and load, without dimensions: in which steps it is taken, and the friction along it.
+"""Any history of velocity and load without dimensions, its moments, and the friction along it.
 
-Times are in the unit of the solid, travel in lengths of the line, loads are F_N / (4 G_inf L) in the unit of height.
+Times are in the unit of the solid, travel is in lengths of the line, loads are F_N / (4 G_inf L) in the unit of height.
 """
 
 from __future__ import annotations
@@ -18,36 +18,14 @@ from mdr_dask.physics.transients.elements.follow import Response, follow_line, s
 from mdr_dask.physics.transients.elements.foundation import Foundation
 from mdr_dask.physics.transients.elements.steps import Schedule, State
 
-
-class Settings(NamedTuple):
-    """Steps of a history at 12 of them in a decade, chosen by ``python -m benchmarks protocols honesty``.
-
-    Parameters
-    ----------
-    most_steps : int
-        Steps of one piece, beyond which it is given up.
-    cells : float
-        Of the line, passed in a step.
-    part : float
-        Of a ramp or a period, in a step.
-    first : float
-        First step, of the time in which a step's cells are passed, or of the unit of time.
-    nearly : float
-        Of a step, by which a moment may miss a time that is asked for and makes way.
-    rounding : float
-        Of a time.
-    """
-
-    most_steps: int = 400_000
-    cells: float = 0.5
-    part: float = 0.01
-    first: float = 1e-3
-    nearly: float = 1e-2
-    rounding: float = 1e-12
-
-
-SETTINGS = Settings()
-STEPS_PER_DECADE = 12.0  # of which the settings speak
+MOST_STEPS = 400_000  # of one piece, beyond which it is given up
+# Of steps at 12 in a decade; with more steps in a decade they are shorter in proportion
+CELLS = 0.5  # cells of the line in a step, at most
+PART = 0.01  # of a ramp or a period in a step, at most
+FIRST = 1e-3  # of the longest step or of the unit of time: the first step
+STEPS_PER_DECADE = 12.0
+NEARLY = 1e-2  # of a step: a moment so near to a requested time is replaced by it
+ROUNDING = 1e-12  # part of a time
 
 
 @dataclass(frozen=True)
@@ -87,23 +65,23 @@ class Piece:
 
     @property
     def changes_in(self) -> float:
-        """Time in which it changes."""
+        """Duration of its changes: the period or the length of a ramp, infinite if it is constant."""
         if self.swing[2]:
             return 2 * np.pi / self.swing[2]
         same = self.velocity[0] == self.velocity[1] and self.force[0] == self.force[1]
         return np.inf if same else self.end - self.start
 
     def moments(self, begin: float, end: float, nodes: int, per_decade: float) -> FloatArray | None:
-        """Return moments that begin finely, grow in a constant ratio, and pass a part of a cell at most.
+        """Return moments whose steps begin small and grow in a constant ratio up to a part of a cell.
 
-        None where there would be too many.
+        None if there would be too many.
         """
         finer = STEPS_PER_DECADE / per_decade
         fastest = max(abs(self.velocity[0]), abs(self.velocity[1])) + self.swing[0]
-        most = SETTINGS.cells * finer / (nodes * fastest) if fastest else np.inf
-        most = min(most, SETTINGS.part * finer * self.changes_in, max(end - begin, 1e-300))
-        first, ratio = SETTINGS.first * finer * min(most, 1.0), 10 ** (1 / per_decade)
-        if (end - begin) / most > SETTINGS.most_steps:
+        most = CELLS * finer / (nodes * fastest) if fastest else np.inf
+        most = min(most, PART * finer * self.changes_in, max(end - begin, 1e-300))
+        first, ratio = FIRST * finer * min(most, 1.0), 10 ** (1 / per_decade)
+        if (end - begin) / most > MOST_STEPS:
             return None
         grown = first * ratio ** np.arange(int(np.ceil(np.log(most / (first * (ratio - 1)) + 1) / np.log(ratio))) + 1)
         grown = grown[np.diff(grown, append=np.inf) < most] if grown.size > 1 else grown
@@ -123,7 +101,7 @@ class Trace(NamedTuple):
     before, at, after : float
         Steady before t = 0, at t = 0+, and in the steady state in which the history ends, NaN if it ends in none.
     friction, depth : array, shape (times,)
-        At the times asked for; at a jump the value after it.
+        At the requested times; at a jump the value after it.
     outcome : Outcome
     """
 
@@ -135,8 +113,8 @@ class Trace(NamedTuple):
     outcome: Outcome
 
 
-class _Stand(NamedTuple):
-    """Where a body stands between two pieces."""
+class _Junction(NamedTuple):
+    """State of all elements, depth and travel between two pieces."""
 
     state: State
     depth: float
@@ -163,7 +141,7 @@ def trace(
     pieces : sequence of Piece
         From t = 0 on for ever.
     times : array, shape (m,)
-        At which friction is wanted, increasing.
+        Requested times, increasing.
     per_decade : float
         Steps in a factor ten of the time after every change.
     """
@@ -173,7 +151,7 @@ def trace(
     if status != Outcome.CONVERGED:
         return _failed(times, Outcome(status))
     first = _still(line, solid, velocity, load_before, state, depth)
-    stand = _Stand(state, depth, 0.0)
+    junction = _Junction(state, depth, 0.0)
     found: list[tuple[FloatArray, FloatArray, FloatArray]] = []
     for piece in pieces:
         begin, end = piece.start, min(piece.end, float(times[-1]))
@@ -184,12 +162,12 @@ def trace(
             return _failed(times, Outcome.TOO_MANY_STEPS)
         moments = _with_times(moments, times)
         way, speed, load = piece.at(moments)
-        travels = stand.travel + way
-        part = follow_line(line, solid, Schedule(moments, travels, speed, load), stand.state, stand.depth)
+        travels = junction.travel + way
+        part = follow_line(line, solid, Schedule(moments, travels, speed, load), junction.state, junction.depth)
         if part.status != Outcome.CONVERGED:
             return _failed(times, Outcome(part.status))
         found.append((moments, part.drag / load, part.depth))
-        stand = _Stand(part.state, float(part.depth[-1]), float(travels[-1]))
+        junction = _Junction(part.state, float(part.depth[-1]), float(travels[-1]))
     moment, friction, depths = (np.concatenate(column) for column in zip(*found, strict=True))
     return Trace(
         float(first.drag[0]) / load_before,
@@ -207,13 +185,13 @@ def _failed(times: FloatArray, outcome: Outcome) -> Trace:
 
 
 def _still(line: CubicLine, solid: Foundation, velocity: float, load: float, state: State, depth: float) -> Response:
-    """Return the response at one moment."""
+    """Return the response at one moment of steady sliding."""
     one = np.ones(1)
     return follow_line(line, solid, Schedule(0 * one, 0 * one, velocity * one, load * one), state, depth)
 
 
 def _end(line: CubicLine, solid: Foundation, piece: Piece) -> float:
-    """Return the friction of the steady state in which a history ends; NaN if it does not or ends at rest."""
+    """Return the friction of the steady state in which a history ends; NaN if it ends in none or at rest."""
     velocity, load = piece.velocity[1], piece.force[1]
     if piece.swing[2] or velocity <= 0:
         return np.nan
@@ -224,27 +202,27 @@ def _end(line: CubicLine, solid: Foundation, piece: Piece) -> float:
 
 
 def _snapped(times: FloatArray, starts: FloatArray) -> FloatArray:
-    """Return times of which those that miss the start of a piece by rounding alone are at it."""
+    """Return times with those that miss the start of a piece by rounding moved to it."""
     nearest = starts[np.abs(times[:, None] - starts).argmin(axis=1)]
-    found: FloatArray = np.where(np.abs(times - nearest) <= SETTINGS.rounding * nearest, nearest, times)
+    found: FloatArray = np.where(np.abs(times - nearest) <= ROUNDING * nearest, nearest, times)
     return found
 
 
 def _with_times(moments: FloatArray, times: FloatArray) -> FloatArray:
-    """Return moments among which are the times wanted; moments of the history that nearly meet one make way."""
+    """Return moments that include the requested times, without other moments very near to these."""
     inside = times[(times > moments[0]) & (times < moments[-1])]
     if inside.size == 0:
         return moments
     gaps = np.diff(moments)
     near = inside[np.clip(np.searchsorted(inside, moments), 0, inside.size - 1)]
     before = inside[np.clip(np.searchsorted(inside, moments) - 1, 0, inside.size - 1)]
-    close = SETTINGS.nearly * np.append(gaps[0], gaps)
+    close = NEARLY * np.append(gaps[0], gaps)
     apart = (np.abs(moments - near) > close) & (np.abs(moments - before) > close)
     apart[[0, -1]] = True
     return np.union1d(moments[apart], inside)
 
 
 def _at(times: FloatArray, moments: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the values at times that are moments; at a jump the value after it."""
+    """Return the values at times that are among the moments; at a jump the value after it."""
     found: FloatArray = values[np.searchsorted(moments, times, side="right") - 1]
     return found

@@ -1,6 +1,6 @@
-"""All elements of a viscoelastic foundation through a loading history, and around a line until steady.
+"""All elements of a viscoelastic foundation through the moments of a loading history.
 
-Units: the static modulus is 1, heights are free, lengths over that of the line, times over one time of the material.
+Units: the static modulus is 1, heights are in any unit, lengths in that of the line, times in one time of the material.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from mdr_dask.physics.transients.elements.foundation import (
     at_rest,
     element_workspace,
     fading,
-    flight,
-    fly,
+    free_after,
     pull,
+    recover,
     release,
     stored,
 )
 
 DRAG, DEPTH, RATE, CONTACT, STORED, WORK, DISSIPATED = range(7)
 ROWS = 7
-CORRECTIONS = 2  # of the moments of release and the depth within a step
+CORRECTIONS = 2  # of the times of separation and the depth within a step
 
 
 class State(NamedTuple):
@@ -44,7 +44,7 @@ class State(NamedTuple):
     displacement, arms : array, shape (n,) and (n, arms)
         u, and the strain of the arms.
     free, free_arms : array, shape (n,) and (n, arms)
-        The same as they would be, had an element in contact not been touched; `free_arms` of these elements only.
+        The same without contact; `free_arms` is valid only for elements in contact.
     touching : array, shape (n,)
         Whether in contact.
     edges : Edges
@@ -60,7 +60,7 @@ class State(NamedTuple):
 
 @jit
 def mean_after(solid: Foundation, state: State, load: float, next_load: float, step: float, modes: FloatArray) -> float:
-    """Return the mean displacement that the loading history decides, whatever is in contact."""
+    """Return the mean displacement after a step: the load decides it, whatever is in contact."""
     n, extra = state.displacement.size, 1 if solid.viscosity > 0 else 0
     count, arms = solid.rates.size, solid.times.size
     inward, strain, mean = solid.inward, state.arms, state.displacement.sum() / n
@@ -93,7 +93,7 @@ def mean_after(solid: Foundation, state: State, load: float, next_load: float, s
 def _instant(
     solid: Foundation, state: State, under: FloatArray, load: float, depth: float
 ) -> tuple[float, float, bool]:
-    """Bring elements without a dashpot under a load at once; return the depth and the work, all of which is stored."""
+    """Load elements without a dashpot at once; return the depth, the work, all of which is stored, and success."""
     n = under.size
     mean, work, glass = 0.0, 0.0, 1.0 + solid.moduli.sum()
     for j in range(n):
@@ -111,7 +111,7 @@ def _instant(
 
 @jit
 def _forget(solid: Foundation, state: State, old: int, new: int) -> float:
-    """Replace elements that have left the line by undeformed ones; return the energy that they will lose."""
+    """Replace elements that have left the line by undeformed ones; return the energy that they will dissipate."""
     n, dissipated = state.displacement.size, 0.0
     for j in range(n):
         if (j + old) // n != (j + new) // n:
@@ -124,7 +124,7 @@ def _forget(solid: Foundation, state: State, old: int, new: int) -> float:
 
 
 class Schedule(NamedTuple):
-    """What a loading history asks of the elements at its moments, shape (moments,) each.
+    """Travel, velocity and load at the moments of a loading history, shape (moments,) each.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ class Schedule(NamedTuple):
 
 
 class Step(NamedTuple):
-    """One step: how long it is, the depth at its start, and v tau / L at its start and end."""
+    """Duration of a step, the depth at its start, and v tau / L at its start and end."""
 
     time: float
     depth: float
@@ -152,8 +152,8 @@ class Step(NamedTuple):
 
 
 class StepWorkspace(NamedTuple):
-    """Arrays of one step: heights and slopes over the elements at its end and start, where each would be at the end
-    without contact, when and where it is let go, gaps and forces, and decay over the whole step.
+    """Arrays of one step: heights and slopes over the elements at its end and start, displacements at the end without
+    contact, times and places of separation, gaps and forces, and the decay over the whole step.
     """
 
     under: FloatArray
@@ -196,8 +196,8 @@ def _workspace_for(solid: Foundation, n: int) -> StepWorkspace:
 
 
 @jit
-def _let_go(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> None:
-    """Write which elements are let go within a step that ends at a depth, and where they end."""
+def _separate(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> None:
+    """Write which elements separate within a step that ends at a depth, and their displacements at its end."""
     plain, damping, fall = solid.times.size == 0, solid.viscosity, (depth - step.depth) / step.time
     lapse = Lapse(step.time, workspace.decay, workspace.fades, workspace.element)
     for j in range(workspace.under.size):
@@ -210,13 +210,13 @@ def _let_go(solid: Foundation, state: State, workspace: StepWorkspace, step: Ste
             continue
         part, leaves = release(solid, lapse, Rise(u, w1, rise0, rise1), state.arms, j)
         if part < 1 or workspace.parts[j] < 1:
-            workspace.after[j] = flight(solid, lapse, u, part if part < 1 else 0.0, leaves, state.arms, j)
+            workspace.after[j] = free_after(solid, lapse, u, part if part < 1 else 0.0, leaves, state.arms, j)
         workspace.parts[j], workspace.leaves[j] = part, leaves
 
 
 @jit
 def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> tuple[float, float]:
-    """Move all elements through a step; return mean work and loss."""
+    """Move all elements through a step; return mean work and dissipation."""
     n, plain, damping = workspace.under.size, solid.times.size == 0, solid.viscosity
     u, touching, after = state.displacement, state.touching, workspace.after
     lapse = Lapse(step.time, workspace.decay, workspace.fades, workspace.element)
@@ -230,7 +230,7 @@ def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step,
         elif plain:
             state.free[j] *= workspace.decay[0]
         elif damping > 0:
-            state.free[j] = fly(solid, state.free[j], state.free_arms, j, workspace.decay, workspace.element.modes)
+            state.free[j] = recover(solid, state.free[j], state.free_arms, j, workspace.decay, workspace.element.modes)
         if not was and w1 <= after[j]:
             if plain:
                 dissipated += 0.5 * (u[j] * u[j] - after[j] * after[j])
@@ -246,8 +246,8 @@ def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step,
             dissipated += gone
             u[j] = w1
             continue
-        let_go = Release(workspace.parts[j], workspace.leaves[j], after[j])
-        u[j], touching[j], done, gone = advance(solid, lapse, (w0, w1), (u[j], was), let_go, state.arms, j)
+        separation = Release(workspace.parts[j], workspace.leaves[j], after[j])
+        u[j], touching[j], done, gone = advance(solid, lapse, (w0, w1), (u[j], was), separation, state.arms, j)
         if not touching[j]:
             state.free[j] = u[j]
         work += done
@@ -264,7 +264,7 @@ def _step(
     mean: float,
     guess: float,
 ) -> tuple[float, float, float, bool]:
-    """Take all elements through a step to a mean displacement; return depth, work and loss, and whether it is found."""
+    """Move all elements through a step to a mean displacement; return depth, work, dissipation, and success."""
     plain = solid.times.size == 0
     for j in range(workspace.under.size):
         workspace.parts[j] = 1.0 if state.touching[j] else 0.0
@@ -273,7 +273,7 @@ def _step(
             continue
         for m in range(solid.times.size):
             workspace.after_arms[j, m] = state.arms[j, m]
-        workspace.after[j] = fly(
+        workspace.after[j] = recover(
             solid, state.displacement[j], workspace.after_arms, j, workspace.decay, workspace.element.modes
         )
     depth = guess
@@ -281,7 +281,7 @@ def _step(
         depth, good = depth_for(workspace.under, workspace.after, mean, depth)
         if not good:
             return depth, 0.0, 0.0, False
-        _let_go(solid, state, workspace, step, depth)
+        _separate(solid, state, workspace, step, depth)
     depth, good = depth_for(workspace.under, workspace.after, mean, depth)
     if not good:
         return depth, 0.0, 0.0, False
@@ -305,10 +305,10 @@ def _state_energy(solid: Foundation, state: State) -> float:
 def forces_now(
     solid: Foundation, state: State, workspace: StepWorkspace, depth: float, rate: float, drive: Drive
 ) -> tuple[float, float, float, float]:
-    """Return the depth and its rate at which the load is carried, drag and fraction in contact; note the edges.
+    """Return the depth and its rate at which the load is carried, drag and fraction in contact; write the edges.
 
-    Without a dashpot the depth is that of the load; the one for the mean displacement of the elements is not more exact
-    than a sum over a line with kinks.
+    Without a dashpot the depth follows from the load here, because the depth from the mean displacement is only as
+    exact as a sum over the elements.
     """
     plain = solid.times.size == 0
     for j in range(workspace.under.size):
@@ -374,7 +374,7 @@ def follow_elements(
             return Outcome.OUTSIDE_LINE
         drive = Drive(deborahs[now], loads[now], first)
         exact, rate, drag, length = forces_now(solid, state, workspace, depth, rate, drive)
-        if length <= 0 and now > 0 and drive.load > 0:  # viscous elements begin before they touch
+        if length <= 0 and now > 0 and drive.load > 0:  # elements with a dashpot carry load at once
             return Outcome.DEPTH_NOT_FOUND
         out[DRAG, now], out[DEPTH, now], out[RATE, now], out[CONTACT, now] = drag, exact, rate, length
         out[STORED, now], out[WORK, now], out[DISSIPATED, now] = _state_energy(solid, state), work, dissipated
@@ -383,7 +383,7 @@ def follow_elements(
 
 @jit
 def note_edges(solid: Foundation, line: CubicLine, state: State, depth: float, deborah: float, load: float) -> None:
-    """Note where the edges are in a steady state."""
+    """Write the edges of contact in a steady state."""
     workspace = _workspace_for(solid, line.height.size - 1)
     under_elements(line, 0.0, workspace.under, workspace.slope)
     forces_now(solid, state, workspace, depth, 0.0, Drive(deborah, load, -1 if line.periodic else 0))
