@@ -1,4 +1,4 @@
-"""Loading histories as a campaign names them."""
+"""Histories of velocity and load in a campaign."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ class Jump(Parameters):
 
 
 class _History(Parameters):
-    """What every other loading history has."""
+    """What all histories but the jump have in common."""
 
     start: Literal["steady", "rest"] = Field(
-        default="steady", description="before t = 0: slides steadily at `velocity`, or rests, under `normal_force`"
+        default="steady", description="before t = 0: steady sliding at `velocity`, or rest, under `normal_force`"
     )
 
 
@@ -38,7 +38,7 @@ class Steps(_History):
     """Velocity and load that are constant between times."""
 
     shape: Literal["steps"]
-    times: Numbers = quantity("s", "times from which on the values hold, from 0 on", min_length=1)
+    times: Numbers = quantity("s", "times at which velocity and force change, from 0 on", min_length=1)
     velocities: Numbers = quantity("m/s", "velocity from each time on", min_length=1)
     forces: Numbers | None = quantity("N", "normal force from each time on; else `normal_force`", default=None)
 
@@ -67,14 +67,14 @@ class Oscillation(_History):
 
 
 class TableFile(_History):
-    """Velocity and load from a table, linear between its rows; two rows of the same time are a jump."""
+    """Velocity and load from a table, linear between its rows; two rows at the same time are a jump."""
 
     shape: Literal["table"]
     file: NamedFile = Field(description="table with columns time, velocity and perhaps force")
 
     @model_validator(mode="after")
     def _holds_a_history(self, info: ValidationInfo) -> TableFile:
-        """Refuse a bad table where a campaign names it, before any case fails of it."""
+        """Refuse a bad table when the campaign is read, before any case fails."""
         if info.context is not None:
             try:
                 _table_rows(self.file, 1.0)

@@ -1,4 +1,4 @@
-"""What a campaign can name of the kinetics of friction: parameters, outputs, and where it is solved."""
+"""Parameters and outputs of the model `velocity_jump`; light to import."""
 
 from __future__ import annotations
 
@@ -26,13 +26,15 @@ class VelocityJump(SlidingBody):
     rms_roughness: float | None = quantity("m", "rms height h of the roughness", usual="2 um", default=None, gt=0)
     velocity: float = quantity("m/s", "sliding velocity v_1 before the jump", usual="50 mm/s", gt=0)
     oversampling: int = quantity(
-        "1", "grid points for every Nyquist point of the transient", default=4, ge=2, le=256, multiple_of=2
+        "1", "grid points per Nyquist point for the transient", default=4, ge=2, le=256, multiple_of=2
     )
-    steps_per_decade: int = quantity("1", "time steps in a factor ten of the time", default=8, ge=4, le=400)
+    steps_per_decade: int = quantity(
+        "1", "time steps per factor of ten in time, 8 or more for large jumps", default=8, ge=4, le=400
+    )
     velocity_change: float = quantity("1", "jump of the velocity dv / v_1", default=0.2, gt=-1)
-    protocol: Protocol = Field(default=Jump(), description="loading history: velocity and load from t_0 = 0 on")
+    protocol: Protocol = Field(default=Jump(), description="history of velocity and load from t_0 = 0 on")
     relaxation_times: tuple[float, ...] = quantity(
-        "1", "times (t - t_0) / tau at which friction is wanted", default=TIMES, strict=False, min_length=2
+        "1", "times (t - t_0) / tau at which friction is computed", default=TIMES, strict=False, min_length=2
     )
 
     @field_validator("relaxation_times")
@@ -59,7 +61,7 @@ class VelocityJump(SlidingBody):
         return kelvin(self.shear_modulus, self.relaxation_time)
 
     def time_unit(self) -> float:
-        """Return tau, in which times are stored: the longest time of the solid's arms and dashpot."""
+        """Return tau, the unit of stored times: the longest time of the solid's Prony terms and dashpot."""
         solid = self.solid()
         return float(max([solid.viscosity / solid.static_modulus, *solid.times]))
 

@@ -1,8 +1,7 @@
-"""Friction that changes in time, after a jump of the velocity or under any loading history.
+"""Friction that changes in time, after a jump of the velocity or under any history of velocity and load.
 
-Read `velocity_jump` first: from steady state to steady state (`ends`) by the `march` of the depth, which asks
-`contact_search` who touches and `free_flight` what the others do. By bounds of the `recent` depths `contact_loss` says
-where they may overtake a patch, and `clearance` which cells rest until the line has come nearer. `patches` are the
-pieces in contact, `curve` joins the moments. `accuracy` chooses the grids and knows the errors. `elements` follows
-every element: slower, but for any history, solid and body.
+Read `velocity_jump` first: it goes from one steady state to the next (`limits`) by a `march` of the depth, which finds
+the contact patches at every moment (`contact_search`) and the displacement of the elements between them
+(`free_recovery`). `patches` holds the forces on a patch. `accuracy` chooses the grids and estimates the errors.
+`elements` follows every element: slower, but for any history, solid and indenter.
 """
