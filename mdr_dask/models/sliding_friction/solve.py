@@ -23,7 +23,7 @@ from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 ACCURACY = 0.01  # where the campaign does not give one
 USUAL_ON_PLANES, USUAL = 2, 16  # nodes per Nyquist point of the finest grid that cases usually need
-BYTES_A_NODE = 500  # peak memory of a line and a case on it, measured
+BYTES_A_NODE = 150  # peak memory of a line and a case on it; 20 to 130 were measured
 SECONDS_A_NODE = 1e-8  # of a line, or of a case on it, with all grids: an order of magnitude
 
 #: Outputs that have errors, and the column of a steady state that each is.

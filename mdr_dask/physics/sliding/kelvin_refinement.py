@@ -24,12 +24,12 @@ from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 FLOORS = (0.0, 1.0, 0.0, 0.0)
 """Errors of the depth are relative to the unit of height (the rms height) where the depth itself is smaller."""
-ORDER = 3.0  # cubic cells are of fourth order, edges of contacts of lower order; measured 3.3 in the median
-SAFETY = 4.0  # instead of the default 3, because contacts on few cells converge irregularly
+ORDER = 3.0  # from node to node: cubic cells are of fourth order, edges of contacts of lower order; measured 3.3
+ORDER_OF_CELLS = 2.0  # of sweeps, which also take contacts within one cell: their curvature is of second order
 ORDER_OF_STEPS = 1.0  # backward Euler, and edges of contacts on straight cells
 SEARCH = 0.1  # error that the search for the depth may leave, relative to the accuracy: small beside it
 NODE_ERROR = 5e-5  # error of the arithmetic from node to node, whatever the grid
-NODE_LEVELS = tuple(2**k for k in range(11))  # nodes per Nyquist point, beyond 2 only where the line is in contact
+NODE_LEVELS = tuple(2**k for k in range(12))  # nodes per Nyquist point, beyond 2 only where the line is in contact
 CELL_LEVELS = tuple(2**k for k in range(1, 7))
 REFERENCE = 0.01  # accuracy of the results that time steps on a given grid are compared with
 
@@ -121,7 +121,7 @@ class KelvinCases:
         if on_plane and left.size and accuracy > 2 * NODE_ERROR:
             search = NodeToNode(*nodes, Cases(self.deborah[left], self.loads[left]), SEARCH * accuracy)
             allowed = accuracy - NODE_ERROR
-            found = refine(search.solve, left.size, NODE_LEVELS, allowed, ORDER, safety=SAFETY, floors=FLOORS)
+            found = refine(search.solve, left.size, NODE_LEVELS, allowed, ORDER, floors=FLOORS)
             _write((columns, errors, status), left, found, NODE_ERROR)
             left = left[~found.met]
         if left.size:
@@ -138,8 +138,8 @@ class KelvinCases:
             depths[cases] = found.depth
             return Solution(found.columns, found.status)
 
-        order = ORDER if self.scheme == "hermite" else ORDER_OF_STEPS
-        return refine(solve, self.loads.size, levels, accuracy, order, safety=SAFETY, floors=FLOORS)
+        order = ORDER_OF_CELLS if self.scheme == "hermite" else ORDER_OF_STEPS
+        return refine(solve, self.loads.size, levels, accuracy, order, floors=FLOORS)
 
 
 def _write(

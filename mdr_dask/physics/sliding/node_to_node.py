@@ -53,7 +53,7 @@ from mdr_dask.physics.surfaces.cubic_line import highest_point
 LANES = 64  # cases that pass the line together
 SMALL, LARGE = 1e-300, 1e12
 CLOSED = 1e-9  # relative difference of the displacement before and after a period that counts as a closed period
-RESOLVED = 5  # cells in contact below which a grid does not resolve the contact
+RESOLVED = 10  # cells in contact below which a grid does not resolve the contact
 
 ITERATIONS = 25
 COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most so many times so many nodes
