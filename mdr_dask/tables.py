@@ -1,44 +1,88 @@
-"""Tables as people and machines keep them: the one reader of every table that a campaign or a command names.
+"""Tables as people and instruments write them: the one reader of every table that a campaign or a command names.
 
-Columns stand by name, in any order; units stand in brackets behind the names or in a row of their own. Commas,
-semicolons, tabs or blanks separate; decimal commas, comments and a byte-order mark are understood.
+Columns go by their names, in any order; units stand in brackets behind the names, joined to them, or in a row of their
+own. Text before the table, blocks with repeated names, decimal commas, UTF-16 and Excel workbooks are understood.
 """
 
 from __future__ import annotations
 
-import csv
+import io
 import math
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, did_you_mean
-from mdr_dask.headings import folded, meanings
 from mdr_dask.units import example_unit, is_unit, to_si
 
 COMMENT = "#%"
-SEPARATORS = "\t;,"
+SEPARATORS = ("\t", ";", ",", r"\s+")
 #: Letters and signs of units beyond ASCII in tables that are not UTF-8.
 WESTERN = "°µ²³·±äöüÄÖÜßéèàç"
-#: More columns than this are no table of measurements.
+#: Tables with more columns are no measurements.
 MOST_COLUMNS = 1000
-#: Problems that are told of one table.
-MOST_TOLD = 10
-_WITH_UNIT = re.compile(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))\s*\Z")
-_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?\Z")
-_CELSIUS = ("C", "c", "°c", "ºC")
-_COMMAS = " (put semicolons between the values if they have decimal commas)"
+#: Problems that are shown of one table.
+MOST_SHOWN = 10
+#: Two columns of one quantity agree to this part: instruments print three digits or more.
+AGREE = 0.01
+#: Characters of a number; longer entries are no measurements.
+LONGEST_NUMBER = 60
+SEMICOLONS = " (put semicolons between the values if they have decimal commas)"
 NO_ROWS = "expected a line of names and at least one line of values"
-_MISSING = frozenset({"", "-", "nan", "na", "n/a"})
+
+#: Names of quantities as instruments and people write them, `plain`; columns add their own.
+SYNONYMS = {
+    "temperature": ("T", "temp", "sample temperature", "temperature sample", "ts", "tr"),
+    "frequency": ("f", "freq", "omega", "w", "ω", "angular frequency", "ang frequency", "frequency angular"),
+    "time": ("t", "step time", "test time"),
+    "velocity": ("v", "speed", "sliding velocity", "sliding speed", "load point velocity"),
+    "storage modulus": ("e'", "g'", "storage", "e storage", "g storage", "e stor", "g stor", "e1", "g1"),
+    "loss modulus": ("e''", "g''", "loss", "e loss", "g loss", "e2", "g2"),
+    "modulus": ("relaxation modulus", "e relax", "g relax", "e(t)", "g(t)", "e", "g"),
+    "compliance": ("creep compliance", "j", "j(t)"),
+    "tan delta": ("tan(delta)", "tan d", "tan δ", "tandelta", "tan(δ)", "loss factor", "damping factor"),
+    "friction coefficient": ("coefficient of friction", "coefficient", "friction", "mu", "μ", "cof"),
+    "normal force": ("force", "load", "normal load", "f n", "fn", "F"),
+    "kinematic viscosity": ("nu", "ν", "kin viscosity", "viscosity"),
+    "dynamic viscosity": ("eta", "η", "mu", "dyn viscosity", "viscosity"),
+    "wavenumber": ("q", "k", "wave number", "wavevector", "wave vector"),
+    "log10 wavenumber": ("log10 q", "log q", "lg q", "log10(q)", "log(q)"),
+    "wavelength": ("lambda", "λ"),
+    "C2D": ("c iso", "areal spectrum", "psd 2d", "psd", "c(q)"),
+    "C1D": ("line spectrum", "psd 1d", "psd", "c(q)"),
+    "height": ("z", "h"),
+}
+_ALIKE = str.maketrans({"’": "'", "′": "'", "″": "''", '"': "''", "µ": "μ", "δ": "δ"})
+#: Units that people join to a name, as they write them there.
+JOINED = {
+    "pa": "Pa",
+    "kpa": "kPa",
+    "mpa": "MPa",
+    "gpa": "GPa",
+    "hz": "Hz",
+    "c": "degC",
+    "k": "K",
+    "f": "degF",
+    "n": "N",
+}
+_DEGREES = {"c": "degC", "°c": "degC", "ºc": "degC", "deg c": "degC", "f": "degF", "°f": "degF", "deg f": "degF"}
+_BRACKETED = re.compile(r"(.*?)[\s,/]*(?:\[([^\]]*)\]|\(([^()]*)\)|\{([^}]*)\}|<([^>]*)>)\s*\Z")
+_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?\Z")
+_STATED = re.compile(
+    r"(?:^|[^a-z])t(?:emp[a-z]*)?\.?\s*[=:]?\s*([+-]?\d+(?:[.,]\d+)?)\s*(°\s?[CF]|deg[CF]|K)\b", re.IGNORECASE
+)
+_MISSING = frozenset({"", "-", "--", "nan", "na", "n/a", "no data"})
 
 
 class Problem(NamedTuple):
-    """One thing wrong with a table: where, counted from 1, and what; line 0 stands for the whole table."""
+    """One thing wrong with a table: where, counted from 1, and what; line 0 means the whole table."""
 
     line: int
     column: int
@@ -59,9 +103,11 @@ class TableError(DataError):
 
     def __str__(self) -> str:
         source, problems = self.args
-        told = [f"{source}:{line}:{column}: {what}" if line else f"{source}: {what}" for line, column, what in problems]
-        more = [f"{source}: {len(told) - MOST_TOLD} more problems"] if len(told) > MOST_TOLD else []
-        return "\n".join([*told[:MOST_TOLD], *more])
+        lines = [
+            f"{source}:{line}:{column}: {what}" if line else f"{source}: {what}" for line, column, what in problems
+        ]
+        more = [f"{source}: {len(lines) - MOST_SHOWN} more problems"] if len(lines) > MOST_SHOWN else []
+        return "\n".join([*lines[:MOST_SHOWN], *more])
 
 
 @dataclass(frozen=True)
@@ -71,11 +117,11 @@ class Column:
     Parameters
     ----------
     name : str
-        Its name in messages and in what is read.
+        Its name in messages and in what is read; its `SYNONYMS` are understood too.
     unit : str
         SI unit of what is read, ``"1"`` for a pure number. Angular frequencies (``rad/s``) take Hz and rpm too.
     other_names : tuple of str
-        Further spellings; blanks, underscores, hyphens, dots and capitals do not matter.
+        Further names. Case, blanks and punctuation do not matter, but for names of one letter.
     needed : bool
         Whether a table without it is refused.
     above, least : float, optional
@@ -93,13 +139,26 @@ class Column:
     given_unit: str = ""
 
     def holds(self, heading: str) -> bool:
-        """Return whether a heading is a name of this column, in English or German."""
-        return not meanings(heading).isdisjoint(map(folded, (self.name, *self.other_names)))
+        """Return whether a heading, without its unit, is a name of this column."""
+        return is_called(heading, self.name, *self.other_names)
+
+
+def is_called(heading: str, *names: str) -> bool:
+    """Return whether a heading is one of some names or of their synonyms."""
+    known = [each for name in names for each in (name, *SYNONYMS.get(plain(name), ()), *SYNONYMS.get(name, ()))]
+    if len(heading.strip()) == 1:
+        return heading.strip().translate(_ALIKE) in known
+    return plain(heading) in {plain(name) for name in known}
+
+
+def plain(name: str) -> str:
+    """Return a name without what does not matter: case, blanks, punctuation, kinds of primes."""
+    return re.sub(r"[\s_.\-:]+", " ", name.strip().casefold().translate(_ALIKE)).strip()
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One entry of a table: its text, and where it stands; lines and columns count from 1."""
+    """One entry of a table: its text, and its place; lines and columns count from 1."""
 
     text: str
     line: int
@@ -123,7 +182,7 @@ class Sheet:
     units : tuple of str
         Unit of each column as written, empty where it has none.
     rows : tuple of tuple of Cell
-        All as long as the first line of the table.
+        All equally long.
     """
 
     source: str
@@ -132,19 +191,34 @@ class Sheet:
     rows: tuple[tuple[Cell, ...], ...]
 
 
+class Read(dict[str, FloatArray]):
+    """Columns that were read, by `Column.name`; `unused` holds the headings of the others."""
+
+    unused: tuple[str, ...] = ()
+
+    @property
+    def remark(self) -> str:
+        """A sentence that names the columns not used, empty if there are none."""
+        return f"not used: {', '.join(self.unused)}" if self.unused else ""
+
+
 def is_table(path: str | Path) -> bool:
-    """Say whether there is a file that may hold a table, not a campaign or a published study."""
+    """Return whether there is a file that may hold a table, not a campaign or a published study."""
     return Path(path).is_file() and Path(path).suffix not in (".yaml", ".zip")
 
 
 def decoded(content: bytes, source: str) -> str:
-    """Return the text of a table: in UTF-8, or as spreadsheets in Western Europe save it.
+    """Return the text of a table: UTF-8, UTF-16, Windows-1252, or the cells of an Excel workbook.
 
     Raises
     ------
     DataError
-        If it is neither.
+        If it is none of these.
     """
+    if content[:4] == b"PK\x03\x04":
+        return _workbook(content, source)
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return content.decode("utf-16", errors="replace")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -155,8 +229,22 @@ def decoded(content: bytes, source: str) -> str:
         return text
 
 
-def read_table(text: str, source: str, columns: Sequence[Column], allow_missing: bool = False) -> dict[str, FloatArray]:
-    """Read the numbers of a table in SI.
+def _workbook(content: bytes, source: str) -> str:
+    """Return the cells of all sheets of a workbook, separated by tabs."""
+    try:
+        sheets = pd.read_excel(io.BytesIO(content), sheet_name=None, header=None, dtype=str, engine="openpyxl")
+    except ImportError:
+        raise DataError(
+            f"{source}: reading Excel workbooks needs openpyxl (or save the sheet as 'CSV UTF-8')"
+        ) from None
+    except Exception as error:  # openpyxl and zipfile raise what the damage happens to cause
+        raise DataError(f"{source}: expected a table or an Excel workbook, got neither ({error})") from None
+    frames = [sheet.fillna("").replace(r"[\t\r\n]+", " ", regex=True) for sheet in sheets.values()]
+    return "\n".join("\n".join("\t".join(row) for row in frame.to_numpy()) for frame in frames)
+
+
+def read_table(text: str, source: str, columns: Sequence[Column], allow_missing: bool = False) -> Read:
+    """Read the numbers of a table in SI; columns that are not asked for are left out.
 
     Parameters
     ----------
@@ -171,103 +259,254 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
 
     Returns
     -------
-    dict of str to array, shape (rows,)
-        The columns that are there, by `Column.name`.
+    Read
+        The columns that are there, by `Column.name`, arrays of shape (rows,).
 
     Raises
     ------
     TableError
-        With every problem, by line and column: unknown, missing or doubled columns, missing or unknown units, entries
-        that are no numbers, impossible values.
+        With every problem, by line and column: missing or misspelt columns, two columns of one quantity that disagree,
+        missing or unknown units, entries that are no numbers, impossible values.
     """
     sheet = read_sheet(text, source)
-    problems: list[Problem] = []
-    read = {}
-    for index, (column, unit) in _matched(sheet, columns, problems).items():
-        read[column.name] = np.empty(len(sheet.rows))
-        for number, row in enumerate(sheet.rows):
-            try:
-                read[column.name][number] = _number(row[index], column, unit, allow_missing)
-            except ValueError as error:
-                problems.append(row[index].problem(f"column {column.name}: {error}"))
+    first, problems, read = sheet.names or sheet.rows[0], [], Read()
+    matched = [(i, *_match(cell.text, sheet.units[i], columns)) for i, cell in enumerate(sheet.names)]
+    if not sheet.names and len(first) > len(columns):
+        raise TableError(
+            source, [first[0].problem(f"expected the names of the {len(first)} columns in the first line")]
+        )
+    if not sheet.names:
+        matched = [(i, column, sheet.units[i]) for i, column in enumerate(columns[: len(first)])]
+    absent = [each for each in columns if each not in [column for _, column, _ in matched]]
+    unknown = [sheet.names[i] for i, column, _ in matched if column is None]
+    for cell in unknown:
+        hint = did_you_mean(cell.text, [each.name for each in absent])
+        if "mean" in hint:
+            problems.append(cell.problem(f"unknown column {cell.text!r}{hint}"))
+    taken: dict[str, int] = {}
+    for index, column, written in matched:
+        if column is None:
+            continue
+        try:
+            unit = _unit(written, column)
+        except ValueError as error:
+            problems.append(first[index].problem(f"column {column.name}: {error}"))
+            continue
+        values, wrong = _values([row[index] for row in sheet.rows], column, unit, allow_missing)
+        problems += wrong
+        if column.name in taken and not wrong:
+            other = first[taken[column.name]].text
+            if not np.allclose(values, read[column.name], rtol=AGREE, atol=0, equal_nan=True):
+                problems.append(first[index].problem(f"column {column.name} is given twice, and {other!r} disagrees"))
+            continue
+        read[column.name], taken[column.name] = values, index
+    lacking = [each.name for each in absent if each.needed]
+    if lacking and not problems:
+        got = f", got {', '.join(cell.text for cell in unknown)[:200]}" if unknown else ""
+        problems.append(first[0].problem(f"expected a column {' and a column '.join(lacking)}{got}"))
     if problems:
         raise TableError(source, sorted(problems))
+    read.unused = tuple(cell.text for cell in unknown)
     return read
+
+
+def _match(heading: str, unit: str, columns: Sequence[Column]) -> tuple[Column | None, str]:
+    """Return the column of a heading and its unit, which may be joined to the name (``freq_hz``)."""
+    names = [(heading, unit)]
+    front, _, behind = heading.replace(" ", "_").rpartition("_")
+    if front and not unit:
+        names.append((front, JOINED.get(behind.casefold(), behind)))
+    for name, written in names:
+        fitting = [column for column in columns if column.holds(name) and (name == heading or _fits(written, column))]
+        best = [column for column in fitting if _fits(written, column)] or fitting
+        if best:
+            return best[0], written
+    return None, unit
+
+
+def _fits(unit: str, column: Column) -> bool:
+    try:
+        _in_si("1", unit, column.unit)
+    except ValueError:
+        return False
+    return bool(unit)
 
 
 def read_sheet(text: str, source: str, numeric: bool = True) -> Sheet:
     """Split a table into headings, units and rows of cells.
+
+    Text before the headings is skipped. Where the headings are repeated, another block of the same table begins. Pairs
+    of columns with a number above each (as digitised from a figure) become three columns.
 
     Parameters
     ----------
     text, source : str
         The table and the name of its file.
     numeric : bool
-        Whether all entries are numbers, so that a second row of words can only hold units.
+        Whether the entries are numbers, so that lines without any are headings.
 
     Raises
     ------
     TableError
         If there are no rows, or rows of different length.
     """
-    lines = [(number, line) for number, line in enumerate(text.lstrip("\ufeff").splitlines(), 1) if line.strip()]
-    lines = [(number, line) for number, line in lines if line.lstrip()[0] not in COMMENT]
+    raw = [(number, line) for number, line in enumerate(text.lstrip("\ufeff").splitlines(), 1) if line.strip(" ,;\t")]
+    lines = [(number, line) for number, line in raw if line.lstrip()[0] not in COMMENT]
     if not lines:
         raise TableError(source, [Problem(1, 1, NO_ROWS)])
-    try:
-        separator = _separator(lines[0][1], lines[-1][1])
-        rows = [tuple(_cells(number, line, separator)) for number, line in lines]
-    except csv.Error as error:
-        raise TableError(source, [Problem(0, 0, f"expected a table: {error}")]) from None
-    width = len(rows[0])
+    rows = _cells(lines, _separator([line for _, line in lines], numeric))
+    if not numeric:
+        return _plain_sheet(source, rows)
+    data = [_is_data(row) for row in rows]
+    widths = Counter(len(row) for row, is_data in zip(rows, data, strict=True) if is_data)
+    if not widths:
+        raise TableError(source, [Problem(rows[-1][0].line, 1, NO_ROWS)])
+    width = max(widths, key=lambda each: (widths[each], each))
     if width > MOST_COLUMNS:
         raise TableError(source, [Problem(1, 1, f"expected at most {MOST_COLUMNS} columns, got {width}")])
-    uneven = [row for row in rows if len(row) != width]
+    return _blocks(source, rows, data, width, raw)
+
+
+def _blocks(
+    source: str, rows: list[tuple[Cell, ...]], data: list[bool], width: int, raw: list[tuple[int, str]]
+) -> Sheet:
+    """Return the headings, and the rows of all blocks that have these headings."""
+    begin = next(i for i, row in enumerate(rows) if data[i] and len(row) == width)
+    words = [i for i in range(begin) if not data[i]]
+    if not words and begin + 2 < len(rows) and not data[begin + 1]:  # numbers above the names of pairs of columns
+        words, begin = [begin, begin + 1], begin + 2
+    wide = [i for i in words if len(rows[i]) == width] or words[-1:]
+    names: tuple[Cell, ...] = rows[wide[-1]] if wide else _names_in_remark(raw, rows[begin])
+    units: tuple[Cell, ...] = ()
+    begin = words[-1] + 1 if words else begin
+    above = wide[:-1]
+    if len(wide) > 1 and _are_units(rows[wide[-1]], surely=len(words) > 2 or _are_pairs(names)):
+        units, names, above = names, rows[wide[-2]], wide[:-2]
+    again = {tuple(cell.text for cell in names)}
+    kept, states, problems, between = [], [], [], []
+    stated = _stated(rows[:begin])
+    for row, is_data in zip([*rows[begin:], ()], [*data[begin:], True], strict=True):
+        if not is_data:
+            between.append(row)
+            continue
+        if between and again.isdisjoint(tuple(cell.text for cell in each) for each in between):
+            problems += [each[0].problem(f"expected a line of numbers, got {each[0].text[:60]!r}") for each in between]
+        stated = _stated(between) if between else stated
+        between = []
+        if row:
+            kept.append(row)
+            states.append(stated)
+    width = len(names) or width
+    line = (names or kept[0])[0].line
+    for number, row in enumerate(kept):
+        if len(row) < width or any(cell.text for cell in row[width:]):
+            hint = SEMICOLONS if len(row) > width else ""
+            problems.append(row[0].problem(f"expected {width} values as in line {line}, got {len(row)}{hint}"))
+        kept[number] = row[:width]
+    if problems:
+        raise TableError(source, problems)
+    headings, written = _headings(names, units, width)
+    if _are_pairs(headings) and above:
+        return _from_pairs(source, headings, written, rows[above[-1]], kept)
+    known = [state for state in states if state]
+    if headings and len(known) == len(kept) and not any(is_called(cell.text, "temperature") for cell in headings):
+        headings = (*headings, replace(headings[0], text="temperature"))
+        written = (*written, known[0][1])
+        kept = [(*row, replace(row[0], text=state[0])) for row, state in zip(kept, known, strict=True)]
+    return Sheet(source, headings, written, tuple(kept))
+
+
+def _plain_sheet(source: str, rows: list[tuple[Cell, ...]]) -> Sheet:
+    """Return a table with words, whose first line holds the names and perhaps the second one known units."""
+    uneven = [row for row in rows if len(row) != len(rows[0])]
     if uneven:
-        what = f"expected {width} values as in line {rows[0][0].line}, got "
-        hints = [_COMMAS if separator == "," and width < len(row) <= 2 * width else "" for row in uneven]
-        told = [Problem(row[0].line, 1, f"{what}{len(row)}{hint}") for row, hint in zip(uneven, hints, strict=True)]
-        raise TableError(source, told)
-    headings: list[tuple[Cell, ...]] = []
-    if not any(_NUMBER.match(cell.text) for cell in rows[0]):
-        headings.append(rows.pop(0))
-        if rows and _are_units(rows[0], numeric) and not _are_names_again(headings[0], rows[0]):
-            headings.append(rows.pop(0))
+        what = f"expected {len(rows[0])} values as in line {rows[0][0].line}, got "
+        problems = [
+            row[0].problem(f"{what}{len(row)}{SEMICOLONS if len(row) > len(rows[0]) else ''}") for row in uneven
+        ]
+        raise TableError(source, problems)
+    names, rows = rows[0], rows[1:]
+    units: tuple[Cell, ...] = ()
+    if any(_NUMBER.match(cell.text) for cell in names):
+        raise TableError(source, [names[0].problem("expected a line of names")])
+    if rows and _are_units(rows[0], surely=True):
+        units, rows = rows[0], rows[1:]
     if not rows:
         raise TableError(source, [Problem(1, 1, NO_ROWS)])
-    words = [row for row in rows if numeric and headings and not any(map(_is_entry, row))]
-    if words:
-        raise TableError(
-            source, [row[0].problem(f"expected a line of numbers, got {row[0].text[:60]!r}, ...") for row in words]
-        )
-    return Sheet(source, *_units(headings, width), tuple(rows))
+    headings, written = _headings(names, units, len(names))
+    return Sheet(source, headings, written, tuple(rows))
+
+
+def _names_in_remark(raw: list[tuple[int, str]], first: tuple[Cell, ...]) -> tuple[Cell, ...]:
+    """Return the names in the last remark above the numbers, if it holds as many."""
+    above = [(number, line) for number, line in raw if number < first[0].line and line.lstrip()[0] in COMMENT]
+    for number, line in above[-1:]:
+        words = re.sub(r"\s+(?=[\[(])", "", line.lstrip(COMMENT + " "))
+        for separator in SEPARATORS:
+            cells = _cells([(number, words)], separator)[0]
+            if len(cells) == len(first) and not any(map(_is_entry, cells)):
+                return cells
+    return ()
+
+
+def _stated(rows: Sequence[tuple[Cell, ...]]) -> tuple[str, str] | None:
+    """Return the temperature and its unit that the text above a block states last."""
+    found = [match for row in rows for match in _STATED.finditer(" ".join(cell.text for cell in row))]
+    return (found[-1][1].replace(",", "."), found[-1][2].replace(" ", "")) if found else None
+
+
+def _are_pairs(headings: tuple[Cell, ...]) -> bool:
+    """Return whether the same two names are repeated."""
+    names = [plain(cell.text) for cell in headings]
+    return len(names) >= 4 and len(names) % 2 == 0 and names == names[:2] * (len(names) // 2)
+
+
+def _from_pairs(
+    source: str,
+    headings: tuple[Cell, ...],
+    units: tuple[str, ...],
+    above: tuple[Cell, ...],
+    rows: list[tuple[Cell, ...]],
+) -> Sheet:
+    """Return pairs of columns, each with a number above it, as three columns; the third is a temperature."""
+    long, problems = [], []
+    labels = [cell for cell in above if cell.text]
+    found = [re.search(r"[+-]?\d+(?:[.,]\d+)?", cell.text) for cell in labels]
+    if len(labels) != len(headings) // 2 or not all(found):
+        problems.append(above[0].problem(f"expected a number above each of the {len(headings) // 2} pairs of columns"))
+        raise TableError(source, problems)
+    for pair, match in enumerate(found):
+        assert match is not None
+        for row in rows:
+            two = row[2 * pair : 2 * pair + 2]
+            if any(cell.text for cell in two):
+                long.append((*two, replace(two[0], text=match[0].replace(",", "."))))
+    assert found[0] is not None
+    unit = labels[0].text[found[0].end() :].strip(" ]()[")
+    third = replace(headings[0], text="temperature")
+    return Sheet(source, (*headings[:2], third), (*units[:2], _DEGREES.get(unit.casefold(), unit)), tuple(long))
 
 
 def numbers(sheet: Sheet) -> FloatArray:
     """Return the entries of a table as they are written, whatever their units, shape (rows, columns).
 
-    NaN where an entry is empty.
+    NaN where an entry is empty, and in columns of words alone.
 
     Raises
     ------
     TableError
-        If an entry is no number.
+        If an entry is no number in a column that has some.
     """
-    problems = [
-        cell.problem(f"expected a number, got {cell.text[:60]!r}")
-        for row in sheet.rows
-        for cell in row
-        if not _is_entry(cell)
-    ]
+    columns, problems = [], []
+    for cells in zip(*sheet.rows, strict=True):
+        are = [bool(_NUMBER.match(cell.text)) for cell in cells]
+        if any(are):
+            wrong = [cell for cell in cells if not _is_entry(cell)]
+            problems += [cell.problem(f"expected a number, got {cell.text[:60]!r}") for cell in wrong]
+        columns.append([float(cell.text) if number else math.nan for cell, number in zip(cells, are, strict=True)])
     if problems:
-        raise TableError(sheet.source, problems)
-    return np.array(
-        [[float(cell.text) if _NUMBER.match(cell.text) else math.nan for cell in row] for row in sheet.rows]
-    )
-
-
-#: Columns without names that are described one by one; more of them are a map.
-MOST_DESCRIBED = 6
+        raise TableError(sheet.source, sorted(problems))
+    return np.array(columns).T
 
 
 def described(text: str, source: str) -> str:
@@ -280,8 +519,6 @@ def described(text: str, source: str) -> str:
     """
     sheet = read_sheet(text, source)
     columns = numbers(sheet).T
-    if not sheet.names and len(columns) > MOST_DESCRIBED:
-        return f"{len(sheet.rows)} rows x {len(columns)} columns, {np.nanmin(columns):.4g} to {np.nanmax(columns):.4g}"
     names = [cell.text for cell in sheet.names] or [f"column {place}" for place in range(1, len(columns) + 1)]
     ranges = []
     for name, unit, column in zip(names, sheet.units, columns, strict=True):
@@ -295,98 +532,94 @@ def described(text: str, source: str) -> str:
 
 def _is_entry(cell: Cell) -> bool:
     """Return whether a cell holds a number, or says that one is missing."""
-    return bool(_NUMBER.match(cell.text)) or cell.text.lower() in _MISSING
+    return bool(_NUMBER.match(cell.text)) or cell.text.casefold() in _MISSING
 
 
-def _are_names_again(names: tuple[Cell, ...], row: tuple[Cell, ...]) -> bool:
-    return [cell.text for cell in names] == [cell.text for cell in row]
+def _is_data(row: tuple[Cell, ...]) -> bool:
+    """Return whether a line holds numbers in half of its filled cells or more."""
+    filled = [cell for cell in row if cell.text]
+    return 2 * sum(bool(_NUMBER.match(cell.text)) for cell in filled) >= max(len(filled), 1)
 
 
-def _are_units(row: tuple[Cell, ...], numeric: bool) -> bool:
-    """Return whether a row holds units: any words in a table of numbers, only known ones in one with words."""
-    units = [cell.text.strip("[]() ") for cell in row]
-    words = [unit for unit in units if unit.lower() not in _MISSING and unit != "1"]
-    if not words or any(re.match(r"[-+]?[.,]?\d(?!/)", word) for word in words):
-        return False
-    return numeric or all(unit in ("", "-", "1") or is_unit(unit) for unit in units)
+def _are_units(row: tuple[Cell, ...], surely: bool) -> bool:
+    """Return whether a line holds units: known ones, or any words below the only line of names if not `surely`."""
+    units = [_unit_of(cell.text.strip("[](){}<> ")) for cell in row]
+    words = [unit for unit in units if unit.casefold() not in _MISSING and unit != "1"]
+    return bool(words) and (not surely or all(is_unit(unit) for unit in words))
 
 
-def _units(headings: Sequence[tuple[Cell, ...]], width: int) -> tuple[tuple[Cell, ...], tuple[str, ...]]:
-    """Take the units off the headings, or from their own row."""
-    if not headings:
+def _headings(names: tuple[Cell, ...], units: tuple[Cell, ...], width: int) -> tuple[tuple[Cell, ...], tuple[str, ...]]:
+    """Return names without their units, and the units."""
+    if not names:
         return (), ("",) * width
-    names, units = [], []
-    for cell in headings[0]:
-        match = _WITH_UNIT.match(cell.text)
-        names.append(Cell(match[1] if match else cell.text, cell.line, cell.column))
-        units.append(_bracketed(match) if match else "")
-    if len(headings) == 2:
-        units = [cell.text.strip("[]() ") or unit for cell, unit in zip(headings[1], units, strict=True)]
-    return tuple(names), tuple(units)
+    kept, written = [], []
+    for number, cell in enumerate(names):
+        match, unit = _BRACKETED.match(cell.text), ""
+        if match and match[1]:
+            square = match[2] if match[2] is not None else ""
+            other = next((group for group in match.groups()[2:] if group), "").strip()
+            unit = square.strip() or (other if is_unit(_unit_of(other)) or _looks_like_a_unit(other) else "")
+        below = units[number].text.strip("[](){}<> ") if units else ""
+        kept.append(replace(cell, text=match[1].strip(" ,") if match and (unit or match[2] is not None) else cell.text))
+        written.append(_unit_of(below or unit))
+    return tuple(kept), tuple(written)
 
 
-def _bracketed(match: re.Match[str]) -> str:
-    """Return a unit in brackets; what stands in round ones may be a remark."""
-    square, round_ = match[2], (match[3] or "").strip()
-    return (square or "").strip() or (round_ if is_unit(round_) or round_ in _CELSIUS else "")
+def _looks_like_a_unit(text: str) -> bool:
+    return text == "-" or bool(re.match(r"deg|°|1/|%", text))
 
 
-def _separator(first: str, last: str) -> str | None:
-    """Return what separates the cells, None for blanks: the first mark that leaves numbers in the last row."""
-    for separator in SEPARATORS:
-        cells = [cell.text for cell in _cells(1, last, separator)]
-        if len(cells) > 1 and all(_NUMBER.match(cell) or cell.lower() in _MISSING for cell in cells):
-            return separator
-    words = last.split()
-    if len(words) > 1 and all(_NUMBER.match(word) for word in words):
-        return None
-    return next((separator for separator in SEPARATORS if separator in first), SEPARATORS[0])
+def _unit_of(text: str) -> str:
+    """Return a unit as `units` spells it: degrees, exponents without a sign, and words."""
+    text = text.strip()
+    text = _DEGREES.get(text.casefold(), text)
+    text = re.sub(r"(?<=[A-Za-z])\^?\{?(-?\d)\}?", r"^\1", text) if not is_unit(text) else text
+    return text.replace("·", " ").replace("microns", "um")
 
 
-def _cells(number: int, line: str, separator: str | None) -> Iterator[Cell]:
-    if separator is None:
-        for match in re.finditer(r"\S+", line):
-            yield Cell(_decimal_point(match[0]), number, match.start() + 1)
-        return
-    column = 1
-    for entry in next(csv.reader([line], delimiter=separator)):
-        text = entry.strip()
-        start = column + len(entry) - len(entry.lstrip())
-        yield Cell(text if separator == "," else _decimal_point(text), number, start)
-        column += len(entry) + 1
+def _separator(lines: Sequence[str], numeric: bool) -> str:
+    """Return what separates the cells: the mark that leaves most lines of two or more numbers."""
+    if not numeric:
+        return next((mark for mark in SEPARATORS[:3] if mark in lines[0]), ",")
+    counts = [sum(_numbers_between(line, mark) > 1 for line in lines) for mark in SEPARATORS]
+    if not any(counts):
+        return next((mark for mark in SEPARATORS[:3] if mark in lines[0]), ",")
+    return SEPARATORS[int(np.argmax(counts))]
 
 
-def _decimal_point(text: str) -> str:
-    return text.replace(",", ".") if _NUMBER.match(text) else text
+def _numbers_between(line: str, separator: str) -> int:
+    """Return how many cells of a line are numbers; none if fewer than half are."""
+    cells = [cell.strip().strip('"') for cell in re.split(separator, line.strip())]
+    filled = [cell for cell in cells if cell]
+    count = sum(bool(_NUMBER.match(cell)) for cell in filled)
+    return count if 2 * count >= len(filled) else 0
 
 
-def _matched(sheet: Sheet, columns: Sequence[Column], problems: list[Problem]) -> dict[int, tuple[Column, str]]:
-    """Return which column stands at which place, and its unit."""
-    first = sheet.names or sheet.rows[0]
-    matched: dict[int, Column] = {}
-    if not sheet.names:
-        matched = dict(enumerate(columns[: len(first)]))
-        if len(first) > len(columns):
-            problems.append(first[0].problem(f"expected the names of the {len(first)} columns in the first line"))
-            return {}
-    for index, heading in enumerate(sheet.names):
-        column = next((column for column in columns if column.holds(heading.text)), None)
-        if column is None:
-            hint = did_you_mean(heading.text, [column.name for column in columns])
-            problems.append(heading.problem(f"unknown column {heading.text!r}{hint}"))
-        elif column in matched.values():
-            problems.append(heading.problem(f"column {column.name} is given twice"))
-        else:
-            matched[index] = column
-    lacking = [column.name for column in columns if column.needed and column not in matched.values()]
-    if lacking and not problems:
-        problems.append(first[0].problem(f"expected a column {' and a column '.join(lacking)}"))
-    found = {}
-    for index, column in matched.items():
-        try:
-            found[index] = column, _unit(sheet.units[index], column)
-        except ValueError as error:
-            problems.append(first[index].problem(f"column {column.name}: {error}"))
+def _cells(lines: Sequence[tuple[int, str]], separator: str) -> list[tuple[Cell, ...]]:
+    """Return the cells of all lines; decimal commas become points where commas do not separate."""
+    blank = separator == r"\s+"
+    texts = [line.strip() if blank else line for _, line in lines]
+    counts = [len(re.split(separator, text)) for text in texts]
+    frame = pd.read_csv(
+        io.StringIO("\n".join(text.replace("\x00", " ") for text in texts)),
+        sep=separator,
+        header=None,
+        names=range(max(counts)),
+        dtype=str,
+        keep_default_na=False,
+        skipinitialspace=True,
+        quoting=3 if blank else 0,
+    ).fillna("")
+    found = []
+    for (number, line), count, row in zip(lines, counts, frame.to_numpy(), strict=False):
+        cells, place = [], len(line) - len(line.lstrip()) if blank else 0
+        for text in row[:count]:
+            text = str(text).strip()
+            place = max(line.find(text, place), place) if text else place
+            point = text.replace(",", ".") if separator != "," and _NUMBER.match(text) else text
+            cells.append(Cell(point, number, place + 1))
+            place += len(text) + (0 if blank else 1)
+        found.append(tuple(cells))
     return found
 
 
@@ -403,37 +636,41 @@ def _unit(written: str, column: Column) -> str:
     return unit
 
 
+def _values(cells: Sequence[Cell], column: Column, unit: str, allow_missing: bool) -> tuple[FloatArray, list[Problem]]:
+    """Return the values of a column in SI, and what is wrong with them."""
+    values, problems = np.full(len(cells), np.nan), []
+    for number, cell in enumerate(cells):
+        try:
+            values[number] = _number(cell, column, unit, allow_missing)
+        except ValueError as error:
+            problems.append(cell.problem(f"column {column.name}: {error}"))
+    return values, problems
+
+
 def _number(cell: Cell, column: Column, unit: str, allow_missing: bool) -> float:
-    if cell.text.lower() in _MISSING:
-        if allow_missing:
-            return math.nan
-        raise ValueError(f"expected a number, got {cell.text!r}")
-    if not _NUMBER.match(cell.text):
+    if allow_missing and cell.text.casefold() in _MISSING:
+        return math.nan
+    if not _NUMBER.match(cell.text) or len(cell.text) > LONGEST_NUMBER:
         raise ValueError(f"expected a number, got {cell.text[:60]!r}")
     value = _in_si(cell.text, unit, column.unit)
+    shown = repr(f"{cell.text} {unit}".strip())
     if not math.isfinite(value):
-        raise ValueError(f"expected a finite number, got {cell.text!r}")
+        raise ValueError(f"expected a finite number, got {cell.text[:60]!r}")
     if column.above is not None and not value > column.above:
-        raise ValueError(f"expected a value above {column.above:g}, got {_shown(cell, unit)}")
+        raise ValueError(f"expected a value above {column.above:g}, got {shown}")
     if column.least is not None and not value >= column.least:
-        raise ValueError(f"expected at least {column.least:g}, got {_shown(cell, unit)}")
+        raise ValueError(f"expected at least {column.least:g}, got {shown}")
     return value
 
 
-def _shown(cell: Cell, unit: str) -> str:
-    return repr(f"{cell.text} {unit}".strip())
-
-
 def _in_si(number: str, unit: str, wanted: str) -> float:
-    """Convert as a campaign file does; temperatures take C, angular frequencies Hz and 1/s, wave numbers 1/m."""
+    """Convert as a campaign file does; angular frequencies take Hz and 1/s, wave numbers 1/m."""
     number = number.replace(",", ".")
     if not unit:
         return float(number)
-    if wanted == "K" and unit in _CELSIUS:
-        unit = "degC"
-    if not wanted.startswith("rad/"):
-        return to_si(f"{number} {unit}", wanted)
     try:
         return to_si(f"{number} {unit}", wanted)
     except ValueError:
+        if not wanted.startswith("rad/"):
+            raise
         return (2 * math.pi if "hz" in unit.lower() else 1.0) * to_si(f"{number} {unit}", wanted.replace("rad", "1"))

@@ -41,6 +41,7 @@ radian = [angle] = rad
 ampere = [current] = A
 mole = [substance] = mol
 degree_Celsius = kelvin; offset: 273.15 = °C = degC = celsius = degreeC
+degree_Fahrenheit = 0.5555555555555556 * kelvin; offset: 255.3722222222222 = °F = degF = fahrenheit
 percent = 0.01
 permille = 0.001 = ‰
 ppm = 1e-6
@@ -320,7 +321,8 @@ def conversion(given: str, unit: str) -> tuple[float, float]:
         raise ValueError(f"expected {expected(unit)}{weight}") from None
     except Exception:  # pint's parser raises many types: TypeError, AssertionError, ...
         raise ValueError(f"expected {expected(unit)}") from None
-    return (1.0, zero) if zero else (one, 0.0)
+    factor = one - zero
+    return (1.0 if math.isclose(factor, 1.0) else factor, zero) if zero else (one, 0.0)
 
 
 #: Coherent SI units of the dimensions that pint derives from `DEFINITIONS`.

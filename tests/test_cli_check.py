@@ -60,7 +60,7 @@ def test_check_tells_axes_tables_lines_and_how_they_meet(capsys):
         "tyre.yaml: sliding_friction",
         "  material_temperature  0 degC, 20 degC, 50 degC",
         "  velocity              1 um/s to 1 m/s, 7 values, geometric",
-        "  table rubber.csv: 15 rows; f 0.01 to 100 Hz, E' 1.079 to 35.62 MPa, E'' 0.0402 to 17.64 MPa, T 0 to 50 C",
+        "  table rubber.csv: 15 rows; f 0.01 to 100 Hz, E' 1.079 to 35.62 MPa, E'' 0.0402 to 17.64 MPa, T 0 to 50 degC",
         "  profile road.csv: 100 points, 1 mm long, rms height 707.1 nm, rms slope 0.00889",
         "  21 cases x 2 realisations = 42 results",
     ):
@@ -168,15 +168,15 @@ def test_moduli_of_no_solid_are_asked_about(files, capsys, unit, ends):
 
 
 def test_columns_of_measured_points_leave_out_structures_where_nothing_else_is_called_so():
-    """German too, with a unit of its own; a name that two structures have is written in full."""
+    """With a unit of its own; a name that two structures have is written in full."""
     conditions = {"material_temperature": "K", "velocity": "m/s", "oil_density": "kg/m^3", "body_density": "kg/m^3"}
-    text = "Temperatur [°C];Geschwindigkeit [mm/s];Reibwert\n20;1;0,5\n40;10;0,6\n"
+    text = "Temperature [°C];Velocity [mm/s];µ\n20;1;0,5\n40;10;0,6\n"
     output = {"friction_coefficient": "1"}
     read = read_measured(text, "rig.csv", conditions, output, ("material", "oil", "body"))
     np.testing.assert_allclose(read.conditions["material_temperature"], [293.15, 313.15])
     np.testing.assert_allclose(read.values, [0.5, 0.6])
     with pytest.raises(DataError, match="unknown column 'density'"):
-        read_measured("density [kg/m^3],Reibwert\n1,2\n3,4\n", "rig.csv", conditions, output, ("oil", "body"))
+        read_measured("density [kg/m^3],mu\n1,2\n3,4\n", "rig.csv", conditions, output, ("oil", "body"))
 
 
 def test_check_says_how_measured_points_meet_each_series(tmp_path, monkeypatch, capsys):

@@ -90,7 +90,7 @@ WRONG = {
         "1:8: unknown column 'storage modulos' (did you mean 'storage modulus'?)",
     ),
     "missing column": ("f [Hz]\n1\n", "1:1: expected a column storage modulus"),
-    "twice": ("f [Hz],omega [Hz],E' [Pa]\n1,2,3\n", "1:8: column frequency is given twice"),
+    "twice": ("f [Hz],omega [Hz],E' [Pa]\n1,2,3\n", "1:8: column frequency is given twice, and 'f' disagrees"),
     "ragged": ("f [Hz],E' [Pa]\n1,2\n3\n", "3:1: expected 2 values as in line 1, got 1"),
     "word": ("f [Hz],E' [Pa]\n1,2\n3,high\n", "3:3: $expected a number, got 'high'"),
     "empty": ("f [Hz],E' [Pa]\n1,2\n3,\n", "3:3: $expected a number, got ''"),
@@ -101,7 +101,7 @@ WRONG = {
     ),
     "below absolute zero": (
         "f [Hz],E' [Pa],T [C]\n1,2,-300\n",
-        "2:5: column temperature: expected a value above 0, got '-300 C'",
+        "2:5: column temperature: expected a value above 0, got '-300 degC'",
     ),
     "overflow": ("f [Hz],E' [MPa]\n1,1e305\n", "2:3: $expected a finite number"),
     "decimal comma in commas": (
@@ -115,7 +115,7 @@ WRONG = {
     "no names": ("1,2,3,4,5\n1,2,3,4,5\n", "1:1: expected the names of the 5 columns in the first line"),
     "long cell": (
         "f [Hz],E' [Pa]\n1," + "9" * 200_000 + "\n",
-        " expected a table: field larger than field limit",
+        "2:3: $expected a number",
     ),
 }
 

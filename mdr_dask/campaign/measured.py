@@ -42,7 +42,9 @@ class Measured:
     conditions : dict of str to array, shape (points,)
         Parameters at which they were measured, by the name of their coordinate, SI.
     lines : tuple of int
-        Where they stand in the table, counted from 1.
+        Their lines in the table, counted from 1.
+    remark : str
+        Which columns are not used; empty if all are.
     """
 
     source: str
@@ -51,6 +53,7 @@ class Measured:
     errors: FloatArray | None
     conditions: Mapping[str, FloatArray]
     lines: tuple[int, ...]
+    remark: str = ""
 
 
 def read_measured(
@@ -90,7 +93,7 @@ def read_measured(
     if values.size < 2:
         raise DataError(f"{source}: expected at least two measured points, got {values.size}")
     lines = tuple(row[0].line for row in read_sheet(text, source).rows)
-    return Measured(source, output, values, errors, read, lines)
+    return Measured(source, output, values, errors, read, lines, read.remark)
 
 
 def _short_names(names: Sequence[str], structures: Iterable[str]) -> dict[str, list[str]]:
@@ -139,6 +142,8 @@ def _sentences(found: Measured, model: str, series: Series, units: Mapping[str, 
         name: f"{name} {' to '.join(dict.fromkeys(shown(float(end), units[name]) for end in (rows.min(), rows.max())))}"
         for name, rows in found.conditions.items()
     }
+    if found.remark:
+        yield found.remark
     yield f"conditions {', '.join(ranges.values()) or 'none'}"
     yield f"unknowns {', '.join(_unknown(found, series)) or 'none: every axis is a column of the table'}"
     outside = [

@@ -223,7 +223,7 @@ def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
     if "law_holds" in curve:
         click.echo(f"law_holds = {curve['law_holds'].item()}", err=True)
     _print_outliers(curve)
-    for sentence in ("left_out", "undetermined"):
+    for sentence in ("not_used", "left_out", "undetermined"):
         if curve.attrs.get(sentence):
             click.echo(curve.attrs[sentence], err=True)
 

@@ -12,24 +12,14 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.headings import folded, meanings
 from mdr_dask.physics.superposition.master_curve import Vertical
-from mdr_dask.tables import decoded, numbers, read_sheet
-from mdr_dask.units import conversion
+from mdr_dask.tables import JOINED, decoded, is_called, numbers, read_sheet
+from mdr_dask.units import conversion, is_unit
 
-ALIASES: dict[str, tuple[str, ...]] = {
-    "friction_coefficient": ("coefficient", "coefficient_of_friction", "friction", "mu", "cof"),
-    "normal_force": ("force", "load", "f_n", "fn"),
-    "velocity": ("v", "speed", "sliding_velocity"),
-    "temperature": ("T", "t_c", "t_k", "temp", "material_temperature"),
-    "frequency": ("f", "freq", "omega"),
-    "time": ("t",),
-    "storage_modulus": ("e_stor", "g_stor", "e'", "g'", "storage"),
-    "loss_modulus": ("e_loss", "g_loss", "e''", "g''", "loss"),
-    "modulus": ("relaxation_modulus", "e_relax", "g_relax", "storage_modulus", "e_stor", "g_stor", "e'", "g'"),
-    "compliance": ("creep_compliance", "j"),
+ALIASES = {"normal_force": "normal force", "friction_coefficient": "friction coefficient"} | {
+    f"{kind}_modulus": f"{kind} modulus" for kind in ("storage", "loss")
 }
-"""Names of columns that are understood, beside the names themselves; case does not matter."""
+"""Names of columns in a study, and what tables call them (`mdr_dask.tables.SYNONYMS`)."""
 
 LEAST_JUMP = 3.0  # between gaps within a group of scattered values and gaps between groups
 
@@ -50,11 +40,14 @@ def read_table(path: str | Path) -> pd.DataFrame:
     sheet = read_sheet(decoded(Path(path).read_bytes(), str(path)), str(path))
     if not sheet.names:
         raise DataError(f"{path}: expected names of columns, got numbers")
+    values = numbers(sheet)
     names = [cell.text for cell in sheet.names]
     if len(set(names)) < len(names):
         raise DataError(f"{path}: expected each name of a column once, got {', '.join(names)!r:.200}")
-    table = pd.DataFrame(numbers(sheet), columns=names)
-    table.attrs["units"] = dict(zip(names, sheet.units, strict=True)) if any(sheet.units) else {}
+    kept = [k for k, column in enumerate(values.T) if not np.all(np.isnan(column))]  # columns of words are left out
+    table = pd.DataFrame(values[:, kept], columns=[names[k] for k in kept])
+    units = {names[k]: sheet.units[k] for k in kept}
+    table.attrs["units"] = units if any(units.values()) else {}
     return table
 
 
@@ -82,12 +75,19 @@ def finite_rows(frame: pd.DataFrame, columns: list[str]) -> tuple[pd.DataFrame, 
 
 
 def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
-    """Return the column of a name or of one of its aliases, as written or else as tables may have it."""
+    """Return the column of a name or of one of its synonyms, as written or else as tables may have it."""
     columns = [str(name) for name in frame.columns]
-    names = (wanted, *ALIASES.get(wanted, ()))
-    exact = [name for name in names if name in columns]
-    loose = [[column for column in columns if folded(name) in meanings(column)] for name in names]
-    return (exact + [found[0] for found in loose if len(found) == 1] + [None])[0]
+    if wanted in columns:
+        return wanted
+    loose = [each for each in columns if is_called(each, wanted, ALIASES.get(wanted, wanted)) or _joined(each, wanted)]
+    return loose[0] if len(loose) == 1 else None
+
+
+def _joined(column: str, wanted: str) -> bool:
+    """Return whether a column is called so with a unit joined to its name, such as ``freq_hz``."""
+    front, _, behind = column.rpartition("_")
+    unit = JOINED.get(behind.casefold(), behind)
+    return bool(front) and is_unit(unit) and is_called(front, wanted, ALIASES.get(wanted, wanted))
 
 
 FAMILIES = (
@@ -228,5 +228,5 @@ def clusters(values: FloatArray) -> NDArray[np.intp]:
 
 
 def is_temperature(by: str) -> bool:
-    """Say whether a column is one of temperatures, by its name."""
-    return not meanings(by).isdisjoint(map(folded, ("temperature", *ALIASES["temperature"])))
+    """Return whether a column is one of temperatures, by its name."""
+    return column_of(pd.DataFrame(columns=[by]), "temperature") is not None or "temperature" in by.casefold()

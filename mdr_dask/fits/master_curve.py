@@ -81,17 +81,24 @@ def master_curve(
     second = second_group(frame, {over, *ordinates, by})
     if isinstance(table, xr.Dataset):
         _require_no_axis_beside(table[ordinates[0]], {over, by, second, "realisation"})
+    unused = [str(name) for name in frame.columns if name not in (over, *ordinates, by, second)]
+    not_used = f"not used: {', '.join(unused)}" if unused and isinstance(table, pd.DataFrame) else ""
     frame, left_out = finite_rows(frame, [over, *ordinates, by] + ([second] if second else []))
     kind = kind_of(over, ordinates, by, units) if vertical is None else vertical
     if second is not None:
         kind = "none" if vertical is None else kind
         dataset = _of_two_groups(frame, over, ordinates, (by, second), kind, reference)
-        return dataset.assign_attrs(left_out=left_out, vertical=_sentence(kind))
+        return dataset.assign_attrs(left_out=left_out, not_used=not_used, vertical=_sentence(kind))
     groups, curves = curves_of(frame, over, ordinates, by)
     zero = float(groups[groups.size // 2]) if reference is None else _inside(groups, reference)
     kelvin = kelvins(groups, units.get(by, "")) if kind in ("modulus", "compliance") else None
     free = superposition.superpose(groups, curves, kind, kelvin=kelvin)
-    attrs = {"left_out": left_out, "vertical": _sentence(kind), "undetermined": _undetermined(free)}
+    attrs = {
+        "left_out": left_out,
+        "not_used": not_used,
+        "vertical": _sentence(kind),
+        "undetermined": _undetermined(free),
+    }
     return _with_laws(free, zero, over, ordinates, by, units, attrs)
 
 

@@ -14,7 +14,7 @@ from mdr_dask.models.base import quantity
 from mdr_dask.models.data_file import NamedFile
 from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.models.parts.temperature import Law
-from mdr_dask.tables import Column, read_table
+from mdr_dask.tables import Column, TableError, is_called, read_sheet, read_table
 from mdr_dask.units import shown
 
 SAME_TEMPERATURE = 1.0  # K: what an instrument scatters about its set point
@@ -206,10 +206,19 @@ def _require_overlap(storage: FloatArray, member: IntArray, levels: FloatArray) 
 def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
     """Return angular frequency, storage and loss modulus and perhaps temperature in SI, as the file has them."""
     name = chosen.file.name
-    table = read_table(chosen.file.read_text(), name, _columns(chosen))
-    omega, storage, loss = (table.get(column) for column in ("frequency", "storage modulus", "loss modulus"))
-    assert omega is not None
-    assert storage is not None
+    text = chosen.file.read_text()
+    try:
+        table = read_table(text, name, _columns(chosen))
+    except TableError as problem:
+        headings = [cell.text for cell in read_sheet(text, name).names]
+        has = {name: any(is_called(each, name) for each in headings) for name in ("time", "frequency")}
+        if has["time"] and not has["frequency"]:
+            raise DataError(
+                f"{name}: moduli versus time are no material here: expected frequency, storage and loss modulus "
+                "(`mdr-dask master-curve` merges relaxation curves)"
+            ) from problem
+        raise
+    omega, storage, loss = table["frequency"], table["storage modulus"], table.get("loss modulus")
     if loss is None and "tan delta" in table:
         loss = storage * table["tan delta"]
     if loss is None:
@@ -223,16 +232,11 @@ def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray,
 
 
 def _columns(chosen: ModulusTable) -> tuple[Column, ...]:
-    """Return the columns of a dynamic-mechanical analysis, by the names that machines and people give them."""
-    storage = ("E'", "G'", "storage", "E stor", "G stor", "Estor", "Gstor", "E1", "G1")
-    loss = ("E''", "G''", "loss", "E loss", "G loss", "Eloss", "Gloss", "E2", "G2")
-    temperature = ("T", "temp", "temp.", "sample temperature")
-    frequency = ("f", "freq", "freq.", "omega", "angular frequency", "w", "ω")
+    """Return the columns of a dynamic-mechanical analysis."""
     return (
-        Column("frequency", "rad/s", frequency, above=0, given_unit=chosen.frequency_unit),
-        Column("storage modulus", "Pa", storage, above=0, given_unit=chosen.modulus_unit),
-        Column("loss modulus", "Pa", loss, needed=False, above=0, given_unit=chosen.modulus_unit),
-        Column("temperature", "K", temperature, needed=False, above=0),
-        Column("tan delta", "1", ("tan(delta)", "tan d", "tand", "loss factor", "tan δ"), needed=False, above=0),
-        Column("set", "1", ("segment", "point", "index", "no"), needed=False),
+        Column("frequency", "rad/s", above=0, given_unit=chosen.frequency_unit),
+        Column("storage modulus", "Pa", above=0, given_unit=chosen.modulus_unit),
+        Column("loss modulus", "Pa", needed=False, above=0, given_unit=chosen.modulus_unit),
+        Column("temperature", "K", needed=False, above=0),
+        Column("tan delta", "1", needed=False, above=0),
     )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mdr_dask.physics.superposition.posterior import Curves, solve
+from mdr_dask.physics.superposition.posterior import CELLS, REACH, Curves, _basis, solve
 
 
 def problem(channels, offset, drifting=False):
@@ -12,7 +12,7 @@ def problem(channels, offset, drifting=False):
     shifts = np.array([0.0, 0.5, 1.1, 1.5])
     shapes = np.array([np.tanh(x + shifts[member] - 1), -0.2 * (x + shifts[member] - 1) ** 2])[:channels]
     y = shapes + 0.01 * random.standard_normal(shapes.shape)
-    curves = Curves(x, y, member, count, np.ones(channels), 21, offset, drifting)
+    curves = Curves(x, y, member, count, np.ones(channels), 36, offset, drifting)
     row = curves.prior[0] + 0.1 * random.standard_normal(curves.prior[0].size)
     row[: count - 1] += shifts[1:]
     return curves, row
@@ -40,7 +40,7 @@ def test_the_density_is_that_of_a_normal_distribution_of_all_ordinates():
     for each in rows:
         moved = curves.x + np.append(0.0, each[: curves.count - 1])[curves.member]
         low = curves.begin(moved[None])
-        first, value, _ = _basis_of(moved, low, curves.splines)
+        first, value, _ = _basis((moved - low) * CELLS, curves.splines)
         basis = np.zeros((moved.size, curves.splines))
         np.put_along_axis(basis, first[:, None] + np.arange(4), value, 1)
         second = np.diff(np.eye(curves.splines), 2, axis=0)
@@ -49,7 +49,7 @@ def test_the_density_is_that_of_a_normal_distribution_of_all_ordinates():
         offsets = np.eye(curves.count)[curves.member] * np.exp(each[-1])
         total = np.kron(np.ones((2, 2)), offsets @ offsets.T)
         for c in range(2):
-            share = np.exp(-0.5 * ((low + np.arange(curves.splines - 2)[:, None] / 5 - centres) / 0.3) ** 2)
+            share = np.exp(-0.5 * ((low + np.arange(curves.splines - 2)[:, None] / CELLS - centres) / REACH) ** 2)
             log_bend = share @ bend[c] / share.sum(axis=1)
             smooth = second.T @ (second * np.exp(-2 * log_bend)[:, None]) + 1e-9 * np.eye(curves.splines)
             own = basis @ np.linalg.inv(smooth) @ basis.T
@@ -62,9 +62,3 @@ def test_the_density_is_that_of_a_normal_distribution_of_all_ordinates():
         energies.append(likelihood + 0.5 * away @ curves.prior[1] @ away)
     found = solve(curves, rows).energy
     assert found[1] - found[0] == pytest.approx(energies[1] - energies[0], rel=1e-3)
-
-
-def _basis_of(moved, low, splines):
-    from mdr_dask.physics.superposition.posterior import CELLS, _basis
-
-    return _basis((moved - low) * CELLS, splines)

@@ -1,0 +1,163 @@
+"""Tables in the layouts of instruments and people, re-made: text, columns, and what comes out."""
+
+# ruff: noqa: E501
+
+from mdr_dask.tables import Column
+
+DMA = (
+    Column("frequency", "rad/s", above=0),
+    Column("storage modulus", "Pa", above=0),
+    Column("loss modulus", "Pa", needed=False, above=0),
+    Column("temperature", "K", needed=False, above=0),
+    Column("tan delta", "1", needed=False, above=0),
+)
+OIL = (Column("temperature", "K", above=0), Column("dynamic viscosity", "Pa s", above=0))
+FRICTION = (
+    Column("velocity", "m/s", above=0),
+    Column("friction coefficient", "1"),
+    Column("normal force", "N", needed=False),
+)
+SPECTRUM = (Column("wavenumber", "rad/m", above=0), Column("C2D", "m^4", above=0))
+SHIFTS = (Column("temperature", "K", above=0), Column("log10 a_T", "1", ("log aT", "log(aT)", "log10 aT")))
+STEPS = (Column("time", "s"), Column("velocity", "m/s"), Column("friction coefficient", "1"))
+
+TRIOS = """\
+Filename\tC:\\data\\rubber.tri
+Instrument name\tDMA850
+Sample name\tEPDM 70
+Geometry\t8.0
+
+[step]
+Frequency sweep at -20 °C
+Ang. frequency\tStorage modulus\tLoss modulus\tTan(delta)\tTemperature\tTorque
+rad/s\tMPa\tMPa\t\t°C\tµN.m
+1,0\t10,0\t2,0\t0,2\t-20,0\t5
+10,0\t20,0\t4,0\t0,2\t-20,0\t5
+
+[step]
+Frequency sweep at 20 °C
+Ang. frequency\tStorage modulus\tLoss modulus\tTan(delta)\tTemperature\tTorque
+rad/s\tMPa\tMPa\t\t°C\tµN.m
+1,0\t2,0\t0,4\t0,2\t20,0\t5
+"""
+STEPS_STATED = """\
+Data set 1, Temperature = 20 °C
+Angular frequency;Storage modulus;Loss modulus
+rad/s;Pa;Pa
+1;1e6;1e5
+10;2e6;2e5
+Data set 2, Temperature = 40 °C
+Angular frequency;Storage modulus;Loss modulus
+rad/s;Pa;Pa
+1;5e5;5e4
+"""
+
+#: Name: text, columns, and the first value of some of them in SI.
+READ = {
+    "trios": (TRIOS, DMA, {"frequency": 1.0, "storage modulus": 1e7, "temperature": 253.15}),
+    "steps with a stated temperature": (STEPS_STATED, DMA, {"storage modulus": 1e6, "temperature": 293.15}),
+    "pandas": (
+        "run,freq_hz,temperature_C,G_storage_pa,G_loss_pa,force_dyn_N\ntf_1,1,20,1e6,1e5,3\ntf_1,2,20,2e6,2e5,3\n",
+        DMA,
+        {"frequency": 6.283185307179586, "temperature": 293.15, "storage modulus": 1e6},
+    ),
+    "both frequencies": (
+        "Frequency (Hz),Angular Frequency (rad/s),Storage Modulus (MPa),Loss Modulus (MPa)\n1,6.283,5,1\n10,62.83,6,1\n",
+        DMA,
+        {"frequency": 6.283185307179586, "storage modulus": 5e6},
+    ),
+    "osc": (
+        "T=40;Mw=223;chem=PI;\nw\tG'\tG''\nrad/s\tPa\tPa\n0.1\t1000\t2000\n1\t3000\t4000\n",
+        DMA,
+        {"frequency": 0.1, "storage modulus": 1000.0},
+    ),
+    "decimal commas": ("f [Hz];E' [MPa];E'' [MPa]\n0,5;1,5;0,1\n1,0;2,5;0,2\n", DMA, {"storage modulus": 1.5e6}),
+    "round brackets and degF": ("T (°F),Dyn. Viscosity (mPa s)\n50,100\n104,30\n", OIL, {"temperature": 283.15}),
+    "degF": ("T [degF],eta [cP]\n50,1\n104,0.5\n", OIL, {"temperature": 283.15, "dynamic viscosity": 1e-3}),
+    "deg C": ("Temperature (deg C)\tViscosity (mPa s)\n10\t100\n40\t30\n", OIL, {"dynamic viscosity": 0.1}),
+    "density beside": (
+        "Temp. [degC];Dyn. Viscosity [mPa s];Density [g/cm3]\n10;100;0.9\n40;30;0.88\n",
+        OIL,
+        {"temperature": 283.15},
+    ),
+    "row of units": ("Temperature,Dynamic viscosity\n°C,mPa·s\n10,100\n40,30\n", OIL, {"dynamic viscosity": 0.1}),
+    "viscosity in round": ("T (K),η (Pa s)\n283.15,0.1\n313.15,0.03\n", OIL, {"temperature": 283.15}),
+    "curly": ("Temperature {K},Dynamic viscosity {Pa s}\n283.15,0.1\n313.15,0.03\n", OIL, {"temperature": 283.15}),
+    "COF": (
+        "Sliding speed [mm/s],COF [-],Load [N]\n1,0.5,10\n10,0.6,10\n",
+        FRICTION,
+        {"velocity": 1e-3, "friction coefficient": 0.5},
+    ),
+    "micro": ("v [mm/s],µ\n1,0.5\n10,0.6\n", FRICTION, {"friction coefficient": 0.5}),
+    "greek mu": ("v [mm/s],μ [-]\n1,0.5\n10,0.6\n", FRICTION, {"friction coefficient": 0.5}),
+    "words in a column": ("sample,v [mm/s],mu\nA,1,0.5\nB,10,0.6\n", FRICTION, {"velocity": 1e-3}),
+    "rig": (
+        "Tribometer 3\nOperator;N. N.\nDate;2024-05-01\n\nTime;Speed;Friction coefficient;Fn\ns;m/s;-;N\n0;0.1;0.5;10\n1;0.2;0.6;10\n",
+        FRICTION,
+        {"velocity": 0.1, "normal force": 10.0},
+    ),
+    "velocity_um_s": ("v (um/s),friction\n3,0.6\n9,0.61\n", FRICTION, {"velocity": 3e-6}),
+    "load point": (
+        "Time (s)\tLoad point velocity (um/s)\tFriction\tNormal stress (MPa)\n0\t3\t0.6\t5\n1\t9\t0.61\t5\n",
+        STEPS,
+        {"velocity": 3e-6, "friction coefficient": 0.6},
+    ),
+    "blanks": ("Time(s) Velocity(m/s) Friction\n0 1e-6 0.6\n1 2e-6 0.6\n", STEPS, {"velocity": 1e-6}),
+    "psd": ("Wavevector (m^-1),PSD (m^4)\n1e3,1e-16\n1e4,1e-20\n", SPECTRUM, {"wavenumber": 1e3, "C2D": 1e-16}),
+    "C(q)": ("q [1/m],C(q) [m^4]\n1e3,1e-16\n1e4,1e-20\n", SPECTRUM, {"C2D": 1e-16}),
+    "names in a remark": ("# q [1/m]  PSD [m^4]\n1e3 1e-16\n1e4 1e-20\n", SPECTRUM, {"C2D": 1e-16}),
+    "shift factors": ("T [°C],log aT,bT\n0,1.0,1\n20,0,1\n", SHIFTS, {"temperature": 273.15, "log10 a_T": 1.0}),
+    "aT in words": ("Temperature (C);log(aT)\n0;1,0\n20;0,0\n", SHIFTS, {"log10 a_T": 1.0}),
+    "quotes": ('"Frequency (Hz)","Storage modulus (MPa)"\n"1","5"\n"2","6"\n', DMA, {"storage modulus": 5e6}),
+    "trailing separators": ("f [Hz];E' [MPa];\n1;5;\n2;6;\n", DMA, {"storage modulus": 5e6}),
+    "blank lines": ("f [Hz],E' [MPa]\n\n1,5\n\n2,6\n\n", DMA, {"storage modulus": 5e6}),
+    "byte-order mark": ("\ufefff [Hz],E' [MPa]\n1,5\n2,6\n", DMA, {"storage modulus": 5e6}),
+    "tabs and units in a row": (
+        "f\tE_stor\tE_loss\tT\tSet\nHz\tMPa\tMPa\tC\t-\n0.1\t5\t1\t20\t1\n1\t6\t1\t20\t1\n",
+        DMA,
+        {"storage modulus": 5e6},
+    ),
+    "primes": ("ω (rad/s),G′ (Pa),G″ (Pa)\n1,5,1\n2,6,1\n", DMA, {"storage modulus": 5.0, "loss modulus": 1.0}),
+    "curved primes": (
+        "ω [rad/s],E’ [kPa],E’’ [kPa]\n1,5,1\n2,6,1\n",
+        DMA,
+        {"storage modulus": 5e3, "loss modulus": 1e3},
+    ),
+    "capitals": ("FREQUENCY [Hz],STORAGE MODULUS [MPa],TAN DELTA\n1,5,0.1\n2,6,0.1\n", DMA, {"tan delta": 0.1}),
+    "underscores": (
+        "Angular_Frequency [rad/s],Storage_Modulus [Pa],Tan_Delta\n1,5,0.1\n2,6,0.1\n",
+        DMA,
+        {"frequency": 1.0},
+    ),
+    "colons": ("Frequency: [Hz]\tG': [Pa]\tG'': [Pa]\n1\t5\t1\n2\t6\t1\n", DMA, {"storage modulus": 5.0}),
+    "units in braces of words": ("Temp. in °C;dyn. viscosity [mPas]\n10;100\n", OIL, None),
+    "rpm": ("f [rpm],G' [Pa]\n60,5\n120,6\n", DMA, {"frequency": 6.283185307179586}),
+    "remarks between": ("# rubber\nf [Hz],E' [MPa]\n1,5\n% warmer\n2,6\n", DMA, {"storage modulus": 5e6}),
+    "windows": ("f [Hz],E' [MPa]\r\n1,5\r\n2,6\r\n", DMA, {"storage modulus": 5e6}),
+    "exponents": ("q [m-1],C_iso [m4]\n1.0E+03,1.0E-16\n1.0E+04,1.0E-20\n", SPECTRUM, {"wavenumber": 1e3}),
+    "sample temperature": ("f [Hz];Sample temperature [°C];E' [MPa]\n1;20;5\n2;20;6\n", DMA, {"temperature": 293.15}),
+    "anton paar": (
+        "Project:\tRubber\nTest:\tSweep\nResult:\tFS 1\n\nInterval and data points:\t1\t2\nInterval data:\tPoint No.\tAngular Frequency\tStorage Modulus\tLoss Modulus\n\t\t[rad/s]\t[Pa]\t[Pa]\n\t1\t1\t5000\t100\n\t2\t10\t6000\t100\n",
+        DMA,
+        {"storage modulus": 5000.0},
+    ),
+    "digitised pairs": (
+        "-20 °C,,20 °C,\nf [Hz],E' [MPa],f [Hz],E' [MPa]\n1,50,1,5\n2,60,2,6\n,,3,7\n",
+        DMA,
+        {"storage modulus": 5e7, "temperature": 253.15},
+    ),
+    "numbers above pairs": (
+        "253.15 K,,293.15 K,\nf [Hz],E' [MPa],f [Hz],E' [MPa]\n1,50,1,5\n2,60,2,6\n",
+        DMA,
+        {"temperature": 253.15},
+    ),
+}
+#: Layouts that are refused, each with a part of the sentence that says what to change.
+REFUSED = {
+    "no unit": ("f [Hz],E'\n1,5\n", DMA, "expected its unit, such as 'storage modulus [MPa]'"),
+    "misspelt": ("f [Hz],storage modulos [Pa]\n1,5\n", DMA, "did you mean 'storage modulus'?"),
+    "missing": ("f [Hz],torque [N]\n1,5\n", DMA, "expected a column storage modulus, got torque"),
+    "disagree": ("f [Hz],omega [rad/s],E' [Pa]\n1,5,5\n", DMA, "is given twice, and 'f' disagrees"),
+    "unknown unit": ("f [Hz],E' [mpa]\n1,5\n", DMA, "unknown unit 'mpa' (did you mean 'MPa'?)"),
+    "decimal commas in commas": ("f [Hz],E' [Pa]\n1,5,2\n", DMA, "put semicolons between the values"),
+}

@@ -1,0 +1,68 @@
+"""Layouts of instruments and people are read as they stand; the others get a sentence that says what to change."""
+
+import io
+
+import numpy as np
+import pandas as pd
+import pytest
+from instrument_layouts import DMA, READ, REFUSED, TRIOS
+
+from mdr_dask.errors import DataError
+from mdr_dask.tables import decoded, read_table
+
+
+@pytest.mark.parametrize("layout", [name for name, (*_, expected) in READ.items() if expected])
+def test_layouts_are_read_without_edits(layout):
+    text, columns, expected = READ[layout]
+    read = read_table(text, layout, columns)
+    for name, value in expected.items():
+        assert read[name][0] == pytest.approx(value, rel=1e-3), name
+
+
+@pytest.mark.parametrize("layout", REFUSED)
+def test_refused_layouts_say_what_to_change(layout):
+    text, columns, sentence = REFUSED[layout]
+    with pytest.raises(DataError) as caught:
+        read_table(text, layout, columns)
+    assert sentence in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_all_blocks_of_an_export_are_one_table_and_what_is_not_used_is_named():
+    read = read_table(TRIOS, "trios.txt", DMA)
+    np.testing.assert_allclose(read["temperature"], [253.15, 253.15, 293.15])
+    np.testing.assert_allclose(read["storage modulus"], [1e7, 2e7, 2e6])
+    assert read.remark == "not used: Torque"
+
+
+def test_pairs_of_columns_become_a_table_with_a_temperature():
+    text, columns, _ = READ["digitised pairs"]
+    read = read_table(text, "pairs.csv", columns)
+    np.testing.assert_allclose(read["temperature"], [253.15, 253.15, 293.15, 293.15, 293.15])
+    np.testing.assert_allclose(read["storage modulus"], [5e7, 6e7, 5e6, 6e6, 7e6])
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "cp1252"])
+def test_encodings_are_found(encoding):
+    read = read_table(decoded(TRIOS.encode(encoding), "trios.txt"), "trios.txt", DMA)
+    assert read["temperature"][0] == pytest.approx(253.15)
+
+
+def test_workbooks_are_read_sheet_by_sheet():
+    pytest.importorskip("openpyxl")
+    content = io.BytesIO()
+    with pd.ExcelWriter(content) as writer:
+        for celsius in (20, 40):
+            rows = [
+                ["Sample", "EPDM", None],
+                ["f", "E'", "T"],
+                ["Hz", "MPa", "°C"],
+                [1, 5.5, celsius],
+                [2, 6.5, celsius],
+            ]
+            pd.DataFrame(rows).to_excel(writer, sheet_name=f"{celsius} C", header=False, index=False)
+    read = read_table(decoded(content.getvalue(), "dma.xlsx"), "dma.xlsx", DMA)
+    np.testing.assert_allclose(read["temperature"], [293.15, 293.15, 313.15, 313.15])
+    np.testing.assert_allclose(read["storage modulus"], [5.5e6, 6.5e6, 5.5e6, 6.5e6])
+    with pytest.raises(DataError, match="expected a table or an Excel workbook"):
+        decoded(b"PK\x03\x04 nothing of the kind", "dma.xlsx")
