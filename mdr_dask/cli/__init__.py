@@ -114,7 +114,7 @@ def main(arguments: list[str] | None = None) -> int:
         result = cli.main(arguments, prog_name="mdr-dask", standalone_mode=False)
     except click.ClickException as error:
         context = error.ctx if isinstance(error, click.UsageError) else None
-        say(error.format_message() + (f" (see {context.command_path} --help)" if context else ""), err=True)
+        say(error.format_message().rstrip(".") + (f" (see {context.command_path} --help)" if context else ""), err=True)
         return error.exit_code
     except (click.Abort, KeyboardInterrupt):
         say("interrupted; finished results are kept, and the same command goes on with the others", err=True)
