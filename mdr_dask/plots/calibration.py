@@ -53,9 +53,10 @@ def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
         )
         panels.append(_density(found, name, product.values, unit, False, data))
     points = f"{found.measured.source}, {found.measured.values.size} points{f', series {series}' if series else ''}"
-    holds = found.law_holds
-    subject = f"calibration: {fit.sentence(found)}" if holds.startswith("yes") else f"calibration: {holds}"
-    return Figure(panels, subject, points, "bars, bands and shades: 95 % (dark: 68 %)", columns=3, ratio=0.8)
+    subject = f"calibration: {fit.sentence(found)}"
+    return Figure(
+        panels, subject, points, f"{found.law_holds}; bars, bands and shades: 95 % (dark: 68 %)", columns=3, ratio=0.8
+    )
 
 
 def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.Dataset]:

@@ -32,8 +32,8 @@ from mdr_dask.units import seconds
 MOST_ROWS = 60
 #: Values of an axis that are written out.
 LISTED = 6
-#: Results of a series that the page is made from; of larger studies, evenly spread values of the axes are read.
-MOST_RESULTS = 50_000
+#: Cases of a series that the page is made from; of larger studies, evenly spread values of the axes are read.
+MOST_CASES = 4000
 
 
 class Table(NamedTuple):
@@ -116,14 +116,13 @@ def _read(url: str) -> Study:
 
 
 def _thinned(data: xr.Dataset) -> xr.Dataset:
-    """Return a series of at most `MOST_RESULTS` results, in memory: evenly spread values of the longest axes."""
+    """Return a series of at most `MOST_CASES` cases, in memory: evenly spread values of the longest axes."""
     dims = [str(dim) for dim in data["status"].dims if dim != "realisation"]
-    while data["status"].size > MOST_RESULTS and dims:
+    while (cases := math.prod(data.sizes[dim] for dim in dims)) > MOST_CASES:
         longest = max(dims, key=lambda dim: data.sizes[dim])
-        if data.sizes[longest] < 3:
-            break
-        most = max(2, min(data.sizes[longest] - 1, data.sizes[longest] * MOST_RESULTS // data["status"].size))
-        data, _ = curves.thin(data, longest, max(most, data.sizes[longest] // 4))
+        size = data.sizes[longest]
+        most = max(1, min(size - 1, size * MOST_CASES // cases), size // 4)
+        data, _ = curves.thin(data, longest, most)
     return data.load()
 
 

@@ -5,7 +5,7 @@ import planted
 import pytest
 
 from mdr_dask.errors import DataError
-from mdr_dask.fits.calibration import calibrate, measured_of, with_table
+from mdr_dask.fits.calibration import calibrate, measured_of, sentence, with_table
 from mdr_dask.plots import available
 from mdr_dask.plots.measured import with_points
 
@@ -61,8 +61,8 @@ def test_calibration_shows_what_the_fit_found(tmp_path):
     given = with_table(groups, path)
     found = calibrate(given[""], measured_of(given[""]))
     figure = available("sliding_friction")["calibration"].describe(given)
-    holds = found.law_holds.startswith("yes")
-    assert figure.subject.startswith("calibration: " + ("every" if holds else found.law_holds[:10]))
+    assert figure.subject == f"calibration: {sentence(found)}"
+    assert found.law_holds in figure.bars
     data = [trace for trace in figure.panels[0].traces if trace.kind == "curve"]
     np.testing.assert_allclose(np.sort(np.concatenate([t.column("y") for t in data])), np.sort(found.measured.values))
     residuals = [trace for trace in figure.panels[1].traces if trace.kind == "curve"]

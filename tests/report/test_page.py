@@ -127,7 +127,7 @@ def test_large_studies_are_reduced_and_say_so(url, monkeypatch):
 
 
 def test_pages_of_large_studies_are_made_from_a_part_of_their_results(url, monkeypatch):
-    monkeypatch.setattr(study_room, "MOST_RESULTS", 30)
+    monkeypatch.setattr(study_room, "MOST_CASES", 8)
     study = read_study(url)
     assert all("evenly spread values of the axes" in figure["left_out"] for figure in study.figures)
     assert study.not_fitted == [("all laws", f"the study is large; use mdr-dask fit {url} NAME")]
