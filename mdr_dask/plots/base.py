@@ -33,12 +33,15 @@ class Plot:
     draw : callable, mapping of str to Dataset -> Figure
         Takes the groups of a store as :class:`mdr_dask.fits.base.Fit` does and returns a
         :class:`mdr_dask.plots.figure.Figure`; `mdr_dask.plots.view.draw` makes those of outputs against parameters.
+    fitted : bool
+        Whether it shows a fit, which takes long for a large study.
     """
 
     name: str
     models: tuple[str, ...]
     summary: str
     draw: Callable[[Mapping[str, xr.Dataset]], Figure]
+    fitted: bool = False
 
     def describe(self, groups: Mapping[str, xr.Dataset]) -> Figure:
         """Return the figure as data; results that failed or are missing are counted.

@@ -212,5 +212,6 @@ PLOTS = (
         (),
         "measured points with the band of the study, residuals, and the density of each unknown",
         calibration,
+        fitted=True,
     ),
 )

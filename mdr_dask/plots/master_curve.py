@@ -182,5 +182,6 @@ PLOTS = (
         ("sliding_friction",),
         "coefficient of friction against force at each velocity, merged, and shift factors",
         _of_store,
+        fitted=True,
     ),
 )

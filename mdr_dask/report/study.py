@@ -133,7 +133,7 @@ def _study(url: str, held: Mapping[str, Any], whole: Mapping[str, xr.Dataset], g
     records = [record for name in groups for record in store.records(url, name)]
     drawn = list(
         drawn_of(
-            plots.available(model),
+            {name: plot for name, plot in plots.available(model).items() if not (reduced and plot.fitted)},
             groups,
             lambda name: provenance(name, [url], f"mdr-dask plot {shlex.quote(url)} {name}"),
         )
