@@ -95,6 +95,8 @@ def test_a_case_that_takes_too_long_has_failed(example, hang):
 
 
 def test_threads_of_blas_are_as_before_a_run(toy, url):
+    import scipy.linalg  # noqa: F401  (brings a BLAS of its own)
+
     with threadpool_limits(limits=2, user_api="blas"):
         before = [found["num_threads"] for found in threadpool_info() if found["user_api"] == "blas"]
         execute.run(toy.campaign(toy.axis("position", [1.0])), url, Resources(threads=1), lambda _: None)
@@ -135,7 +137,7 @@ def test_a_script_without_a_guard_gets_one_sentence(tmp_path):
 def test_a_dask_client_in_this_process_computes_and_stays_open(toy, url):
     from distributed import Client
 
-    with Client(processes=False, dashboard_address=None, n_workers=1, threads_per_worker=1) as client:
+    with Client(processes=False, dashboard_address="127.0.0.1:0", n_workers=1, threads_per_worker=1) as client:
         campaign = toy.campaign(toy.axis("position", [1.0, 2.0]))
         assert execute.run(campaign, url, Resources(client=client), lambda _: None).done == 12
         assert client.submit(lambda: 3).result() == 3
