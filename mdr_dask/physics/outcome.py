@@ -1,4 +1,4 @@
-"""What became of a solution: one enumeration for every solver, each outcome with its sentence for a user."""
+"""How a solution ended: one enumeration for every solver, each outcome with a sentence for users."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from enum import IntEnum
 class Outcome(IntEnum):
     """How a solver ended; kernels return the number, users read the `sentence`.
 
-    A kernel compares with members as with whole numbers: numba takes them for constants.
+    Kernels compare with members as with integers: numba treats them as constants.
     """
 
     CONVERGED = 0
@@ -29,7 +29,7 @@ class Outcome(IntEnum):
 
     @property
     def is_impossible(self) -> bool:
-        """Whether no solver could have done better: the case itself is to blame."""
+        """Whether the case itself is the reason, so that no finer grid can help."""
         return self in (Outcome.OUTSIDE_LINE, Outcome.INVALID)
 
 

@@ -1,4 +1,4 @@
-"""The displaced surface of a Kelvin foundation in steady sliding, on a grid: for pictures of a contact."""
+"""The displaced surface of a Kelvin foundation in steady sliding, on a grid, for figures of a contact."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Full contact of any linear solid with a plane's roughness: where nothing lifts off, every wave is pressed alone.
+"""Full contact of any linear solid with a rough plane: the harmonics are independent.
 
-The foundation follows the line, u = d + h, and every wave c_k of it asks for the pressure G*(q_k v) c_k (thesis eq.
-3.21 for the Kelvin solid). So the drag is a sum over the spectrum, whatever the phases. It holds where the pressure is
-positive everywhere, which is shown on nodes: between m nodes a sum of waves of up to k periods is at most
+The foundation follows the line, u = d + h, and every wave c_k needs the pressure G*(q_k v) c_k (thesis eq. 3.14 for the
+Kelvin solid). So the drag is a sum over the spectrum, whatever the phases. This holds where the pressure is positive
+everywhere, which is checked at nodes: between m nodes a sum of waves of up to k periods is at most
 1 / cos(pi k / m) times its largest value on them (Ehlich and Zeller, 1964).
 """
 
@@ -18,7 +18,7 @@ from mdr_dask.physics.sliding.cases import Steady
 from mdr_dask.physics.surfaces.waves import Waves, series
 
 OVERSAMPLING = 2  # nodes per Nyquist point: the pressure between them is bounded to 41 %
-DEEP = 4.0  # load over the rms of the pressure of the waves, below which contact is hardly ever that full
+DEEP = 4.0  # load over the rms pressure of the waves, below which full contact is too rare to be worth the check
 ROUNDING = 1e-12  # relative error of sums over a spectrum
 
 

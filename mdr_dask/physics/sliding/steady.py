@@ -1,4 +1,4 @@
-"""Direct steady sliding of a viscoelastic Kelvin foundation over a line, at prescribed load."""
+"""Steady sliding of a Kelvin foundation over a line at a given load: the search for the depth."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ ITERATIONS = 200
 PATIENCE = 20  # sweeps before the bracket is halved
 OUTLINES, OUTLINED = 12, 0.02  # looks at the tops of blocks for a guess of the depth, and the change that is the last
 OUTLINED_FROM = 64.0  # Deborah number in cells: of elements that fade sooner, what is between the tops counts
-LOST = 1e-13  # rise of a line into contact, over its heights there, that may be rounding
+LOST = 1e-13  # rise of a line where it touches, relative to its heights there, below which it is rounding
 TRAIL = 5  # numbers of a trail: log depth, log load, slope of these and its change, Deborah number
 LATTICE_BITS = 20  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
 
@@ -59,16 +59,16 @@ def _next(depth: float) -> float:
 
 @jit
 def _begin(trail: FloatArray, depth: float, load: float) -> None:
-    """Begin a `trail` where nothing but a depth for a load is known."""
+    """Start a `trail` from a guess of the depth for a load."""
     trail[0], trail[1], trail[2], trail[3], trail[4] = math.log(depth), math.log(load), 0.7, 0.0, 0.0
 
 
 @jit
 def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tuple[float, float]:
-    """Return log depth at a load, and its slope over log load, of an element that the tops of blocks alone press.
+    """Guess log depth at a load, and its derivative by log load, from the highest points of blocks alone.
 
-    Were it pressed everywhere, it would be deepest; tangents of the load are above the depth, too. Where the load is
-    lost in the rounding of these, nothing better than the start is known.
+    The full-contact depth is an upper bound, and so is each tangent of the load. If the load is lost to rounding, the
+    start is returned.
     """
     fade, memory = np.exp(-BLOCK / deborah), -deborah * math.expm1(-BLOCK / deborah)
     depth, most, slope = math.exp(start), load / (memory * peak.size) - peak.mean(), 1.0
@@ -95,7 +95,7 @@ def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tu
 
 @jit
 def _follow(sums: FloatArray, depth: float, deborah: float, trail: FloatArray) -> None:
-    """Note log depth, log load, their slope and its change in `trail`, from the last sweep and the one before.
+    """Write log depth, log load, their slope and its change to `trail`, from the last sweep and the one before.
 
     At another Deborah number the slope was another one, but its change is nearly the same.
     """
@@ -116,7 +116,7 @@ def _guess(trail: FloatArray, load: float) -> float:
 
 
 class _Swept(NamedTuple):
-    """A line as sweeps at one Deborah number take it, and its mean height, from the highest point."""
+    """A line with its blocks and thresholds at one Deborah number, and its mean height from the highest point."""
 
     cells: Cells
     blocks: Blocks
@@ -125,14 +125,14 @@ class _Swept(NamedTuple):
 
 
 class Touching(NamedTuple):
-    """Where the patches of cases begin and end at the lattice depths that were found.
+    """Beginnings and ends of the contact patches of cases at the lattice depths that were found.
 
     Parameters
     ----------
     start, end : array, shape (cases, room)
-        The first patches of every case, as many as there is room for: that does not depend on the other cases.
+        The first patches of every case, up to the capacity of the arrays.
     patches : int array, shape (cases,)
-        Number of patches of every case, of those without room too; 0 where no depth was found.
+        Number of patches of every case, also beyond the capacity; 0 where no depth was found.
     """
 
     start: FloatArray
@@ -141,14 +141,14 @@ class Touching(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """What others keep of a line: the barriers of a Deborah number in cells, and what touches."""
+    """Thresholds of a line by Deborah number in cells, and its contact patches, that a caller keeps."""
 
     barriers_at: Callable[[float], Barriers]
     touching: Touching
 
 
 class _Found(NamedTuple):
-    """What is found of some cases: columns of results, status, patches, and the rows of these."""
+    """Results of some cases: columns, status, patches, and the rows of these."""
 
     results: FloatArray
     status: NDArray[np.int8]
@@ -157,7 +157,7 @@ class _Found(NamedTuple):
 
 
 def touching_for(cases: int, room: int) -> Touching:
-    """Return room for so many patches of each of some cases."""
+    """Return arrays for so many patches of each of some cases."""
     return Touching(np.empty((cases, room)), np.empty((cases, room)), np.zeros(cases, np.int64))
 
 
@@ -309,9 +309,9 @@ def steady_on_cells(
     close: float = 0.0,
     kept: Kept | None = None,
 ) -> Steady:
-    """Return what :func:`steady_sliding` does, on a line that is cut into its cells and blocks already.
+    """Return what :func:`steady_sliding` does, on a line that is already cut into cells and blocks.
 
-    Where others have use for the barriers, they are taken from where they are kept, and what touches is written down.
+    With ``kept`` the thresholds come from the caller, and the contact patches are written there.
     """
     start = np.full(loads.size, np.nan) if guesses is None else guesses
     keeps = kept or Kept(_unknown_barriers(cells.mean.size - 1), touching_for(loads.size, 0))
@@ -324,7 +324,7 @@ def steady_on_cells(
 
 
 def _unknown_barriers(cells: int) -> Callable[[float], Barriers]:
-    """Return a function that forgets the barriers of one Deborah number for those of the next."""
+    """Return a function that resets one set of thresholds for each Deborah number."""
     barriers = barriers_for(cells)
 
     def forgotten(_: float) -> Barriers:
@@ -353,7 +353,7 @@ def _solved(
     loads: FloatArray,
     solve: Callable[..., tuple[FloatArray, NDArray[np.int8]]],
 ) -> Steady:
-    """Solve the cases that are numbers, measured in cells."""
+    """Solve the cases with finite, positive numbers, measured in cells."""
     n = line.enter.size if isinstance(line, CubicLine) else line.mean.size - 1
     with np.errstate(over="ignore"):
         good = valid(deborah * n, loads * n)
@@ -409,7 +409,7 @@ def _swept(
 
 
 def _is_lost(cases: Cases, near: FloatArray, depth: FloatArray) -> NDArray[np.bool_]:
-    """Return for which cases the dashpots carry the load where the line rises by no more than rounding.
+    """Return the cases whose load is carried by dashpots over a rise of the line that is no more than rounding.
 
     That is by F_N / (4 G dx) over the Deborah number in cells; heights near the highest point are below it.
     """
