@@ -137,7 +137,6 @@ WRONG = [
     ("verify FOREIGN --repair --campaign other.yaml", "FOREIGN"),
     ("master-curve small.yaml -o new/x.json", "small.yaml"),
     ("master-curve nowhere.csv", "nowhere.csv: no such table or store"),
-    ("master-curve STORE --bootstrap -1", "-1 is not in the range x>=0"),
     ("master-curve STORE --over velocity --plot x.bmp", "expected a file that ends in .png, .pdf or .svg, got 'x.bmp'"),
 ]
 

@@ -211,7 +211,7 @@ RIG = "normal_force [N], velocity [m/s], mu, standard_error\n1, 0.01, 0.05, 0.00
     ("text", "change", "message"),
     [
         (RIG.replace("mu", "wear_volume [m^3]"), {}, r"expected a column with one output of the study \(mu\)"),
-        (RIG.replace("velocity [m/s]", "voltage [m/s]"), {}, "unknown column 'voltage'"),
+        (RIG.replace("velocity [m/s]", "velocty [m/s]"), {}, "unknown column 'velocty'"),
         (RIG.replace(" [N]", ""), {}, "column normal_force: expected its unit"),
         (RIG.replace("1, 0.1, 0.09, 0.001\n", ""), {}, "expected at least two measured points, got 1"),
         (
