@@ -1,3 +1,3 @@
 """The version of the package, on the ground floor: stores and tasks name it without importing what is above them."""
 
-__version__ = "0.2.0.dev0"
+__version__ = "0.2.0"

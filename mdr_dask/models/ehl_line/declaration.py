@@ -171,7 +171,7 @@ def coordinates(parameters: EhlLineParameters) -> dict[str, Coordinate]:
 
 MODEL = Model(
     name="ehl_line",
-    version=9,
+    version=10,
     summary="film, pressure and traction of a lubricated line contact (elastohydrodynamic)",
     parameters=EhlLineParameters,
     outputs=OUTPUTS,

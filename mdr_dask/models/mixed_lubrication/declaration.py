@@ -318,7 +318,7 @@ def _expected_points(block: Block[MixedLubrication]) -> FloatArray:
 
 MODEL = Model(
     name="mixed_lubrication",
-    version=12,
+    version=13,
     summary="breakthrough of the boundary layer between two rough rollers on an oil film",
     parameters=MixedLubrication,
     outputs=OUTPUTS,
