@@ -208,8 +208,8 @@ def _merged(
     mean = shifts.mean(axis=0)
     x = problem.x + mean[problem.member]
     grid = np.linspace(x.min(), x.max(), CURVE_POINTS)
-    linear = [solve(problem, part) for part in np.array_split(rows, max(len(rows) // 50, 1))]
-    unknowns = np.concatenate([_drawn(each.mean, each.covariance, generator) for each in linear])
+    parts = np.array_split(rows, max(len(rows) // 50, 1))
+    unknowns = np.concatenate([solve(problem, part).unknowns(generator) for part in parts])
     offsets = unknowns[:, -count:] if problem.offset else np.zeros((len(rows), count))
     lifted = np.stack([problem.spline(c, unknowns, shifts, grid) for c in range(channels)], axis=1)
     lifted -= offsets[:, None, :1]
@@ -239,13 +239,6 @@ def _merged(
         measured=(float(own.min()), float(own.max())),
         undetermined=_runs(values, loose),
     )
-
-
-def _drawn(mean: FloatArray, covariance: FloatArray, generator: np.random.Generator) -> FloatArray:
-    """Return one draw of each row of normal distributions."""
-    values, vectors = np.linalg.eigh(covariance)
-    normal = generator.standard_normal(mean.shape) * np.sqrt(np.maximum(values, 0))
-    return np.asarray(mean + (vectors @ normal[..., None])[..., 0], dtype=np.float64)
 
 
 def _runs(groups: FloatArray, steps: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:

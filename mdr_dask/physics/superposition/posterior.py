@@ -20,6 +20,7 @@ from scipy.linalg import block_diag
 from scipy.special import softmax
 
 from mdr_dask.arrays import FloatArray, IntArray
+from mdr_dask.physics.superposition.banded import Factors, drawn, solve_rows
 
 CELLS = 8
 """Spline cells along a curve of median width; ten give the same factors, five are too few for sharp bends."""
@@ -153,13 +154,18 @@ class Solved:
     gradient : array, shape (rows, parameters)
     mean : array, shape (rows, unknowns)
         Coefficients of the splines, channel by channel, then offsets.
-    covariance : array, shape (rows, unknowns, unknowns)
+    factors : Factors
+        Cholesky factors of the precision of the coefficients and offsets.
     """
 
     energy: FloatArray
     gradient: FloatArray
     mean: FloatArray
-    covariance: FloatArray
+    factors: Factors
+
+    def unknowns(self, generator: np.random.Generator) -> FloatArray:
+        """Return one draw of coefficients and offsets for each row, shape (rows, unknowns)."""
+        return self.mean + drawn(self.factors, generator.standard_normal(self.mean.shape))
 
 
 def solve(curves: Curves, rows: FloatArray) -> Solved:
@@ -170,7 +176,7 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
     """
     many, channels, points = rows.shape[0], curves.y.shape[0], curves.x.size
     count, splines, offsets = curves.count, curves.splines, 0 if curves.offset is None else curves.count
-    unknowns, lines, bends = channels * splines + offsets, count - 1, channels * count
+    lines, bends = count - 1, channels * count
     middle, known = curves.prior
     away = rows - middle
     logs = middle[lines:] + np.clip(away[:, lines:], -FARTHEST, FARTHEST)
@@ -181,92 +187,40 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
     moved = curves.x + shifts[:, curves.member]
     low = curves.begin(moved)[:, None]
     first, value, slope = _basis((moved - low) * CELLS, splines)
-    columns = first[..., None] + np.arange(4)
-    if offsets:
-        columns = np.concatenate([columns, np.broadcast_to(curves.member[:, None], (many, points, 1))], axis=2)
-        value = np.concatenate([value, np.full((many, points, 1), -1.0)], axis=2)
     apart = (low + np.arange(splines - 2) / CELLS)[..., None] - (curves.centre + shifts)[:, None]
     share = softmax(-0.5 * (apart / REACH) ** 2, axis=2)
     bend = np.einsum("wjk,wck->wcj", share, near)
-
-    second = np.diff(np.eye(splines), 2, axis=0)
-    base = np.arange(many)[:, None, None] * unknowns
-    precision, right = np.zeros((many, unknowns, unknowns)), np.zeros((many, unknowns))
-    weight = 1 / (noise**2 + ROUNDING**2)
-    places = []
-    for c in range(channels):
-        at = np.concatenate([columns[..., :4] + c * splines, columns[..., 4:] + channels * splines], axis=2)
-        places.append(at)
-        weighted = weight[:, c, None, None] * value
-        pairs = ((base + at)[..., :, None] * unknowns + at[..., None, :]).ravel()
-        products = (weighted[..., :, None] * value[..., None, :]).ravel()
-        precision += np.bincount(pairs, products, many * unknowns**2).reshape(precision.shape)
-        parts = (weighted * curves.y[c, :, None]).ravel()
-        right += np.bincount((base + at).ravel(), parts, many * unknowns).reshape(right.shape)
-        block = slice(c * splines, (c + 1) * splines)
-        precision[:, block, block] += second.T @ (second * np.exp(-2 * bend[:, c, :, None]))
+    stiffness, weight = np.exp(-2 * bend), 1 / (noise**2 + ROUNDING**2)
+    tied = np.zeros((many, 0, 0))
     if offsets:
-        precision[:, -offsets:, -offsets:] += curves.tied * np.exp(-2 * logs[:, -1, None, None])
-    covariance, log_determinant = _inverse(precision, channels, splines)
-    mean = (covariance @ right[..., None])[..., 0]
+        tied = curves.tied * np.exp(-2 * logs[:, -1, None, None])
+    factors, linear = solve_rows(first, value, slope, curves.member, curves.y, weight, stiffness, tied)
 
-    energy = 0.5 * log_determinant - 0.5 * np.sum(right * mean, axis=1)
+    left, by_bend = curves.y - linear.fitted, 1 - linear.rough * stiffness
+    squares = np.sum(left**2 + linear.variance, axis=2)
+    change = share[:, None] * (near[:, :, None] - bend[..., None]) * (apart / REACH**2)[:, None]
+    turn = np.einsum("wc,wcp->wp", weight, linear.tilt - left * linear.slope)
+    by_place = np.einsum("wcj,wcjk->wk", by_bend, change)
+    # at the mean, the exponent is half the weighted residuals times the ordinates
+    energy = 0.5 * linear.log_determinant + 0.5 * np.sum(weight * np.sum(left * curves.y, axis=2), axis=1)
+    energy += np.sum(bend, axis=(1, 2)) - 0.5 * points * np.sum(np.log(weight), axis=1)
     gradient = np.zeros_like(rows)
-    turn, by_place = np.zeros((many, points)), np.zeros((many, count))
-    each = np.arange(many)[:, None, None]
-    for c, at in enumerate(places):
-        solved = mean[each, at]
-        left = curves.y[c] - np.sum(value * solved, axis=2)
-        spread = (covariance[each[..., None], at[..., :, None], at[..., None, :]] @ value[..., None])[..., 0]
-        tilt = np.sum(slope * solved[..., :4], axis=2)
-        turn += weight[:, c, None] * (np.sum(slope * spread[..., :4], axis=2) - left * tilt)
-        energy += 0.5 * weight[:, c] * np.sum(curves.y[c] ** 2) - 0.5 * points * np.log(weight[:, c])
-        energy += np.sum(bend[:, c], axis=1)
-        squares = np.sum(left**2, axis=1) + np.sum(value * spread, axis=(1, 2))
-        gradient[:, lines + bends + c] = (points / weight[:, c] - squares) * (weight[:, c] * noise[:, c]) ** 2
-        block = slice(c * splines, (c + 1) * splines)
-        rough = (mean[:, block] @ second.T) ** 2 + np.sum((second @ covariance[:, block, block]) * second, axis=2)
-        by_bend = 1 - rough * np.exp(-2 * bend[:, c])
-        gradient[:, lines + c * count : lines + (c + 1) * count] = np.einsum("wj,wjk->wk", by_bend, share)
-        change = share * (near[:, c, None] - bend[:, c, :, None]) * apart / REACH**2
-        by_place += np.einsum("wj,wjk->wk", by_bend, change)
-    if offsets:
-        own = np.sum(mean[:, -offsets:] @ curves.tied * mean[:, -offsets:], axis=1)
-        own += np.sum(covariance[:, -offsets:, -offsets:] * curves.tied, axis=(1, 2))
-        energy += offsets * logs[:, -1]
-        gradient[:, -1] = offsets - own * np.exp(-2 * logs[:, -1])
     gradient[:, :lines] = (turn * CELLS @ np.eye(count)[curves.member] + by_place)[:, 1:]
+    gradient[:, lines : lines + bends] = np.einsum("wcj,wjk->wck", by_bend, share).reshape(many, bends)
+    gradient[:, lines + bends : lines + bends + channels] = (points / weight - squares) * (weight * noise) ** 2
+    if offsets:
+        found = linear.mean[:, -offsets:]
+        squared = found[:, :, None] * found[:, None] + linear.offsets
+        energy += offsets * logs[:, -1]
+        gradient[:, -1] = offsets - np.sum(squared * tied, axis=(1, 2))
     pull = away @ known
-    return Solved(energy + 0.5 * np.sum(pull * away, axis=1), gradient + pull, mean, covariance)
-
-
-def _inverse(precision: FloatArray, channels: int, splines: int) -> tuple[FloatArray, FloatArray]:
-    """Return inverses and log determinants of precisions in which channels are tied by the offsets alone."""
-    blocks = [slice(c * splines, (c + 1) * splines) for c in range(channels)]
-    alone = [np.linalg.inv(precision[:, block, block]) for block in blocks]
-    log_determinant = sum(np.linalg.slogdet(precision[:, block, block])[1] for block in blocks)
-    covariance = np.zeros_like(precision)
-    offsets = slice(channels * splines, None)
-    if precision.shape[1] > channels * splines:
-        gains = [one @ precision[:, block, offsets] for one, block in zip(alone, blocks, strict=True)]
-        rest = precision[:, offsets, offsets] - sum(
-            precision[:, offsets, block] @ gain for gain, block in zip(gains, blocks, strict=True)
-        )
-        inner = np.linalg.inv(rest)
-        log_determinant = log_determinant + np.linalg.slogdet(rest)[1]
-        gain = np.concatenate(gains, axis=1)
-        covariance[:, : offsets.start, : offsets.start] = gain @ inner @ gain.transpose(0, 2, 1)
-        covariance[:, : offsets.start, offsets] = -gain @ inner
-        covariance[:, offsets, : offsets.start] = covariance[:, : offsets.start, offsets].transpose(0, 2, 1)
-        covariance[:, offsets, offsets] = inner
-    for one, block in zip(alone, blocks, strict=True):
-        covariance[:, block, block] += one
-    return covariance, np.asarray(log_determinant)
+    return Solved(energy + 0.5 * np.sum(pull * away, axis=1), gradient + pull, linear.mean, factors)
 
 
 def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, FloatArray]:
     """Return the first of the four splines at each place in cells, their values, and their derivatives there."""
-    first = np.clip(np.floor(place), 0, splines - 4).astype(np.intp)
+    # places that are no numbers, of rows gone astray, must not become indices; their values stay no numbers
+    first = np.clip(np.nan_to_num(np.floor(place)), 0, splines - 4).astype(np.intp)
     inside = np.clip(place - first, 0.0, 1.0)
     slope = _SLOPES(inside)
     return first, _VALUES(inside) + (place - first - inside)[..., None] * slope, slope

@@ -70,11 +70,11 @@ def laid_out(curves: Curves, shifts: FloatArray) -> Curves:
 def draws(curves: Curves, generator: np.random.Generator) -> tuple[Curves, FloatArray]:
     """Return the curves with the spline used, and draws of their parameters, shape (draws, parameters)."""
     shifts = first_guess(curves)
-    for _ in range(2):  # the second time with a spline about the best shifts
-        curves = laid_out(curves, shifts)
-        start = _best(curves, np.append(shifts, curves.prior[0][shifts.size :]), shifts.size)
-        start = _best(curves, start)
-        shifts = start[: shifts.size]
+    curves = laid_out(curves, shifts)
+    start = _best(curves, np.append(shifts, curves.prior[0][shifts.size :]), shifts.size)
+    start = _best(curves, start)
+    curves = laid_out(curves, start[: shifts.size])  # with a spline about the best shifts
+    start = _best(curves, start)
     scale = _scale(curves, start)
     place = start + generator.standard_normal((CHAINS, start.size)) @ scale.T
     here, share, kept = solve(curves, place), 1.0, []
@@ -136,9 +136,7 @@ def _hop(curves: Curves, place: FloatArray, generator: np.random.Generator) -> t
 
 def _best(curves: Curves, start: FloatArray, fixed: int = 0) -> FloatArray:
     """Return the most probable parameters, the first `fixed` ones kept."""
-    scale = _scale(curves, start)
-    if fixed:
-        scale = np.vstack([np.zeros((fixed, start.size - fixed)), np.eye(start.size - fixed)])
+    scale = np.eye(start.size)[:, fixed:] if fixed else _scale(curves, start)
 
     def energy(away: FloatArray) -> tuple[float, FloatArray]:
         found = solve(curves, (start + scale @ away)[None])

@@ -1,0 +1,377 @@
+"""Normal distributions of splines that are tied by a few common offsets: banded factors, and what follows from them.
+
+The unknowns are the spline coefficients m_c of each channel c, followed by the offsets v. Their precision is
+
+    [ A_c   B_c ]
+    [ B_c^T  D  ],
+
+where A_c is banded (half bandwidth 3) and channels are coupled by the offsets alone. It is L L^T with the banded
+factors L_c of A_c, the border W_c = L_c^-1 B_c, and the factor of the corner D - sum_c W_c^T W_c. A lower or symmetric
+matrix M is stored by diagonals: ``band[i, d]`` is M[i, i - d]. The corner is stored in the same way, with all its
+diagonals, so that the same functions serve both. A row of parameters costs O(splines (4 + offsets)^2) operations.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mdr_dask.arrays import FloatArray, IntArray
+from mdr_dask.physics.jit import jit
+
+ORDER = 4
+"""Cubic B-splines that overlap at a place, so that a band holds as many diagonals."""
+
+EPS = float(np.finfo(np.float64).eps)
+
+
+class Factors(NamedTuple):
+    """Cholesky factors of the precision for rows of parameters.
+
+    Parameters
+    ----------
+    band : array, shape (rows, channels, splines, 4)
+        L_c, stored by diagonals.
+    border : array, shape (rows, channels, splines, offsets)
+        W_c.
+    corner : array, shape (rows, offsets, offsets)
+        Factor of the corner, stored by diagonals.
+    """
+
+    band: FloatArray
+    border: FloatArray
+    corner: FloatArray
+
+
+class Linear(NamedTuple):
+    """What follows from the factors for rows of parameters.
+
+    Parameters
+    ----------
+    mean : array, shape (rows, unknowns)
+        Spline coefficients, channel by channel, then the offsets.
+    log_determinant : array, shape (rows,)
+        That of the precision.
+    fitted, slope : array, shape (rows, channels, points)
+        Mean of the curve less the offset, and its derivative with respect to the abscissa in cells, at each point.
+    variance, tilt : array, shape (rows, channels, points)
+        Variance of the former, and covariance of the two.
+    rough : array, shape (rows, channels, splines - 2)
+        Mean square of the second differences.
+    offsets : array, shape (rows, offsets, offsets)
+        Covariance of the offsets.
+    """
+
+    mean: FloatArray
+    log_determinant: FloatArray
+    fitted: FloatArray
+    slope: FloatArray
+    variance: FloatArray
+    tilt: FloatArray
+    rough: FloatArray
+    offsets: FloatArray
+
+
+def solve_rows(
+    first: IntArray,
+    value: FloatArray,
+    slope: FloatArray,
+    member: IntArray,
+    y: FloatArray,
+    weight: FloatArray,
+    stiffness: FloatArray,
+    tied: FloatArray,
+) -> tuple[Factors, Linear]:
+    """Return factors of the precision of the unknowns, and what the density of the parameters needs of its inverse.
+
+    Parameters
+    ----------
+    first : array of int, shape (rows, points)
+        First of the four splines at each point.
+    value, slope : array, shape (rows, points, 4)
+        Their values and derivatives.
+    member : array of int, shape (points,)
+        Number of the offset of each point.
+    y : array, shape (channels, points)
+    weight : array, shape (rows, channels)
+        Precision of y.
+    stiffness : array, shape (rows, channels, splines - 2)
+        Prior precision of the second differences.
+    tied : array, shape (rows, offsets, offsets)
+        Prior precision of the offsets; of shape (rows, 0, 0) for curves without.
+    """
+    (rows, points), (channels, splines), offsets = first.shape, stiffness.shape[1:], tied.shape[1]
+    splines += 2
+    factors = Factors(
+        np.zeros((rows, channels, splines, ORDER)),
+        np.zeros((rows, channels, splines, offsets)),
+        np.zeros((rows, offsets, offsets)),
+    )
+    linear = Linear(
+        np.zeros((rows, channels * splines + offsets)),
+        np.zeros(rows),
+        np.zeros((rows, channels, points)),
+        np.zeros((rows, channels, points)),
+        np.zeros((rows, channels, points)),
+        np.zeros((rows, channels, points)),
+        np.zeros((rows, channels, splines - 2)),
+        np.zeros((rows, offsets, offsets)),
+    )
+    _factorise(first, value, member, y, weight, stiffness, tied, *factors, linear.mean, linear.log_determinant)
+    _select(first, value, slope, member, *factors, *linear)
+    return factors, linear
+
+
+def drawn(factors: Factors, normal: FloatArray) -> FloatArray:
+    """Return departures from the mean whose precision is L L^T, from standard normal ones, shape (rows, unknowns)."""
+    found = normal.copy()
+    _back_substitute(*factors, found)
+    return found
+
+
+@jit
+def _factorise(
+    first: IntArray,
+    value: FloatArray,
+    member: IntArray,
+    y: FloatArray,
+    weight: FloatArray,
+    stiffness: FloatArray,
+    tied: FloatArray,
+    band: FloatArray,
+    border: FloatArray,
+    corner: FloatArray,
+    mean: FloatArray,
+    log_determinant: FloatArray,
+) -> None:
+    """Build the precision of each row, factorise it, and solve for the mean."""
+    rows, channels, splines, offsets = border.shape
+    begin = channels * splines
+    for r in range(rows):
+        for i in range(offsets):
+            for j in range(i + 1):
+                corner[r, i, i - j] = tied[r, i, j]
+        for c in range(channels):
+            own, side, right = band[r, c], border[r, c], mean[r, c * splines : (c + 1) * splines]
+            _add_bending(stiffness[r, c], own)
+            _add_points(first[r], value[r], y[c], weight[r, c], own, right)
+            if offsets:
+                _add_ties(first[r], value[r], member, y[c], weight[r, c], side, corner[r], mean[r, begin:])
+            log_determinant[r] += _cholesky(own)
+            _forward(own, mean[r : r + 1, c * splines : (c + 1) * splines].T)
+            _forward(own, side)
+            for i in range(splines):
+                for k in range(offsets):
+                    mean[r, begin + k] -= side[i, k] * right[i]
+                    for j in range(k + 1):
+                        corner[r, k, k - j] -= side[i, k] * side[i, j]
+        log_determinant[r] += _cholesky(corner[r])
+        _forward(corner[r], mean[r : r + 1, begin:].T)
+    _back_substitute(band, border, corner, mean)
+
+
+@jit
+def _add_bending(stiffness: FloatArray, band: FloatArray) -> None:
+    """Add the precision of second differences."""
+    second = (1.0, -2.0, 1.0)
+    for j in range(stiffness.size):
+        for a in range(3):
+            for b in range(a + 1):
+                band[j + a, a - b] += stiffness[j] * second[a] * second[b]
+
+
+@jit
+def _add_points(
+    first: IntArray, value: FloatArray, y: FloatArray, weight: float, band: FloatArray, right: FloatArray
+) -> None:
+    """Add the precision of the points of a channel, and their share of the right side."""
+    for p in range(first.size):
+        at = first[p]
+        for a in range(ORDER):
+            weighted = weight * value[p, a]
+            right[at + a] += weighted * y[p]
+            for b in range(a + 1):
+                band[at + a, a - b] += weighted * value[p, b]
+
+
+@jit
+def _add_ties(
+    first: IntArray,
+    value: FloatArray,
+    member: IntArray,
+    y: FloatArray,
+    weight: float,
+    border: FloatArray,
+    corner: FloatArray,
+    right: FloatArray,
+) -> None:
+    """Add what the points of a channel contribute to the rows of the offsets, which are subtracted from the spline."""
+    for p in range(first.size):
+        k = member[p]
+        corner[k, 0] += weight
+        right[k] -= weight * y[p]
+        for a in range(ORDER):
+            border[first[p] + a, k] -= weight * value[p, a]
+
+
+@jit
+def _select(
+    first: IntArray,
+    value: FloatArray,
+    slope: FloatArray,
+    member: IntArray,
+    band: FloatArray,
+    border: FloatArray,
+    corner: FloatArray,
+    mean: FloatArray,
+    log_determinant: FloatArray,
+    fitted: FloatArray,
+    tangent: FloatArray,
+    variance: FloatArray,
+    tilt: FloatArray,
+    rough: FloatArray,
+    covariance: FloatArray,
+) -> None:
+    """Compute the entries of the covariance that are needed, and what they give at each point."""
+    rows, channels, splines, offsets = border.shape
+    begin = channels * splines
+    within = np.empty((splines, ORDER))  # the band of the covariance of a channel
+    inner = np.empty((offsets, offsets))
+    gain = np.empty((splines, offsets))  # G = A^-1 B
+    cross = np.empty((splines, offsets))  # G S^-1: the covariance with the offsets, apart from its sign
+    for r in range(rows):
+        _inverse_band(corner[r], inner)
+        for i in range(offsets):
+            for j in range(i + 1):
+                covariance[r, i, j] = covariance[r, j, i] = inner[i, i - j]
+        for c in range(channels):
+            own = mean[r, c * splines : (c + 1) * splines]
+            _inverse_band(band[r, c], within)
+            _add_border(band[r, c], border[r, c], corner[r], within, gain, cross)
+            for j in range(splines - 2):
+                bend = own[j] - 2 * own[j + 1] + own[j + 2]
+                square = within[j, 0] + 4 * within[j + 1, 0] + within[j + 2, 0]
+                rough[r, c, j] = bend**2 + square - 4 * (within[j + 1, 1] + within[j + 2, 1]) + 2 * within[j + 2, 2]
+            _at_points(
+                first[r], value[r], slope[r], own, within, fitted[r, c], tangent[r, c], variance[r, c], tilt[r, c]
+            )
+            for p in range(member.size if offsets else 0):
+                at, k = first[r, p], member[p]
+                fitted[r, c, p] -= mean[r, begin + k]
+                variance[r, c, p] += covariance[r, k, k]
+                for a in range(ORDER):
+                    variance[r, c, p] += 2 * value[r, p, a] * cross[at + a, k]
+                    tilt[r, c, p] += slope[r, p, a] * cross[at + a, k]
+
+
+@jit
+def _add_border(
+    band: FloatArray, border: FloatArray, corner: FloatArray, within: FloatArray, gain: FloatArray, cross: FloatArray
+) -> None:
+    """Add G S^-1 G^T to the band of the covariance of a channel; write G and G S^-1."""
+    splines, offsets = border.shape
+    gain[:] = border
+    _backward(band, gain)
+    cross[:] = gain
+    _forward(corner, cross.T)
+    _backward(corner, cross.T)
+    for i in range(splines):
+        for d in range(min(i + 1, ORDER)):
+            for k in range(offsets):
+                within[i, d] += cross[i, k] * gain[i - d, k]
+
+
+@jit
+def _at_points(
+    first: IntArray,
+    value: FloatArray,
+    slope: FloatArray,
+    mean: FloatArray,
+    within: FloatArray,
+    fitted: FloatArray,
+    tangent: FloatArray,
+    variance: FloatArray,
+    tilt: FloatArray,
+) -> None:
+    """Add mean and covariance of a curve and its slope at each point."""
+    for p in range(first.size):
+        at = first[p]
+        for a in range(ORDER):
+            spread = 0.0  # covariance of a coefficient and the curve
+            for b in range(ORDER):
+                spread += within[at + max(a, b), abs(a - b)] * value[p, b]
+            fitted[p] += value[p, a] * mean[at + a]
+            tangent[p] += slope[p, a] * mean[at + a]
+            variance[p] += value[p, a] * spread
+            tilt[p] += slope[p, a] * spread
+
+
+@jit
+def _back_substitute(band: FloatArray, border: FloatArray, corner: FloatArray, right: FloatArray) -> None:
+    """Replace each right side by the solution of L^T x = right, shape (rows, unknowns)."""
+    rows, channels, splines, offsets = border.shape
+    begin = channels * splines
+    for r in range(rows):
+        _backward(corner[r], right[r : r + 1, begin:].T)
+        for c in range(channels):
+            for i in range(splines):
+                for k in range(offsets):
+                    right[r, c * splines + i] -= border[r, c, i, k] * right[r, begin + k]
+            _backward(band[r, c], right[r : r + 1, c * splines : (c + 1) * splines].T)
+
+
+@jit
+def _cholesky(band: FloatArray) -> float:
+    """Replace a symmetric matrix by its lower factor, and return its log determinant.
+
+    A pivot that is lost to rounding is set to the rounding error of the diagonal.
+    """
+    size, width = band.shape
+    log_determinant = 0.0
+    for i in range(size):
+        low, diagonal = max(i - width + 1, 0), band[i, 0]
+        for j in range(low, i + 1):
+            rest = band[i, i - j]
+            for k in range(low, j):
+                rest -= band[i, i - k] * band[j, j - k]
+            band[i, i - j] = np.sqrt(max(rest, EPS * diagonal)) if i == j else rest / band[j, 0]
+        log_determinant += 2 * np.log(band[i, 0])
+    return log_determinant
+
+
+@jit
+def _forward(band: FloatArray, right: FloatArray) -> None:
+    """Replace the columns of the right side by the solutions of L x = right."""
+    (size, width), columns = band.shape, right.shape[1]
+    for i in range(size):
+        for j in range(max(i - width + 1, 0), i):
+            for m in range(columns):
+                right[i, m] -= band[i, i - j] * right[j, m]
+        for m in range(columns):
+            right[i, m] /= band[i, 0]
+
+
+@jit
+def _backward(band: FloatArray, right: FloatArray) -> None:
+    """Replace the columns of the right side by the solutions of L^T x = right."""
+    (size, width), columns = band.shape, right.shape[1]
+    for i in range(size - 1, -1, -1):
+        for j in range(i + 1, min(i + width, size)):
+            for m in range(columns):
+                right[i, m] -= band[j, j - i] * right[j, m]
+        for m in range(columns):
+            right[i, m] /= band[i, 0]
+
+
+@jit
+def _inverse_band(band: FloatArray, inverse: FloatArray) -> None:
+    """Write the entries within the band of the inverse of L L^T (recursion of Takahashi, Fagan and Chin, 1973)."""
+    size, width = band.shape
+    for j in range(size - 1, -1, -1):
+        last = min(j + width, size) - 1
+        for i in range(last, j - 1, -1):
+            rest = 1 / band[j, 0] if i == j else 0.0
+            for k in range(j + 1, last + 1):
+                rest -= inverse[max(i, k), abs(i - k)] * band[k, k - j]
+            inverse[i, i - j] = rest / band[j, 0]
