@@ -49,27 +49,35 @@ class Executor(AbstractContextManager["Executor"]):
         Name of the model.
     url : str
         The store.
-    lock : Lock
-        Lock of the run; blocks that a crashed run had begun are computed in processes of their own.
     tell : callable
         Takes events.
     """
 
-    def __init__(self, resources: Resources, model: str, url: str, lock: Lock, tell: Tell) -> None:
-        self._resources, self._url, self._lock, self._tell = resources, url, lock, tell
+    def __init__(self, resources: Resources, model: str, url: str, tell: Tell) -> None:
+        self._resources, self._url, self._tell = resources, url, tell
         self._threads = resources.threads or _cores()
         is_python = getattr(models.load(model).compute, "is_plain_python", False)
         self._may_fork = hasattr(os, "fork")
         self._prefers_processes = is_python and resources.threads is None and self._threads > 1
-        self._suspects = set(lock.begun)
         self._helpers: list[Helper] = []
-        self._begun: set[str] = set(lock.begun)
         self._noting = threading.Lock()
         self._stack = ExitStack()
         self._window: TaskWindow | None = None
 
     def __exit__(self, *_: object) -> None:
         self._stack.close()
+
+    def hold(self, lock: Lock) -> None:
+        """Compute under the lock of a run; blocks that a crashed run had begun are computed in their own processes."""
+        self._lock = lock
+        self._suspects, self._begun = set(lock.begun), set(lock.begun)
+
+    def connect(self) -> None:
+        """Start or find the cluster, if one is named, before anything is written."""
+        from mdr_dask.execute.clusters import task_window
+
+        if self._resources.remote and self._window is None:
+            self._window = self._stack.enter_context(task_window(self._resources, self._tell))
 
     def __call__(self, works: Iterable[Work], settle: Settle) -> None:
         """Compute blocks, and settle each that has ended, in whatever order."""
@@ -111,10 +119,8 @@ class Executor(AbstractContextManager["Executor"]):
                 yield work
 
     def _on_cluster(self, works: Iterable[Work], settle: Settle) -> None:
-        from mdr_dask.execute.clusters import task_window
-
-        if self._window is None:
-            self._window = self._stack.enter_context(task_window(self._resources, self._tell))
+        self.connect()
+        assert self._window is not None
         self._window.run(works, settle)
 
     def _in_pool(self, works: Iterable[Work], compute: Compute, settle: Settle) -> None:

@@ -123,18 +123,21 @@ def run(
         from mdr_dask.fits.answers import require_known
 
         require_known(campaign)
-    url = store.absolute(url)  # a model may change the working directory
     stage = Stage.first(campaign)
     stored_layout(stage, url)  # refuses before anything is locked
-    with store.exclusive(url) if part is None else store.shared(url, part) as lock:
-        if store.exists(url):
-            store.require_sound(url, store.series_names(url))
-        with Executor(resources, campaign.model, url, lock, tell) as execute:
+    url = store.absolute(url)  # a model may change the working directory
+    with Executor(resources, campaign.model, url, tell) as execute:
+        if not store.exists(url):
+            execute.connect()  # a cluster that cannot be reached leaves no new store
+        with store.exclusive(url) if part is None else store.shared(url, part) as lock:
+            execute.hold(lock)
+            if store.exists(url):
+                store.require_sound(url, store.series_names(url))
             job = _Job(stage, url, lock, execute, part, retry_failed, report, tell)
             progress = _run_stages(job)
-        if progress.blocks:
-            _merge(job)
-        return progress
+            if progress.blocks:
+                _merge(job)
+            return progress
 
 
 def _merge(job: _Job) -> None:
