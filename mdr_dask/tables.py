@@ -509,6 +509,10 @@ def numbers(sheet: Sheet) -> FloatArray:
     return np.array(columns).T
 
 
+#: Columns without names that are described one by one; more of them are a map.
+MOST_DESCRIBED = 6
+
+
 def described(text: str, source: str) -> str:
     """Return the number of rows of a table, and name, unit and range of its columns, as it has them.
 
@@ -519,6 +523,8 @@ def described(text: str, source: str) -> str:
     """
     sheet = read_sheet(text, source)
     columns = numbers(sheet).T
+    if not sheet.names and len(columns) > MOST_DESCRIBED:
+        return f"{len(sheet.rows)} rows x {len(columns)} columns, {np.nanmin(columns):.4g} to {np.nanmax(columns):.4g}"
     names = [cell.text for cell in sheet.names] or [f"column {place}" for place in range(1, len(columns) + 1)]
     ranges = []
     for name, unit, column in zip(names, sheet.units, columns, strict=True):

@@ -79,9 +79,7 @@ def problems(figure):
 
 
 @pytest.mark.parametrize("size", ["", "85mm", "170mm", "85x60mm"])
-@pytest.mark.parametrize(
-    ("curves", "second", "words"), [(1, 1, False), (5, 1, False), (25, 1, False), (6, 3, False), (25, 3, True)]
-)
+@pytest.mark.parametrize("case", [(1, 1, False), (5, 1, False), (25, 1, False), (6, 3, False), (25, 3, True)])
 def test_nothing_overlaps_and_nothing_is_cut(size, case):
     curves, second, words = case
     asked = page.Page(*(page.size(size) if size else ()))
