@@ -104,7 +104,7 @@ def test_what_is_wrong_with_it_is_one_sentence_at_its_line(example, capsys, name
 
 def test_installed_packages_offer_models_and_fits_by_name(example, monkeypatch):
     entry = EntryPoint("wear_rate", "wear_rate:MODEL", models.GROUP)
-    monkeypatch.setattr(models, "_offered", lambda: {"wear_rate": entry})
+    monkeypatch.setattr(models, "_installed", lambda: {"wear_rate": entry})
     assert models.load("wear_rate").summary == "Archard's law"
     assert models.names()[-1] == "wear_rate"
     with pytest.raises(ModelError, match="unknown model 'wear'"):

@@ -68,8 +68,8 @@ def general_cases(family, cases, seed):
 def ratios(found, exact):
     """Return errors over their estimates, and estimates over the numbers, for every column."""
     (state, errors), rows = found, []
-    for column in COLUMNS:
-        value, true, error = (float(getattr(each, column)[0]) for each in (state, exact, errors))
+    for column, error in zip(COLUMNS, errors[:, 0], strict=True):
+        value, true = (float(getattr(each, column)[0]) for each in (state, exact))
         rows.append((abs(value - true) / (error + ROUNDING * abs(true)), error / abs(value), abs(value / true - 1)))
     return np.array(rows)
 

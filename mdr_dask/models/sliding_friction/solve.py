@@ -139,9 +139,9 @@ class _Group:
             yield int(k), Outcome(int(status[k])).sentence
         if self.request.oversampling == "auto":
             asked = [name for name in OUTPUTS if name in self.block.outputs]
-            values, errors = ({name: found[name] for name in asked} for found in (values, errors))
+            found, stated = ({name: each[name] for name in asked} for each in (values, errors))
             floors = {"indentation_depth": self._height}
-            yield from missed_accuracy(values, errors, self.request.accuracy, floors, " on the finest grid").items()
+            yield from missed_accuracy(found, stated, self.request.accuracy, floors, " on the finest grid").items()
         if isinstance(self.setting.roughness, OfSurface) and self.setting.body is None:
             yield from beyond_tested(self.loads[self.which], values["contact_fraction"]).items()
 
