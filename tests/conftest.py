@@ -18,6 +18,8 @@ if "NUMBA_CACHE_DIR" not in os.environ:
     name = hashlib.sha1(sources, usedforsecurity=False).hexdigest()[:12]
     os.environ["NUMBA_CACHE_DIR"] = str(PHYSICS.parents[1] / ".numba_cache" / name)
 
+os.environ.pop("COLUMNS", None)  # xdist exports it, and messages are wrapped where it is exported
+
 # the same examples every time; `--hypothesis-profile=search` looks for new ones; no deadline, for machines may be busy
 hypothesis.settings.register_profile("repeatable", derandomize=True, deadline=None)
 hypothesis.settings.register_profile("search", deadline=None)

@@ -35,8 +35,8 @@ parameters:
 outputs: [central_film, central_film_thickness, pressure, traction_coefficient]
 """
 PROFILES = """\
-  surface_1: {profile: {file: one.csv, unit: um}}
-  surface_2: {profile: {file: two.csv, unit: um}}
+  surface_1: {profile: {file: one.csv, unit: um, x_unit: um}}
+  surface_2: {profile: {file: two.csv, unit: um, x_unit: um}}
 """
 
 
@@ -207,10 +207,10 @@ def test_ranges_that_are_left_stand_beside_the_results(capsys):
     for name in ("mixed", "loaded", "line"):
         assert main(["status", f"results/{name}.zarr", "--messages"]) == 0
         told[name] = capsys.readouterr().out
-    assert "film formula Pan-Hamrock (central): W = " in told["mixed"]
+    assert "film formula Pan-Hamrock (central) is extrapolated: W lies outside" in told["mixed"]
     assert "film ratio" in told["loaded"]
     assert "apart by the given film would carry" in told["loaded"]
-    assert "film formula Pan-Hamrock (central): W = " in told["line"]
+    assert "film formula Pan-Hamrock (central) is extrapolated: W lies outside" in told["line"]
 
 
 @pytest.mark.parametrize(("errors", "turns"), [("true", 4), ("false", 7)])
