@@ -249,7 +249,7 @@ MODELS = {
         | {"indenter": {"shape": "parabola", "radius": 0.01}, "normal_force": 50.0, "amplitude": 5e-7, "xi": 0.8}
         | {"wear_coefficient": 1e-4, "cycles": 2e4, "points": 5, "wear_rule": "fast"},
     ),
-    "worn exactly": ("fretting_wear", {"stick_radius": 0.5, "cycles": 1.0, "accuracy": 0.1, "points": 5}),
+    "worn exactly": ("fretting_wear", {"stick_radius": 0.5, "cycles": 1.0, "points": 5}),
     "film": (
         "ehl_line",
         {"radius": 0.01, "line_load": 1e5, "mean_velocity": 1.0, "viscosity": 0.08, "pressure_viscosity": 2e-8}

@@ -121,7 +121,7 @@ def test_a_fault_of_the_program_has_its_own_exit_code_and_a_report(filled, monke
     def broken(*_):
         raise RuntimeError("wheels came off")
 
-    monkeypatch.setattr("mdr_dask.store.look", broken)
+    monkeypatch.setattr("mdr_dask.store.series_names", broken)
     assert main(["status", str(filled)]) == cli.BROKE == 3
     said = capsys.readouterr().err
     assert len(said.splitlines()) == 1

@@ -189,8 +189,13 @@ class _Expansion:
         """Return the checked values of every varied parameter, case by case; None for all if a case is wrong."""
         known = _checked(base, self.data, {one.path[0] for one in variations})
         cases = range(min((len(one.items) for one in variations), default=0))
-        if all(one.spread and fields.is_independent(self.parameters, one.path, self.data) for one in variations):
-            sizes = [[item.value for item in one.items] for one in variations]
+        sizes = [[item.value for item in one.items] for one in variations]
+        if all(
+            one.spread
+            and all(isinstance(value, int | float) for value in values)
+            and fields.is_independent(self.parameters, one.path, self.data)
+            for one, values in zip(variations, sizes, strict=True)
+        ):
             extremes = {values.index(end(values)) for values in sizes for end in (min, max)}
             good = [self._validate(known, variations, position, broken) is not None for position in extremes]
             return [values if all(good) else None for values in sizes]

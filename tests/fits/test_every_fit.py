@@ -59,7 +59,7 @@ STUDIES: dict[str, tuple[str, dict[str, object], set[str]]] = {
     "spectrum, one realisation": (SLIDING + SPECTRUM + KELVIN + SPEEDS, {"realisations": 1}, OF_SLOPE),
     "spectrum, rough cone": (SLIDING + SPECTRUM + KELVIN + SPEEDS + CONE, {}, OF_SLOPE),
     "spectrum, Prony series": (SLIDING + SPECTRUM + PRONY + SPEEDS, {}, {"master_curve"}),
-    "moduli of a table": (SLIDING + ROUGH + DMA + SPEEDS, {}, {"master_curve", "contact_slope"}),
+    "moduli of a table": (SLIDING + ROUGH + DMA + SPEEDS, {}, {"contact_slope"}),
     "smooth and rough cone": (
         SLIDING + LENGTH + "  rms_roughness: [0 m, 1 um]\n" + KELVIN + SPEEDS + CONE,
         {},

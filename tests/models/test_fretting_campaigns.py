@@ -104,8 +104,8 @@ def test_cases_that_only_differ_in_stiffness_share_the_closed_forms(write, capsy
 
 def test_sliding_from_a_campaign(write):
     path = write(
-        "  indenter: [{shape: parabola}, {shape: cone}]\n  hold: [depth, force]\n  path: [0, 1, 40]\n"
-        "  accuracy: 1e-4\n",
+        "  indenter: [{shape: parabola}, {shape: cone}]\n  hold: [depth, force]\n  path: [0, 1, 40]\n",
+        "accuracy: 1e-4\n"
         "outputs: [contact_radius, wear_volume, contact_force, worn_profile, worn_image, pressure, worn_depth, "
         "block_depth, stick_border]\n",
     )

@@ -380,7 +380,7 @@ def solve_film(
     >>> found = solve_film(line_contact((2e-5, 1e-11, 5000.0), E_star=115e9))
     >>> central = found.central_film.scaled(8 * 2e-5 / np.pi)  # a^2/R^2
     >>> print(f"h_c/R = {central.value:.3e}")
-    h_c/R = 2.546e-05
+    h_c/R = 2.547e-05
     """
     outcome, source = _source(case)
     if outcome != Outcome.CONVERGED:
