@@ -157,10 +157,28 @@ def chance(residuals: FloatArray, count: int, draws: int = RESAMPLES) -> float:
     draws : int
         Number of resamples among the rows.
     """
+    caused = _caused(residuals, count, draws)
+    return float(np.mean(caused >= np.sqrt(np.mean(residuals[0] ** 2)))) if caused.size else np.nan
+
+
+def scatter(residuals: FloatArray, count: int) -> float:
+    """Return the rms residual that scatter and errors alone exceed with a probability of 5 %; NaN if unknown.
+
+    Parameters
+    ----------
+    residuals, count
+        As for `chance`.
+    """
+    caused = _caused(residuals, count, RESAMPLES)
+    return float(np.quantile(caused, CONFIDENCE, method="higher")) if caused.size else np.nan
+
+
+def _caused(residuals: FloatArray, count: int, draws: int) -> FloatArray:
+    """Return the rms residuals that scatter and errors alone cause, one per resample; none if there are too few."""
     flat = residuals.reshape(residuals.shape[0], -1)
-    size = np.sqrt(np.sum(flat[0] ** 2))
-    away = np.sqrt(np.sum((flat[1:] - flat[0]) ** 2, axis=1))
-    scatter = away[:draws][~np.isnan(away[:draws])]
-    if count < 2 or scatter.size < FEWEST:
-        return np.nan
-    return float(np.mean(widening(count) * scatter + _reach(away[draws:]) >= size))
+    away = np.sqrt(np.mean((flat[1:] - flat[0]) ** 2, axis=1))
+    known = away[:draws][~np.isnan(away[:draws])]
+    if count < 2 or known.size < FEWEST:
+        return np.empty(0)
+    caused: FloatArray = widening(count) * known + _reach(away[draws:])
+    return caused

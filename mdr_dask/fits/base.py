@@ -182,7 +182,9 @@ def verdict(
     if residuals.shape[1] <= constants:
         return law_holds(residuals[0], np.nan, constants)
     place = where(int(np.argmax(np.abs(residuals[0])))) if where else ""
-    return law_holds(residuals[0], None if excluded else bootstrap.chance(residuals, count), constants, place)
+    chance = bootstrap.chance(residuals, count)
+    by_chance = None if excluded and not np.isnan(chance) else chance
+    return law_holds(residuals[0], by_chance, constants, place, bootstrap.scatter(residuals, count))
 
 
 def excludes(stack: FloatArray, count: int, stated: float) -> bool:
@@ -196,25 +198,32 @@ def short(number: float) -> str:
     return f"{float(f'{number:.2g}'):g}"
 
 
-def law_holds(departures: FloatArray, chance: float | None, constants: int = 0, where: str = "") -> str:
+def law_holds(
+    departures: FloatArray, chance: float | None, constants: int = 0, where: str = "", scatter: float = 0.0
+) -> str:
     """Say whether a law holds.
+
+    Scatter never improves a verdict: where it may hide a departure beyond a limit, the limit counts as exceeded, and
+    where it may hide any departure up to the largest limit, the law is not tested.
 
     Parameters
     ----------
     departures : array
         Relative departures of the data from the law.
     chance : float or None
-        Probability that scatter and errors alone cause as large departures; NaN if unknown, None for data without
-        scatter.
+        Probability that scatter and errors alone cause as large departures; NaN if unknown, None if they cannot.
     constants : int
         Number of constants fitted to these data.
     where : str
         Description of the case with the largest departure.
+    scatter : float
+        Rms departure that scatter and errors alone exceed with a probability of 5 %; NaN if unknown.
     """
     if departures.size <= constants:
         return f"not tested: {departures.size} cases for {constants} constants leave nothing to compare"
     rms, largest = 100 * np.sqrt(np.mean(departures**2)), 100 * np.max(np.abs(departures))
-    limit = 100 * (WITHIN if max(rms, largest / 2) <= 100 * WITHIN else APPROXIMATE)
+    size = max(rms, largest / 2)
+    limit = 100 * (WITHIN if max(size, 100 * scatter) <= 100 * WITHIN else APPROXIMATE)
     pairs = distinguishable(rms, limit, digits=2), distinguishable(largest, 2 * limit, digits=2)
     (mean, of_mean), (most, of_most) = ((_plain(one), _plain(other)) for one, other in pairs)
     if departures.size == 1:
@@ -222,18 +231,25 @@ def law_holds(departures: FloatArray, chance: float | None, constants: int = 0, 
     else:
         departs = f"departs by {mean} % rms, at most {most} %{f' at {where}' if where else ''}"
         limits = f"limits {of_mean} % and {of_most} %"
-    if max(rms, largest / 2) <= 100 * WITHIN:
-        return f"yes: {departs}; {limits}"
-    if chance is not None and chance >= DOUBTFUL:
-        return f"yes: {departs}, which scatter explains (probability {chance:.2g})"
-    if max(rms, largest / 2) <= limit:
-        return f"approximately: {departs}; {limits}"
-    if chance is None:
-        return f"no: {departs}; {limits}"
-    if np.isnan(chance):
+    if np.isnan(scatter) or (chance is not None and np.isnan(chance) and size > limit):
         return f"not tested: too few realisations for the scatter; {departs}"
-    likely = f"{chance:.2g}" if chance else f"below {1 / bootstrap.RESAMPLES:g}"
-    return f"no: {departs}; scatter alone would cause this with probability {likely}"
+    if np.isinf(scatter):
+        return f"not tested: errors of the results are unknown; {departs}"
+    hidden = f"scatter alone may cause {_plain(short(100 * scatter))} % rms"
+    if size > limit and (chance is None or chance < DOUBTFUL):
+        because = limits if chance is None else f"scatter alone would cause this with {_probability(chance)}"
+        return f"no: {departs}; {because}"
+    if size > limit:
+        return f"not tested: {departs}, which scatter explains ({_probability(chance)})"
+    if 100 * scatter > limit:
+        return f"not tested: {departs}, but {hidden}"
+    if limit == 100 * WITHIN:
+        return f"yes: {departs}; {limits}"
+    return f"approximately: {departs}; {limits if size > 100 * WITHIN else hidden}"
+
+
+def _probability(chance: float | None) -> str:
+    return f"probability {chance:.2g}" if chance else f"a probability below {1 / bootstrap.RESAMPLES:g}"
 
 
 def _signed(number: float, digits: str) -> str:

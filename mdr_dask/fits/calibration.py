@@ -196,8 +196,9 @@ def _residuals(found: Calibration) -> Residuals:
     squares = distance(found.measured.values, predicted, noise[None] ** 2)[0]
     known = found.measured.errors is not None
     freedom = left.size - (len(found.unknowns) - len(found.free) + len(found.products))
-    relative = float(np.sqrt(np.mean(left**2) / np.mean(found.measured.values**2)))
-    return Residuals(left / np.sqrt(variance), relative, float(squares[0]) if known else np.nan, freedom)
+    relative, errors = np.sqrt(np.array([np.mean(left**2), np.mean(variance)]) / np.mean(found.measured.values**2))
+    chi_squared = float(squares[0]) if known else np.nan
+    return Residuals(left / np.sqrt(variance), float(relative), chi_squared, freedom, float(errors))
 
 
 def measured_of(dataset: xr.Dataset) -> Measured:

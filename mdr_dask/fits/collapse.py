@@ -17,6 +17,7 @@ from mdr_dask.physics.superposition.master_curve import Superposition
 from mdr_dask.units import conversion
 
 DEGREES = range(1, 7)  # of the polynomials that tell the scatter within curves
+HOLDS = {"yes", "approximately"}
 LOG = float(np.log(10.0))  # a departure in decades, times this, is a relative one
 
 
@@ -107,8 +108,10 @@ def with_verdict(curve: xr.Dataset, verdicts: dict[str, str]) -> xr.Dataset:
     described = words[1:] or ["yes"]
     if words[0] == "no" or all(word == "no" for word in described):
         word = "no"
+    elif words[0] not in HOLDS or HOLDS.isdisjoint(described):
+        word = "not tested"
     else:
-        word = "yes" if words[0] == "yes" and "yes" in described else "not tested"
+        word = "yes" if words[0] == "yes" and "yes" in described else "approximately"
     sentence = f"{word}: " + "; ".join(f"{name}: {reason}" for name, reason in told.items())
     return curve.assign(law_holds=xr.Variable((), sentence, LAW_HOLDS))
 

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 from scipy.stats import f as fisher
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.fits.base import DOUBTFUL, WITHIN
+from mdr_dask.fits.base import APPROXIMATE, DOUBTFUL, WITHIN
 
 #: A trend of the residuals that chance alone causes with a smaller probability counts against the model.
 TREND = 0.005
@@ -31,12 +31,15 @@ class Residuals(NamedTuple):
         With the correlations of the errors; NaN if the errors of measurement are unknown.
     freedom : int
         Degrees of freedom: points minus determined combinations of unknowns.
+    errors : float
+        Root mean square of the standard deviations of measured minus predicted values over that of the measured values.
     """
 
     scaled: FloatArray
     relative: float
     chi_squared: float
     freedom: int
+    errors: float
 
     @property
     def chance(self) -> float:
@@ -45,21 +48,26 @@ class Residuals(NamedTuple):
 
 
 def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str:
-    """Say whether the model explains the measured points."""
+    """Say whether the model explains the measured points; errors that would hide any misfit leave it untested."""
     size = f"residuals are {100 * residuals.relative:.2g} % of the measured values, rms"
+    hidden = (
+        f"not tested: errors of {100 * residuals.errors:.2g} % of the measured values would hide any misfit; {size}"
+    )
     if residuals.freedom < 1:
         return "not tested: there are no more points than constants"
     if np.isfinite(residuals.chi_squared):
         test = f"chi squared {residuals.chi_squared:.3g}, {residuals.freedom} degrees of freedom"
         about = f"({test}, probability {residuals.chance:.2g}); {size}"
-        if residuals.chance >= DOUBTFUL:
-            return f"yes: the errors explain the residuals {about}"
-        return f"no: the errors do not explain the residuals {about}"
+        if residuals.chance < DOUBTFUL:
+            return f"no: the errors do not explain the residuals {about}"
+        return hidden if residuals.errors > APPROXIMATE else f"yes: the errors explain the residuals {about}"
     if residuals.scaled.size < FEWEST:
         return f"not tested: {residuals.scaled.size} points without known errors are too few; {size}"
     probability, along = trend(residuals.scaled, conditions)
     if probability < TREND and residuals.relative > WITHIN:
         return f"no: the residuals have a trend along {along} (by chance with probability {probability:.1g}); {size}"
+    if residuals.errors > APPROXIMATE:
+        return hidden
     return f"yes: the residuals have no trend that counts (by chance with probability {probability:.2g}); {size}"
 
 

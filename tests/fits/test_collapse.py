@@ -36,7 +36,7 @@ def step(temperature):
 @pytest.mark.parametrize(
     ("case", "verdicts"),
     [
-        ({}, ("yes: ", "the curves collapse: yes", "wlf: yes")),
+        ({}, ("approximately: ", "the curves collapse: yes", "wlf: approximately: departs by 5 % rms")),
         ({"shift": step}, ("no: ", "the curves collapse: yes", "wlf: no", "arrhenius: no")),
         ({"tilt": 0.3}, ("not tested: ", "the curves collapse: not tested: shift factors are not determined")),
     ],
@@ -52,7 +52,7 @@ def test_false_alarms_are_rare():
     """Two tests with a chance of 5 % each; Arrhenius does not hold, and WLF is enough."""
     told = [master_curve(modulus(seed, 0.02))["law_holds"].item() for seed in range(10)]
     print(*(sentence for sentence in told if not sentence.startswith("yes")), sep="\n")
-    assert np.mean([sentence.startswith("yes: ") for sentence in told]) >= 0.8
+    assert np.mean([sentence.startswith(("yes: ", "approximately: ")) for sentence in told]) >= 0.8
 
 
 def test_too_few_curves_leave_a_law_untested():

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from mdr_dask import fits
+from mdr_dask import bootstrap, fits
 from mdr_dask.cli import main
-from mdr_dask.fits.base import Fit, fitted, law_holds
+from mdr_dask.fits.base import Fit, fitted, law_holds, verdict
 
 WORDS = ("yes", "approximately", "no", "not tested")
 STUDY = """\
@@ -34,7 +34,8 @@ parameters:
     ("departures", "chance", "constants", "begins"),
     [
         ([0.01, -0.02, 0.01], 0.0, 0, "yes: departs by 1.4 % rms, at most 2 %"),
-        ([0.3, -0.4, 0.2], 0.3, 0, "yes: departs by 31 % rms, at most 40 % at x = 1, which scatter explains"),
+        ([0.3, -0.4, 0.2], 0.3, 0, "not tested: departs by 31 % rms, at most 40 % at x = 1, which scatter explains"),
+        ([0.08, -0.22, 0.05], 0.3, 0, "approximately: departs by 14 % rms, at most 22 % at x = 1"),
         ([0.08, -0.22, 0.05], 0.0, 0, "approximately: departs by 14 % rms, at most 22 % at x = 1"),
         ([0.3, -0.4, 0.2], 0.0, 0, "no: departs by 31 % rms, at most 40 % at x = 1"),
         ([0.0] * 99 + [0.4], 0.0, 0, "no: departs by 4 % rms, at most 40 %"),  # one bad case of many counts
@@ -45,6 +46,24 @@ parameters:
 )
 def test_sentences(departures, chance, constants, begins):
     assert law_holds(np.array(departures), chance, constants, "x = 1").startswith(begins)
+
+
+RANKS = {"not tested": 0, "no": 0, "approximately": 1, "yes": 2}
+
+
+@pytest.mark.parametrize(("off", "best"), [(0.0, "yes"), (0.1, "approximately"), (0.6, "no")])
+@pytest.mark.parametrize("cases", [1, 12])
+def test_fewer_realisations_give_no_better_verdict(off, best, cases):
+    """Scatter of each realisation is as large as the mean; with two of them nothing can be said."""
+    for seed in range(5):
+        values = 1 + off + np.random.default_rng(seed).normal(size=(40_000, cases))
+        found = {}
+        for count in (1, 2, 5, 40_000):
+            sentence = verdict(bootstrap.means(values[:count]) - 1, count)
+            found[count] = sentence.partition(":")[0]
+        assert found[1] == found[2] == "not tested"
+        assert RANKS[found[5]] <= RANKS[best]
+        assert found[40_000] == best
 
 
 def test_a_law_that_does_not_hold_moves_its_constants():

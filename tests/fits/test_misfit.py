@@ -43,11 +43,14 @@ def test_residuals_without_errors_of_their_own_are_judged_by_their_trend_alone()
     bent = np.log(velocity) ** 2 - 8 + 0.1 * np.random.default_rng(0).normal(size=12)
     even = np.random.default_rng(1).normal(size=12)
 
-    def said(scaled, relative=0.1, freedom=10):
-        return law_holds(Residuals(scaled, relative, np.nan, freedom), {"velocity": velocity})
+    def said(scaled, relative=0.1, freedom=10, errors=0.1, squares=np.nan):
+        return law_holds(Residuals(scaled, relative, squares, freedom, errors), {"velocity": velocity})
 
     assert said(even, freedom=0).startswith("not tested: there are no more points")
     assert said(even[:5]).startswith("not tested: 5 points")
     assert said(even).startswith("yes: ")
     assert said(bent).startswith("no: the residuals have a trend along velocity")
     assert said(bent, relative=0.9 * WITHIN).startswith("yes: ")
+    for squares in (np.nan, 5.0):
+        assert said(even, squares=squares).startswith("yes: ")
+        assert said(even, errors=0.5, squares=squares).startswith("not tested: errors of 50 %")

@@ -186,7 +186,7 @@ def test_the_plateau_is_judged_with_both_slopes():
     def level(_, velocity):
         return 1.2 * 1.2 * SLOPE / np.hypot(1, 1e-2 / velocity)
 
-    data = planted(axes, 10, 1, friction_coefficient=level, contact_slope=lambda force, v: 1.2 * SLOPE + 0 * v * force)
+    data = planted(axes, 40, 1, friction_coefficient=level, contact_slope=lambda force, v: 1.2 * SLOPE + 0 * v * force)
     found = available("sliding_friction")["plateau"].compute({"": data.isel(study=0, normal_force=0)})
     assert str(found["line_slope_holds"].item()).startswith("yes")
     assert str(found["law_holds"].item()).startswith(("no: departs by -", "approximately: departs by -"))
