@@ -1,7 +1,7 @@
-"""Reductions over realisations: mean, scatter, quantiles and intervals, each as a variable of its own.
+"""Reduce results over realisations to means, standard deviations, quantiles and intervals.
 
-An output may have a companion with its discretisation errors. Both errors of a mean are kept apart, as
-``standard_error`` (scatter of the realisations) and ``grid_error``, and joined in its interval.
+An output may have a companion that holds its discretisation errors. The two errors of a mean are stored separately, as
+``standard_error`` (scatter of the realisations) and ``grid_error``; its interval combines both.
 """
 
 from __future__ import annotations
@@ -17,15 +17,16 @@ from mdr_dask import bootstrap
 from mdr_dask.errors import DataError, did_you_mean
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-#: Results that one step of the bootstrap holds in memory.
+#: Largest number of resampled means that are held in memory at once.
 _STEP = 2**20
 
 
 @dataclass(frozen=True)
 class Statistic:
-    """A reduction over ``realisation`` as data: its name, what it means, how it is computed.
+    """One reduction over ``realisation``: its name, its meaning and the function that computes it.
 
-    `compute` takes an output and its companion with errors, or None; it returns None where it needs what is not there.
+    `compute` takes an output and the companion with its errors (None if there is none). It returns None if it needs
+    errors and there are none.
     """
 
     name: str
@@ -45,7 +46,7 @@ def mean(array: xr.DataArray) -> xr.DataArray:
 
 
 def standard_deviation(array: xr.DataArray) -> xr.DataArray:
-    """Return the standard deviation of one realisation; NaN below two of them."""
+    """Return the standard deviation over realisations; NaN for fewer than two."""
     spare = count(array) - 1
     squares: xr.DataArray = (array - mean(array)) ** 2
     variance: xr.DataArray = squares.sum("realisation") / spare.where(spare > 0)
@@ -53,18 +54,18 @@ def standard_deviation(array: xr.DataArray) -> xr.DataArray:
 
 
 def standard_error(array: xr.DataArray) -> xr.DataArray:
-    """Return the standard deviation of the mean; NaN below two realisations."""
+    """Return the standard error of the mean; NaN for fewer than two realisations."""
     number = count(array)
     return standard_deviation(array) / number.where(number > 0) ** 0.5
 
 
 def grid_error(error: xr.DataArray) -> xr.DataArray:
-    """Return the discretisation error of the mean: that of one realisation, for errors of a grid need not cancel."""
+    """Return the discretisation error of the mean: the mean error, because errors of a grid need not cancel."""
     return mean(abs(error))
 
 
 def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
-    """Return the bootstrap interval of the mean, with the discretisation error added to either side.
+    """Return the bootstrap interval of the mean, widened by the discretisation error on both sides.
 
     Returns
     -------
@@ -79,9 +80,10 @@ def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
 
 
 def mean_and_ends(array: xr.DataArray, error: xr.DataArray | None) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
-    """Return the mean and both ends of its `interval`; where nothing scatters, they are its discretisation error away.
+    """Return the mean and both ends of its `interval`.
 
-    All three are computed at once, for figures and pages ask for them thousands of times.
+    Where the scatter is unknown, as with one realisation, the ends are the mean plus and minus its discretisation
+    error.
     """
     known = (array,) if error is None else xr.broadcast(array, abs(error))
     found: tuple[xr.DataArray, xr.DataArray, xr.DataArray] = xr.apply_ufunc(
@@ -101,7 +103,7 @@ def _mean_and_ends(
         return middle, *np.moveaxis(_interval(values, count), -1, 0)
     grid = _mean(errors)
     low, high = np.moveaxis(_interval(np.concatenate([values, grid[..., None]], axis=-1), count), -1, 0)
-    with np.errstate(invalid="ignore"):  # an infinite mean of an infinite error, as of a resistance, has no ends
+    with np.errstate(invalid="ignore"):  # an infinite mean with an infinite error, as of a resistance, has no ends
         return middle, np.where(np.isnan(low), middle - grid, low), np.where(np.isnan(high), middle + grid, high)
 
 
@@ -113,7 +115,10 @@ def _mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _interval(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Return the ends of intervals from realisations along the last axis, and perhaps their error behind them."""
+    """Return the ends of intervals, shape (..., 2).
+
+    The last axis of `values` holds `count` realisations, and after them the discretisation error if there is one.
+    """
     flat = values.reshape(-1, values.shape[-1])
     bounds = np.full((len(flat), 2), np.nan)
     step = max(1, _STEP // bootstrap.RESAMPLES)
@@ -135,7 +140,7 @@ def quantiles(array: xr.DataArray) -> xr.DataArray:
 def _reduce(
     array: xr.DataArray, function: Callable[..., NDArray[np.float64]], arguments: dict[str, int], dim: str, size: int
 ) -> xr.DataArray:
-    """Apply a function that turns the last axis, realisations, into a dimension of its own."""
+    """Apply a function that replaces the dimension ``realisation`` by the dimension `dim`."""
     reduced: xr.DataArray = xr.apply_ufunc(
         function,
         array.chunk(realisation=-1) if array.chunks else array,

@@ -1,4 +1,4 @@
-"""Progress of a run on stderr: a live line on a terminal, now and then a plain one elsewhere."""
+"""Show the progress of a run on stderr: a live line on a terminal, otherwise a line every few seconds."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mdr_dask.units import seconds
 if TYPE_CHECKING:
     from mdr_dask.execute import Progress
 
-#: Seconds between two plain lines, and between two looks at the clock of a live one.
+#: Seconds between two plain lines, and between two updates of the live line.
 PAUSE, LIVE_PAUSE = 5.0, 0.5
 
 Draw = Callable[["Progress | None", float], None]
@@ -22,7 +22,7 @@ Draw = Callable[["Progress | None", float], None]
 
 @contextmanager
 def reporter(quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """Yield the function that takes the progress of a run; it is shown now and then, whether it is called or not."""
+    """Yield the function that takes the progress of a run; the latest progress is shown at regular times."""
     if quiet:
         yield lambda _: None
     elif "ipykernel" in sys.modules:
@@ -40,7 +40,7 @@ def reporter(quiet: bool) -> Iterator[Callable[[Progress], None]]:
 
 @contextmanager
 def at_work(what: str) -> Iterator[None]:
-    """Tell a terminal now and then that something takes long, and why."""
+    """Print every few seconds on a terminal what is being done and for how long."""
 
     def draw(_: Progress | None, elapsed: float) -> None:
         _write(", ".join([what, seconds(round(elapsed)), *(["compiling ..."] if _compiles() else [])]))
@@ -54,7 +54,7 @@ def at_work(what: str) -> Iterator[None]:
 
 @contextmanager
 def _beating(draw: Draw, pause: float) -> Iterator[Callable[[Progress], None]]:
-    """Draw the latest progress, and the time since the start, at every beat."""
+    """Draw the latest progress and the elapsed time every `pause` seconds."""
     started, ended = time.monotonic(), threading.Event()
     latest: list[Progress] = []
 
@@ -119,7 +119,7 @@ def _write(line: str) -> None:
 
 
 def describe(progress: Progress | None, elapsed: float) -> str:
-    """Return share, time and time left of a run, and its results, in one line; what matters most comes first."""
+    """Return one line with the share done, the elapsed and remaining time, and the number of results."""
     if progress is None:
         return f"preparing, {seconds(round(elapsed))}"
     settled = progress.total - progress.to_do
@@ -132,7 +132,7 @@ def describe(progress: Progress | None, elapsed: float) -> str:
 
 
 def _compiles() -> bool:
-    """Return whether kernels are compiled in this process now."""
+    """Return whether numba is compiling in this process."""
     from mdr_dask.compile_clock import compile_clock
 
     return "numba" in sys.modules and compile_clock().is_running

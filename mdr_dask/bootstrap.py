@@ -1,8 +1,9 @@
-"""Bootstrap intervals from the scatter of the realisations and from the errors of the numbers themselves.
+"""Bootstrap intervals from the scatter of realisations and from the discretisation errors of results.
 
-A *stack* is an array whose first row is a mean. `RESAMPLES` rows with means of resampled realisations follow, and then
-rows in which the mean is moved by its errors. A function applied row by row turns a stack into another stack, and
-`interval` makes an interval from all rows. A resample that contains only failed realisations is NaN and does not count.
+A *stack* is an array whose first row is the mean. It is followed by `RESAMPLES` rows with the means of resampled
+realisations, and by rows in which the mean is shifted by its errors. A fit is applied to every row; the result is a
+stack of the fitted constants, from which `interval` computes an interval. A resample that contains only failed
+realisations is NaN and is left out.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from mdr_dask.arrays import FloatArray
 
 CONFIDENCE = 0.95
 RESAMPLES = 400
-#: Number of groups of values that are moved by their errors one after the other; within a group errors have one sign.
+#: Number of groups of values that are shifted by their errors one group at a time; within a group errors have one sign.
 GROUPS = 32
 #: Probabilities of the ends of an interval.
 TAILS = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
-#: Least number of resamples for the tails.
+#: Smallest number of resamples from which the ends of an interval are computed.
 FEWEST = round(1 / TAILS[0])
 #: Logarithm that stands for values that are not positive; its exponential is 0.
 NOTHING = -1000.0
@@ -30,7 +31,7 @@ NOTHING = -1000.0
 def weights(count: int) -> FloatArray:
     """Return how often each realisation is drawn, shape (1 + RESAMPLES, count); in the first row each is drawn once.
 
-    All cases are resampled alike, because they share their lines; so differences between cases are paired.
+    All cases use the same resamples, because they share their rough lines; differences between cases are then paired.
     """
     generator = np.random.Generator(np.random.Philox(0))
     drawn = generator.multinomial(count, np.full(count, 1 / count), RESAMPLES)
@@ -40,9 +41,10 @@ def weights(count: int) -> FloatArray:
 
 
 def means(values: FloatArray) -> FloatArray:
-    """Return the stack of means over the first axis, realisations.
+    """Return the stack of means over the first axis (realisations).
 
-    Values that are not finite are left out. The mean is NaN if none is left, its resamples also if only one is left.
+    Values that are not finite are left out. Without any finite value the mean is NaN; with fewer than two, its
+    resamples are NaN.
     """
     flat = values.reshape(values.shape[0], -1)
     known = np.isfinite(flat)
@@ -56,15 +58,15 @@ def means(values: FloatArray) -> FloatArray:
 
 
 def complete(values: FloatArray) -> FloatArray:
-    """Return values in which realisations (first axis) that are not finite everywhere are NaN."""
+    """Return the values with NaN for every realisation (first axis) that has a value that is not finite."""
     known = np.all(np.isfinite(values.reshape(values.shape[0], -1)), axis=1)
     return np.where(known.reshape(-1, *(1 for _ in values.shape[1:])), values, np.nan)
 
 
 def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
-    """Return values moved up and down by errors, one group of neighbours after the other, shape (2 groups, ...).
+    """Return values shifted up and down by their errors, one group of neighbours at a time, shape (2 groups, ...).
 
-    An infinite error moves a value by its own size.
+    An infinite error shifts a value by its own size.
     """
     size = np.where(np.isinf(errors), values, errors)
     flat = np.abs(np.where(np.isfinite(size), size, 0.0)).ravel()
@@ -77,7 +79,7 @@ def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
 
 
 def difference(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Return the stack of the difference of two stacks that were resampled alike; the errors of both are kept."""
+    """Return the stack of the difference of two stacks with the same resamples, with the rows for the errors of both."""
     plain = 1 + RESAMPLES
     rows = [one[:plain] - other[:plain], one[plain:] - other[0], one[0] - other[plain:]]
     both: FloatArray = np.concatenate(rows)
@@ -85,21 +87,21 @@ def difference(one: FloatArray, other: FloatArray) -> FloatArray:
 
 
 def logarithms(stack: FloatArray) -> FloatArray:
-    """Return logarithms of a stack of a positive quantity; rows that are not positive get the lowest value."""
+    """Return the logarithms of a stack of a positive quantity; values that are not positive become `NOTHING`."""
     with np.errstate(invalid="ignore", divide="ignore"):
         logs: FloatArray = np.where(stack <= 0, NOTHING, np.log(stack))
     return logs
 
 
 def _reach(shifts: FloatArray) -> FloatArray:
-    """Return the sum of the upward shifts of all groups, from the shifts by errors of both signs; NaN counts as 0."""
+    """Return the sum over groups of the larger upward shift of both signs of the errors; NaN counts as 0."""
     known = np.where(np.isnan(shifts), 0.0, shifts)
     reach: FloatArray = np.maximum(np.maximum(known[0::2], known[1::2]), 0.0).sum(axis=0)
     return reach
 
 
 def regrouped(stack: FloatArray) -> FloatArray:
-    """Return a stack of cases with separate errors as a stack in which the errors of neighbours have one sign."""
+    """Return a stack in which errors of neighbouring cases have one sign, from one in which each error is separate."""
     shifts = stack[1 + RESAMPLES :] - stack[0]
     own = np.maximum(_reach(shifts), _reach(-shifts))
     return np.concatenate([stack[: 1 + RESAMPLES], moved(stack[0], own)]) if np.any(own > 0) else stack[: 1 + RESAMPLES]
@@ -115,9 +117,9 @@ def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tup
     Parameters
     ----------
     stack : array, shape (1 + RESAMPLES + 2 groups, ...)
-        The value, the resamples, and the values moved up and down by their errors.
+        The value, its resamples, and the value shifted up and down by its errors.
     count : int or array
-        Realisations n that were resampled.
+        Number n of realisations that were resampled.
     positive : bool
         Whether to compute the interval in logarithms, for positive quantities.
     """
@@ -135,7 +137,7 @@ def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tup
 
 
 def widening(count: ArrayLike) -> FloatArray:
-    """Return sqrt(n / (n - 1)) t / z, the factor by which deviations of resamples of n realisations are too small."""
+    """Return sqrt(n / (n - 1)) t / z, by which deviations of resamples of n realisations are multiplied."""
     from scipy.special import ndtri, stdtrit
 
     number = np.maximum(np.asarray(count, dtype=np.float64), 2.0)
@@ -151,7 +153,7 @@ def chance(residuals: FloatArray, count: int, draws: int = RESAMPLES) -> float:
     Parameters
     ----------
     residuals : array, shape (1 + RESAMPLES + 2 groups, ...)
-        Stack of data minus law. If the law holds, the first row differs from the truth as the resamples differ from it.
+        Stack of data minus law. If the law holds, the first row differs from zero as the resamples differ from it.
     count : int
         Realisations that were resampled.
     draws : int

@@ -1,4 +1,4 @@
-"""Measure how long numba has compiled kernels in this process."""
+"""Measure the time that numba spends on compilation in this process."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from typing import Any
 
 
 class CompileClock:
-    """Seconds in which some thread compiled; compilations that overlap count once."""
+    """Seconds during which at least one thread was compiling."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._running, self._since, self._before = 0, 0.0, 0.0
 
     def begin(self) -> None:
-        """Note that a compilation begins."""
+        """Register the start of a compilation."""
         with self._lock:
             self._since = self._since if self._running else time.perf_counter()
             self._running += 1
 
     def end(self) -> None:
-        """Note that a compilation has ended; one that began before the clock existed does not count."""
+        """Register the end of a compilation; one that started before the clock existed is ignored."""
         with self._lock:
             if self._running == 1:
                 self._before += time.perf_counter() - self._since
@@ -30,19 +30,19 @@ class CompileClock:
 
     @property
     def is_running(self) -> bool:
-        """Whether some thread compiles now."""
+        """Whether a thread is compiling."""
         return self._running > 0
 
     @property
     def seconds(self) -> float:
-        """Time spent so far."""
+        """Seconds so far."""
         with self._lock:
             return self._before + (time.perf_counter() - self._since if self._running else 0.0)
 
 
 @lru_cache(maxsize=1)
 def compile_clock() -> CompileClock:
-    """Return the clock of this process, which measures from its first use on."""
+    """Return the clock of this process; it starts at the first call."""
     from numba.core.event import Event, Listener, register
 
     clock = CompileClock()

@@ -1,4 +1,4 @@
-"""What a campaign will compute and what it will cost, as text and as JSON: the answer of ``mdr-dask check``."""
+"""Describe what a campaign will compute and cost, as text and as JSON, for ``mdr-dask check``."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def summary(campaign: Campaign) -> Summary:
 
 
 def require_answers(campaign: Campaign) -> None:
-    """Raise CampaignError if the realisations continue until a constant is known that no fit gives."""
+    """Raise CampaignError if ``until`` names a fitted constant that no fit of the model gives."""
     if campaign.replication.answers:
         from mdr_dask.fits.answers import require_known
 
@@ -60,7 +60,7 @@ def require_answers(campaign: Campaign) -> None:
 
 
 def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
-    """Yield the lines about a study: the axes of each series, notes about its data, its costs."""
+    """Yield the axes of each series, notes about its data, and its costs, line by line."""
     written = written_units(campaign.text)
     for series in campaign.series:
         units = models.load(campaign.model).units(series.parameters)
@@ -114,7 +114,7 @@ def spacing(values: tuple[float, ...]) -> str:
 
 
 def cost_lines(costs: Estimate) -> Iterator[str]:
-    """Yield counts, size and time of a study, from the first round to the largest number of rounds."""
+    """Yield counts, size and time of a study; with ``until``, those of the first round and of all possible rounds."""
     more = costs.rounds
     cases, results = _counted("case", costs.cases, costs.growth), _counted("result", costs.results, more)
     yield f"{cases} x {_counted('realisation', costs.realisations, costs.at_most / costs.realisations)} = {results}"

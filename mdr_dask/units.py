@@ -14,8 +14,8 @@ from mdr_dask.errors import did_you_mean, distinguishable
 if TYPE_CHECKING:
     from pint import UnitRegistry
 
-#: In the language of pint. Pint's own 900 units take ten times as long to read and contain single letters that are
-#: more likely mistakes in a campaign (``c``, ``e``, ``M``). Here angles have a dimension of their own.
+#: Units in the syntax of pint. Pint's own list of 900 units takes ten times as long to load and contains single letters
+#: that are more likely mistakes in a campaign (``c``, ``e``, ``M``). Here angles have a dimension of their own.
 DEFINITIONS = """
 yocto- = 1e-24 = y-
 zepto- = 1e-21 = z-
@@ -78,7 +78,7 @@ ohm = volt / ampere = Ω
 siemens = ampere / volt = S
 """
 
-#: Names of quantities in messages by their SI unit, each with an example.
+#: Names of quantities in messages, by SI unit, each with an example.
 _MEANINGS = {
     "1": ("a number", ""),
     "m": ("a length", "20 mm"),
@@ -105,7 +105,7 @@ _MEANINGS = {
     "W": ("a power", "1 W"),
 }
 
-#: Units are short and have exponents of at most two digits; others could keep pint busy for ever.
+#: Longer texts and exponents of more than two digits are refused, because pint could take for ever to parse them.
 _MOST_LETTERS = 60
 _BAD_POWER = re.compile(r"(\*\*|\^)\s*(?!\(?[-+]?\d{1,2}\)?(?![\d.]|\s*(\*\*|\^)))")
 
@@ -117,7 +117,7 @@ _SEVERAL = re.compile(r"\d.*?(,|;|\.\.|\bto\b|\s-\s)\s*[+-]?[\d.]")
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.DOTALL)
 
 
-#: Units that an unknown one is compared with.
+#: Units among which a suggestion for an unknown unit is searched.
 COMMON = (
     "m mm um nm cm km s ms us min h m/s mm/s km/h N mN kN Pa kPa MPa GPa K degC deg rad Hz kHz kg g J W bar psi rpm "
     "inch percent meter metre millimeter micrometer nanometer kilometer micron second millisecond microsecond minute "
@@ -132,9 +132,9 @@ def to_si(value: str, unit: str) -> float:
     Parameters
     ----------
     value : str
-        Such as ``"20 mm"``; without a unit it is in SI already.
+        A number with a unit, such as ``"20 mm"``, or without one if it is in SI.
     unit : str
-        The coherent SI unit wanted, ``"1"`` for a pure number.
+        The coherent SI unit of the result, ``"1"`` for a pure number.
 
     Returns
     -------

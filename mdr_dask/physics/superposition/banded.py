@@ -1,14 +1,15 @@
-"""Normal distributions of splines that are tied by a few common offsets: banded factors, and what follows from them.
+"""Solve the normal equations of several splines that share a few offsets, with banded Cholesky factors.
 
 The unknowns are the spline coefficients m_c of each channel c, followed by the offsets v. Their precision is
 
     [ A_c   B_c ]
     [ B_c^T  D  ],
 
-where A_c is banded (half bandwidth 3) and channels are coupled by the offsets alone. It is L L^T with the banded
-factors L_c of A_c, the border W_c = L_c^-1 B_c, and the factor of the corner D - sum_c W_c^T W_c. A lower or symmetric
-matrix M is stored by diagonals: ``band[i, d]`` is M[i, i - d]. The corner is stored in the same way, with all its
-diagonals, so that the same functions serve both. A row of parameters costs O(splines (4 + offsets)^2) operations.
+where A_c is banded (half bandwidth 3) and channels are coupled only by the offsets. The Cholesky factor consists of the
+banded factors L_c of A_c, the border W_c = L_c^-1 B_c, and the factor of the corner D - sum_c W_c^T W_c. A lower or
+symmetric matrix M is stored by diagonals: ``band[i, d]`` is M[i, i - d]. The corner is stored in the same way, with all
+its diagonals, so that the same functions can be used for both. A row of parameters costs O(splines (4 + offsets)^2)
+operations.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit
 
 ORDER = 4
-"""Cubic B-splines that overlap at a place, so that a band holds as many diagonals."""
+"""Number of cubic B-splines that overlap at a point, and of the diagonals that a band stores."""
 
 EPS = float(np.finfo(np.float64).eps)
 
@@ -45,18 +46,18 @@ class Factors(NamedTuple):
 
 
 class Linear(NamedTuple):
-    """What follows from the factors for rows of parameters.
+    """Means and covariances of the unknowns for rows of parameters.
 
     Parameters
     ----------
     mean : array, shape (rows, unknowns)
         Spline coefficients, channel by channel, then the offsets.
     log_determinant : array, shape (rows,)
-        That of the precision.
+        Logarithm of the determinant of the precision.
     fitted, slope : array, shape (rows, channels, points)
-        Mean of the curve less the offset, and its derivative with respect to the abscissa in cells, at each point.
+        Mean of the curve minus the offset, and its derivative with respect to the abscissa in cells, at each point.
     variance, tilt : array, shape (rows, channels, points)
-        Variance of the former, and covariance of the two.
+        Variance of `fitted`, and covariance of `fitted` and `slope`.
     rough : array, shape (rows, channels, splines - 2)
         Mean square of the second differences.
     offsets : array, shape (rows, offsets, offsets)
@@ -83,7 +84,7 @@ def solve_rows(
     stiffness: FloatArray,
     tied: FloatArray,
 ) -> tuple[Factors, Linear]:
-    """Return factors of the precision of the unknowns, and what the density of the parameters needs of its inverse.
+    """Return the factors of the precision of the unknowns, and the means and covariances that the density needs.
 
     Parameters
     ----------
@@ -325,7 +326,7 @@ def _back_substitute(band: FloatArray, border: FloatArray, corner: FloatArray, r
 def _cholesky(band: FloatArray) -> float:
     """Replace a symmetric matrix by its lower factor, and return its log determinant.
 
-    A pivot that is lost to rounding is set to the rounding error of the diagonal.
+    A pivot that is not positive because of rounding is set to the rounding error of the diagonal.
     """
     size, width = band.shape
     log_determinant = 0.0

@@ -1,4 +1,4 @@
-"""Master curves: curves of one quantity in several groups, shifted along logarithmic axes until they are one curve."""
+"""Master curves: shift curves of one quantity along logarithmic axes until they form one curve."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ EXPANSION = 6e-4
 """Volume expansion of melts and rubbers, 1/K, in b_T; typical values are 5e-4 to 7e-4."""
 
 OFFSET = (0.02 / np.log(10), np.log(2))
-"""Prior of the offset of all moduli of one temperature: 2 % within a factor of two, as specimens are clamped anew and
-their size is known to a per cent or so."""
+"""Prior of the offset of all moduli of one temperature: 2 % within a factor of two, because specimens are clamped again
+and their dimensions are known to about a per cent."""
 
 FREE = (0.03, 1.5)
 """Prior of the steps of free vertical factors about their mean: 0.03 decades within a factor of five."""
 
 DETERMINED = 0.5
-"""Standard deviation of a step, over that of the prior about its mean, above which it counts as not determined."""
+"""Standard deviation of a step, relative to that of its prior, above which the step counts as not determined."""
 
 Vertical = Literal["none", "modulus", "compliance", "free"]
 
 
 @dataclass(frozen=True)
 class Superposition:
-    """Shift factors and the curve they make; abscissa and ordinates are logarithms to the base 10.
+    """Shift factors and the merged curve; abscissa and ordinates are logarithms to the base 10.
 
     Parameters
     ----------
     groups : array, shape (groups,)
-        What the curves differ in (velocity, temperature), ascending.
+        Values of the quantity in which the curves differ (velocity, temperature), ascending.
     horizontal, vertical : array, shape (groups,)
-        What is added to log10 x and to log10 y of each curve; zero at the reference.
+        Decades added to log10 x and to log10 y of each curve; zero at the reference.
     draws : array, shape (draws, 2 groups)
         Draws of horizontal and vertical factors from their probability density.
     reference : float
@@ -58,14 +58,14 @@ class Superposition:
         The group of each point.
     curve_x : array, shape (curve points,)
     curve_y, curve_error : array, shape (channels, curve points)
-        The merged curves and their standard errors, where the reference is held in place.
+        The merged curves and their standard errors; the curve of the reference is not shifted.
     curve_cross : array, shape (channels, curve points, 2 groups)
         Covariance of the curves and the factors.
     measured : tuple of float
-        Range of log10 x in which the reference itself was measured; beyond, the curve rests on the shift factors.
+        Range of log10 x in which the reference itself was measured; outside, the curve depends on the shift factors.
     undetermined : tuple of (float, float)
-        First and last group of each run of neighbours whose steps the curves do not determine, as on a plateau or
-        beside a gap.
+        First and last group of each run of neighbours between which the curves do not determine the shift, as on a
+        plateau or across a gap.
     """
 
     groups: FloatArray
@@ -113,16 +113,16 @@ def superpose(
     seed: int = 0,
     kelvin: ArrayLike | None = None,
 ) -> Superposition:
-    """Find the shifts that make curves parts of one smooth curve, with their uncertainty.
+    """Find the shifts for which the curves are parts of one smooth curve, with their uncertainty.
 
-    The shifts, a smooth curve, the scatter and vertical offsets have a joint probability density (module `posterior`),
-    from which they are drawn. Results are means over the draws, so that intervals contain what smoothness, scatter and
-    offsets leave open.
+    The shifts, the smooth curve, the scatter and the vertical offsets have a joint probability density (module
+    `posterior`), from which they are drawn. Results are means over the draws, and intervals include the uncertainty of
+    smoothness, scatter and offsets.
 
     Parameters
     ----------
     groups : array_like, shape (groups,)
-        What the curves differ in; distinct numbers.
+        Distinct values of the quantity in which the curves differ.
     curves : sequence of (x, y)
         log10 of abscissa, shape (points,), and ordinate of each curve, at least two points each. Ordinates of shape
         (channels, points), such as storage and loss modulus, are shifted together.
@@ -202,7 +202,7 @@ def _merged(
     width: float,
     generator: np.random.Generator,
 ) -> Superposition:
-    """Return factors and merged curves about the first group, from draws of the parameters."""
+    """Return the factors relative to the first group and the merged curves, from draws of the parameters."""
     count, channels, lines = values.size, problem.y.shape[0], values.size - 1
     shifts = np.concatenate([np.zeros((len(rows), 1)), rows[:, :lines]], axis=1)
     mean = shifts.mean(axis=0)
@@ -249,7 +249,7 @@ def _runs(groups: FloatArray, steps: NDArray[np.bool_]) -> tuple[tuple[float, fl
 
 
 def _gaps(x: FloatArray, member: NDArray[np.intp], shifts: FloatArray) -> NDArray[np.bool_]:
-    """Return for rows of shifts whether each curve begins beyond a gap in the abscissa, shape (rows, curves)."""
+    """Return for each row of shifts and each curve whether it begins after a gap in the abscissa."""
     ends = np.array([[x[member == k].min(), x[member == k].max()] for k in range(shifts.shape[1])])
     low, high = ends[:, 0] + shifts, ends[:, 1] + shifts
     order = np.argsort(low, axis=1)

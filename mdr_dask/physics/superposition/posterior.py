@@ -23,34 +23,34 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.superposition.banded import Factors, drawn, solve_rows
 
 CELLS = 8
-"""Spline cells along a curve of median width; ten give the same factors, five are too few for sharp bends."""
+"""Spline cells along a curve of median width: ten give the same factors, five do not resolve sharp bends."""
 
 MARGIN = 0.5
-"""Widths of a curve by which the spline extends beyond the first guess on either side; farther off it is straight."""
+"""Distance by which the spline extends beyond the first guess on each side, in widths of a curve."""
 
 ROUNDING = 1e-5
-"""Scatter that no curve falls below, decades: that of a table of five digits."""
+"""Smallest scatter of a curve, decades: the rounding of a table with five digits."""
 
 STEP_MEAN, STEP_SCATTER = 1.0, 0.5
-"""Prior of the steps between neighbouring curves, in widths of a curve: standard deviations of their mean about zero,
-and of each about that mean."""
+"""Prior of the steps between neighbouring curves, in widths of a curve: the standard deviation of their mean about
+zero, and of each step about this mean."""
 
 BEND, BEND_SCATTER, BEND_DRIFT = 0.02, 3.0, 1.0
-"""Prior of the bend (standard deviation of the second differences of the spline) near each curve: median in heights of
-a curve, standard deviation of its logarithm, and of the change of this logarithm from a curve to the next, as
-superposed curves are bent in some places and straight in others."""
+"""Prior of the bend near each curve, which is the standard deviation of the second differences of the spline: its
+median in heights of a curve, the standard deviation of its logarithm, and the standard deviation of the change of this
+logarithm from one curve to the next. The bend varies, because a master curve is bent in some places only."""
 
 REACH = 0.3
-"""Distance over which the bend changes from that of one curve to that of the next, in widths of a curve."""
+"""Distance over which the bend changes from one curve to the next, in widths of a curve."""
 
 NOISE, NOISE_SCATTER = 0.01, 2.0
-"""Prior of the relative scatter of each channel: median, and standard deviation of its logarithm."""
+"""Prior of the relative scatter of each channel: its median, and the standard deviation of its logarithm."""
 
 TREND = 10.0
-"""Standard deviation of the mean step of drifting offsets, over that of the steps about it."""
+"""Standard deviation of the mean step of drifting offsets, relative to that of the steps about it."""
 
 FARTHEST = 8.0
-"""Distance of the logarithm of a scale from its prior median beyond which it is cut off: a guard against overflow."""
+"""Largest distance of the logarithm of a scale from its prior median; it prevents overflow."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Curves:
     Parameters
     ----------
     x : array, shape (points,)
-        Abscissa; ``x + shift`` begins near zero.
+        Abscissae, such that ``x + shift`` begins near zero.
     y : array, shape (channels, points)
         Ordinates, decades.
     member : array of int, shape (points,)
@@ -96,7 +96,7 @@ class Curves:
         )
 
     def begin(self, moved: FloatArray) -> FloatArray:
-        """Return where the splines begin for rows of shifted points, which they are laid about, shape (rows,)."""
+        """Return the beginning of the spline, which is centred on the shifted points, for each row, shape (rows,)."""
         return np.asarray((moved.min(axis=1) + moved.max(axis=1) - (self.splines - 3) / CELLS) / 2, dtype=np.float64)
 
     def spline(self, channel: int, unknowns: FloatArray, shifts: FloatArray, grid: FloatArray) -> FloatArray:
@@ -108,7 +108,7 @@ class Curves:
 
     @cached_property
     def tied(self) -> FloatArray:
-        """Prior precision of the vertical offsets, times the square of their scale."""
+        """Prior precision of the vertical offsets, multiplied by the square of their scale."""
         if not self.drifting:
             return np.eye(self.count)
         steps = np.eye(self.count) - np.eye(self.count, k=-1)
@@ -120,8 +120,9 @@ class Curves:
     def prior(self) -> tuple[FloatArray, FloatArray]:
         """Prior mean and precision of all parameters.
 
-        They are the shifts of all curves but the first in widths; the logarithms of the bend near each curve, channel
-        by channel; those of the noise of each channel; and that of the standard deviation of the offsets.
+        The parameters are: the shifts of all curves except the first, in widths of a curve; the logarithms of the bend
+        near each curve, channel by channel; the logarithm of the noise of each channel; and the logarithm of the
+        standard deviation of the offsets, if there are offsets.
         """
         channels = self.y.shape[0]
         drift = np.diff(np.eye(self.count), axis=0) / BEND_DRIFT
@@ -134,7 +135,7 @@ class Curves:
 
 
 def _pieces() -> tuple[BSpline, BSpline]:
-    """Return the four cubic B-splines of a cell of width one, on this cell, and their derivatives."""
+    """Return the four cubic B-splines that overlap on a cell of width one, and their derivatives."""
     knots = np.arange(-3.0, 5.0)
     pieces = BSpline(knots, np.eye(4), 3)
     return pieces, pieces.derivative()
@@ -145,15 +146,15 @@ _VALUES, _SLOPES = _pieces()
 
 @dataclass(frozen=True)
 class Solved:
-    """The linear part for rows of parameters.
+    """Density of rows of parameters, with the spline coefficients and offsets given these parameters.
 
     Parameters
     ----------
     energy : array, shape (rows,)
-        Minus the logarithm of the probability density, up to a constant.
+        Negative logarithm of the probability density, up to a constant.
     gradient : array, shape (rows, parameters)
     mean : array, shape (rows, unknowns)
-        Coefficients of the splines, channel by channel, then offsets.
+        Mean coefficients of the splines, channel by channel, then the offsets.
     factors : Factors
         Cholesky factors of the precision of the coefficients and offsets.
     """
@@ -171,8 +172,8 @@ class Solved:
 def solve(curves: Curves, rows: FloatArray) -> Solved:
     """Return density, gradient, and spline coefficients for rows of parameters, shape (rows, parameters).
 
-    The parameters are described at `Curves.prior`. The splines are laid about the shifted curves of each row; the
-    gradient leaves out that they move with them, which changes nothing but the place of their knots.
+    The parameters are described at `Curves.prior`. The knots of the splines follow the shifted curves of each row; the
+    gradient neglects this, because the density hardly depends on the position of the knots.
     """
     many, channels, points = rows.shape[0], curves.y.shape[0], curves.x.size
     count, splines, offsets = curves.count, curves.splines, 0 if curves.offset is None else curves.count
@@ -219,7 +220,7 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
 
 def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, FloatArray]:
     """Return the first of the four splines at each place in cells, their values, and their derivatives there."""
-    # places that are no numbers, of rows gone astray, must not become indices; their values stay no numbers
+    # NaN and infinity from diverged rows must not become indices
     first = np.clip(np.nan_to_num(np.floor(place)), 0, splines - 4).astype(np.intp)
     inside = np.clip(place - first, 0.0, 1.0)
     slope = _SLOPES(inside)

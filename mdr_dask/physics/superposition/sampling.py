@@ -1,4 +1,4 @@
-"""Draws from the probability of shifts: the best shifts first, then Hamiltonian Monte Carlo in many chains at once."""
+"""Draw shifts from their probability density: find the most probable ones, then sample by Hamiltonian Monte Carlo."""
 
 from __future__ import annotations
 
@@ -13,27 +13,29 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.superposition.posterior import CELLS, MARGIN, Curves, Solved, solve, step_precision
 
 HOPS = 2
+"""Jumps of single steps after each move."""
+
 CHAINS, WARM, KEPT = 24, 16, 20
-"""Chains, moves left out, and moves kept of each: 480 draws give the ends of an interval of 95 % to some 5 %."""
+"""Number of chains, and moves of each that are discarded and kept: 480 draws give the ends of an interval of 95 % to
+about 5 %."""
 
 PATH, STEPS = 1.5, 3
-"""Length of a move in standard deviations (a quarter of a period), and the steps that it is made in."""
+"""Length of a move in standard deviations (a quarter of a period), and its number of steps."""
 
 DIFFERENCE = 1e-3
-"""Step of the differences of gradients, in standard deviations of the prior."""
+"""Step of the finite differences of the gradient, in standard deviations of the prior."""
 
 STIFFNESSES = (0.0, 3.0, 6.0)
-"""Logarithms by which the splines of a first guess are stiffer than expected."""
+"""Stiffnesses of the splines tried for a first guess: logarithms, relative to the prior."""
 
 SCAN = 81
-"""Steps tried of each pair of neighbours, from a gap as wide as a curve on one side to one on the other."""
+"""Number of steps tried for each pair of neighbours; the extreme steps leave gaps as wide as a curve."""
 
 
 def first_guess(curves: Curves) -> FloatArray:
-    """Return shifts from each pair of neighbours by itself, shape (curves - 1,).
+    """Return a first guess of the shifts, from each pair of neighbours separately, shape (curves - 1,).
 
-    The mean and variance of a step over those that let the two curves overlap, or nearly so, are combined with the
-    prior of the steps.
+    The mean and variance of each step, weighted by the density of the two curves, are combined with the prior.
     """
     steps = np.linspace(-2.0, 2.0, SCAN)
     means, variances = [], []
@@ -50,7 +52,7 @@ def first_guess(curves: Curves) -> FloatArray:
             rows = np.column_stack([steps * width, np.tile(middle[1:], (SCAN, 1))])
             rows[:, 1 : 1 + 2 * curves.y.shape[0]] -= stiffness
             channels = curves.y.shape[0]
-            # the best step lies between two of the scan, so a steep curve is off by its slope times their distance
+            # the best step lies between two tried steps, so a steep curve misses by its slope times their distance
             coarse = curves.height * width * (steps[1] - steps[0]) / np.sqrt(12)
             noise = slice(1 + 2 * channels, 1 + 3 * channels)
             rows[:, noise] = np.maximum(rows[:, noise], np.log(coarse))
@@ -66,19 +68,19 @@ def first_guess(curves: Curves) -> FloatArray:
 
 
 def laid_out(curves: Curves, shifts: FloatArray) -> Curves:
-    """Return the same curves with a spline that covers them after some shifts, with a margin."""
+    """Return the same curves with a spline that covers them after shifting, with a margin."""
     moved = curves.x + np.append(0.0, shifts)[curves.member]
     return replace(curves, splines=int(np.ceil((np.ptp(moved) + 2 * MARGIN) * CELLS)) + 3)
 
 
-@np.errstate(over="ignore", invalid="ignore")  # of moves that go far astray, and are not taken
+@np.errstate(over="ignore", invalid="ignore")  # in moves that diverge and are rejected
 def draws(curves: Curves, generator: np.random.Generator) -> tuple[Curves, FloatArray]:
-    """Return the curves with the spline used, and draws of their parameters, shape (draws, parameters)."""
+    """Return the curves with the spline that was used, and draws of the parameters, shape (draws, parameters)."""
     shifts = first_guess(curves)
     curves = laid_out(curves, shifts)
     start = _best(curves, np.append(shifts, curves.prior[0][shifts.size :]), shifts.size)
     start = _best(curves, start)
-    curves = laid_out(curves, start[: shifts.size])  # with a spline about the best shifts
+    curves = laid_out(curves, start[: shifts.size])
     start = _best(curves, start)
     scale = _scale(curves, start)
     place = start + generator.standard_normal((CHAINS, start.size)) @ scale.T
@@ -121,9 +123,9 @@ def _chosen(taken: NDArray[np.bool_], new: Solved, old: Solved) -> Solved:
 
 
 def _hop(curves: Curves, place: FloatArray, generator: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Return rows with one step between neighbours drawn from its prior given the others, and what its energy rises by.
+    """Return rows with one step between neighbours redrawn from its prior given the others, and the rise of its energy.
 
-    Such moves cross the many small maxima along a plateau.
+    Such jumps cross the many small maxima along a plateau.
     """
     lines, rows = curves.count - 1, np.arange(place.shape[0])
     known = step_precision(curves.count)
@@ -140,7 +142,7 @@ def _hop(curves: Curves, place: FloatArray, generator: np.random.Generator) -> t
 
 
 def _best(curves: Curves, start: FloatArray, fixed: int = 0) -> FloatArray:
-    """Return the most probable parameters, the first `fixed` ones kept."""
+    """Return the most probable parameters; the first `fixed` ones are not changed."""
     scale = np.eye(start.size)[:, fixed:] if fixed else _scale(curves, start)
 
     def energy(away: FloatArray) -> tuple[float, FloatArray]:
@@ -152,7 +154,7 @@ def _best(curves: Curves, start: FloatArray, fixed: int = 0) -> FloatArray:
 
 
 def _scale(curves: Curves, best: FloatArray) -> FloatArray:
-    """Return a matrix whose square is about the covariance of the parameters."""
+    """Return a matrix S such that S S^T approximates the covariance of the parameters."""
     known = curves.prior[1]
     step = DIFFERENCE / np.sqrt(np.diag(known))
     rows = np.concatenate([best + np.diag(step), best - np.diag(step)])

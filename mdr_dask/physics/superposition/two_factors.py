@@ -1,4 +1,4 @@
-"""Shift factors that are the sum of two: one of velocity and one of temperature, say."""
+"""Shift factors that are a sum of two factors, such as one of velocity and one of temperature."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from mdr_dask.physics.superposition.master_curve import Superposition, Vertical,
 
 @dataclass(frozen=True)
 class TwoShifts:
-    """Factors ``h(v, T) = a(v) + b(T)``, perhaps vertical ones of that form too, and the curve they make.
+    """Factors ``h(v, T) = a(v) + b(T)``, vertical factors of the same form if there are any, and the merged curve.
 
     Parameters
     ----------
     first, second : Superposition
-        The same merged points and curve twice, once with the factors a and the groups v, once with b and T; `member`
-        counts the groups of each.
+        The same merged points and curve, once with the factors a and the groups v, once with b and T; `member` numbers
+        the groups of each.
     chi_squared : float
-        Squared distance of the factors of all pairs from the sum, in their covariance, for every degree of freedom; the
-        errors are enlarged by its root where it is above one.
+        Reduced chi-squared of the difference between the factors of all pairs and the sum. Where it is above one, the
+        errors are multiplied by its square root.
     probability : float
-        Probability of a chi-squared that large if the sum holds; 1 where no degree of freedom is left to test it.
+        Probability of a chi-squared at least as large if the sum holds; 1 without a degree of freedom to test it.
     """
 
     first: Superposition
@@ -44,28 +44,28 @@ def superpose_twice(
     vertical: Vertical = "none",
     seed: int = 0,
 ) -> TwoShifts:
-    """Shift curves that differ in two things into one, and split the factors into a sum of two.
+    """Shift curves that differ in two quantities into one curve, and split each factor into a sum of two.
 
-    All curves are superposed without the sum; a and b follow by least squares in the covariance of all factors, which
-    is what a joint fit does to first order, and tests the sum.
+    All curves are superposed without assuming the sum. Then a and b follow by least squares, weighted by the covariance
+    of all factors. To first order this equals a joint fit, and its chi-squared tests the sum.
 
     Parameters
     ----------
     first, second : array_like, shape (curves,)
-        What each curve belongs to, two or more values of each; not every pair is needed.
+        The two quantities of each curve, with at least two values each; not every pair has to exist.
     curves : sequence of (x, y)
         log10 of abscissa and ordinate.
     references : pair of float, optional
-        Groups whose factors are zero; the middle ones if not given.
+        Groups whose factors are zero; by default the middle ones.
     vertical : {'none', 'free'}
-        Whether curves may move along the ordinate as well, by factors that are such a sum, too.
+        Whether there are vertical factors, which are a sum as well.
     seed : int
         Seed of the draws of `superpose`.
 
     Raises
     ------
     DataError
-        If a group has one value only, or the pairs fall into parts that share no value.
+        If a group has only one value, or the pairs form parts that share no value.
     """
     values = [np.asarray(a, dtype=np.float64).reshape(-1) for a in (first, second)]
     groups, places = zip(*(np.unique(a, return_inverse=True) for a in values), strict=True)
@@ -91,10 +91,10 @@ def _split(
     columns: NDArray[np.intp],
     axes: int,
 ) -> TwoShifts:
-    """Fit the sum to the factors of all curves, zero for the first one, in the covariance of the others.
+    """Fit the sum to the factors of all curves by least squares, weighted by their covariance.
 
-    `design` makes the factors of the curves of those of both groups, of which `columns` are not zero by definition;
-    `axes` is two if there are vertical factors, of which the same sum holds, else one.
+    `design` maps the factors of both groups to those of the curves; `columns` are the factors that are not zero by
+    definition. `axes` is 2 if there are vertical factors, otherwise 1.
     """
     curves, both = free.groups.size, design.shape[1]
     rows = np.kron(np.eye(axes), (design - design[0])[1:, columns])
@@ -150,7 +150,7 @@ def _split(
 
 
 def _serpentine(first: NDArray[np.intp], second: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return an order in which curves that follow each other are neighbours in one of the groups."""
+    """Return an order in which consecutive curves are neighbours in one of the groups."""
     along = np.where(second % 2 == 0, first, first.max() - first)
     return np.lexsort((along, second))
 
