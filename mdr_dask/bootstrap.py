@@ -79,7 +79,7 @@ def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
 
 
 def difference(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Return the stack of the difference of two stacks with the same resamples, with the rows for the errors of both."""
+    """Return the stack of the difference of two stacks with the same resamples, with rows for the errors of both."""
     plain = 1 + RESAMPLES
     rows = [one[:plain] - other[:plain], one[plain:] - other[0], one[0] - other[plain:]]
     both: FloatArray = np.concatenate(rows)
