@@ -270,7 +270,7 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
     """
     sheet = read_sheet(text, source)
     first, problems, read = sheet.names or sheet.rows[0], [], Read()
-    matched = [(i, *_match(cell.text, sheet.units[i], columns)) for i, cell in enumerate(sheet.names)]
+    matched = [(i, *match(cell.text, sheet.units[i], columns)) for i, cell in enumerate(sheet.names)]
     if not sheet.names and len(first) > len(columns):
         raise TableError(
             source, [first[0].problem(f"expected the names of the {len(first)} columns in the first line")]
@@ -310,8 +310,8 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
     return read
 
 
-def _match(heading: str, unit: str, columns: Sequence[Column]) -> tuple[Column | None, str]:
-    """Return the column of a heading and its unit, which may be joined to the name (``freq_hz``)."""
+def match(heading: str, unit: str, columns: Sequence[Column]) -> tuple[Column | None, str]:
+    """Return the column of a heading, None if it has none, and its unit, which may be joined to it (``freq_hz``)."""
     names = [(heading, unit)]
     front, _, behind = heading.replace(" ", "_").rpartition("_")
     if front and not unit:
@@ -441,7 +441,7 @@ def _names_in_remark(raw: list[tuple[int, str]], first: tuple[Cell, ...]) -> tup
     """Return the names in the last remark above the numbers, if it holds as many."""
     above = [(number, line) for number, line in raw if number < first[0].line and line.lstrip()[0] in COMMENT]
     for number, line in above[-1:]:
-        words = re.sub(r"\s+(?=[\[(])", "", line.lstrip(COMMENT + " "))
+        words = line.lstrip(COMMENT + " ")
         for separator in SEPARATORS:
             cells = _cells([(number, words)], separator)[0]
             if len(cells) == len(first) and not any(map(_is_entry, cells)):
@@ -604,7 +604,7 @@ def _numbers_between(line: str, separator: str) -> int:
 def _cells(lines: Sequence[tuple[int, str]], separator: str) -> list[tuple[Cell, ...]]:
     """Return the cells of all lines; decimal commas become points where commas do not separate."""
     blank = separator == r"\s+"
-    texts = [line.strip() if blank else line for _, line in lines]
+    texts = [re.sub(r"\s+(?=[\[(])", "", line.strip()) if blank else line for _, line in lines]  # a unit and its name
     counts = [len(re.split(separator, text)) for text in texts]
     frame = pd.read_csv(
         io.StringIO("\n".join(text.replace("\x00", " ") for text in texts)),
@@ -638,7 +638,9 @@ def _unit(written: str, column: Column) -> str:
         raise ValueError(
             f"expected its unit, such as {column.name + f' [{example_unit(column.unit)}]'!r} in the first line"
         )
-    _in_si("1", unit, column.unit)
+    size = _in_si("1", unit, column.unit)
+    if column.given_unit and not math.isclose(size, _in_si("1", column.given_unit, column.unit), rel_tol=1e-6):
+        raise ValueError(f"the file says {written}, got the unit {column.given_unit!r}: give only what the file omits")
     return unit
 
 

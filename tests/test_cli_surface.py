@@ -49,6 +49,14 @@ def test_maps_to_numbers_figure_and_spectrum(folder, capsys):
     taken = drawn[(drawn["what"] == "line of the method, pi q C^{2D}") & (drawn["file"] == "road1.npy")]
     expected = np.pi * taken["x"] * SPECTRUM.at(taken["x"].to_numpy())
     assert np.median(taken["y"] / expected) == pytest.approx(1, rel=0.1)
+    bins = drawn[(drawn["what"] == "spectrum in bins") & (drawn["file"] == "road0.npy")]
+    assert len(bins) > 10
+    assert ((bins["y_low"] < bins["y"]) & (bins["y"] < bins["y_high"])).all()
+    law = drawn[(drawn["what"] == "power law") & (drawn["file"] == "road0.npy")]
+    power, level = np.polyfit(np.log(law["x"]), np.log(law["y"]), 1)
+    assert power == pytest.approx(-2 - 2 * told["rows"][0]["hurst"], abs=0.01)
+    within = bins[bins["x"].between(law["x"].min(), law["x"].max())]
+    assert np.median(np.log(within["y"]) - power * np.log(within["x"])) == pytest.approx(level, abs=0.02)
     assert main(["surface", *MAPS, "-o", "road.csv", "--plot", "road.png"]) == 2
     assert "road.csv is the table of the figure road.png: give the spectrum another name" in capsys.readouterr().err
     (spectrum,) = spectra_of(Surface.model_validate({"spectrum": str(folder / "c2d.csv")}))

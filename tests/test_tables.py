@@ -149,7 +149,9 @@ def test_a_given_unit_serves_a_table_without_one():
     column = Column("x", "m", given_unit="mm")
     assert read_table("x\n5\n", "a.csv", [column])["x"] == 0.005
     assert read_table("5\n6\n", "a.csv", [column])["x"][1] == 0.006
-    assert read_table("x [um]\n5\n", "a.csv", [column])["x"] == 5e-6
+    assert read_table("x [mm]\n5\n", "a.csv", [column])["x"] == 0.005
+    with pytest.raises(TableError, match="the file says um, got the unit 'mm'"):
+        read_table("x [um]\n5\n", "a.csv", [column])
 
 
 @given(st.text(max_size=200))

@@ -35,14 +35,18 @@ def damaged(word, separator="\t"):
     return "\n".join(separator.join(row) for row in rows) + "\n"
 
 
-def holed(code):
+def holed(code, again=True):
     rows = ROWS.copy()
-    rows[3, 5] = rows[20, 7] = code
+    rows[3, 5] = code
+    rows[20, 7] = code if again else np.nan
     return rows
 
 
+SLOPE = ROWS + 40 * X + 30 * Y[:, None]
+JITTERED_X, JITTERED_Y = (axis + 0.1 * np.random.default_rng(2).uniform(-1, 1, axis.size) for axis in (X, Y))
 GAPS = np.delete(np.arange(NX * NY), [3 * NX + 5, 20 * NX + 7])
 SHUFFLED = np.random.default_rng(1).permutation(GAPS)
+JITTER = 0.1 * np.random.default_rng(3).uniform(-1, 1, (GAPS.size, 3)) * [1, 1, 0]
 XYZ = Units("um", "um")
 #: Text, units, and whether two points are missing.
 LAYOUTS = {
@@ -72,6 +76,25 @@ LAYOUTS = {
     "xyz with names": ("X,Y,Z\n" + joined(xyz(), ","), XYZ, False),
     "xyz with gaps": (joined(xyz(order=GAPS)), XYZ, True),
     "xyz in any order": (joined(xyz(order=SHUFFLED)), XYZ, True),
+    "positions last": (joined(np.c_[ROWS, Y]), UNITS, False),
+    "positions below": (joined(np.vstack([ROWS, X])), UNITS, False),
+    "positions with jitter": (joined(np.c_[JITTERED_Y, ROWS]), UNITS, False),
+    "axes with jitter": (joined(np.vstack([np.r_[0, JITTERED_X], np.c_[JITTERED_Y, ROWS]])), Units("um", "um"), False),
+    "number and position": (joined(np.c_[np.arange(NY), 1e-3 * JITTERED_Y, ROWS]), UNITS, False),
+    "positions beside a slope": (joined(np.vstack([np.r_[0, X], np.c_[JITTERED_Y, SLOPE]])), UNITS, False),
+    "slope": (joined(SLOPE), UNITS, False),
+    "missing as 9999 once": (joined(holed(9999, again=False)), UNITS, True),
+    "xyz with jitter": (joined(xyz(order=SHUFFLED) + JITTER), XYZ, True),
+    "xyz with units": ("x [um] y [um] z [nm]\n" + joined(xyz() * [1, 1, 1e3], " "), Units(), False),
+    "xyz with units in a remark": ("# X (mm), Y (um), Z (nm)\n" + joined(xyz() * [1e-3, 1, 1e3], ","), Units(), False),
+    "numbers and xyz": (joined(np.c_[np.arange(NX * NY), xyz()]), XYZ, False),
+    "xyz among others": (
+        "quality,Z [um],Y [um],X [um]\n" + joined(np.c_[np.ones(NX * NY), xyz()[:, ::-1]], ","),
+        Units(),
+        False,
+    ),
+    "units in the heading": (f"Unit: um\n# x-spacing: {STEP * 1e6:g} um\n" + joined(ROWS), Units(), False),
+    "units in the corner": (joined([["y [um]", *X]], ",", "{}") + joined(np.c_[Y, ROWS], ","), Units("um"), False),
     "surfer": (
         f"DSAA\n{NX} {NY}\n{X[0]} {X[-1]}\n{Y[0]} {Y[-1]}\n{ROWS.min()} {ROWS.max()}\n" + joined(ROWS, " "),
         XYZ,
@@ -92,16 +115,18 @@ def test_a_text_map_is_read_as_it_stands(layout, tmp_path):
     path = tmp_path / "map.txt"
     path.write_bytes(text.encode())
     surface, remarks = read_map(DataFile.of(path), units)
-    expected = (ROWS + 500 if "zero" in layout else ROWS).T * 1e-6
+    expected = (ROWS + 500 if "zero" in layout else SLOPE if "slope" in layout else ROWS).T * 1e-6
     assert surface.height.shape == expected.shape
     holes = ~np.isfinite(surface.height)
     assert np.count_nonzero(holes) == (2 if missing else 0)
     np.testing.assert_allclose(surface.height[~holes], expected[~holes], atol=1e-13)
-    assert surface.size == pytest.approx((LENGTH, LENGTH * NY / NX))
-    if any(word in layout for word in ("axes", "pandas", "column numbers")):
-        assert "was left out" in " ".join(remarks) or "were left out" in " ".join(remarks)
+    assert surface.size == pytest.approx((LENGTH, LENGTH * NY / NX), rel=1e-3)
+    left_out = any(word in layout for word in ("axes", "pandas", "numbers", "position", "corner"))
+    assert ("positions or numbers, left out" in " ".join(remarks)) == (
+        left_out and "xyz" not in layout and "preamble" not in layout
+    )
     if "preamble" in layout:
-        assert "lines before the heights, not used" in " ".join(remarks)
+        assert "lines before the heights" in " ".join(remarks)
     assert dimensions(DataFile.of(path)) == 2
 
 
@@ -120,6 +145,22 @@ def test_encodings_of_windows_are_read(tmp_path):
         (joined(xyz()), Units("um"), "does not say the unit of its positions: give `x_unit`"),
         (joined(xyz()), Units("um", "um", 2 * STEP), "leave out `spacing`"),
         (joined(ROWS) + "1\t2\n", UNITS, "line 33 has 2, others 40"),
+        (joined(np.c_[Y, ROWS]), Units("um"), "does not say the unit of its positions: give `x_unit`"),
+        (joined(np.c_[Y, ROWS]), Units("um", "", 1.5 * STEP), "which is not 3.75 um in any unit: give `x_unit`"),
+        (joined(np.vstack([X, ROWS])), Units("um", "mm", STEP), "leave out `spacing` or correct the file"),
+        (joined(np.c_[Y, 3 * Y, ROWS]), UNITS, "more than one column of positions, with steps of 2.5 and 7.5"),
+        (joined(np.c_[Y**1.5, ROWS]), UNITS, "expected positions on a regular grid"),
+        ("Unit: nm\n" + joined(ROWS), UNITS, "the file says nm, got 'um': leave out `unit`"),
+        ("Unit: nm\nz in um\n" + joined(ROWS), Units("", "", STEP), "states more than one height"),
+        ("pixel size,2 um\n" + joined(ROWS, ","), UNITS, "`spacing` 2.5 um: leave out `spacing`"),
+        ("x [um] y [um] z [nm]\n" + joined(xyz(), " "), Units("um"), "the file says nm, got 'um': leave out `unit`"),
+        (
+            "x [um] y [um] z [nm]\n" + joined(xyz(), " "),
+            Units("", "mm"),
+            "the file says um, got 'mm': leave out `x_unit`",
+        ),
+        ("x [um] y [um] z [nm]\n" + joined(xyz(), " "), Units("", "", 1e-6), "leave out `spacing`"),
+        (joined(np.c_[xyz(), xyz()]), XYZ, "expected a map, or columns x, y and z, got 6 columns: name them"),
         ("no numbers at all\n", UNITS, "expected rows of heights"),
         ("", UNITS, "expected rows of heights"),
     ],
@@ -132,15 +173,49 @@ def test_what_cannot_be_read_says_what_to_give(text, units, message, tmp_path):
     assert str(caught.value).startswith("map.txt: ")
 
 
-def test_the_unit_of_heights_is_not_that_of_positions(tmp_path):
+PLACE, HEIGHT = np.linspace(0, 9.4, 200), np.sin(3 * np.linspace(0, 9.4, 200))
+SCANS = {
+    "x, z": (joined(np.c_[PLACE, HEIGHT]), Units("um", "mm")),
+    "z, x": (joined(np.c_[HEIGHT, PLACE]), Units("um", "mm")),
+    "number, x, z": (joined(np.c_[np.arange(200), PLACE, HEIGHT]), Units("um", "mm")),
+    "names": ("z [um],x [mm]\n" + joined(np.c_[HEIGHT, PLACE], ","), Units()),
+    "names between blanks": ("x [mm] z [um]\n" + joined(np.c_[PLACE, HEIGHT], " "), Units()),
+    "names without units": ("x z\n" + joined(np.c_[PLACE, HEIGHT], " "), Units("um", "mm")),
+}
+
+
+@pytest.mark.parametrize("code", [None, -9999.0, 1.70141e38])
+@pytest.mark.parametrize("layout", SCANS)
+def test_a_scan_is_read_as_it_stands_and_codes_are_no_heights(layout, code, tmp_path):
+    text, units = SCANS[layout]
     path = tmp_path / "line.txt"
-    place = np.linspace(0, 9.4, 200)
-    path.write_text(joined(np.c_[place, np.sin(3 * place)]))
-    x, z = read_scan(DataFile.of(path), Units("um", "mm"))
-    assert (x[-1], z.max()) == pytest.approx((9.4e-3, 1e-6), rel=1e-3)
-    for units in (Units("um"), Units("", "mm")):
-        with pytest.raises(DataError):
-            read_scan(DataFile.of(path), units)
+    if code:
+        text = text.replace(f"{HEIGHT[7]:.9g}", f"{code:g}").replace(f"{HEIGHT[120]:.9g}", f"{code:g}")
+    path.write_text(text)
+    assert dimensions(DataFile.of(path)) == 1
+    x, z, remarks = read_scan(DataFile.of(path), units)
+    np.testing.assert_allclose(x, 1e-3 * PLACE, atol=1e-11)
+    np.testing.assert_allclose(z, 1e-6 * HEIGHT, atol=2e-8 if code else 1e-13)
+    assert ("taken as missing: 2 points" in " ".join(remarks)) == bool(code)
+
+
+@pytest.mark.parametrize(
+    ("layout", "units", "message"),
+    [
+        ("x, z", Units("um"), "unit of its positions: give `x_unit`"),
+        ("x, z", Units("", "mm"), "unit of its heights: give `unit`"),
+        ("names", Units("nm"), "the file says um, got the unit 'nm'"),
+        ("names", Units("", "um"), "the file says mm, got the unit 'um'"),
+    ],
+)
+def test_a_scan_that_leaves_doubt_is_refused(layout, units, message, tmp_path):
+    path = tmp_path / "line.txt"
+    path.write_text(SCANS[layout][0])
+    with pytest.raises(DataError, match=message):
+        read_scan(DataFile.of(path), units)
+    path.write_text(joined(np.c_[PLACE, PLACE**2 + 0.1 * PLACE]))
+    with pytest.raises(DataError, match="one column of positions and one of heights, got 2 columns: name them"):
+        read_scan(DataFile.of(path), Units("um", "mm"))
 
 
 def test_what_a_file_says_of_itself_is_used_or_a_contradiction(tmp_path):

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.models.data_file import DataFile
-from mdr_dask.tables import Column, read_table
+from mdr_dask.models.parts import positions
+from mdr_dask.tables import Column, match, numbers, read_sheet, read_table
 from mdr_dask.units import shown, to_si
 
 if TYPE_CHECKING:
@@ -19,12 +20,14 @@ if TYPE_CHECKING:
 
 #: Ends of the names of plain text.
 TEXT = (".csv", ".txt", ".dat", ".xyz", ".asc", ".tsv", ".grd", ".prn")
-SAME = 1e-3
-"""Relative difference up to which two lengths, or the steps between positions, count as equal: files round them."""
+SAME = 0.01
+"""Relative difference up to which two lengths count as equal: files round them, and positions are recorded ones."""
+MOST_COLUMNS = 6
+"""Columns that x, y, z or a line scan may have with numbers and other values beside them; a map has more."""
 
 
 class Units(NamedTuple):
-    """What a user says of a file: units of heights and of positions, and distances of points, m; empty if unsaid."""
+    """Units of heights and of positions, and distances of points, m; empty where they are not stated."""
 
     height: str = ""
     position: str = ""
@@ -39,85 +42,93 @@ class Recorded(NamedTuple):
     remarks: tuple[str, ...]
 
 
+class Scan(NamedTuple):
+    """Positions and heights of a line scan, m, and what was done to read it."""
+
+    position: FloatArray
+    height: FloatArray
+    remarks: tuple[str, ...]
+
+
+class _Grid(NamedTuple):
+    """Heights in the unit of the file, rows along x; steps of the positions along x and y in their unit, if any."""
+
+    rows: FloatArray
+    steps: tuple[float | None, float | None] = (None, None)
+    stated: Units = Units()
+    remarks: tuple[str, ...] = ()
+
+
 def read_map(file: DataFile, units: Units) -> Recorded:
     """Return the heights of a map.
 
-    What the file says about itself is used. Rows of text and npy run along x, one below the other along y.
+    What the file states is used. Rows of text and npy run along x, one below the other along y.
 
     Parameters
     ----------
     file : DataFile
         Text, npy, or any format that SurfaceTopography reads.
     units : Units
-        What the file does not say.
+        What the user states.
 
     Raises
     ------
     DataError
-        If the file holds no map, if a unit or spacing is missing, or if the file says something else than `units`.
+        If the file holds no map, if a unit or spacing is missing, or if file and user contradict each other.
     """
-    axes: tuple[float, float] | None = None
-    remarks: tuple[str, ...] = ()
+    from mdr_dask.physics.surfaces.maps import SurfaceMap
+
     if file.name.lower().endswith(".npy"):
-        rows = _array(file)
+        grid = _without_positions(file, _array(file), Units(), ())
     elif (channel := _channel(file)) is not None:
-        if channel.dim != 2:
-            raise DataError(f"{file.name}: expected a map, got a line scan: name it by `scan` instead of `map`")
-        return _of_channel(file, channel, units)
+        grid = _of_channel(file, channel, units)
     else:
-        rows, axes, remarks = _grid_of_text(file)
-    unsaid = []
-    if axes is None and units.spacing is None:
-        unsaid.append("its spacing: give `spacing`, such as 1 um")
-    if not units.height:
-        unsaid.append("the unit of its heights: give `unit`, such as um")
-    if axes is not None and not units.position:
-        unsaid.append("the unit of its positions: give `x_unit`, such as um")
-    if unsaid:
-        raise DataError("\n".join(f"{file.name}: does not say {what}" for what in unsaid))
-    metre = _metre(file, units.height, "unit")
-    if axes is None:
-        assert units.spacing is not None
-        steps = units.spacing, units.spacing_y or units.spacing
-    else:
-        position = _metre(file, units.position, "x_unit")
-        steps = axes[0] * position, axes[1] * position
-        _agree(file, "spacing", units.spacing, steps[0])
-        _agree(file, "spacing_y", units.spacing_y, steps[1])
-    return _without_codes(rows.T * metre, (rows.shape[1] * steps[0], rows.shape[0] * steps[1]), remarks)
+        grid = _grid_of_text(file)
+    metre, steps_m = _settled(file, grid, units)
+    height, remarks = positions.without_codes(grid.rows.T * metre)
+    size = height.shape[0] * steps_m[0], height.shape[1] * steps_m[1]
+    return Recorded(SurfaceMap(height, size), (*grid.remarks, *remarks))
 
 
-def read_scan(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]:
-    """Return positions and heights of a line scan, m, as they were recorded.
+def read_scan(file: DataFile, units: Units) -> Scan:
+    """Return a line scan as it was recorded; missing heights are interpolated.
 
     Parameters
     ----------
     file : DataFile
         Table of x and z, or any format that SurfaceTopography reads.
     units : Units
-        What the file does not say.
+        What the user states.
 
     Raises
     ------
     DataError
-        If the file does not hold a line, or a unit is missing.
+        If the file does not hold a line, if a unit is missing, or if file and user contradict each other.
     """
+    import numpy as np
+
+    from mdr_dask.physics.surfaces.maps import require_few_missing
+
     if file.name.lower().endswith(".npy"):
         raise DataError(f"{file.name}: expected a table of x and z, got an array: name it by `map` instead of `scan`")
     channel = _channel(file)
     if channel is None:
-        columns = (
-            Column("x", "m", ("position", "distance", "length", "X"), given_unit=units.position),
-            Column("z", "m", ("height", "h", "y", "profile"), given_unit=units.height),
-        )
-        table = read_table(file.read_text(), file.name, columns)
-        return table["x"], table["z"]
-    if channel.dim != 1:
+        x, z = _line_of_text(file, units)
+    elif channel.dim != 1:
         points = " x ".join(map(str, channel.nb_grid_pts))
         raise DataError(f"{file.name}: expected a line scan, got a map of {points} points: name it by `map`")
-    line, metre = _topography(file, channel, units)
-    x, z = line.positions_and_heights()
-    return x * metre, z * metre
+    else:
+        line, unit = _topography(file, channel, units)
+        metre = _metre(file, unit, "unit")
+        x, z = (np.ma.filled(np.ma.asarray(a, dtype=np.float64), np.nan) * metre for a in line.positions_and_heights())
+    z, remarks = positions.without_codes(z)
+    missing = ~np.isfinite(z)
+    if missing.any():
+        require_few_missing(missing)
+        order = np.argsort(x)
+        z[missing] = np.interp(x[missing], x[order][~missing[order]], z[order][~missing[order]])
+        remarks = (*remarks, f"missing points interpolated: {np.count_nonzero(missing)}")
+    return Scan(x, z, remarks)
 
 
 def dimensions(file: DataFile) -> int:
@@ -126,11 +137,69 @@ def dimensions(file: DataFile) -> int:
         return 2
     if (channel := _channel(file)) is not None:
         return int(channel.dim)
+    lines = file.read_text().splitlines()
+    if _is_grid(lines):
+        return 2
     try:
-        rows, _, _ = _grid_of_text(file)
+        cells, first = _block(file, lines)
+        return 2 if cells.shape[1] > MOST_COLUMNS or _coordinates(file, lines, first, cells) else 1
     except DataError:
         return 1
-    return 2 if rows.shape[1] > 2 else 1
+
+
+def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[float, float]]:
+    """Return the unit of the heights and the spacings along x and y, all in m, from what file and user state."""
+    height = _one_unit(file, "unit", grid.stated.height, units.height)
+    position = _one_unit(file, "x_unit", grid.stated.position, units.position)
+    metre = _metre(file, position, "x_unit") if position else _implied_unit(file, grid.steps, units)
+    spacings: list[float | None] = []
+    for option, step, stated, given in zip(
+        ("spacing", "spacing_y"), grid.steps, grid.stated[2:], units[2:], strict=True
+    ):
+        known = [length for length in (step and metre and step * metre, stated, given) if length]
+        for other in known[1:]:
+            if abs(other - known[0]) > SAME * known[0]:
+                own, option_or_heading = ("positions", "heading") if step and metre else ("heading", "option")
+                source = f"`{option}`" if other == given else f"the {option_or_heading}"
+                raise DataError(
+                    f"{file.name}: the {own} have a {option} of {shown(known[0], 'm')}, {source} {shown(other, 'm')}: "
+                    f"leave out `{option}` or correct the file"
+                )
+        spacings.append(known[0] if known else None)
+    unsaid = []
+    if any(grid.steps) and metre is None:
+        unsaid.append("the unit of its positions: give `x_unit`, such as um")
+    elif spacings[0] is None:
+        unsaid.append("its spacing: give `spacing`, such as 1 um")
+    if not height:
+        unsaid.append("the unit of its heights: give `unit`, such as um")
+    if unsaid:
+        raise DataError("\n".join(f"{file.name}: does not say {what}" for what in unsaid))
+    assert spacings[0] is not None
+    return _metre(file, height, "unit"), (spacings[0], spacings[1] or spacings[0])
+
+
+def _implied_unit(file: DataFile, steps: tuple[float | None, float | None], units: Units) -> float | None:
+    """Return the unit of positions, m, that follows from a spacing which the user states; a power of ten."""
+    import math
+
+    for step, spacing in zip(steps, (units.spacing, units.spacing_y or units.spacing), strict=True):
+        if step and spacing:
+            power = round(math.log10(spacing / step))
+            if abs(spacing / step / 10.0**power - 1) > SAME:
+                raise DataError(
+                    f"{file.name}: its positions are {step:.4g} apart, which is not {shown(spacing, 'm')} in any unit: "
+                    "give `x_unit`, the unit of the positions"
+                )
+            return 10.0**power
+    return None
+
+
+def _one_unit(file: DataFile, option: str, stated: str, given: str) -> str:
+    """Return the unit that a file or the user states."""
+    if stated and given and abs(_metre(file, stated, option) / _metre(file, given, option) - 1) > SAME:
+        raise DataError(f"{file.name}: the file says {stated}, got {given!r}: leave out `{option}` or correct the file")
+    return stated or given
 
 
 def _metre(file: DataFile, unit: str, option: str) -> float:
@@ -139,14 +208,6 @@ def _metre(file: DataFile, unit: str, option: str) -> float:
         return to_si(f"1 {unit}", "m")
     except ValueError as error:
         raise DataError(f"{file.name}: {option}: {error}") from None
-
-
-def _agree(file: DataFile, option: str, given: float | None, found: float) -> None:
-    """Refuse an option that contradicts the file."""
-    if given is not None and abs(given - found) > SAME * found:
-        raise DataError(
-            f"{file.name}: has a {option} of {shown(found, 'm')}, got {shown(given, 'm')}: leave out `{option}`"
-        )
 
 
 def _channel(file: DataFile) -> Any:
@@ -172,37 +233,32 @@ def _channel(file: DataFile) -> Any:
     return None if is_text and channel.unit is None else channel
 
 
-def _topography(file: DataFile, channel: Any, units: Units) -> tuple[Any, float]:
-    """Return the map or line of a channel, and its unit of length in m."""
-    sizes = channel.physical_sizes
-    if channel.unit is not None:
-        metre = to_si(f"1 {channel.unit}", "m")
-        if units.height and abs(_metre(file, units.height, "unit") - metre) > SAME * metre:
-            raise DataError(f"{file.name}: the file says {channel.unit}, got {units.height!r}: leave out `unit`")
-    elif not units.height:
+def _topography(file: DataFile, channel: Any, units: Units) -> tuple[Any, str]:
+    """Return the map or line of a channel, and its unit, which is that of heights and positions."""
+    stated = channel.unit or ""
+    unit = _one_unit(file, "unit", stated, units.height)
+    if not unit:
         raise DataError(f"{file.name}: does not say its unit: give `unit`, such as um")
-    else:
-        metre = _metre(file, units.height, "unit")
-    if sizes is None:
+    _one_unit(file, "x_unit", unit, units.position)
+    if channel.physical_sizes is None:
         if units.spacing is None:
             raise DataError(f"{file.name}: does not say its spacing: give `spacing`, such as 1 um")
         steps = (units.spacing, units.spacing_y or units.spacing)
+        metre = _metre(file, unit, "unit")
         sizes = tuple(n * step / metre for n, step in zip(channel.nb_grid_pts, steps, strict=False))
-        return channel.topography(physical_sizes=sizes), metre
-    for option, given, size, points in zip(
-        ("spacing", "spacing_y"), (units.spacing, units.spacing_y), sizes, channel.nb_grid_pts, strict=False
-    ):
-        _agree(file, option, given, size / points * metre)
-    return channel.topography(), metre
+        return channel.topography(physical_sizes=sizes), unit
+    return channel.topography(), unit
 
 
-def _of_channel(file: DataFile, channel: Any, units: Units) -> Recorded:
+def _of_channel(file: DataFile, channel: Any, units: Units) -> _Grid:
     import numpy as np
 
-    surface, metre = _topography(file, channel, units)
-    height = np.ma.filled(np.ma.asarray(surface.heights(), dtype=np.float64), np.nan) * metre
-    x, y = (length * metre for length in surface.physical_sizes)
-    return _without_codes(height, (x, y), ())
+    if channel.dim != 2:
+        raise DataError(f"{file.name}: expected a map, got a line scan: name it by `scan` instead of `map`")
+    surface, unit = _topography(file, channel, units)
+    rows = np.ma.filled(np.ma.asarray(surface.heights(), dtype=np.float64), np.nan).T
+    steps = tuple(size / points for size, points in zip(surface.physical_sizes, surface.nb_grid_pts, strict=True))
+    return _Grid(rows, (float(steps[0]), float(steps[1])), Units(unit, unit))
 
 
 def _array(file: DataFile) -> FloatArray:
@@ -220,31 +276,78 @@ def _array(file: DataFile) -> FloatArray:
     return np.asarray(array, dtype=np.float64)
 
 
-Grid = tuple[FloatArray, tuple[float, float] | None, tuple[str, ...]]
-
-
-def _grid_of_text(file: DataFile) -> Grid:
-    """Return rows of heights, the steps along x and y where the file has positions, and remarks."""
-    lines = file.read_text().splitlines()
+def _is_grid(lines: list[str]) -> bool:
+    """Return whether a text is a grid of Surfer or ESRI."""
     head = lines[0].split() if lines else []
-    if head[:1] == ["DSAA"]:
-        return _surfer(file, lines)
-    if head[:1] and head[0].lower() == "ncols":
-        return _esri(file, lines)
-    cells, before = _block(file, lines)
+    return head[:1] == ["DSAA"] or (bool(head) and head[0].lower() == "ncols")
+
+
+def _grid_of_text(file: DataFile) -> _Grid:
+    """Return the heights of a text, and what it states about them."""
+    lines = file.read_text().splitlines()
+    if _is_grid(lines):
+        return _surfer(file, lines) if lines[0].startswith("DSAA") else _esri(file, lines)
+    cells, first = _block(file, lines)
+    stated = _stated(file, lines[:first], lines[first])
+    if cells.shape[1] <= MOST_COLUMNS < len(cells):
+        return _scattered(file, lines, first, cells, stated)
     words = cells.size - int(cells.notna().to_numpy().sum())
-    remarks = [f"lines before the heights, not used: {before}"] if before else []
-    rows = cells.to_numpy(dtype="float64")
-    if rows.shape[1] == 3 and rows.shape[0] > rows.shape[1] ** 2:
-        return _scattered(file, rows, remarks)
+    before = sum(bool(line.strip()) and line.lstrip()[0] not in "#%" for line in lines[:first])
+    remarks = [f"lines before the heights: {before}"] if before else []
     if words:
         remarks.append(f"cells without a number, taken as missing points: {words}")
-    rows, found = _without_positions(rows)
-    return rows, None, (*remarks, *found)
+    return _without_positions(file, cells.to_numpy(dtype="float64"), stated, tuple(remarks))
+
+
+def _without_positions(file: DataFile, rows: FloatArray, stated: Units, remarks: tuple[str, ...]) -> _Grid:
+    try:
+        heights, steps, found = positions.without_positions(rows)
+    except DataError as problem:
+        raise DataError(f"{file.name}: {problem}") from None
+    return _Grid(heights, steps, stated, (*remarks, *found))
+
+
+def _stated(file: DataFile, head: list[str], first: str) -> Units:
+    """Return the units and the spacings that lines before the heights state, or a corner such as ``y [um]``.
+
+    A line that ends in a unit of length states that unit for what it names, and a length if it names a spacing.
+    """
+    corner = re.split(r"[\t;,]", first)[0]
+    head = [*head, f"position {corner}"] if re.search(r"[\[(]", corner) else head
+    found: dict[str, dict[str, str]] = {}
+    for line in head:
+        words = [word for word in re.split(r"[\s:=,;()\[\]\"/\\#%]+", line) if word]
+        names = {word.rstrip("s") for word in re.findall(r"[a-z]+", line.casefold())}
+        if len(words) < 2 or not _is_length(words[-1]):
+            continue
+        along, upwards = names & {"x", "y", "lateral", "position", "horizontal"}, names & {"z", "height", "value"}
+        number = re.fullmatch(r"[+-]?[\d.]+(e[+-]?\d+)?", words[-2], re.IGNORECASE)
+        if number and names & {"spacing", "pitch", "pixel", "step", "dx", "dy", "distance"}:
+            key = "spacing_y" if names & {"y", "dy"} and not names & {"x", "dx"} else "spacing"
+            found.setdefault(key, {})[f"{words[-2]} {words[-1]}"] = line
+        elif not number and bool(along) != bool(upwards):  # both are the names of several columns
+            found.setdefault("position" if along else "height", {})[words[-1]] = line
+        elif not number and "unit" in names:
+            found.setdefault("height", {})[words[-1]] = line
+    for key, values in found.items():
+        if len({to_si(f"1 {v}" if key in ("height", "position") else v, "m") for v in values}) > 1:
+            lines = " and ".join(repr(line.strip()) for line in values.values())
+            raise DataError(f"{file.name}: states more than one {key}: {lines}: remove the lines that are not about it")
+    only = {key: next(iter(values)) for key, values in found.items()}
+    spacing, spacing_y = (to_si(only[key], "m") if key in only else None for key in ("spacing", "spacing_y"))
+    return Units(only.get("height", ""), only.get("position", ""), spacing, spacing_y)
+
+
+def _is_length(unit: str) -> bool:
+    try:
+        to_si(f"1 {unit}", "m")
+    except ValueError:
+        return False
+    return True
 
 
 def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
-    """Return the rows of numbers of a text as a table, NaN for words, and how many lines come before them."""
+    """Return the rows of numbers of a text as a table, NaN for words, and the index of the first line that is one."""
     import pandas as pd
 
     kept = [line for line in lines if line.strip() and line.lstrip()[0] not in "#%"]
@@ -283,10 +386,10 @@ def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
     if table.empty or odd:
         line = f": line {lines.index(kept[odd[0]]) + 1} has {width[odd[0] - first]}, others {common}" if odd else ""
         raise DataError(f"{file.name}: expected rows of heights of one length{line}")
-    return table.apply(pd.to_numeric, errors="coerce"), first
+    return table.apply(pd.to_numeric, errors="coerce"), lines.index(kept[first])
 
 
-def _surfer(file: DataFile, lines: list[str]) -> Grid:
+def _surfer(file: DataFile, lines: list[str]) -> _Grid:
     """Return the grid of a text of Surfer: DSAA, numbers of points, ranges of x, y and z, rows from the lowest y on."""
     import numpy as np
 
@@ -297,10 +400,10 @@ def _surfer(file: DataFile, lines: list[str]) -> Grid:
     except ValueError:
         raise DataError(f"{file.name}: expected a grid of Surfer with as many heights as its head says") from None
     steps = (numbers[3] - numbers[2]) / (nx - 1), (numbers[5] - numbers[4]) / (ny - 1)
-    return rows, (float(steps[0]), float(steps[1])), ()
+    return _Grid(rows, (float(steps[0]), float(steps[1])))
 
 
-def _esri(file: DataFile, lines: list[str]) -> Grid:
+def _esri(file: DataFile, lines: list[str]) -> _Grid:
     """Return the grid of an ESRI text: names and numbers, then rows from the highest y on."""
     import numpy as np
 
@@ -314,83 +417,87 @@ def _esri(file: DataFile, lines: list[str]) -> Grid:
     except (KeyError, ValueError):
         raise DataError(f"{file.name}: expected an ESRI grid with ncols, nrows, cellsize and as many heights") from None
     rows[rows == float(head.get("nodata_value", "nan"))] = np.nan
-    return rows[::-1], (step, step), ()
+    return _Grid(rows[::-1], (step, step))
 
 
-def _scattered(file: DataFile, points: FloatArray, remarks: list[str]) -> Grid:
-    """Return the grid of rows x, y, z in any order; points of the grid that have no row are missing."""
-    import numpy as np
-
-    places, steps = [], []
-    for axis in range(2):
-        values = np.unique(points[:, axis])
-        gaps = np.diff(values)
-        step = float(np.median(gaps[gaps > SAME * gaps.max(initial=0.0)])) if gaps.size else 0.0
-        place = np.rint((points[:, axis] - values[0]) / step) if step else points[:, axis]
-        if not step or np.max(np.abs(points[:, axis] - values[0] - place * step)) > 0.1 * step:
-            raise DataError(f"{file.name}: expected x, y and z on a regular grid")
-        places.append(place.astype(int))
-        steps.append(step)
-    shape = places[1].max() + 1, places[0].max() + 1
-    if shape[0] * shape[1] > 4 * len(points):
-        raise DataError(f"{file.name}: expected x, y and z on a regular grid")
-    rows = np.full(shape, np.nan)
-    rows[places[1], places[0]] = points[:, 2]
-    return rows, (steps[0], steps[1]), tuple(remarks)
+#: Columns of a table of points.
+COORDINATES = (
+    Column("x", "m", ("X", "position")),
+    Column("y", "m", ("Y",)),
+    Column("z", "m", ("Z", "height")),
+)
 
 
-def _without_positions(rows: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
-    """Leave out a first row of positions, and a first column of positions or row numbers."""
-    remarks = []
-    if min(rows.shape) > 3 and _ascends(rows[0, 1:]) and not _ascends(rows[1, 1:]):
-        rows = rows[1:]
-        remarks.append("the first row holds positions and was left out")
-        if _ascends(rows[:, 0]):
-            return rows[:, 1:], ("the first row and column hold positions and were left out",)
-    if min(rows.shape) > 3 and _ascends(rows[:, 0]) and not _ascends(rows[:, 1]):
-        rows = rows[:, 1:]
-        remarks.append("the first column holds positions or row numbers and was left out")
-    return rows, tuple(remarks)
+def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame) -> tuple[tuple[int, str], ...]:
+    """Return place and unit of the columns x, y and z of a table, by their names; empty if it has none of them.
 
-
-def _ascends(numbers: FloatArray) -> bool:
-    """Return whether numbers rise or fall in equal steps."""
-    import numpy as np
-
-    steps = np.diff(numbers)
-    return bool(steps.size and steps[0] != 0 and np.all(np.abs(steps - steps.mean()) <= SAME * abs(steps.mean())))
-
-
-def _without_codes(height: FloatArray, size: tuple[float, float], remarks: tuple[str, ...]) -> Recorded:
-    """Return a map whose missing points are NaN also where the file has a code such as 9999 for them.
-
-    A code is the highest or the lowest number, occurs twice or more, and is farther from all other heights than these
-    are from each other.
+    In a table without names they are the three that are left without the numbers of the rows.
     """
-    import numpy as np
+    try:
+        sheet = read_sheet("\n".join(lines[: first + 10]), file.name)
+    except DataError:
+        sheet = None
+    if sheet is not None and sheet.names:
+        found: dict[str, tuple[int, str]] = {}
+        for place, (cell, unit) in enumerate(zip(sheet.names, sheet.units, strict=True)):
+            column, written = match(cell.text, unit, COORDINATES)
+            if column is not None:
+                found.setdefault(column.name, (place, written))
+        return tuple(found[name] for name in "xyz") if len(found) == len(COORDINATES) else ()
+    table = cells.to_numpy(dtype="float64")
+    places = [k for k in range(table.shape[1]) if not positions.is_numbered(table[:, k])]
+    has_line = positions.rising(table[:, places].T).any()
+    return tuple((k, "") for k in places) if len(places) == len(COORDINATES) and not has_line else ()
 
-    from mdr_dask.physics.surfaces.maps import SurfaceMap
 
-    height = np.array(height, dtype=np.float64)
-    height[~np.isfinite(height)] = np.nan
-    found = list(remarks)
-    while np.any(finite := np.isfinite(height)):
-        low, high = float(np.min(height[finite])), float(np.max(height[finite]))
-        rest = height[finite & (height > low) & (height < high)]
-        if not rest.size:
-            break
-        least, most = float(rest.min()), float(rest.max())
-        codes = [
-            code
-            for code, distance in ((low, least - low), (high, high - most))
-            if distance > most - least and np.count_nonzero(height == code) > 1
-        ]
-        if not codes:
-            break
-        for code in codes:
-            there = height == code
-            found.append(
-                f"taken as missing: {np.count_nonzero(there)} points at {shown(code, 'm')}, far from all others"
-            )
-            height[there] = np.nan
-    return Recorded(SurfaceMap(height, size), tuple(found))
+def _scattered(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame, stated: Units) -> _Grid:
+    """Return the grid of a table of x, y and z in any order; points of the grid that have no row are missing."""
+    columns = _coordinates(file, lines, first, cells)
+    if not columns:
+        raise DataError(
+            f"{file.name}: expected a map, or columns x, y and z, got {cells.shape[1]} columns: name them in the line "
+            "above, such as x [mm], y [mm], z [um]"
+        )
+    x, y, z = (cells[place].to_numpy(dtype="float64") for place, _ in columns)
+    units = [unit for _, unit in columns]
+    if units[0] and units[1]:
+        y = y * (_metre(file, units[1], "x_unit") / _metre(file, units[0], "x_unit"))
+    try:
+        rows, steps = positions.scattered(x, y, z)
+    except DataError as problem:
+        raise DataError(f"{file.name}: {problem}") from None
+    return _Grid(rows, steps, stated._replace(position=units[0] or stated.position, height=units[2] or stated.height))
+
+
+def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]:
+    """Return positions and heights, m, of a table: by the names of its columns, or else by their numbers."""
+    text = file.read_text()
+    sheet = read_sheet(text, file.name)
+    if sheet.names:
+        columns = (
+            Column("x", "m", ("position", "distance", "length", "X"), given_unit=units.position),
+            Column("z", "m", ("height", "h", "y", "profile"), given_unit=units.height),
+        )
+        table = read_table(text, file.name, columns, allow_missing=True)
+        return table["x"], table["z"]
+    table_of = numbers(sheet)
+    rises = [k for k, one in enumerate(positions.rising(table_of.T)) if one]
+    counted = [k for k in rises if positions.is_numbered(table_of[:, k])]
+    along = [k for k in rises if k not in counted] or rises or [0]
+    across = [k for k in range(table_of.shape[1]) if k not in rises and k not in along]
+    if len(along) != 1 or len(across) != 1:
+        raise DataError(
+            f"{file.name}: expected one column of positions and one of heights, got {table_of.shape[1]} columns: name "
+            "them in the first line, such as x [mm], z [um]"
+        )
+    unsaid = [
+        f"{file.name}: does not say the unit of its {what}: give `{option}`, such as um"
+        for what, option, unit in (("heights", "unit", units.height), ("positions", "x_unit", units.position))
+        if not unit
+    ]
+    if unsaid:
+        raise DataError("\n".join(unsaid))
+    return (
+        table_of[:, along[0]] * _metre(file, units.position, "x_unit"),
+        table_of[:, across[0]] * _metre(file, units.height, "unit"),
+    )

@@ -45,7 +45,8 @@ class ProfileFile(NamedByFile):
 
     def notes(self) -> tuple[str, ...]:
         """Return points, length, rms height and rms slope of the line."""
-        return (_statistics(self),)
+        remarks = read_scan(self.file, Units(self.unit, self.x_unit)).remarks
+        return (_statistics(self), *(f"profile {self.file.name}: {remark}" for remark in remarks))
 
 
 @lru_cache(maxsize=16)
@@ -71,6 +72,6 @@ def line_of(profile: ProfileFile) -> MeasuredLine:
     """
     from mdr_dask.physics.surfaces.measured import measured_line
 
-    x, z = read_scan(profile.file, Units(profile.unit, profile.x_unit))
+    scan = read_scan(profile.file, Units(profile.unit, profile.x_unit))
     band = profile.shortest_wavelength or 0.0, profile.longest_wavelength or 0.0
-    return measured_line(x, z, profile.detrend, profile.taper, *band)
+    return measured_line(scan.position, scan.height, profile.detrend, profile.taper, *band)

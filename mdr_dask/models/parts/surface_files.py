@@ -10,7 +10,7 @@ from pydantic import Field
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import quantity
 from mdr_dask.models.data_file import DataFile, NamedFile
-from mdr_dask.models.parts.height_file import Units, read_map, read_scan
+from mdr_dask.models.parts.height_file import Scan, Units, read_map, read_scan
 from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.tables import Column, read_table
 
@@ -138,13 +138,18 @@ def _tabulated(file: DataFile) -> Spectrum:
 
 
 @lru_cache(maxsize=64)
+def _scan(scans: ScanFiles, file: DataFile) -> Scan:
+    return read_scan(file, Units(scans.unit, scans.x_unit))
+
+
+@lru_cache(maxsize=64)
 def line_of_scan(scans: ScanFiles, file: DataFile) -> MeasuredLine:
     """Return a scan without its trend."""
     from mdr_dask.physics.surfaces.measured import measured_line
 
-    x, z = read_scan(file, Units(scans.unit, scans.x_unit))
+    scan = _scan(scans, file)
     try:
-        return measured_line(x, z, scans.detrend)
+        return measured_line(scan.position, scan.height, scans.detrend)
     except DataError as problem:
         raise DataError(f"{file.name}: {problem}") from None
 
@@ -156,7 +161,7 @@ def scanned(scans: ScanFiles, file: DataFile) -> Found:
 
     line = line_of_scan(scans, file)  # names the file itself
     try:
-        return of_surface_cut(cut_of_lines([line], scans.window == "hann"))
+        return of_surface_cut(cut_of_lines([line], scans.window == "hann"))._replace(remarks=_scan(scans, file).remarks)
     except DataError as problem:
         raise DataError(f"{file.name}: {problem}") from None
 

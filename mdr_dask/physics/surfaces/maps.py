@@ -79,9 +79,14 @@ def require_points(surface: SurfaceMap) -> None:
     height = surface.height
     if height.ndim != 2 or min(height.shape) < LEAST_POINTS:
         raise DataError(f"expected a map of {LEAST_POINTS} x {LEAST_POINTS} points or more, got {height.shape}")
-    count = int(np.count_nonzero(~np.isfinite(height)))
-    if count > MOST_MISSING * height.size:
-        share, most = distinguishable(100 * count / height.size, 100 * MOST_MISSING)
+    require_few_missing(~np.isfinite(height))
+
+
+def require_few_missing(missing: NDArray[np.bool_]) -> None:
+    """Raise DataError for more than `MOST_MISSING` missing points."""
+    count = int(np.count_nonzero(missing))
+    if count > MOST_MISSING * missing.size:
+        share, most = distinguishable(100 * count / missing.size, 100 * MOST_MISSING)
         raise DataError(f"expected at most {most} % of missing points, which are filled, got {share} %")
 
 
