@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, did_you_mean
@@ -231,6 +230,8 @@ def decoded(content: bytes, source: str) -> str:
 
 def _workbook(content: bytes, source: str) -> str:
     """Return the cells of all sheets of a workbook, separated by tabs."""
+    import pandas as pd
+
     try:
         sheets = pd.read_excel(io.BytesIO(content), sheet_name=None, header=None, dtype=str, engine="openpyxl")
     except ImportError:
@@ -603,6 +604,8 @@ def _numbers_between(line: str, separator: str) -> int:
 
 def _cells(lines: Sequence[tuple[int, str]], separator: str) -> list[tuple[Cell, ...]]:
     """Return the cells of all lines; decimal commas become points where commas do not separate."""
+    import pandas as pd  # slow to import, and most commands read no table
+
     blank = separator == r"\s+"
     texts = [re.sub(r"\s+(?=[\[(])", "", line.strip()) if blank else line for _, line in lines]  # a unit and its name
     counts = [len(re.split(separator, text)) for text in texts]

@@ -20,6 +20,7 @@ from mdr_dask import models, store
 from mdr_dask.compile_clock import compile_clock
 from mdr_dask.errors import ClusterError, MachineError, MdrDaskError
 from mdr_dask.models.base import Block, Model, Result, Status
+from mdr_dask.models.per_case import is_interrupt, real_numbers, reason
 from mdr_dask.store import Place
 from mdr_dask.version import __version__
 
@@ -177,14 +178,16 @@ def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
     try:
         result = model.compute(block)
         return _checked(model, block, result) if is_own else result
-    except (Exception, SystemExit) as error:
+    except BaseException as error:
+        if is_interrupt(error):
+            raise
         is_fault = isinstance(error, MACHINE_FAULTS) or (is_single and isinstance(error, MemoryError))
         if is_fault and not is_own and not isinstance(error, MdrDaskError):
             raise MachineError(
                 f"{platform.node()} cannot compute {model.name}: {type(error).__name__}: {error}"
             ) from None
         if is_single:
-            return _failed(model, block, f"{type(error).__name__}: {error}")
+            return _failed(model, block, reason(error))
     parts = [
         _compute(model, block.part(case, number), is_own)
         for case in range(block.cases)
@@ -194,31 +197,48 @@ def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
 
 
 def _checked(model: Model[Any], block: Block[Any], result: Result) -> Result:
-    """Return the result of a user's own model if it has the declared shapes; a value that is not finite has failed."""
+    """Return the result of a user's own model, where a case without a proper value has failed.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the result is not what the model declares.
+    """
     if not isinstance(result, Result):
         raise TypeError(f"expected a Result, got {type(result).__name__}")
     shape = block.cases, len(block.realisations)
-    values, status, messages = {}, np.array(result.status, dtype=np.int8), dict(result.messages)
-    if status.shape != shape:
-        raise ValueError(f"status: expected shape {shape}, got {status.shape}")
-    for name, unknown in _unknown(model, block, shape).items():
+    unknown, values = _unknown(model, block, shape), {}
+    status, messages = np.array(result.status), dict(result.messages)
+    if status.shape != shape or not np.isin(status, (Status.DONE, Status.NOT_CONVERGED, Status.FAILED)).all():
+        raise ValueError(f"status: expected DONE, NOT_CONVERGED or FAILED in shape {shape}, got {status}")
+    if not messages.keys() <= set(np.ndindex(shape)):
+        raise ValueError(f"messages: expected places in shape {shape}, got {list(messages)}")
+    status = status.astype(np.int8)
+    result = replace(result, status=status, messages=messages, solves=int(result.solves))
+    if (status == Status.FAILED).all():
+        return replace(result, values=unknown)
+    for name, empty in unknown.items():
         if name not in result.values:
             raise ValueError(f"the output {name} is missing")
-        values[name] = np.array(result.values[name], dtype=np.float64)
-        if values[name].shape != unknown.shape:
-            expected, got = unknown.shape[2:], values[name].shape[2:]
+        values[name] = real_numbers(name, result.values[name])
+        if values[name].shape != empty.shape:
+            expected, got = empty.shape[2:], values[name].shape[2:]
             what = f"shape {expected}" if expected else "a number"
             raise ValueError(f"{name}: expected {what} for each case, got shape {got or values[name].shape}")
-    for output in model.outputs:
-        if output.name in values and not output.allow_nan:
-            finite = np.isfinite(values[output.name]).reshape(*shape, -1).all(axis=-1)
-            for case, number in np.argwhere(~finite & (status == Status.DONE)).tolist():
-                at, what = (case, number), values[output.name][case, number]
-                messages[at] = f"{output.name} is {what}" if what.ndim == 0 else f"{output.name} holds NaN or infinity"
-                status[at] = Status.FAILED
+    errors = {output.name for output in model.companions.values()} | {output.scatter for output in model.outputs}
+    for name, array in values.items():
+        flat = array.reshape(*shape, -1)
+        bad = flat < 0 if name in errors else np.zeros(flat.shape, dtype=bool)
+        if not model.output(name).allow_nan:
+            bad |= ~np.isfinite(flat)
+        for case, number in np.argwhere(bad.any(axis=-1) & (status == Status.DONE)).tolist():
+            got = flat[case, number][bad[case, number]][0]
+            what = "at least 0" if got < 0 and name in errors else "a finite number"
+            messages[case, number] = f"{name}: expected {what}, got {got:g}"
+            status[case, number] = Status.FAILED
     for array in values.values():
         array[status == Status.FAILED] = np.nan
-    return replace(result, values=values, status=status, messages=messages)
+    return replace(result, values=values)
 
 
 def _unknown(model: Model[Any], block: Block[Any], shape: tuple[int, ...]) -> dict[str, NDArray[np.float64]]:
@@ -298,7 +318,7 @@ def _record(work: Work, result: Result, status: NDArray[np.int8], seconds: float
             "case": _describe(work.block, case),
             "realisation": work.block.realisations[number],
             "status": Status(states[case, number]).name.lower(),
-            "message": text[:LONGEST_MESSAGE],
+            "message": " ".join(str(text).split())[:LONGEST_MESSAGE],
         }
         for (case, number), text in result.messages.items()
     ]
@@ -335,12 +355,11 @@ def kind() -> str:
 
     import scipy.linalg  # noqa: F401  (brings its own BLAS)
     from llvmlite import binding
-    from numba.core import config
     from threadpoolctl import threadpool_info
 
     blas = sorted({str(found.get("architecture")) for found in threadpool_info() if found["user_api"] == "blas"})
     programs = [f"{name} {version(name)}" for name in ("numpy", "scipy", "numba")]
-    processor = getattr(config, "CPU_NAME", None) or binding.get_host_cpu_name()
+    processor = os.environ.get("NUMBA_CPU_NAME") or binding.get_host_cpu_name()
     return ", ".join([f"processor {processor}", f"BLAS for {' '.join(blas)}", *programs, f"mdr_dask {__version__}"])
 
 

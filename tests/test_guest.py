@@ -127,7 +127,7 @@ def test_a_script_without_a_guard_gets_one_sentence(tmp_path):
     script.write_text(
         "import mdr_dask\nfrom mdr_dask import Resources\nmdr_dask.run({'model': 'ehl_line', 'parameters': {"
         "'load_parameter': 1e-5, 'speed_parameter': 1e-11, 'material_parameter': 4500}}, "
-        "resources=Resources(workers=1))\n"
+        "resources=Resources(cluster={'class': 'distributed.LocalCluster', 'arguments': {'n_workers': 1}}))\n"
     )
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.returncode == 1

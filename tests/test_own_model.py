@@ -1,10 +1,12 @@
 """A model of one's own, as docs/own-model.md tells it: through every command, and what is said where it is missing."""
 
+import importlib
 import json
 import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
@@ -12,10 +14,15 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from mdr_dask import fits, models
+import mdr_dask
+from mdr_dask import execute, fits, models, units
 from mdr_dask.cli import main
-from mdr_dask.errors import ModelError
+from mdr_dask.errors import ModelError, StoreError
+from mdr_dask.execute import Resources
 from mdr_dask.fits.base import Fit
+from mdr_dask.models.base import Block, Status
+from mdr_dask.models.per_case import per_case
+from mdr_dask.questions.progress import messages
 
 PAGE = (Path(__file__).parents[1] / "docs/own-model.md").read_text()
 MODULE, CAMPAIGN = (re.search(rf"^```{kind}\n(.*?)^```", PAGE, flags=re.M | re.S)[1] for kind in ("python", "yaml"))
@@ -136,36 +143,101 @@ def test_where_every_case_fails_outputs_with_dimensions_of_their_own_are_written
     assert "200 x failed: ValueError: no pin" in capsys.readouterr().out
 
 
+class UnprintableError(Exception):
+    def __str__(self):
+        raise RuntimeError("no text")
+
+
+def raises(error):
+    def outputs(*_):
+        raise error
+
+    return outputs
+
+
+def gives(volume, error=0.0):
+    return lambda _: {"wear_volume": volume, "wear_volume_error": error}
+
+
+NUMBER = "wear_volume: expected a real number or an array of them, in SI units, got"
+#: What a model may return or raise for a case that then has failed, and the reason that is recorded.
 MISBEHAVIOUR = {
-    "NaN": ('volume = float("nan")', "wear_volume is nan"),
-    "infinity": ('volume = float("inf")', "wear_volume is inf"),
-    "None": ('return {"wear_volume": None, "wear_volume_error": 0.0}', "wear_volume is None"),
-    "masked": ("import numpy; volume = numpy.ma.masked", "wear_volume is masked"),
-    "a vector": ("import numpy; volume = numpy.zeros(3)", "wear_volume: expected a number for each case"),
-    "text": ('return {"wear_volume": "large", "wear_volume_error": 0.0}', "could not convert string to float"),
-    "no output": ("return {}", "the output wear_volume is missing"),
-    "exit": ("import sys; sys.exit(0)", "SystemExit: 0"),
-    "a long message": ('raise ValueError("x" * 10**6)', "ValueError: xxx"),
+    "NaN": (gives(np.nan), "wear_volume: expected a finite number, got nan"),
+    "infinity": (gives(-np.inf), "wear_volume: expected a finite number, got -inf"),
+    "too large": (gives(10**400), "OverflowError: int too large to convert to float"),
+    "negative error": (gives(1.0, -1), "wear_volume_error: expected at least 0, got -1"),
+    "error is NaN": (gives(1.0, np.nan), "wear_volume_error: expected a finite number, got nan"),
+    "output is None": (gives(None), f"ValueError: {NUMBER} None"),
+    "truth value": (gives(True), f"ValueError: {NUMBER} True"),
+    "truth value of NumPy": (gives(np.bool_(True)), f"ValueError: {NUMBER} (np.)?True_?"),
+    "number in quotes": (gives("3.5"), f"ValueError: {NUMBER} '3.5'"),
+    "complex": (gives(1 + 2j), rf"ValueError: {NUMBER} \(1\+2j\)"),
+    "date": (gives(np.datetime64("2020")), f"ValueError: {NUMBER} "),
+    "ragged list": (gives([[1.0], [2.0, 3.0]]), rf"ValueError: {NUMBER} \[\[1.0\], \[2.0, 3.0\]\]"),
+    "masked": (gives(np.ma.masked), f"ValueError: {NUMBER} masked"),
+    "quantity": (gives(units.registry().Quantity(1.0, "m^3")), f"ValueError: {NUMBER} "),
+    "vector": (gives(np.zeros(3)), r"wear_volume: expected a number for each case, got shape \(3,\)"),
+    "nothing": (lambda _: None, r"expected a dict of outputs by name, got None \(is the return statement missing\?\)"),
+    "number alone": (lambda volume: volume, "expected a dict of outputs by name, got float"),
+    "generator": (lambda _: (yield), "expected a dict of outputs by name, got generator"),
+    "other names": (lambda _: {"wear": 1.0}, "the output wear_volume is missing, got wear"),
+    "exception": (raises(ValueError("two\n  lines\n")), "ValueError: two lines"),
+    "exception without text": (raises(ValueError()), "ValueError"),
+    "exception that has no text": (raises(UnprintableError()), "UnprintableError"),
+    "long text": (raises(ValueError("x" * 10**6)), "ValueError: xxx"),
+    "exit": (raises(SystemExit(0)), "SystemExit: 0"),
+    "end of a generator": (raises(GeneratorExit()), "GeneratorExit"),
+    "own kind of end": (raises(BaseException("stop")), "BaseException: stop"),
+    "interrupt of its own": (raises(KeyboardInterrupt()), "KeyboardInterrupt"),
+    "group": (raises(BaseExceptionGroup("both", [SystemExit(1)])), "BaseExceptionGroup: both"),
+    "library error": (raises(StoreError("not found")), "StoreError: not found"),
+    "no memory": (raises(MemoryError()), "MemoryError"),
 }
 
 
 @pytest.mark.parametrize("kind", MISBEHAVIOUR)
-def test_a_case_without_a_proper_result_has_failed_and_the_others_go_on(example, capsys, kind):
-    line, reason = MISBEHAVIOUR[kind]
-    place = "    volume = coefficient * case.normal_force * case.sliding_distance / case.hardness\n"
-    bad = f"{place}    if case.normal_force > 50:\n        {line}\n"
-    (example / "wear_rate.py").write_text(MODULE.replace(place, bad))
-    assert main(["run", "pin.yaml", "--quiet"]) == 1
-    assert "160 done, 40 failed" in capsys.readouterr().out
-    assert main(["status", "results/pin.zarr", "--failures"]) == 0
-    told = capsys.readouterr().out
-    assert "40 x failed" in told
-    assert reason in told
-    assert len(told) < 5000
-    (example / "wear_rate.py").write_text(MODULE)
-    sys.modules.pop("wear_rate")
-    assert main(["run", "pin.yaml", "--quiet", "--retry-failed"]) == 0
-    assert "160 kept, 40 done, 0 failed" in capsys.readouterr().out
+def test_a_case_without_a_proper_result_has_failed_and_the_others_go_on(example, monkeypatch, kind):
+    misbehave, why = MISBEHAVIOUR[kind]
+    module = importlib.import_module("wear_rate")
+    solve = module.solve
+
+    def compute(case, random):
+        outputs = solve(case, random)
+        return misbehave(outputs["wear_volume"]) if case.normal_force > 50 else outputs
+
+    monkeypatch.setattr(module, "MODEL", replace(module.MODEL, compute=per_case(compute)))
+    campaign = mdr_dask.read("pin.yaml")
+    outcome = execute.run(campaign, "pin.zarr", Resources(threads=1), lambda _: None)
+    assert (outcome.done, outcome.failed) == (160, 40)
+    opened = xr.open_zarr("pin.zarr")
+    (text,) = {each["message"] for each in messages("pin.zarr", "", opened)}
+    assert re.match(f"([a-zA-Z]+: )?{why}", text), text
+    assert "\n" not in text
+    assert len(text) <= 1000
+    assert bool((opened.wear_volume.isnull() == (opened.status == Status.FAILED)).all())
+    monkeypatch.setattr(module, "MODEL", replace(module.MODEL, compute=per_case(solve)))
+    again = execute.run(campaign, "pin.zarr", Resources(threads=1), lambda _: None, retry_failed=True)
+    assert (again.kept, again.done, again.failed) == (160, 40, 0)
+
+
+@pytest.mark.parametrize(
+    ("broken", "sentence"),
+    [
+        ("seconds=lambda block: 1 / 0", "'seconds' of model 'wear_rate:MODEL' failed: ZeroDivisionError"),
+        ("seconds=lambda block: float('nan')", "'seconds' of model .* expected a number from 0 on, got nan"),
+        ("seconds=lambda block: 1.0, memory=lambda block: None", "'memory' of model .* failed: TypeError"),
+        ("seconds=lambda block: 1.0, notes=lambda cases: cases[9]", "'notes' of model .* failed: "),
+    ],
+)
+def test_a_fault_in_another_function_of_the_model_is_one_sentence(example, capsys, broken, sentence):
+    Path("wear_rate.py").write_text(re.sub("seconds=.*,", f"{broken},", MODULE))
+    assert main(["check", "pin.yaml"]) == 2
+    assert re.search(sentence, capsys.readouterr().err)
+
+
+def test_ctrl_c_during_a_case_of_the_main_thread_is_no_failed_case():
+    with pytest.raises(KeyboardInterrupt):
+        per_case(raises(KeyboardInterrupt()))(Block(None, {}, 1, (0,), 1, ("y",)))
 
 
 def test_an_output_may_declare_that_nan_is_normal(example, capsys):

@@ -1,8 +1,8 @@
-"""Compute blocks in child processes: of a model that is plain Python, may crash, or may take too long.
+"""Compute blocks in child processes of this machine, which may crash or take too long.
 
-A helper process imports everything and forks a child, which computes one block after the other. If the child dies, the
-helper reports it and forks the next one within milliseconds. The child inherits the pipes: it reads blocks and writes
-outcomes itself.
+One process imports everything and forks a keeper for each child, which forks the child. The child computes one block
+after the other: it reads blocks from a pipe and writes outcomes. If it dies, its keeper reports that and forks the next
+one within milliseconds.
 """
 
 from __future__ import annotations
@@ -10,23 +10,26 @@ from __future__ import annotations
 import itertools
 import os
 import pickle
-import select
 import signal
 import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any
 
 import numpy as np
 
+from mdr_dask import models
 from mdr_dask.errors import MachineError
-from mdr_dask.task import Outcome, Work, one_blas_thread, run_block, write_off
+from mdr_dask.task import Outcome, Work, kind, one_blas_thread, run_block, write_off
 
-#: What the helper process runs.
-COMMAND = "import sys; from mdr_dask.execute.children import serve; serve(int(sys.argv[1]), int(sys.argv[2]))"
+#: What the process runs that forks the others.
+COMMAND = "import sys; from mdr_dask.execute.children import serve; serve(sys.argv[1], [int(x) for x in sys.argv[2:]])"
 #: Seconds beyond the limit of a case before its process is killed: Python code raises an exception before.
 GRACE = 1.0
 #: Results of a case that must have crashed before the rest of the case is written off.
@@ -40,18 +43,11 @@ class Death:
     why: str
 
 
-class Helper:
-    """A helper process and its pipes; one block at a time."""
+@dataclass(frozen=True)
+class Child:
+    """The pipe to a child process; one block at a time."""
 
-    def __init__(self) -> None:
-        read, theirs = os.pipe()
-        mine, write = os.pipe()
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-        command = [sys.executable, "-c", COMMAND, str(mine), str(theirs)]
-        self._process = subprocess.Popen(command, pass_fds=(mine, theirs), env=environment)
-        self._read, self._write = read, write
-        os.close(mine)
-        os.close(theirs)
+    pipe: Connection
 
     def run(self, work: Work, limit: float | None = None) -> Outcome | Death:
         """Compute a block in the child; `limit` is the time in seconds for each result.
@@ -61,37 +57,44 @@ class Helper:
         MdrDaskError
             What the child raised: the store cannot be written, or the machine has a fault.
         """
-        _send(self._write, (work, limit))
-        child = self._receive(None)
-        if isinstance(child, Death):
-            return child
-        hard_limit = None if limit is None else limit * np.count_nonzero(work.wanted) + GRACE
-        reply = self._receive(hard_limit)
-        if reply is None:
-            os.kill(child, signal.SIGKILL)
-            self._receive(None)
-            return Death(f"took longer than {limit:g} s")
+        try:
+            self.pipe.send((work, limit))
+            begun = self.pipe.recv()
+            if isinstance(begun, Death):
+                return begun
+            if limit is not None and not self.pipe.poll(limit * np.count_nonzero(work.wanted) + GRACE):
+                os.kill(begun, signal.SIGKILL)
+                self.pipe.recv()
+                return Death(f"took longer than {limit:g} s")
+            reply = self.pipe.recv()
+        except (EOFError, OSError):
+            raise MachineError(
+                "a process that computes blocks was killed; what is in the store is kept: run again"
+            ) from None
         if isinstance(reply, Exception):
             raise reply
         assert isinstance(reply, Outcome | Death)
         return reply
 
-    def _receive(self, timeout: float | None) -> Any:
-        if not select.select([self._read], [], [], timeout)[0]:
-            return None
-        found = _take(self._read)
-        if found is None:
-            raise MachineError("a process that computes blocks was killed; what is in the store is kept: run again")
-        return found
 
-    def close(self) -> None:
-        """End the helper and its child after the block that it computes."""
-        for descriptor in (self._write, self._read):
-            os.close(descriptor)
-        self._process.wait()
+@contextmanager
+def children(count: int, model: str) -> Iterator[list[Child]]:
+    """Start child processes for a model; at the end, wait until each has computed its block."""
+    pipes = [Pipe() for _ in range(count)]
+    numbers = [theirs.fileno() for _, theirs in pipes]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    command = [sys.executable, "-c", COMMAND, model, *map(str, numbers)]
+    with subprocess.Popen(command, pass_fds=numbers, env=environment):
+        try:
+            for _, theirs in pipes:
+                theirs.close()
+            yield [Child(ours) for ours, _ in pipes]
+        finally:
+            for ours, _ in pipes:
+                ours.close()
 
 
-def compute_apart(helper: Helper, work: Work, limit: float | None = None) -> Iterator[tuple[Work, Outcome]]:
+def compute_apart(child: Child, work: Work, limit: float | None = None) -> Iterator[tuple[Work, Outcome]]:
     """Compute a block that may crash: by halves if it does, down to the results to blame, which have failed.
 
     After `CONVICTED` results of a case have crashed, its other results are written off.
@@ -109,7 +112,7 @@ def compute_apart(helper: Helper, work: Work, limit: float | None = None) -> Ite
             part = replace(piece, wanted=guilty, spared=np.zeros_like(guilty))
             yield part, write_off(part, "other realisations of this case crashed")
             continue
-        reply = helper.run(piece, limit)
+        reply = child.run(piece, limit)
         if isinstance(reply, Outcome):
             yield piece, reply
         elif halves := piece.halves():
@@ -119,19 +122,41 @@ def compute_apart(helper: Helper, work: Work, limit: float | None = None) -> Ite
             yield piece, write_off(piece, reply.why)
 
 
-def serve(read: int, write: int) -> None:
-    """Fork a child that computes blocks, and another one whenever it dies; end when the pipe is closed."""
+def serve(model: str, numbers: list[int]) -> None:
+    """Import what blocks need, and fork a keeper for each pipe; end when all of them have ended."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all processes; the driver decides
     one_blas_thread()
+    kind()
+    with suppress(Exception):  # the first block reports it
+        models.load(model)
+    pipes = [Connection(number) for number in numbers]
+    keepers = []
+    for pipe in pipes:
+        keeper = os.fork()
+        if keeper == 0:
+            for other in pipes:
+                if other is not pipe:
+                    other.close()
+            _keep(pipe)
+            os._exit(0)
+        keepers.append(keeper)
+    for pipe in pipes:
+        pipe.close()
+    for keeper in keepers:
+        os.waitpid(keeper, 0)
+
+
+def _keep(pipe: Connection) -> None:
+    """Fork a child that computes blocks, and another one whenever it dies; end when the pipe is closed."""
     while True:
         child = os.fork()
         if child == 0:
-            _compute_blocks(read, write)
+            _compute_blocks(pipe)
             os._exit(0)
         status = os.waitpid(child, 0)[1]
         if status == 0:
             return
-        _reply(write, Death(_describe(status)))
+        _reply(pipe, Death(_describe(status)))
 
 
 def _describe(status: int) -> str:
@@ -142,17 +167,21 @@ def _describe(status: int) -> str:
     return f"its process ended with exit code {os.WEXITSTATUS(status)}"
 
 
-def _compute_blocks(read: int, write: int) -> None:
-    """Compute the blocks of a pipe in this process."""
-    while (request := _take_bytes(read)) is not None:
-        _reply(write, os.getpid())
+def _compute_blocks(pipe: Connection) -> None:
+    """Compute the blocks of a pipe in this process, until the other end is closed."""
+    while True:
+        try:
+            request = pipe.recv_bytes()
+        except EOFError:
+            return
+        _reply(pipe, os.getpid())
         try:
             work, limit = pickle.loads(request)
             with _limited(limit):
                 reply: Any = run_block(work)
         except Exception as error:
             reply = error
-        _reply(write, reply)
+        _reply(pipe, reply)
 
 
 class _limited:  # noqa: N801
@@ -175,37 +204,9 @@ class _limited:  # noqa: N801
         raise TimeoutError(f"took longer than {self._limit:g} s")
 
 
-def _send(descriptor: int, content: Any) -> None:
-    data = pickle.dumps(content)
-    data = len(data).to_bytes(8, "little") + data
-    while data:
-        data = data[os.write(descriptor, data) :]
-
-
-def _reply(descriptor: int, content: Any) -> None:
+def _reply(pipe: Connection, content: Any) -> None:
     """Send something to the driver; end this process if the driver has died."""
     try:
-        _send(descriptor, content)
-    except BrokenPipeError:
+        pipe.send(content)
+    except OSError:
         os._exit(0)
-
-
-def _take(descriptor: int) -> Any:
-    """Return what was sent through a pipe; None if its other end is closed."""
-    data = _take_bytes(descriptor)
-    return None if data is None else pickle.loads(data)
-
-
-def _take_bytes(descriptor: int) -> bytes | None:
-    length = _read(descriptor, 8)
-    return None if length is None else _read(descriptor, int.from_bytes(length, "little"))
-
-
-def _read(descriptor: int, count: int) -> bytes | None:
-    found = b""
-    while len(found) < count:
-        piece = os.read(descriptor, count - len(found))
-        if not piece:
-            return None
-        found += piece
-    return found

@@ -24,12 +24,6 @@ from mdr_dask.execute.resources import Resources
 from mdr_dask.execute.window import TaskWindow
 from mdr_dask.task import one_blas_thread
 
-#: Run in every worker process: Ctrl-C reaches them too, but the driver ends them.
-QUIET = """\
-import logging, signal
-signal.signal(signal.SIGINT, signal.SIG_IGN)
-logging.getLogger("distributed").setLevel(logging.CRITICAL)
-"""
 #: Seconds that a scheduler has to answer.
 SCHEDULER_PATIENCE = 10
 #: Where the page of a scheduler is served: to this machine alone.
@@ -85,7 +79,8 @@ def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
             client = stack.enter_context(_connected(resources.scheduler))
         else:
             _require_guard()
-            plan = _local(resources.workers) if resources.cluster is None else resources.cluster
+            assert resources.cluster is not None
+            plan = resources.cluster
             tell(Event("starting", {"cluster": plan["class"]}, f"starting {plan['class']}"))
             is_local = issubclass(cluster_class(plan["class"]), LocalCluster)
             stack.enter_context(dask.config.set(ON_THIS_MACHINE if is_local else {}))
@@ -140,12 +135,6 @@ def _connected(address: str) -> Client:
         return Client(address, timeout=SCHEDULER_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
         raise ClusterError(f"no Dask scheduler answers at {address!r}: {str(error) or type(error).__name__}") from None
-
-
-def _local(workers: int | None) -> dict[str, Any]:
-    """Return what a cluster file of worker processes on this machine would say."""
-    arguments = {"n_workers": workers, "threads_per_worker": 1, "preload": [QUIET]}
-    return {"class": "distributed.LocalCluster", "arguments": arguments}
 
 
 @contextmanager

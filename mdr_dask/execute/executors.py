@@ -8,7 +8,8 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextlib import AbstractContextManager, ExitStack, suppress
+from contextlib import AbstractContextManager, ExitStack
+from queue import SimpleQueue
 from typing import TYPE_CHECKING
 
 from mdr_dask import models, store
@@ -19,7 +20,7 @@ from mdr_dask.store import Lock
 from mdr_dask.task import Outcome, Work, one_blas_thread, run_block
 
 if TYPE_CHECKING:
-    from mdr_dask.execute.children import Helper
+    from mdr_dask.execute.children import Child
     from mdr_dask.execute.window import TaskWindow
 
 #: Blocks that wait for each thread, so that none is idle.
@@ -55,11 +56,14 @@ class Executor(AbstractContextManager["Executor"]):
 
     def __init__(self, resources: Resources, model: str, url: str, tell: Tell) -> None:
         self._resources, self._url, self._tell = resources, url, tell
-        self._threads = resources.threads or _cores()
+        self._model = model
+        self._threads = resources.workers or resources.threads or _cores()
         is_python = getattr(models.load(model).compute, "is_plain_python", False)
         self._may_fork = hasattr(os, "fork")
+        self._needs_processes = resources.workers is not None or resources.case_timeout is not None
         self._prefers_processes = is_python and resources.threads is None and self._threads > 1
-        self._helpers: list[Helper] = []
+        self._children: SimpleQueue[Child] = SimpleQueue()
+        self._has_children = False
         self._noting = threading.Lock()
         self._stack = ExitStack()
         self._window: TaskWindow | None = None
@@ -74,9 +78,9 @@ class Executor(AbstractContextManager["Executor"]):
 
     def connect(self) -> None:
         """Start or find the cluster, if one is named, before anything is written."""
-        from mdr_dask.execute.clusters import task_window
-
         if self._resources.remote and self._window is None:
+            from mdr_dask.execute.clusters import task_window
+
             self._window = self._stack.enter_context(task_window(self._resources, self._tell))
 
     def __call__(self, works: Iterable[Work], settle: Settle) -> None:
@@ -93,7 +97,7 @@ class Executor(AbstractContextManager["Executor"]):
             return
         self._stack.enter_context(one_blas_thread())
         ordinary = self._without_suspects(remaining, settle)
-        if self._resources.case_timeout is not None and self._may_fork:
+        if self._needs_processes and self._may_fork:
             self._in_pool(ordinary, self._in_child, settle)
         elif self._prefers_processes and self._may_fork:
             self._in_pool(_for_a_while(ordinary), self._here, settle)
@@ -163,20 +167,22 @@ class Executor(AbstractContextManager["Executor"]):
         from mdr_dask.execute.children import compute_apart
 
         self._tell(of_block("begun", work))
-        helper = self._free_helper()
+        child = self._free_child()
         try:
-            return list(compute_apart(helper, work, self._resources.case_timeout))
+            return list(compute_apart(child, work, self._resources.case_timeout))
         finally:
-            self._helpers.append(helper)
+            self._children.put(child)
 
-    def _free_helper(self) -> Helper:
-        from mdr_dask.execute.children import Helper
+    def _free_child(self) -> Child:
+        """Return a child process that computes nothing; all are started together, when the first is needed."""
+        from mdr_dask.execute.children import children
 
-        with self._noting, suppress(IndexError):
-            return self._helpers.pop()
-        helper = Helper()
-        self._stack.callback(helper.close)
-        return helper
+        with self._noting:
+            if not self._has_children:
+                for child in self._stack.enter_context(children(self._threads, self._model)):
+                    self._children.put(child)
+                self._has_children = True
+        return self._children.get()
 
 
 def _for_a_while(works: Iterator[Work]) -> Iterator[Work]:

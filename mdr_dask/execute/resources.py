@@ -16,7 +16,7 @@ class Resources:
     threads : int or None
         Threads of this process.
     workers : int or None
-        Processes of a local Dask cluster instead.
+        Processes of this machine instead; threads where the system cannot fork.
     scheduler : str or None
         Address of a running Dask scheduler instead.
     cluster : mapping or None
@@ -40,4 +40,4 @@ class Resources:
     @property
     def remote(self) -> bool:
         """Whether a Dask cluster computes the blocks."""
-        return any(each is not None for each in (self.workers, self.scheduler, self.cluster, self.client))
+        return any(each is not None for each in (self.scheduler, self.cluster, self.client))

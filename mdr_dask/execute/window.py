@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterable
+from contextlib import ExitStack
 from functools import lru_cache
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -13,7 +15,7 @@ from distributed.client import ClosedClientError
 from distributed.comm import CommClosedError
 
 from mdr_dask.errors import ClusterError, ModelError
-from mdr_dask.execute.children import Helper, compute_apart
+from mdr_dask.execute.children import Child, children, compute_apart
 from mdr_dask.execute.events import Event, Settle, Tell, of_block
 from mdr_dask.task import Outcome, Work, finished, one_blas_thread, run_block, write_off
 
@@ -26,6 +28,9 @@ ANSWER = 3.0
 #: Topic under which workers report the blocks that they begin.
 TOPIC = "mdr_dask"
 KEPT = "what is in the store is kept: run the campaign again"
+
+#: Holds the child process of a worker open; its threads use it one after the other.
+_OPEN, _APART = ExitStack(), threading.Lock()
 
 Outcomes = list[tuple[Work, Outcome]]
 
@@ -188,7 +193,8 @@ def _run(work: Work, _: float | None) -> Outcomes:
 def _run_apart(work: Work, limit: float | None) -> Outcomes:
     _report(work)
     try:
-        return list(compute_apart(_helper(), work, limit))
+        with _APART:
+            return list(compute_apart(_child(work.model), work, limit))
     except (ImportError, ModelError):  # a model that only this process has
         return _run(work, limit)
 
@@ -199,5 +205,6 @@ def _report(work: Work) -> None:
 
 
 @lru_cache(maxsize=1)
-def _helper() -> Helper:
-    return Helper()
+def _child(model: str) -> Child:
+    """Return the child process of this worker; it ends with the worker."""
+    return _OPEN.enter_context(children(1, model))[0]

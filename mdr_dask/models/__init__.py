@@ -6,6 +6,9 @@ A model is one of this package (`NAMES`), one in the entry point group `GROUP` o
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -13,6 +16,7 @@ from typing import Any
 
 from mdr_dask.errors import ModelError
 from mdr_dask.models.base import Model
+from mdr_dask.models.per_case import reason
 
 NAMES: tuple[str, ...] = (
     "sliding_friction",
@@ -78,4 +82,23 @@ def _own(name: str, entry: EntryPoint, module: str) -> Model[Any]:
         raise ModelError(f"cannot load model {name!r}: {type(error).__name__}: {error}") from None
     if not isinstance(found, Model):
         raise ModelError(f"expected {name!r} to be a mdr_dask Model, got {type(found).__name__}")
-    return found
+    others = ("seconds", "memory", "distinct", "coordinates", "units", "notes")
+    guarded: dict[str, Any] = {
+        each: _guarded(name, each, getattr(found, each)) for each in others if getattr(found, each) is not None
+    }
+    return replace(found, **guarded)
+
+
+def _guarded(model: str, what: str, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return a function of a user's model whose exceptions, and estimates that are no numbers, are ModelErrors."""
+
+    def call(argument: Any) -> Any:
+        try:
+            found = function(argument)
+            if what in ("seconds", "memory") and not 0 <= float(found) < math.inf:
+                raise ValueError(f"expected a number from 0 on, got {found!r}")
+        except Exception as error:
+            raise ModelError(f"the function {what!r} of model {model!r} failed: {reason(error)}") from None
+        return found
+
+    return call

@@ -232,7 +232,7 @@ class Output:
     def error(self) -> Output:
         """The companion ``<name>_error``: the estimated absolute discretisation error, in the unit of the output."""
         meaning = f"estimated absolute discretisation error, {self.long_name}"
-        return Output(f"{self.name}_error", self.unit, meaning, self.dims, self.default)
+        return Output(f"{self.name}_error", self.unit, meaning, self.dims, self.default, allow_nan=self.allow_nan)
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import reprlib
 import signal
+import threading
 from collections.abc import Callable, Mapping
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -25,13 +28,14 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
     solve : callable, (parameters, random generator) -> mapping of output to number or array
         Takes the parameters of one case, in SI, and the random numbers of a realisation, the same for all cases.
         Returns every output of the model by name, and the error of an output that has one as ``<output>_error``.
-        A case has failed if `solve` raises an exception or calls ``sys.exit``, or if an output is missing or None,
-        is not finite (unless declared with ``allow_nan=True``) or has another shape than declared.
+        A case has failed if `solve` raises anything, also SystemExit, or if an output is missing, is not a real number
+        or an array of them, is not finite (unless declared with ``allow_nan=True``) or has another shape than declared,
+        or if an error is negative.
 
     Notes
     -----
-    If no case of a block succeeds, or if the outputs of two cases differ in shape, the function raises. The runner then
-    computes the cases one by one and compares each with the declared shapes.
+    If the outputs of two cases differ in shape, the function raises. The runner then computes the cases one by one and
+    compares each with the declared shapes.
     """
 
     def compute(block: Block[Any]) -> Result:
@@ -39,21 +43,17 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
         status = np.full(shape, Status.DONE, dtype=np.int8)
         found: dict[tuple[int, int], dict[str, NDArray[np.float64]]] = {}
         messages: dict[tuple[int, int], str] = {}
-        failure: BaseException | None = None
         for case in range(block.cases):
             parameters = block.case(case)
             for number, realisation in enumerate(block.realisations):
-                if time_limit:
-                    signal.setitimer(signal.ITIMER_REAL, time_limit)
                 try:
-                    outputs = solve(parameters, _stream(block.seed, realisation))
-                    found[case, number] = {name: _array(name, outputs) for name in block.outputs}
-                except (Exception, SystemExit) as error:
-                    failure = error
+                    outputs = _limited(solve, parameters, _stream(block.seed, realisation))
+                    found[case, number] = {name: _output(name, outputs) for name in block.outputs}
+                except BaseException as error:
+                    if is_interrupt(error):
+                        raise
                     status[case, number] = Status.FAILED
-                    messages[case, number] = f"{type(error).__name__}: {error}"
-        if failure and not found:
-            raise failure
+                    messages[case, number] = reason(error)
         values = {name: _gathered(name, found, shape) for name in block.outputs}
         return Result(values, status, messages, solves=status.size)
 
@@ -65,13 +65,65 @@ def _stream(seed: int, realisation: int) -> np.random.Generator:
     return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(realisation,))))
 
 
-def _array(name: str, outputs: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
+def _limited(solve: Solve, parameters: Any, random: np.random.Generator) -> Any:
+    """Solve a case, with an alarm if there is a time limit."""
+    if time_limit is None:
+        return solve(parameters, random)
+    signal.setitimer(signal.ITIMER_REAL, time_limit)
+    try:
+        return solve(parameters, random)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+
+
+def is_interrupt(error: BaseException) -> bool:
+    """Return whether an exception is Ctrl-C of the user: it reaches the main thread alone, if that handles it."""
+    is_main = threading.current_thread() is threading.main_thread()
+    return isinstance(error, KeyboardInterrupt) and is_main and signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
+
+
+def reason(error: BaseException) -> str:
+    """Return an exception as the reason why a case failed."""
+    try:
+        text = str(error)
+    except Exception:  # an exception class of the user may have a fault of its own
+        text = ""
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def _output(name: str, outputs: Any) -> NDArray[np.float64]:
+    if not isinstance(outputs, Mapping):
+        got = "None (is the return statement missing?)" if outputs is None else type(outputs).__name__
+        raise TypeError(f"expected a dict of outputs by name, got {got}")
     if name not in outputs:
-        raise ValueError(f"the output {name} is missing")
-    value = outputs[name]
-    if value is None or np.ma.is_masked(value):
-        raise ValueError(f"{name} is {'None' if value is None else 'masked'}")
-    return np.asarray(value, dtype=np.float64)
+        got = ", ".join(map(str, outputs)) or "none"
+        raise ValueError(f"the output {name} is missing, got {got}")
+    return real_numbers(name, outputs[name])
+
+
+def real_numbers(name: str, value: Any) -> NDArray[np.float64]:
+    """Return an output as an array of floating-point numbers.
+
+    Raises
+    ------
+    ValueError
+        If it is anything but a real number or an array of them: True, text, a masked value, a quantity with a unit.
+    """
+    if type(value) is float:
+        return np.asarray(value)
+    try:
+        array = None if hasattr(value, "units") or np.ma.is_masked(value) else np.asarray(value)
+    except Exception:  # a list of lists of different lengths
+        array = None
+    if array is not None and array.dtype.kind == "O" and all(_is_real(item) for item in array.flat):
+        array = array.astype(np.float64)
+    if array is None or array.dtype.kind not in "iuf":
+        raise ValueError(f"{name}: expected a real number or an array of them, in SI units, got {reprlib.repr(value)}")
+    return array.astype(np.float64)
+
+
+def _is_real(item: Any) -> bool:
+    return isinstance(item, Real) and not isinstance(item, bool)
 
 
 def _gathered(
@@ -79,7 +131,7 @@ def _gathered(
 ) -> NDArray[np.float64]:
     """Return one output of all cases, NaN where a case failed."""
     arrays = {place: outputs[name] for place, outputs in found.items()}
-    extra = {array.shape for array in arrays.values()}
+    extra = {array.shape for array in arrays.values()} or {()}
     if len(extra) > 1:
         raise ValueError(f"{name}: expected one shape for all cases, got {' and '.join(map(str, sorted(extra)))}")
     gathered = np.full(shape + extra.pop(), np.nan)
