@@ -1,5 +1,7 @@
 """Tables and messages for a reader: within the width of the terminal, and without what is the same in every row."""
 
+import math
+
 import pytest
 
 from mdr_dask.cli.printing import print_aligned, print_rows, say, with_error, with_interval
@@ -68,6 +70,7 @@ def test_a_single_row_that_is_too_wide_is_a_list(capsys, monkeypatch):
         (with_error(float("nan"), 0.1), "-"),
         (with_interval(0.5, 0.4, 0.6), "0.5 (0.4, 0.6)"),
         (with_interval(0.5), "0.5"),
+        (with_interval(math.nan), "not determined"),
     ],
 )
 def test_numbers_with_errors(text, expected):

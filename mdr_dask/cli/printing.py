@@ -259,7 +259,9 @@ def with_intervals(rows: list[Row], units: dict[str, str]) -> tuple[list[Row], d
 
 
 def with_interval(value: float, low: float = math.nan, high: float = math.nan) -> str:
-    """Join a number and the ends of its interval, if they are known."""
+    """Join a constant and the ends of its interval, if they are known."""
+    if math.isnan(value):
+        return "not determined"
     if not (math.isfinite(low) and math.isfinite(high)):
         return short(value)
     return f"{_number(value, 4)} ({_number(low, 4)}, {_number(high, 4)})"

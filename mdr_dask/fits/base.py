@@ -3,7 +3,8 @@
 Every result has a variable ``law_holds``: a sentence about the law as its source states it, with the constants that the
 source states. It begins with *yes*, *approximately*, *no* or *not tested*. Where constants are fitted,
 ``fitted_law_holds`` says the same of the law with the fitted constants. If the fitted law does not hold either, its
-departures enter the intervals as an error of every case (`fitted`), or the ends of the intervals are NaN.
+departures enter the intervals as an error of every case (`fitted`), or the ends of the intervals are NaN. A constant
+that the data do not determine (`undetermined`) is NaN.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask import bootstrap
-from mdr_dask.arrays import FloatArray
+from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.campaign import Campaign
 from mdr_dask.errors import FitError, distinguishable
 
@@ -109,7 +110,7 @@ class Fitted:
     Attributes
     ----------
     constants : array, shape (1 + RESAMPLES + 2 groups, p)
-        Stack of the constants, for `mdr_dask.bootstrap.interval`.
+        Stack of the constants, for `mdr_dask.bootstrap.interval`; NaN for those that the data do not determine.
     residuals : array, shape (1 + RESAMPLES + 2 groups, cases)
         Stack of data minus law.
     count : int
@@ -135,25 +136,54 @@ def fitted(
     left: Callable[[FloatArray, FloatArray], FloatArray],
     data: FloatArray,
     count: int,
+    stated: FloatArray | None = None,
 ) -> Fitted:
     """Fit a law; where scatter and errors do not explain its residuals, these become an error of every case.
 
     Parameters
     ----------
     fit : callable
-        From data, shape (rows, cases), to constants, shape (rows, p).
+        From data, shape (rows, cases), to constants, shape (rows, p): exponents, or logarithms of factors.
     left : callable
         From data and constants to data minus law, shape (rows, cases).
     data : array, shape (1 + RESAMPLES + 2 groups, cases)
         Stack of the data.
     count : int
         Realisations that were resampled.
+    stated : array, shape (p,), optional
+        Constants that the source states. What the data would not determine about these is not determined, either.
     """
     constants = fit(data)
     residuals = left(data, constants)
     if not bootstrap.chance(residuals, count) >= DOUBTFUL:
         constants = np.concatenate([constants, fit(bootstrap.moved(data[0], residuals[0]))])
+    step = 1e-4 * np.eye(constants.shape[1])
+    free = np.zeros(constants.shape[1], dtype=bool)
+    for about in (constants[0], constants[0] if stated is None else stated):
+        effects = [left(data[:1], about[None] - each) - left(data[:1], about[None] + each) for each in step]
+        free |= undetermined(np.concatenate(effects).T / 2e-4)
+    constants = np.where(free, np.nan, constants)
     return Fitted(constants, residuals, count)
+
+
+def undetermined(effects: FloatArray) -> BoolArray:
+    """Return which constants of a law the data do not determine.
+
+    These are the constants whose change by one, with the others refitted, changes the law by less than `WITHIN` in
+    every case. Such a constant would only follow departures of the data as small as those of a law that holds.
+
+    Parameters
+    ----------
+    effects : array, shape (cases, p)
+        Derivatives of the logarithm of the law by its constants, which are exponents or logarithms of factors.
+    """
+    largest = np.empty(effects.shape[1])
+    for k in range(largest.size):
+        others = np.delete(effects, k, axis=1)
+        left = effects[:, k] - others @ np.linalg.lstsq(others, effects[:, k])[0]
+        largest[k] = np.abs(left).max(initial=0.0)
+    free: BoolArray = largest < WITHIN
+    return free
 
 
 def verdict(

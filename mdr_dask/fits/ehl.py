@@ -9,7 +9,7 @@ import xarray as xr
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import FITTED_LAW_HOLDS, WITHIN, Fit, law_holds
+from mdr_dask.fits.base import FITTED_LAW_HOLDS, WITHIN, Fit, law_holds, undetermined
 from mdr_dask.models.ehl_line import groups as groups_of
 from mdr_dask.physics.lubrication.film_formulas import PAN_HAMROCK_CENTRAL, PAN_HAMROCK_MINIMUM
 
@@ -60,11 +60,11 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     constants, width = np.full(4, np.nan), np.full(4, np.nan)
     solution, *_ = np.linalg.lstsq(design[:, varied], table[3], rcond=None)
     residuals = table[3] - design[:, varied] @ solution
-    covariance = np.linalg.inv(design[:, varied].T @ design[:, varied]) * np.sum(residuals**2) / freedom
-    constants[varied] = solution
-    width[varied] = t.ppf(0.975, freedom) * np.sqrt(np.diag(covariance))
+    inverse = np.linalg.pinv(design[:, varied])
+    width[varied] = t.ppf(0.975, freedom) * np.sqrt(np.sum(inverse**2, axis=1) * np.sum(residuals**2) / freedom)
     if np.sqrt(np.mean(residuals**2)) > WITHIN:  # a systematic misfit is no scatter: it may have one sign everywhere
-        width[varied] += np.abs(np.linalg.pinv(design[:, varied])) @ np.abs(residuals)
+        width[varied] += np.abs(inverse) @ np.abs(residuals)
+    constants[varied] = np.where(undetermined(design[:, varied]), np.nan, solution)
     return constants, width, residuals
 
 
@@ -82,10 +82,10 @@ def film_exponents(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
     -------
     Dataset, dims (series,)
         ``<film>_factor``, ``<film>_load``, ``<film>_speed``, ``<film>_material`` for the central and the minimum film,
-        with ``_low`` and ``_high``; NaN for an exponent whose number is not varied. ``<film>_rms`` and ``<film>_worst``
-        are the rms and the largest residual of ``ln h``. Films have no scatter, so the intervals measure the misfit of
-        the formula. ``law_holds`` judges the formula of Pan and Hamrock with its own constants, ``fitted_law_holds``
-        that with the fitted ones.
+        with ``_low`` and ``_high``; NaN for an exponent whose number is not varied, or only together with others.
+        ``<film>_rms`` and ``<film>_worst`` are the rms and the largest residual of ``ln h``. Films have no scatter, so
+        the intervals measure the misfit of the formula. ``law_holds`` judges the formula of Pan and Hamrock with its
+        own constants, ``fitted_law_holds`` that with the fitted ones.
 
     Raises
     ------

@@ -283,11 +283,11 @@ def _zone_one(data: xr.Dataset) -> Variables:
 
 
 def _velocity_of(place: FloatArray, x: FloatArray, count: int, meaning: str, unit: str) -> Variables:
-    """Return the velocity of the largest friction from the stack of its logarithm; no ends if it may lie outside."""
+    """Return the velocity of the largest friction from the stack of its logarithm; NaN if it may lie outside."""
     outside = np.isinf(place[~np.isnan(place)])
-    found = constant("plateau_velocity", np.exp(np.clip(place, x[0], x[-1])), count, meaning, positive=True)
     if outside[0] or outside.mean() > bootstrap.TAILS[0]:
-        found |= {f"plateau_velocity_{end}": xr.Variable((), np.nan) for end in ("low", "high")}
+        place = np.full_like(place, np.nan)
+    found = constant("plateau_velocity", np.exp(np.clip(place, x[0], x[-1])), count, meaning, positive=True)
     return {name: xr.Variable((), each.values, {"units": unit, "long_name": meaning}) for name, each in found.items()}
 
 
@@ -366,14 +366,14 @@ def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: st
 
 
 def least_squares(
-    model: Callable[[FloatArray], FloatArray], start: tuple[float, ...], data: FloatArray, steps: int = 40
+    model: Callable[[FloatArray], FloatArray], start: FloatArray, data: FloatArray, steps: int = 40
 ) -> FloatArray:
     """Fit every row of the data, shape (rows, cases), by Levenberg-Marquardt steps; return (rows, constants).
 
     One call of the model serves all rows, which is a hundred times faster than scipy row by row.
     """
-    size = np.eye(len(start))
-    constants = np.tile(np.array(start), (data.shape[0], 1))
+    size = np.eye(start.size)
+    constants = np.tile(start, (data.shape[0], 1))
     damping = np.full(data.shape[0], 1e-6)
     value = model(constants)
     cost = np.sum((data - value) ** 2, axis=1)
@@ -430,10 +430,12 @@ def _interpolation(data: xr.Dataset) -> Variables:
         return law
 
     stated = laws.alpha(one_value(data, "hurst"))
-    start = (stated, float(np.log(laws.BETA)))
+    start = np.array([stated, np.log(laws.BETA)])
     stack = table.logarithms(used)
-    found = fitted(lambda rows: least_squares(model, start, rows), lambda rows, best: rows - model(best), stack, count)
-    of_stated = stack - model(np.array([start]))
+    found = fitted(
+        lambda rows: least_squares(model, start, rows), lambda rows, best: rows - model(best), stack, count, start
+    )
+    of_stated = stack - model(start[None])
     excluded = excludes(found.constants[:, 0], count, stated)
 
     def where(k: int) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -109,9 +108,11 @@ def _indenter(data: xr.Dataset) -> Variables:
     def where(k: int) -> str:
         return f"xi = {short(xi[k])}"
 
-    start = (math.log(laws.INDENTER_EXPONENT),)
-    found = fitted(lambda rows: least_squares(model, start, rows), lambda rows, best: rows - model(best), logs, count)
-    stated = logs - model(np.array([start]))
+    start = np.log([laws.INDENTER_EXPONENT])
+    found = fitted(
+        lambda rows: least_squares(model, start, rows), lambda rows, best: rows - model(best), logs, count, start
+    )
+    stated = logs - model(start[None])
     excluded = excludes(found.constants[:, 0], count, start[0])
     return {
         **constant("exponent", np.exp(found.constants[:, 0]), count, "exponent of the law of rough indenters", True),

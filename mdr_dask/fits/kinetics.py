@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import FITTED_LAW_HOLDS, LAW_HOLDS, Fit, fitted, law_holds, require, short, verdict
+from mdr_dask.fits.base import FITTED_LAW_HOLDS, LAW_HOLDS, Fit, excludes, fitted, law_holds, require, short, verdict
 from mdr_dask.fits.jumps import LAW, jump_law
 from mdr_dask.fits.kinetic_cases import LEAST, LEVELS, Cases, jump_numbers, law_rate
 from mdr_dask.fits.relaxation import RATE_FIELDS, Relaxation, relaxation_of, window
@@ -251,8 +251,8 @@ def _power(
     x: FloatArray, rates: FloatArray, error: FloatArray, law: float, count: int
 ) -> tuple[list[float], tuple[str, str]]:
     """Return the entries of `POWER_FIELDS` for the rates of one regime, and whether both laws hold."""
-    if x.size < 3 or np.ptp(x) < TRUSTED:
-        reason = f"not tested: {x.size} rates are known to a factor of 1.6, three at different v_1 tau q_max are needed"
+    if x.size < 3:
+        reason = f"not tested: {x.size} rates are known to a factor of 1.6, three are needed"
         return [np.nan, np.nan, np.nan, law, np.nan, np.nan, x.size], (reason, reason)
     weights = 1 / (error**2 + SURE**2)
     weights /= weights.sum()
@@ -269,7 +269,7 @@ def _power(
     def where(k: int) -> str:
         return f"v_1 tau q_max = {short(np.exp(x[k]))}"
 
-    stated = verdict(rest - (rest @ weights)[:, None], count, 1, where, excluded=not low <= law <= high)
+    stated = verdict(rest - (rest @ weights)[:, None], count, 1, where, excluded=excludes(power, count, law))
     return [float(number) for number in numbers], (found.holds(where), stated)
 
 

@@ -60,6 +60,12 @@ def point_weights(time: FloatArray, trace: FloatArray, error: FloatArray) -> Flo
     return weights
 
 
+def tried_rates(time: FloatArray) -> FloatArray:
+    """Return the rates that are tried for a trace; slower and faster ones cannot be seen at these moments."""
+    rates: FloatArray = np.geomspace(0.02 / time[-1], 2 / time[time > 0][0], GRID)
+    return rates
+
+
 def exponential(time: FloatArray, traces: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Fit one exponential to each of many traces by weighted least squares.
 
@@ -79,7 +85,7 @@ def exponential(time: FloatArray, traces: FloatArray, weights: FloatArray) -> tu
     -------
     rate, amplitude : array, shape (n,)
     """
-    logs = np.linspace(np.log(0.02 / time[-1]), np.log(2 / time[time > 0][0]), GRID)
+    logs = np.log(tried_rates(time))
     shapes = np.exp(-np.exp(logs)[:, None] * time)
     gain = ((weights * traces) @ shapes.T) ** 2 / (shapes**2 @ weights)
     best = 1 + np.argmax(gain[:, 1:-1], axis=1)
@@ -114,9 +120,13 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
     residuals = y - amplitude[:, None] * np.exp(-rate[:, None] * t)
     chance = min(bootstrap.chance(residuals * weight, count) for weight in (np.sqrt(weights), 1.0))
     integral = traces[:, 0] / (traces @ widths(time))
+    slowest, fastest = tried_rates(t)[[1, -2]]
+    outside = (rate < 1.001 * slowest) | (rate > 0.999 * fastest)
     if not chance >= DOUBTFUL:
         rates, amplitudes = exponential(t, bootstrap.moved(y[0], residuals[0]), weights)
         rate, amplitude = np.concatenate([rate, rates, integral[:1], rate[:1]]), np.concatenate([amplitude, amplitudes])
+    if outside[0] or outside.mean() > bootstrap.TAILS[0]:  # the end of the tried rates is no property of the data
+        rate = np.full_like(rate, np.nan)
     return Relaxation(rate, amplitude, integral, residuals[0] / np.abs(y[0]).max(), chance)
 
 

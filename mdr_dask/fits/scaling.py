@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mdr_dask import bootstrap
 from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import DOUBTFUL, Fit, fitted, verdict
+from mdr_dask.fits.base import DOUBTFUL, Fit, fitted, undetermined, verdict
 from mdr_dask.fits.friction import (
     KELVIN,
     MODELS,
@@ -37,7 +37,6 @@ from mdr_dask.fits.friction import (
 from mdr_dask.physics.sliding import laws
 
 KNOTS = 2  # knots of the common curve of a collapse per decade of velocity
-BEND = 0.3  # a curve whose logarithmic slope changes by less fits any part of a straight common curve
 SLOPE_FOLLOWED = "whether friction beyond its maximum is proportional to the slope in contact"
 
 
@@ -173,11 +172,14 @@ class Collapse(NamedTuple):
         Stack of the distances of the points from the common curve.
     constants : int
         Number of fitted heights of the common curve and fitted shifts.
+    vague : array, shape (curves,)
+        Whether the data leave a shift of a curve open. Such are straight curves, and those beside a straight one.
     """
 
     shifts: FloatArray
     residuals: FloatArray
     constants: int
+    vague: BoolArray
 
 
 def collapse(
@@ -232,7 +234,11 @@ def collapse(
     shifts = np.zeros((len(rows), 2, start.size))
     last = (best.x + steps)[:, best.x.size - axes * free.size :]
     shifts[:, :axes, free] = last.reshape(len(rows), axes, free.size)
-    return Collapse(shifts, best.fun[: x.size] + change + steps @ best.jac[: x.size].T, best.jac.shape[1])
+    count = best.jac.shape[1]
+    open_shifts = undetermined(best.jac[: x.size])[count - axes * free.size :].reshape(axes, free.size)
+    vague = np.full(start.size, x.size <= count)
+    vague[free] |= open_shifts.any(axis=0)
+    return Collapse(shifts, best.fun[: x.size] + change + steps @ best.jac[: x.size].T, count, vague)
 
 
 def _natural(knots: FloatArray, place: FloatArray) -> FloatArray:
@@ -276,30 +282,20 @@ def _collapse(data: xr.Dataset) -> Variables:
         **measure("rms_before", spread, "the same before shifting"),
         **measure("collapsed", 1 - (rms / spread) ** 2, "share of the spread that shifting removes"),
         **measure("cases", int(used.size), "number of cases shifted"),
-        **_shifts(np.unique(force), loads, found, start - start[reference], _vague(found, curve, x, stack[0]), count),
+        **_shifts(np.unique(force), loads, found, start - start[reference], count),
         **holds(stated, verdict(found.residuals, count, found.constants, where)),
     }
 
 
-def _vague(found: Collapse, curve: NDArray[np.intp], x: FloatArray, row: FloatArray) -> BoolArray:
-    """Return the curves without a determined shift: straight ones, and all of them if there are too few points."""
-    slopes = (np.diff(row[curve == k]) / np.diff(x[curve == k]) for k in range(found.shifts.shape[2]))
-    straight = np.array([np.ptp(slope) < BEND for slope in slopes])
-    vague: BoolArray = straight | (found.residuals.shape[1] <= found.constants)
-    return vague
-
-
-def _shifts(
-    forces: FloatArray, loads: FloatArray, found: Collapse, stated: FloatArray, vague: BoolArray, count: int
-) -> Variables:
-    """Return the shifts of all loads of a study in decades; NaN for loads without a curve, and for vague ends."""
-    decades = found.shifts / np.log(10)
+def _shifts(forces: FloatArray, loads: FloatArray, found: Collapse, stated: FloatArray, count: int) -> Variables:
+    """Return the shifts of all loads of a study in decades; NaN for loads without a curve, and for vague shifts."""
+    decades = np.where(found.vague, np.nan, found.shifts / np.log(10))
     columns = {"horizontal_stated": (stated / np.log(10), "shift along log velocity by eqs. 3.17 and 3.23")}
     for k, name in enumerate(("horizontal", "vertical")):
         low, high = bootstrap.interval(decades[:, k], count)
         meaning = f"shift along the {'velocity' if k == 0 else 'friction'} in decades"
-        ends = {f"{name}_low": np.where(vague, np.nan, low), f"{name}_high": np.where(vague, np.nan, high)}
-        columns |= {key: (value, meaning) for key, value in ({name: decades[0, k]} | ends).items()}
+        values = {name: decades[0, k], f"{name}_low": low, f"{name}_high": high}
+        columns |= {key: (value, meaning) for key, value in values.items()}
     result = {"force_number": xr.Variable("curve", forces, {"units": "1", "long_name": "F_N / (G h L) of every curve"})}
     for name, (values, meaning) in columns.items():
         wide = np.full(forces.size, np.nan)

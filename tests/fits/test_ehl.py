@@ -86,3 +86,22 @@ def test_too_little_is_said() -> None:
 def test_one_point_more_than_constants_is_enough() -> None:
     fit = film_exponents({"": power_law(GRID[0][:1], GRID[1][:3], GRID[2][:1])})
     assert float(fit["central_speed"][0]) == pytest.approx(0.692, rel=1e-9)
+
+
+def test_numbers_that_vary_only_together_have_no_exponents() -> None:
+    """Another modulus of the bodies changes W, U and G by powers of the same factor."""
+    one = power_law(np.array([1e-4]), np.array([1e-10]), np.array([2000.0])).central_film.item()
+    stiffness = np.geomspace(1.0, 10.0, 8)
+    film = one * stiffness ** (0.166 - 0.692 + 0.47)
+    data = xr.Dataset(
+        {"central_film": (("modulus", "realisation"), film[:, None])},
+        {
+            "load_parameter": ("modulus", 1e-4 / stiffness),
+            "speed_parameter": ("modulus", 1e-10 / stiffness),
+            "material_parameter": ("modulus", 2000 * stiffness),
+            "contact_modulus": 1e11,
+        },
+    )
+    fit = film_exponents({"": data})
+    assert all(np.isnan(fit[f"central_{name}"][0]) for name in ("load", "speed", "material", "factor"))
+    assert str(fit["law_holds"][0].item()).startswith("yes")

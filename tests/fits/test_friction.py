@@ -196,3 +196,14 @@ def test_a_slope_that_is_not_stored_follows_from_every_line(forces):
             unit = roughness.spectral_slope(roughness.amplitudes(points // 2, hurst))
             here = float(found.sel(hurst=hurst, points=points))
             assert here == pytest.approx(unit * float(data["rms_roughness"] / data["length"]), rel=1e-12)
+
+
+@pytest.mark.parametrize("misfit", [0.0, 0.1])
+def test_far_from_zone_one_its_constants_are_not_determined(misfit):
+    """Loads of 250 to 10 000 depend on neither alpha nor beta (eq. 3.17), whatever else the law departs by."""
+    axes = {"normal_force": np.geomspace(25, 1000, 4), "velocity": np.geomspace(1e-3, 10, 9)}
+    data = store(axes, realisations=6)
+    wrong = 1 + misfit * np.cos(3 * np.log(data.velocity) + np.log(data.normal_force))
+    found = FIT["interpolation"]({"": data.assign(friction_coefficient=data.friction_coefficient * wrong)})
+    for name in ("alpha", "beta"):
+        assert np.isnan([found[name + end].item() for end in ("", "_low", "_high")]).all()

@@ -74,6 +74,30 @@ def test_a_law_that_does_not_hold_moves_its_constants():
     assert mean.holds().startswith("no: ")
 
 
+LOG_LOADS = np.repeat(np.linspace(0.0, 1.0, 4), 3)
+
+
+@pytest.mark.parametrize(
+    ("columns", "known"),
+    [
+        ([1 + 0 * LOG_LOADS, LOG_LOADS], [True, True]),
+        ([1 + 0 * LOG_LOADS, 0.05 * LOG_LOADS], [True, False]),  # nearly equal loads
+        ([1 + 0 * LOG_LOADS, 1e-3 * LOG_LOADS**2, 0 * LOG_LOADS], [True, False, False]),  # constants that play no part
+        ([1 + 0 * LOG_LOADS, LOG_LOADS, 2 * LOG_LOADS], [True, False, False]),  # two constants of which one is enough
+    ],
+)
+@pytest.mark.parametrize("misfit", [0.0, 0.2])
+def test_constants_that_play_no_part_are_not_determined(columns, known, misfit):
+    design = np.stack(columns)
+    bent = design.sum(axis=0) + misfit * np.cos(9 * LOG_LOADS)
+    rows = bent + 0.01 * np.random.default_rng(0).normal(size=(401, bent.size))
+    found = fitted(lambda data: data @ np.linalg.pinv(design), lambda data, c: data - c @ design, rows, 10)
+    low, high = bootstrap.interval(found.constants, 10)
+    for values in (found.constants[0], low, high):
+        assert np.isfinite(values).tolist() == known
+    assert np.isfinite(found.rms)
+
+
 def test_a_fit_without_a_law_says_so():
     plain = Fit("plain", ("toy",), "none", lambda groups: xr.Dataset({"a": 1.0}))
     assert plain.results({})[""]["law_holds"].item().startswith("not tested: ")

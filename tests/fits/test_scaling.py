@@ -15,7 +15,7 @@ from mdr_dask.physics.surfaces import roughness
 FIT = {fit.name: fit for fit in FITS}
 LEAST = 0.9  # 95 % less 2.3 standard deviations of a share of 100 studies
 G, RMS, LENGTH, TAU, SLOPE, POINTS = 1e7, 5e-7, 0.02, 1e-3, 0.1, 400
-LINES = pytest.mark.parametrize("lines", [5, 30])
+LINES = pytest.mark.parametrize("lines", [3, 30])
 
 
 def planted(axes, lines, studies, hurst=0.5, **outputs):
@@ -139,9 +139,16 @@ def test_curves_of_different_form_do_not_collapse(lines):
 
 def test_straight_curves_have_no_shifts_that_are_told_apart():
     found = FIT["collapse"].compute({"": planted(CURVES, 10, 2, friction_coefficient=lambda force, v: force**-0.3 * v)})
-    assert np.all(np.isnan(found["horizontal_low"]))
-    assert np.all(np.isnan(found["vertical_high"]))
-    assert np.all(np.isfinite(found["horizontal"]))
+    moved = found.isel(curve=[0, 1, 3])
+    assert all(np.all(np.isnan(moved[name])) for name in ("horizontal", "horizontal_low", "vertical", "vertical_high"))
+
+
+def test_a_bend_of_one_curve_alone_determines_no_shift():
+    """Loads of 250 to 10 000: only the lowest reaches the bend, and beside straight curves it may lie anywhere."""
+    axes = {"normal_force": np.geomspace(25, 1000, 4), "velocity": np.geomspace(1e-3, 0.5, 12)}
+    data = planted(axes, 10, 1, friction_coefficient=lambda force, v: 1 / np.hypot(1, force / v / 4))
+    found = FIT["collapse"].compute({"": data})
+    assert np.all(np.isnan(found["horizontal"].isel(curve=[0, 1, 3])))
 
 
 def test_the_model_follows_its_statics():
@@ -202,7 +209,6 @@ def test_few_points_of_a_curve_are_no_test():
     falling = (data.hurst == 0.7) & (data.normal_force > 5) & (data.velocity > 1e-5)
     data["friction_coefficient"] = data.friction_coefficient.where(~falling, 1e-9)
     found = FIT["collapse"].compute({"": data})
-    assert found["horizontal"].isnull().sum("curve").values.tolist() == [0, 1]
     assert found["force_number"].notnull().all()
     assert found["fitted_law_holds"].str.startswith("not tested: ").all()
     assert found["horizontal_low"].isnull().all()
