@@ -196,7 +196,8 @@ ROWS = {
     ),
 }
 
-#: What has no value on a way: no last state is steady, and a body worn along a path has no estimate of its image.
+#: Outputs without a value: no last state is steady, a body worn along a path has no estimate of its image, and a spike
+#: of the pressure that falls within one cell has no height (docs/ehl.md).
 NO_VALUE = {
     "steps": {"friction_coefficient_after", "friction_coefficient_after_error"},
     "oscillation": {"friction_coefficient_after", "friction_coefficient_after_error"},

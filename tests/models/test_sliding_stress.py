@@ -232,3 +232,21 @@ def test_a_peak_between_nodes_that_holds_an_element_above_the_highest_node():
     found, exact = friction("auto"), friction(64)["friction_coefficient"]
     miss = np.abs(found["friction_coefficient"] / exact - 1)
     assert np.all(miss <= relative_error(found))
+
+
+@pytest.mark.parametrize("realisation", range(4))
+def test_the_error_covers_a_peak_between_two_nodes(realisation):
+    """A contact shorter than a cell: drag depends on the curvature of one cubic only, and two grids may agree on it."""
+    columns = {"velocity": np.geomspace(2e4, 1e8, 6), "normal_force": np.geomspace(1e4, 1e8, 6)}
+    parameters = LINE | KELVIN | LOAD | {"length": 1.0, "rms_roughness": 1.0, "hurst": 0.3}
+
+    def friction(oversampling):
+        case = SlidingFriction.model_validate(parameters | {"oversampling": oversampling})
+        return MODEL.compute(Block(case, columns, 6, (realisation,), 9, ALL, 0.01)).values
+
+    exact = friction(64)["friction_coefficient"]
+    for oversampling in (2, 4, 16):
+        found = friction(oversampling)
+        miss = np.abs(found["friction_coefficient"] / exact - 1)
+        assert np.all(found["contact_fraction"] * LINE["points"] * oversampling < 2)
+        assert np.all(miss <= relative_error(found))

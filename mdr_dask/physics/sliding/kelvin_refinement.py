@@ -138,7 +138,8 @@ class KelvinCases:
             depths[cases] = found.depth
             return Solution(found.columns, found.status)
 
-        order = ORDER_OF_CELLS if self.scheme == "hermite" else ORDER_OF_STEPS
+        # one node per Nyquist point is too coarse to show the order of cubic cells
+        order = ORDER_OF_CELLS if self.scheme == "hermite" and levels[0] > 1 else ORDER_OF_STEPS
         return refine(solve, self.loads.size, levels, accuracy, order, floors=FLOORS)
 
 
