@@ -14,11 +14,21 @@ from mdr_dask import models
 from mdr_dask import store as stores
 from mdr_dask.models.base import Block
 from mdr_dask.models.parts.sliding_problem import sliding_problems
-from mdr_dask.physics.sliding.displacement import displacement
 from mdr_dask.plots.curves import parameters_at
 
 #: Places for each point of the line, and the part of the line that is shown enlarged.
 OVERSAMPLING, PART = 8, 0.05
+
+
+def displacement(penetration: np.ndarray, deborah: float) -> np.ndarray:
+    """Return how far a periodic line presses each element in: the largest penetration it has had, faded since then.
+
+    `penetration` is depth + height at equidistant places, `deborah` is v tau over their distance.
+    """
+    place = np.arange(2 * penetration.size) / deborah
+    with np.errstate(divide="ignore"):
+        pressed = np.log(np.maximum(np.tile(penetration, 2), 0.0)) + place
+    return np.exp(np.maximum.accumulate(pressed) - place)[-penetration.size :]
 
 
 def main(store: str, target: str = "contact.png") -> None:
@@ -32,7 +42,7 @@ def main(store: str, target: str = "contact.png") -> None:
     count = OVERSAMPLING * waves.points
     line, place = waves.heights(count), np.arange(count) / count
     depth = float(case["indentation_depth"]) / height
-    pushed = displacement(depth + line, float(problems.deborah[0]) * count, periodic=True)
+    pushed = displacement(depth + line, float(problems.deborah[0]) * count)
     elastomer = np.maximum(pushed - depth, line)
     contact = np.where(elastomer - line < 1e-9 * np.ptp(line), line, np.nan)
     figure, panels = plt.subplots(2, 1, figsize=(9, 5), layout="constrained")

@@ -346,6 +346,11 @@ class Result:
     messages: dict[tuple[int, int], str] = field(default_factory=dict)
     solves: int = 0
 
+    def add_message(self, case: int, realisation: int, message: str) -> None:
+        """Add a message to those of a case; `realisation` is its position in the block."""
+        before = self.messages.get((case, realisation))
+        self.messages[case, realisation] = f"{before}; {message}" if before else message
+
 
 @dataclass(frozen=True)
 class Model(Generic[P]):

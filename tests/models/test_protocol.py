@@ -66,6 +66,21 @@ def test_every_course_ends_in_its_steady_state(protocol: dict[str, object], mate
     assert np.allclose(found["friction_coefficient"][..., -1], found["friction_coefficient_after"], rtol=0.01)
 
 
+@pytest.mark.parametrize("time", [1e-3, 0.7e-3, 1.3e-3])
+@pytest.mark.parametrize("oversampling", [6, 16])
+def test_a_time_at_a_change_of_velocity_has_the_value_after_it(time: float, oversampling: int) -> None:
+    """Also if it is the last requested time, and whatever the moments of the march round to."""
+    steps = {"shape": "steps", "times": [0.0, time], "velocities": [0.03, 0.3]}
+    at = (0.2, time / 1e-3)
+    small = {"points": 16, "oversampling": oversampling, "protocol": steps}
+    last, inside, later = (
+        compute(block(relaxation_times=times, **small)).values["friction_coefficient"][..., 1]
+        for times in (at, (*at, 3.0), (at[0], at[1] + 1e-7))
+    )
+    assert np.allclose(last, later, rtol=0.02)
+    assert np.allclose(inside, later, rtol=0.02)
+
+
 def test_oscillation_returns_every_period() -> None:
     swing = {"shape": "oscillation", "amplitude": 0.02, "frequency": 500.0}
     found = compute(block(protocol=swing, relaxation_times=(10.0, 12.0, 14.0))).values["friction_coefficient"]

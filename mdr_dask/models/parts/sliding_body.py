@@ -97,6 +97,10 @@ class SlidingBody(Parameters):
             return "expected length, of the line that stands for the surface"
         return ""
 
+    def largest_force(self) -> float:
+        """Return the largest normal force, N."""
+        return self.normal_force
+
     def wavelengths(self) -> tuple[float, float]:
         """Return the shortest and the longest wavelength of the line, m."""
         if self.surface is not None and self.surface.profile is not None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.errors import DataError, distinguishable
@@ -53,7 +54,9 @@ class SlidingProblems:
     Parameters
     ----------
     settings : list of Setting
-        Line and solid of every case.
+        The different pairs of line and solid.
+    which : int array, shape (cases,)
+        Index into `settings` of every case, -1 for a case that cannot be solved.
     loads : array, shape (cases,)
         F_N / (4 G_inf L h).
     deborah : array, shape (cases,)
@@ -65,35 +68,50 @@ class SlidingProblems:
     """
 
     settings: list[Setting]
+    which: IntArray
     loads: FloatArray
     deborah: FloatArray
     length: FloatArray
     height: FloatArray
     faults: dict[int, str]
 
-    def groups(self, *columns: list[Any]) -> Iterator[tuple[Setting, tuple[Any, ...], IntArray]]:
-        """Yield the cases that share a setting and the values of some columns."""
-        members: dict[Any, list[int]] = {}
-        for j, key in enumerate(zip(map(id, self.settings), *columns, strict=True)):  # equal settings are one object
-            members.setdefault(key, []).append(j)
-        for (_, *others), cases in members.items():
-            sound = [j for j in cases if j not in self.faults]
-            if sound:
-                yield self.settings[sound[0]], tuple(others), np.array(sound)
+    def groups(self, *columns: NDArray[Any]) -> Iterator[tuple[Setting, IntArray]]:
+        """Yield the solvable cases that share a setting and the values of some columns."""
+        is_sound = self.which >= 0
+        is_sound[list(self.faults)] = False
+        sound = np.flatnonzero(is_sound)
+        first, group = combinations(self.which[sound], *(column[sound] for column in columns))
+        ends = np.cumsum(np.bincount(group, minlength=1))[:-1]
+        for k, members in zip(first, np.split(sound[np.argsort(group, kind="stable")], ends), strict=False):
+            yield self.settings[self.which[sound[k]]], members
 
     def different(self, members: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
         """Return the different pairs of Deborah number and load among some cases, and the pair of each case."""
-        pairs = list(zip(self.deborah[members].tolist(), self.loads[members].tolist(), strict=True))
-        places = {pair: k for k, pair in enumerate(sorted(set(pairs)))}
-        deborah, loads = np.array(list(places)).T.copy()
-        return deborah, loads, np.array([places[pair] for pair in pairs])
+        pairs, which = np.unique(self.deborah[members] + 1j * self.loads[members], return_inverse=True)
+        return pairs.real.copy(), pairs.imag.copy(), which
+
+
+def combinations(*columns: NDArray[Any]) -> tuple[IntArray, IntArray]:
+    """Return the first row of every different combination of values in some columns, and the combination of each row.
+
+    Objects are the same value only if they are the same object.
+    """
+    which = np.zeros(columns[0].size, np.int64) if columns else np.zeros(1, np.int64)
+    first = np.zeros(min(which.size, 1), np.int64)
+    for column in columns:
+        keys = np.fromiter(map(id, column), np.int64, column.size) if column.dtype == object else column
+        if np.all(keys == keys[:1]):
+            continue
+        code = np.unique(keys, return_inverse=True)[1]
+        _, first, which = np.unique(which * (code.max() + 1) + code, return_index=True, return_inverse=True)
+    return first, which
 
 
 def sliding_problems(block: Block[Any]) -> SlidingProblems:
     """Return the cases of a block of any `SlidingBody` without units."""
     faults: dict[int, str] = {}
-    roughness, length, height = _lines(block, faults)
-    static, viscosity, terms = _solids(block, faults)
+    lines, which_line, length, height = _lines(block, faults)
+    static, viscosity, terms, which_solid = _solids(block, faults)
     velocity, force = (np.asarray(block.column(name), dtype=np.float64) for name in ("velocity", "normal_force"))
     with np.errstate(all="ignore"):
         loads = canonical(force / (4 * static * length * height))
@@ -105,8 +123,43 @@ def sliding_problems(block: Block[Any]) -> SlidingProblems:
     with np.errstate(all="ignore"):
         slope = height / length
     refuse_immense({"h / L": slope, "F_N / (4 G L h)": loads, "v tau / L": np.where(deborah == 0, 1, deborah)}, faults)
-    settings = _settings(block, roughness, terms, length, height, velocity, faults)
-    return SlidingProblems(settings, loads, deborah, length, height, faults)
+
+    indenters, which_indenter = each(block, "indenter")
+    bodies = [indenter.line() for indenter in indenters]
+    columns: list[NDArray[Any]] = [which_line, which_indenter, which_solid]
+    columns += [length, height] if any(body is not None for body in bodies) else []
+    columns += [length, velocity] if any(term is not None for term in terms) else []
+    sound = np.ones(block.cases, np.bool_)
+    sound[list(faults)] = False
+    cases = np.flatnonzero(sound)
+    first, of_sound = combinations(*(column[cases] for column in columns))
+    places: dict[Setting, int] = {}
+    codes = []
+    for j in cases[first]:
+        body = _without_units(bodies[which_indenter[j]], length[j], height[j])
+        solid = _travelling(terms[which_solid[j]], float(velocity[j]), float(length[j]))
+        codes.append(places.setdefault(Setting(lines[which_line[j]], body, solid), len(places)))
+    which = np.full(block.cases, -1)
+    which[cases] = np.array(codes, np.int64)[of_sound]
+    return SlidingProblems(list(places), which, loads, deborah, length, height, faults)
+
+
+def _without_units(body: Shape | None, length: float, height: float) -> Shape | None:
+    """Return the line of an indenter in units of length and height, with canonical numbers."""
+    if body is None:
+        return None
+    body = body.scaled(float(length), float(height))
+    numbers = {name: float(canonical(number)) for name, number in vars(body).items()}
+    return replace(body, **numbers)  # type: ignore[type-var]  # a protocol of dataclasses
+
+
+def _travelling(term: tuple[FloatArray, FloatArray] | None, velocity: float, length: float) -> PronyTerms | None:
+    """Return Prony terms whose times are replaced by the distance travelled in them over the length of the line."""
+    from mdr_dask.physics.sliding.problem import PronyTerms
+
+    if term is None:
+        return None
+    return PronyTerms(*(tuple(canonical(numbers).tolist()) for numbers in (term[0], term[1] * velocity / length)))
 
 
 def refuse_immense(numbers: dict[str, FloatArray], faults: dict[int, str]) -> None:
@@ -117,47 +170,55 @@ def refuse_immense(numbers: dict[str, FloatArray], faults: dict[int, str]) -> No
             faults.setdefault(int(j), f"expected {name} between {least} and {most}, got {number}; look at the units")
 
 
-def each(block: Block[Any], name: str) -> list[Any]:
-    """Return a nested parameter of every case, whichever part of it varies."""
-    if any(path.partition(".")[0] == name for path in block.columns):
-        return [getattr(block.case(j), name) for j in range(block.cases)]
-    return [getattr(block.parameters, name)] * block.cases
+def each(block: Block[Any], name: str) -> tuple[list[Any], IntArray]:
+    """Return the different values of a nested parameter, whichever part of it varies, and the value of every case."""
+    varied = [column for path, column in block.columns.items() if path.partition(".")[0] == name]
+    if not varied:
+        return [getattr(block.parameters, name)], np.zeros(block.cases, np.int64)
+    first, which = combinations(*varied)
+    return [getattr(block.case(int(j)), name) for j in first], which
 
 
 def _numbers(block: Block[Any], name: str) -> FloatArray:
     """Return a number of every case, NaN where it is not given."""
-    return np.array([np.nan if value is None else value for value in block.column(name).tolist()], dtype=np.float64)
+    if name not in block.columns:
+        value = getattr(block.parameters, name)
+        return np.full(block.cases, np.nan if value is None else value, dtype=np.float64)
+    column = block.columns[name]
+    return column.astype(np.float64)  # None becomes NaN
 
 
-def _lines(block: Block[Any], faults: dict[int, str]) -> tuple[list[Roughness], FloatArray, FloatArray]:
-    """Return roughness, length and height of every case."""
+def _lines(
+    block: Block[Any], faults: dict[int, str]
+) -> tuple[list[Roughness | None], IntArray, FloatArray, FloatArray]:
+    """Return the different lines, the line of every case, and length and height of every case."""
     length, height = _numbers(block, "length"), _numbers(block, "rms_roughness")
     flat = height == 0
     height = np.where(flat, length, height)
     with np.errstate(all="ignore"):
-        corners = [
-            np.where(np.isnan(wavelength), 0.0, canonical(length / wavelength)).tolist()
-            for wavelength in (_numbers(block, "rolloff_wavelength"), _numbers(block, "longest_wavelength"))
-        ]
-    columns = block.column("hurst").tolist(), block.column("points").tolist(), *corners
-    distinct: dict[Any, Roughness] = {}
-    lines: list[Roughness] = []
-    for smooth, *numbers in zip(flat.tolist(), *columns, strict=True):
-        key = (smooth, *numbers)
-        if key not in distinct:
-            distinct[key] = Smooth(numbers[1]) if smooth else Generated(*numbers)
-        lines.append(distinct[key])
-    surfaces: dict[Any, OfSurface | Measured] = {}
-    for j, surface in enumerate(each(block, "surface")):
-        if surface is not None:
-            key = surface, columns[1][j], length[j]
-            try:
-                line = surfaces.setdefault(key, _measured(*key))
-                length[j] = line_of(line.profile).length if isinstance(line, Measured) else length[j]
-                lines[j], height[j] = line, line.height()
-            except DataError as problem:
-                faults[j] = str(problem)
-    return lines, length, height
+        ends = [canonical(length / _numbers(block, name)) for name in ("rolloff_wavelength", "longest_wavelength")]
+    corners = [np.where(np.isnan(end), 0.0, end) for end in ends]  # 0: no such wavelength
+    surfaces, which_surface = each(block, "surface")
+    columns = _numbers(block, "hurst"), _numbers(block, "points").astype(np.int64), *corners
+    own_length = [length] if any(surface is not None for surface in surfaces) else []
+    first, which = combinations(which_surface, flat, *columns, *own_length)
+    lines: list[Roughness | None] = []
+    for k, j in enumerate(first):
+        surface = surfaces[which_surface[j]]
+        hurst, points, rolloff, longest = (column[j].item() for column in columns)
+        if surface is None:
+            lines.append(Smooth(points) if flat[j] else Generated(hurst, points, rolloff, longest))
+            continue
+        members = np.flatnonzero(which == k)
+        try:
+            line = _measured(surface, points, float(length[j]))
+            length[members] = line_of(line.profile).length if isinstance(line, Measured) else length[j]
+            height[members] = line.height()
+            lines.append(line)
+        except DataError as problem:
+            faults.update(dict.fromkeys(members.tolist(), str(problem)))
+            lines.append(None)
+    return lines, which, length, height
 
 
 def _measured(surface: Surface, points: int, length: float) -> OfSurface | Measured:
@@ -165,57 +226,24 @@ def _measured(surface: Surface, points: int, length: float) -> OfSurface | Measu
     return OfSurface(surface, points, length) if surface.profile is None else Measured(surface.profile)
 
 
-def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArray, FloatArray, list[Any]]:
-    """Return static modulus, viscosity and Prony terms of every case; the last are None for a Kelvin solid.
+def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArray, FloatArray, list[Any], IntArray]:
+    """Return static modulus and viscosity of every case, the Prony terms of every solid, and the solid of every case.
 
-    Viscosity and moduli of the terms are divided by the static modulus.
+    Viscosity and moduli of the terms are divided by the static modulus. The terms of a Kelvin solid are None.
     """
     static, viscosity = _numbers(block, "shear_modulus"), _numbers(block, "relaxation_time")
-    terms: list[Any] = [None] * block.cases
-    for j, material in enumerate(each(block, "material")):
-        if material is not None:
-            try:
-                solid = solid_of(material)
-            except (DataError, ValueError) as problem:
-                faults[j] = str(problem)
-                continue
-            static[j], viscosity[j] = solid.static_modulus, solid.viscosity / solid.static_modulus
-            is_kelvin = solid.times.size == 0 and solid.viscosity > 0
-            terms[j] = None if is_kelvin else (solid.moduli / solid.static_modulus, solid.times)
-    return static, viscosity, terms
-
-
-def _settings(
-    block: Block[Any],
-    roughness: list[Roughness],
-    terms: list[Any],
-    length: FloatArray,
-    height: FloatArray,
-    velocity: FloatArray,
-    faults: dict[int, str],
-) -> list[Setting]:
-    """Return line and solid of every case in units of length and height; equal settings are one object."""
-    from mdr_dask.physics.sliding.problem import PronyTerms
-
-    indenters = each(block, "indenter")
-    bodies = {id(indenter): indenter.line() for indenter in {id(one): one for one in indenters}.values()}
-    known: dict[Any, Setting] = {}
-    equal: dict[Setting, Setting] = {}
-    settings = []
-    columns = roughness, indenters, terms, length.tolist(), height.tolist(), velocity.tolist()
-    for j, (line, indenter, term, unit, rms, pace) in enumerate(zip(*columns, strict=True)):
-        key: tuple[Any, ...] = (id(line), id(indenter), unit, rms)
-        if term is not None:
-            key += (id(term), pace)
-        if key not in known:
-            body, travelling = bodies[id(indenter)], None
-            if body is not None and j not in faults:
-                body = body.scaled(unit, rms)
-                body = replace(body, **{name: float(canonical(number)) for name, number in vars(body).items()})
-            if term is not None and j not in faults:
-                numbers = canonical(term[0]), canonical(term[1] * pace / unit)
-                travelling = PronyTerms(*(tuple(column.tolist()) for column in numbers))
-            setting = Setting(line, body, travelling)
-            known[key] = equal.setdefault(setting, setting)
-        settings.append(known[key])
-    return settings
+    materials, which = each(block, "material")
+    terms: list[Any] = [None] * len(materials)
+    for k, material in enumerate(materials):
+        if material is None:
+            continue
+        members = np.flatnonzero(which == k)
+        try:
+            solid = solid_of(material)
+        except (DataError, ValueError) as problem:
+            faults.update(dict.fromkeys(members.tolist(), str(problem)))
+            continue
+        static[members], viscosity[members] = solid.static_modulus, solid.viscosity / solid.static_modulus
+        is_kelvin = solid.times.size == 0 and solid.viscosity > 0
+        terms[k] = None if is_kelvin else (solid.moduli / solid.static_modulus, solid.times)
+    return static, viscosity, terms, which

@@ -1,4 +1,4 @@
-"""Messages where a line stands for a measured surface outside the range that docs/validity.md has tested."""
+"""Messages about results on measured surfaces outside the range that docs/validity.md has tested."""
 
 from __future__ import annotations
 
@@ -9,18 +9,19 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.models.parts.indenter import Plane
+from mdr_dask.models.parts.rough_line import OfSurface
 from mdr_dask.models.parts.sliding_body import SlidingBody
+from mdr_dask.models.parts.sliding_problem import Setting
 
 LARGEST_LOAD = 1.0
-"""F_N / (E* L h), with E* = 4 G of an incompressible solid: beyond, lines come closer to full contact than surfaces."""
+"""F_N / (E* L h) with E* = 4 G of an incompressible solid. Above it a line is nearer to full contact than a surface."""
 LARGEST_FRACTION = 0.5  # of the line in contact
 PAGE = "docs/validity.md"
 
 
 def load_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
-    """Return a note if loads of a study lie beyond those for which friction on a rough surface was tested."""
+    """Return a note if loads of a study exceed those for which friction on a rough surface was tested."""
     from mdr_dask.models.parts.material import solid_of
-    from mdr_dask.models.parts.rough_line import OfSurface
 
     loads = []
     for one in sets:
@@ -29,10 +30,10 @@ def load_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
         assert one.length is not None
         try:
             modulus = one.shear_modulus if one.material is None else solid_of(one.material).static_modulus
-            height = OfSurface(one.surface, one.points, one.length).height()
-        except (DataError, ValueError):  # a message of the cases themselves
+            height, force = OfSurface(one.surface, one.points, one.length).height(), one.largest_force()
+        except (DataError, ValueError):  # the cases themselves report it
             continue
-        loads.append(one.normal_force / (4 * (modulus or np.inf) * one.length * height))
+        loads.append(force / (4 * (modulus or np.inf) * one.length * height))
     largest = max(loads, default=0.0)
     if largest <= LARGEST_LOAD:
         return ()
@@ -42,16 +43,20 @@ def load_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
     )
 
 
-def beyond_tested(loads: FloatArray, fractions: FloatArray) -> dict[int, str]:
+def beyond_tested(setting: Setting, loads: FloatArray, fractions: FloatArray) -> dict[int, str]:
     """Return a message for every case outside the tested range, by the index of the case.
 
     Parameters
     ----------
+    setting : Setting
+        Line and solid of the cases. Only a plane body on lines that stand for a measured surface has a tested range.
     loads : array, shape (cases,)
-        F_N / (4 G_inf L h).
+        F_N / (4 G_inf L h), the largest of a history.
     fractions : array, shape (cases,)
-        Length in contact over length of the line.
+        Length in contact over length of the line, the largest of a history; NaN if it is not known.
     """
+    if setting.body is not None or not isinstance(setting.roughness, OfSurface):
+        return {}
     heavy, full = loads > LARGEST_LOAD, fractions > LARGEST_FRACTION
     messages = {}
     for k in np.flatnonzero(heavy | full):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,6 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.models.base import Block, Result, Status
 from mdr_dask.models.parts.accuracy import missed_accuracy
 from mdr_dask.models.parts.material import fit_error
-from mdr_dask.models.parts.rough_line import OfSurface
 from mdr_dask.models.parts.sliding_problem import STATUS, Setting, SlidingProblems, each, sliding_problems
 from mdr_dask.models.parts.tested_range import beyond_tested
 from mdr_dask.models.sliding_friction.declaration import SlidingFriction
@@ -44,15 +42,20 @@ def compute(block: Block[SlidingFriction]) -> Result:
         for group in groups:
             solves += group.solve(result, r, realisation)
     if "material_error" in block.outputs:
-        errors = np.array([fit_error(material) for material in each(block, "material")])
-        values["material_error"][:] = np.where(result.status == Status.DONE, errors[:, None], np.nan)
+        materials, which = each(block, "material")
+        errors = np.array([fit_error(material) for material in materials])
+        values["material_error"][:] = np.where(result.status == Status.DONE, errors[which, None], np.nan)
     result.messages.update({(j, r): fault for j, fault in problems.faults.items() for r in range(shape[1])})
     return replace(result, solves=solves)
 
 
-def _groups(block: Block[SlidingFriction], problems: SlidingProblems) -> Any:
-    """Yield setting, oversampling and scheme, and the cases that share them."""
-    yield from problems.groups(block.column("oversampling").tolist(), block.column("scheme").tolist())
+def _groups(
+    block: Block[SlidingFriction], problems: SlidingProblems
+) -> Iterator[tuple[Setting, SlidingFriction, IntArray]]:
+    """Yield the cases that share setting, oversampling and scheme, with the parameters of one of them."""
+    varied = [block.columns[name] for name in ("oversampling", "scheme") if name in block.columns]
+    for setting, members in problems.groups(*varied):
+        yield setting, block.case(int(members[0])), members
 
 
 @dataclass
@@ -70,15 +73,19 @@ class _Group:
 
     @classmethod
     def of(
-        cls, block: Block[SlidingFriction], problems: SlidingProblems, setting: Setting, grid: Any, members: IntArray
+        cls,
+        block: Block[SlidingFriction],
+        problems: SlidingProblems,
+        setting: Setting,
+        case: SlidingFriction,
+        members: IntArray,
     ) -> _Group:
         """Collect the different cases among the members."""
         deborah, loads, which = problems.different(members)
         with_errors = any(f"{output}_error" in block.outputs for output in OUTPUTS)
         contact = not {"contact_fraction", "contact_slope"}.isdisjoint(block.outputs)
         accuracy = ACCURACY if block.accuracy is None else block.accuracy
-        oversampling, scheme = grid
-        request = Request(accuracy, oversampling, scheme, with_errors, contact)
+        request = Request(accuracy, case.oversampling, case.scheme, with_errors, contact)
         return cls(block, problems, setting, request, members, deborah, loads, which)
 
     def solve(self, result: Result, r: int, realisation: int) -> int:
@@ -103,8 +110,7 @@ class _Group:
                 if name in result.values:
                     result.values[name][self.members, r] = np.where(np.isnan(values[output]), np.nan, found)
         for k, message in self._messages(steady, values, absolute):
-            place = int(self.members[k]), r
-            result.messages[place] = f"{result.messages[place]}; {message}" if place in result.messages else message
+            result.add_message(int(self.members[k]), r, message)
         return int(self.loads.size)
 
     def _repeat(self, result: Result, r: int) -> None:
@@ -142,8 +148,7 @@ class _Group:
             found, stated = ({name: each[name] for name in asked} for each in (values, errors))
             floors = {"indentation_depth": self._height}
             yield from missed_accuracy(found, stated, self.request.accuracy, floors, " on the finest grid").items()
-        if isinstance(self.setting.roughness, OfSurface) and self.setting.body is None:
-            yield from beyond_tested(self.loads[self.which], values["contact_fraction"]).items()
+        yield from beyond_tested(self.setting, self.loads[self.which], values["contact_fraction"]).items()
 
 
 def distinct(block: Block[SlidingFriction]) -> int:
@@ -162,10 +167,10 @@ def _lines(block: Block[SlidingFriction], setting: Setting) -> int:
 def seconds(block: Block[SlidingFriction]) -> float:
     """Estimate the time of a block from its nodes, to an order of magnitude."""
     problems, nodes = sliding_problems(block), 0.0
-    for setting, (oversampling, _), members in _groups(block, problems):
+    for setting, case, members in _groups(block, problems):
         solves = problems.different(members)[0].size
         visits = 1 if setting.terms is None else 4 * (4 + len(setting.terms.moduli))
-        grid = 2 if oversampling == "auto" else int(oversampling)
+        grid = 2 if case.oversampling == "auto" else case.oversampling
         # a line takes as long as ten cases; on the first grids cases visit few of the nodes
         nodes += _lines(block, setting) * setting.roughness.points * grid * (10 + 0.5 * solves * visits)
     return 1e-4 + SECONDS_A_NODE * nodes
@@ -174,9 +179,9 @@ def seconds(block: Block[SlidingFriction]) -> float:
 def memory(block: Block[SlidingFriction]) -> float:
     """Estimate the peak memory of a block: one line on the grid that its cases usually need."""
     problems, nodes = sliding_problems(block), 0.0
-    for setting, (oversampling, _), _ in _groups(block, problems):
-        grid = oversampling
-        if oversampling == "auto":
+    for setting, case, _ in _groups(block, problems):
+        grid = case.oversampling
+        if grid == "auto":
             is_plane = setting.terms is None and setting.body is None
             grid = USUAL_ON_PLANES if is_plane else USUAL
         nodes = max(nodes, setting.roughness.points * float(grid))

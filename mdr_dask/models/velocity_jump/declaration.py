@@ -8,10 +8,11 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from mdr_dask.models.base import Coordinate, Model, Number, Output, deferred, quantity
-from mdr_dask.models.parts.loading_history import Jump, Protocol
+from mdr_dask.models.parts.loading_history import Jump, Protocol, pieces
 from mdr_dask.models.parts.material import solid_of
 from mdr_dask.models.parts.sliding_body import NUMBERS, SlidingBody, frequency_notes
 from mdr_dask.models.parts.surface import NO_GAP
+from mdr_dask.models.parts.tested_range import load_notes
 
 if TYPE_CHECKING:
     from mdr_dask.physics.solids import LinearSolid
@@ -49,6 +50,11 @@ class VelocityJump(SlidingBody):
         if self.velocity_change == 0:
             raise ValueError("expected a velocity_change other than 0")
         return self
+
+    def largest_force(self) -> float:
+        """Return the largest normal force of the history, N."""
+        (_, before), history = pieces(self.protocol, self.velocity, self.normal_force, self.velocity_change)
+        return max(before, *(max(piece.force) + piece.swing[1] for piece in history))
 
     def solid(self) -> LinearSolid:
         """Return the solid of the body."""
@@ -107,6 +113,6 @@ MODEL = Model(
             "immediate change of the friction over the friction before",
         ),
     ),
-    notes=frequency_notes,
+    notes=lambda sets: (*frequency_notes(sets), *load_notes(sets)),
     compiling=18.0,
 )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Block, Result, Status
-from mdr_dask.models.parts.accuracy import missed, share
+from mdr_dask.models.parts.accuracy import missed_accuracy
 from mdr_dask.models.parts.loading_history import pieces
 from mdr_dask.models.parts.measured_line import line_of
 from mdr_dask.models.parts.rough_line import Measured, Roughness
@@ -24,6 +24,7 @@ from mdr_dask.models.parts.sliding_problem import (
     refuse_immense,
     sliding_problems,
 )
+from mdr_dask.models.parts.tested_range import beyond_tested
 from mdr_dask.models.velocity_jump.declaration import VelocityJump
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Solution, refine
@@ -59,6 +60,7 @@ class _Found:
 
     values: dict[str, FloatArray]
     errors: dict[str, FloatArray]
+    contact: FloatArray  # largest fraction of the line in contact
     outcome: NDArray[np.int8]
 
 
@@ -84,14 +86,15 @@ def compute(block: Block[VelocityJump]) -> Result:
 
 def _groups(block: Block[VelocityJump], problems: SlidingProblems) -> Iterator[_Group]:
     """Yield groups of cases: those of one line and grid that are marched, and each other case by itself."""
-    alone = [
-        j if setting.terms is not None or setting.body is not None or protocol.shape != "jump" else None
-        for j, (setting, protocol) in enumerate(zip(problems.settings, each(block, "protocol"), strict=True))
-    ]
-    grids = block.column("oversampling").tolist(), block.column("steps_per_decade").tolist()
-    for setting, (oversampling, steps, followed), members in problems.groups(*grids, alone):
-        kind = _Marched if followed is None else _Followed
-        yield kind(block, problems, setting, oversampling, steps, members)
+    protocols, which = each(block, "protocol")
+    is_jump = np.array([protocol.shape == "jump" for protocol in protocols])[which]
+    is_simple = np.array([setting.terms is None and setting.body is None for setting in problems.settings] + [False])
+    followed = np.where(is_jump & is_simple[problems.which], -1, np.arange(block.cases))
+    varied = [block.columns[name] for name in ("oversampling", "steps_per_decade") if name in block.columns]
+    for setting, members in problems.groups(followed, *varied):
+        first = int(members[0])
+        kind, case = _Marched if followed[first] < 0 else _Followed, block.case(first)
+        yield kind(block, problems, setting, case.oversampling, case.steps_per_decade, members)
 
 
 @dataclass(frozen=True)
@@ -110,6 +113,11 @@ class _Group:
         """The requested outputs that have errors."""
         return [name for name in WITH_ERROR if name in self.block.outputs]
 
+    @property
+    def largest_loads(self) -> FloatArray:
+        """F_N / (4 G_inf L h) of the cases, the largest of a history."""
+        return self.problems.loads[self.members]
+
     def found(self, waves: Waves) -> tuple[_Found, int]:
         """Solve the cases on one realisation of the roughness; return also how many different ones were solved."""
         raise NotImplementedError
@@ -121,7 +129,8 @@ class _Group:
         try:
             _check_rough(self.setting.roughness)
             waves = self.setting.roughness.waves(self.block.seed, realisation)
-            found, solves = self.found(waves) if self.outputs else (_Found({}, {}, np.zeros(members.size, np.int8)), 0)
+            nothing = _Found({}, {}, np.full(members.size, np.nan), np.zeros(members.size, np.int8))
+            found, solves = self.found(waves) if self.outputs else (nothing, 0)
         except (DataError, ValueError) as problem:
             result.messages.update({(int(j), r): str(problem) for j in members})
             return 0
@@ -135,41 +144,37 @@ class _Group:
                     result.values[output][members[good], r] = (values.T * unit).T[good]
         if "rms_slope" in result.values:
             result.values["rms_slope"][members[good], r] = (self.setting.roughness.slope(realisation) * steep)[good]
-        for k, sentence in self._sentences(found):
-            result.messages[int(members[k]), r] = sentence
+        for k, message in self._messages(found):
+            result.add_message(int(members[k]), r, message)
         return solves
 
-    def _sentences(self, found: _Found) -> Iterator[tuple[int, str]]:
-        """Yield the reason of a failed case, or which outputs miss the accuracy and by how much."""
-        shares = {name: self._shares(found, name) for name in self.outputs}
-        accuracy = self.block.accuracy or ACCURACY
-        for k, outcome in enumerate(found.outcome):
-            if outcome != Outcome.CONVERGED:
-                more = ": fewer points or a shorter time" if outcome == Outcome.TOO_MANY_STEPS else ""
-                yield k, Outcome(int(outcome)).sentence + more
-                continue
-            sentence = missed({name: float(each[k]) for name, each in shares.items()}, accuracy)
-            if sentence:
-                yield k, sentence
+    def _messages(self, found: _Found) -> Iterator[tuple[int, str]]:
+        """Yield why a case failed, which outputs miss the accuracy, and whether it is outside the tested range."""
+        for k in np.flatnonzero(found.outcome != Outcome.CONVERGED):
+            outcome = Outcome(int(found.outcome[k]))
+            more = ": fewer points or a shorter time" if outcome == Outcome.TOO_MANY_STEPS else ""
+            yield int(k), outcome.sentence + more
+        # a transient counts only if the campaign states an accuracy
+        judged = [name for name in self.outputs if self.block.accuracy is not None or name not in TRANSIENT]
+        values, errors = ({name: each[name] for name in judged} for each in (found.values, found.errors))
+        floors = {name: self._floor(found, name) for name in judged}
+        yield from missed_accuracy(values, errors, self.block.accuracy or ACCURACY, floors).items()
+        yield from beyond_tested(self.setting, self.largest_loads, found.contact).items()
 
-    def _shares(self, found: _Found, name: str) -> FloatArray:
-        """Return the relative error of an output in every case, at the worst time; 0 if it is not known.
+    def _floor(self, found: _Found, name: str) -> FloatArray:
+        """Return the size with which the error of an output is compared if the output is zero within its error.
 
-        A transient counts only if the campaign states an accuracy. A value that is zero within its error, such as the
-        jump of a body without a dashpot or the friction of a body at rest, is compared with the largest friction of
-        the case.
+        This is the largest friction of the case, for instance for the friction of a body at rest.
         """
         cases = found.outcome.size
-        if self.block.accuracy is None and name in TRANSIENT:
+        if name == "indentation_depth":
             return np.zeros(cases)
-        beside = [name] if name == "indentation_depth" else [each for each in WITH_ERROR if each != "indentation_depth"]
-        known = [
-            np.nan_to_num(np.abs(found.values[each])).reshape(cases, -1) for each in beside if each in found.values
-        ]
-        whole = np.concatenate(known, axis=1).max(axis=1, initial=0.0)
-        errors, values = (each[name].reshape(cases, -1) for each in (found.errors, found.values))
-        worst: FloatArray = np.nan_to_num(share(errors, values, whole[:, None]), posinf=np.inf).max(axis=1, initial=0.0)
-        return worst
+        frictions = [found.values[each].reshape(cases, -1) for each in WITH_ERROR if each != "indentation_depth"]
+        largest = np.fmax.reduce(np.abs(np.concatenate(frictions, axis=1)), axis=1)
+        size, error = (
+            np.fmax.reduce(np.abs(each[name].reshape(cases, -1)), axis=1) for each in (found.values, found.errors)
+        )
+        return np.where(size > error, 0.0, largest)
 
 
 class _Marched(_Group):
@@ -215,7 +220,7 @@ class _Marched(_Group):
         }
         values = {name: value[which] for name, (value, _) in named.items()}
         errors = {name: error[which] for name, (_, error) in named.items()}
-        return _Found(values, errors, jumps.outcome[which])
+        return _Found(values, errors, jumps.contact[which], jumps.outcome[which])
 
 
 class _Followed(_Group):
@@ -229,17 +234,24 @@ class _Followed(_Group):
         def solve(grid: int, _: IntArray) -> Solution:
             found = self._trace(waves, nodes // grid)
             friction = np.concatenate([[found.before, found.at], found.friction])
-            values = [friction[None], np.array([found.after]), found.depth[None]]
+            values = [friction[None], np.array([found.after]), found.depth[None], np.array([found.contact])]
             return Solution(values, np.array([found.outcome], np.int8))
 
         # depths are relative to the rms height at least, which is 1 here
-        refined = refine(solve, 1, grids, 0.0, HISTORY_ORDER, floors=[0.0, 0.0, 1.0], shared=False)
-        (friction, after, depth), (error, after_error, depth_error) = refined.values, refined.errors[:, 0]
+        refined = refine(solve, 1, grids, 0.0, HISTORY_ORDER, floors=[0.0, 0.0, 1.0, 0.0], shared=False)
+        friction, after, depth, contact = refined.values
+        error, after_error, depth_error, _ = refined.errors[:, 0]
         before, at = friction[:, 0], friction[:, 1]
         values = dict(zip(WITH_ERROR, (before, at - before, after, friction[:, 2:], depth), strict=True))
         largest = error, error, max(after_error, error), error, depth_error
         errors = {n: np.where(np.isnan(values[n]), np.nan, each) for n, each in zip(WITH_ERROR, largest, strict=True)}
-        return _Found(values, errors, refined.outcome), 1
+        return _Found(values, errors, contact, refined.outcome), 1
+
+    @property
+    def largest_loads(self) -> FloatArray:
+        """F_N / (4 G_inf L h), the largest of the history."""
+        case = self.block.case(int(self.members[0]))
+        return self.problems.loads[self.members] * (case.largest_force() / case.normal_force)
 
     def _trace(self, waves: Waves, every: int) -> Trace:
         """Follow the case on every so many of its nodes."""

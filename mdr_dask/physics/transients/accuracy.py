@@ -91,6 +91,8 @@ class Jumps(NamedTuple):
         Drag and depth after the jump: the level long after, plus the transient of the march.
     trace_error, depth_error : array, shape (cases, times)
         Estimated absolute errors; NaN where they are not wanted.
+    contact : array, shape (cases,)
+        Fraction of the line in contact before or long after the jump, the larger of the two.
     outcome : array, shape (cases,)
     """
 
@@ -100,6 +102,7 @@ class Jumps(NamedTuple):
     depth: FloatArray
     trace_error: FloatArray
     depth_error: FloatArray
+    contact: FloatArray
     outcome: NDArray[np.int8]
 
 
@@ -129,7 +132,8 @@ def solve_jumps(problem: JumpProblem, request: JumpRequest) -> Jumps:
     march = request.march
     shape = cases, march.times.size if march else 0
     trace, depth, trace_error, depth_error = (np.full(shape, np.nan) for _ in range(4))
-    jumps = Jumps(levels, errors, trace, depth, trace_error, depth_error, refined.outcome)
+    contact = np.array([limits[grid, k].contact.max() for k in range(cases)])
+    jumps = Jumps(levels, errors, trace, depth, trace_error, depth_error, contact, refined.outcome)
     if march is None:
         return jumps
     for k in np.flatnonzero(refined.outcome == Outcome.CONVERGED):

@@ -76,8 +76,8 @@ class SteadyLimits(NamedTuple):
         Depth before and long after the jump.
     first, slower : Patches or None
         Contact before the jump, and in steady sliding at the lower velocity; None without a solution.
-    is_full : bool
-        Whether the whole line is in contact before and after.
+    contact : array, shape (2,)
+        Fraction of the line in contact before and long after the jump.
     outcome : Outcome
     """
 
@@ -89,8 +89,13 @@ class SteadyLimits(NamedTuple):
     depth: FloatArray
     first: Patches | None
     slower: Patches | None
-    is_full: bool
+    contact: FloatArray
     outcome: Outcome
+
+    @property
+    def is_full(self) -> bool:
+        """Whether the whole line is in contact before and after."""
+        return bool(np.all(self.contact >= WHOLE))
 
 
 def steady_limits(
@@ -121,7 +126,7 @@ def steady_limits(
         outcome = Outcome(int(outcomes[k].max()))
         if outcome != Outcome.CONVERGED:
             no = np.nan
-            found.append(SteadyLimits(no, no, no, no, no, np.full(2, no), None, None, False, outcome))
+            found.append(SteadyLimits(no, no, no, no, no, np.full(2, no), None, None, np.full(2, no), outcome))
             continue
         both, drags = [], []
         for depth, speed in zip(depths[k], deborah[k] * n, strict=True):
@@ -130,9 +135,8 @@ def steady_limits(
             drags.append(float(sums[SWEEP_DRAG]))
         fast = float(deborah[k, 1] * n)
         at, rate, tilt, end = _release(line.track, both[0], line.barriers(fast), fast, float(load * n))
-        slower, is_full = both[int(np.argmin(deborah[k]))], bool(np.all(contacts[k] >= WHOLE))
-        outcome = Outcome(end)
-        found.append(SteadyLimits(drags[0], at, drags[1], rate, tilt, depths[k], both[0], slower, is_full, outcome))
+        slower, outcome = both[int(np.argmin(deborah[k]))], Outcome(end)
+        found.append(SteadyLimits(drags[0], at, drags[1], rate, tilt, depths[k], both[0], slower, contacts[k], outcome))
     return found
 
 

@@ -35,7 +35,7 @@ MARGIN, WIDENINGS = 0.25, 3  # of the change of depth that a march may leave it 
 SHALLOW = 0.01  # of the least depth of the steady states: no march goes below
 MOMENTS = 3000  # most moments of a march
 STEEPEST = 3.0  # times the lesser secant beside a moment: a cubic with a steeper tangent would overshoot
-EVERY = 2  # moments of a path in a step of the same path on another grid
+EVERY = 2  # moments of a path in a step of the same path on another grid, but for the last step
 
 
 class MarchRequest(NamedTuple):
@@ -232,8 +232,9 @@ class _Relaxation(NamedTuple):
         before, after = self.deborah / self.line.track.cells
         growth = 10 ** (1 / self.request.per_decade)
         onset = ONSET * min(1.0, 1 / (self.request.wavenumber * max(after, before - after)))
-        onset /= ROOT if after < before else 1.0
         times = self.request.times
+        if after < before:
+            onset = min(onset / ROOT, float(times[times > 0][0]) / (growth - 1))
         part = self.change / self.request.per_decade
         return Stepping(onset * (growth - 1), growth, MISS * part, NEWTON * part, float(times[-1]))
 
@@ -298,7 +299,8 @@ class _Relaxation(NamedTuple):
 
     def retrace(self, path: Path) -> Path | None:
         """Return the path on this grid at every second moment of a path on another one, or None."""
-        time, depths = path.time[::EVERY], path.values[1, ::EVERY] + self.line.cells.top
+        moments = np.unique(np.append(np.arange(0, path.time.size, EVERY), path.time.size - 1))
+        time, depths = path.time[moments], path.values[1, moments] + self.line.cells.top
         for interval in self.intervals(np.append(depths + (self.ends[0] - depths[0]), self.ends)):
             marching, found, work = self.begun(interval, time.size)
             found.time[:], found.place[:] = time, np.log1p(time / marching.onset)

@@ -89,8 +89,11 @@ class Piece:
         late = grown[-1] if grown.size else 0.0
         count = max(int(np.ceil((end - begin - late) / most)), 1)
         rest = late + (end - begin - late) * np.arange(1, count + 1) / count
+        if end <= begin:
+            return np.array([begin])
         moments: FloatArray = begin + np.concatenate([[0.0], grown, rest])
-        return moments if end > begin else np.array([begin])
+        moments[-1] = end  # without a rounding error: the next piece begins there, and a time may be requested there
+        return moments
 
 
 class Trace(NamedTuple):
@@ -102,6 +105,8 @@ class Trace(NamedTuple):
         Steady before t = 0, at t = 0+, and in the steady state in which the history ends, NaN if it ends in none.
     friction, depth : array, shape (times,)
         At the requested times; at a jump the value after it.
+    contact : float
+        Largest fraction of the line in contact from t = 0 to the last requested time.
     outcome : Outcome
     """
 
@@ -110,6 +115,7 @@ class Trace(NamedTuple):
     after: float
     friction: FloatArray
     depth: FloatArray
+    contact: float
     outcome: Outcome
 
 
@@ -152,10 +158,10 @@ def trace(
         return _failed(times, Outcome(status))
     first = _still(line, solid, velocity, load_before, state, depth)
     junction = _Junction(state, depth, 0.0)
-    found: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+    found: list[tuple[FloatArray, FloatArray, FloatArray, FloatArray]] = []
     for piece in pieces:
         begin, end = piece.start, min(piece.end, float(times[-1]))
-        if begin > times[-1] or (begin == times[-1] and found):
+        if begin > times[-1]:
             break
         moments = piece.moments(begin, end, line.height.size - 1, per_decade)
         if moments is None:
@@ -166,22 +172,23 @@ def trace(
         part = follow_line(line, solid, Schedule(moments, travels, speed, load), junction.state, junction.depth)
         if part.status != Outcome.CONVERGED:
             return _failed(times, Outcome(part.status))
-        found.append((moments, part.drag / load, part.depth))
+        found.append((moments, part.drag / load, part.depth, part.contact))
         junction = _Junction(part.state, float(part.depth[-1]), float(travels[-1]))
-    moment, friction, depths = (np.concatenate(column) for column in zip(*found, strict=True))
+    moment, friction, depths, contact = (np.concatenate(column) for column in zip(*found, strict=True))
     return Trace(
         float(first.drag[0]) / load_before,
         float(friction[0]),
         _end(line, solid, pieces[-1]),
         _at(times, moment, friction),
         _at(times, moment, depths),
+        float(contact.max()),
         Outcome.CONVERGED,
     )
 
 
 def _failed(times: FloatArray, outcome: Outcome) -> Trace:
     nothing = np.full(times.size, np.nan)
-    return Trace(np.nan, np.nan, np.nan, nothing, nothing, outcome)
+    return Trace(np.nan, np.nan, np.nan, nothing, nothing, np.nan, outcome)
 
 
 def _still(line: CubicLine, solid: Foundation, velocity: float, load: float, state: State, depth: float) -> Response:
