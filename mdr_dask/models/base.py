@@ -40,11 +40,14 @@ def unquoted(value: Any) -> Any:
 class Parameters(BaseModel):
     """Base of every parameter set: SI numbers, checked bounds, no unknown key, immutable.
 
-    `gone` has the parameters and outputs that there once were, and what to write instead of each. `ways` has the
-    parameters that belong together: an entry has the ways to give one thing, each of which names parameters, dotted
-    ones inside structures, that are given together. `replaced` has parameters, and the one whose place each takes.
-    `settings` names parameters of the solver or of what is stored, `requires` those that have a say only where
-    another parameter has a value.
+    A subclass may declare more about its parameters:
+
+    * `renamed`: parameters and outputs of earlier versions, each with what to write instead.
+    * `alternatives`: groups of which exactly one member is given. Each member is a tuple of parameters that are given
+      together; a dot separates the names of nested parameters.
+    * `overrides`: parameters that replace another one, each with the one it replaces.
+    * `settings`: parameters of the solver, and of what is stored.
+    * `requires`: parameters that have an effect only if another parameter has a certain value.
     """
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
@@ -77,7 +80,7 @@ class Parameters(BaseModel):
 
 @lru_cache(maxsize=256)
 def _whole_fields(kind: type[BaseModel]) -> frozenset[str]:
-    """Return the fields of a parameter set that may hold a whole number."""
+    """Return the fields of a parameter set that accept a whole number."""
     return frozenset(name for name, info in kind.model_fields.items() if _may_be_whole(info.annotation))
 
 
@@ -108,8 +111,8 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     description : str
         One line about its meaning.
     usual : str
-        A common value with its unit, ``"10 MPa"``, for ``mdr-dask init``. A bare number more than three decades away
-        from it is questioned.
+        A common value with its unit, ``"10 MPa"``, for ``mdr-dask init``. ``check`` asks about a number without a unit
+        that is more than three decades away from it.
     **bounds
         ``default``, ``gt``, ``ge``, ``lt``, ``le`` and other arguments of :func:`pydantic.Field`.
 
@@ -131,13 +134,13 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     examples = [usual] if usual else None
     field = Field(description=description, json_schema_extra={"unit": unit}, examples=examples, **bounds)
     field.metadata.append(BeforeValidator(to_si))
-    if unit != "m^(1-n)":  # a body r^50 may have any prefactor
+    if unit != "m^(1-n)":  # the prefactor of a body r^50 may have any size
         field.metadata.append(AfterValidator(partial(_conceivable, 0.0 if unit == "1" else LEAST)))
     return field
 
 
 def _conceivable(least: float, value: Any) -> Any:
-    """Raise ValueError for sizes that no quantity has, and that overflow in products."""
+    """Raise ValueError for numbers so large or small that their products overflow or underflow."""
     for number in value if isinstance(value, tuple) else (value,):
         if isinstance(number, float) and number != 0 and not least <= abs(number) <= MOST:
             got, low, high = distinguishable(number, least, MOST, digits=6)
@@ -163,12 +166,12 @@ def notes_of(parameters: Any) -> tuple[str, ...]:
     return notes
 
 
-#: Bits of dimensionless numbers: those that agree to 6e-14 are the same case.
+#: Bits of dimensionless numbers: numbers that agree to 6e-14 are the same case.
 CANONICAL_BITS = 44
 
 
 def canonical(number: ArrayLike) -> Any:
-    """Round to `CANONICAL_BITS`, so that equal dimensionless numbers do not differ by rounding errors."""
+    """Round to `CANONICAL_BITS`, so that dimensionless numbers that differ by rounding errors alone become equal."""
     mantissa, exponent = np.frexp(number)
     return np.ldexp(np.rint(np.ldexp(mantissa, CANONICAL_BITS)), exponent - CANONICAL_BITS)
 

@@ -12,12 +12,12 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.tables import decoded, described
 
-#: Bytes of a file beyond which it is no table to tell of.
+#: Bytes of a file above which no notes on its columns are made.
 LARGEST_TABLE = 10**7
 
 
 class DataFile(BaseModel):
-    """A file named by a campaign: found when the campaign is read, recognised by its digest when it is used."""
+    """A file named by a campaign. It is found when the campaign is read, and its digest is compared when it is used."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     name: str
@@ -47,7 +47,7 @@ class DataFile(BaseModel):
         return decoded(self.read_bytes(), self.path)
 
     def notes(self) -> tuple[str, ...]:
-        """Return columns and ranges of a table, as it has them; nothing of any other file."""
+        """Return a note with the columns and ranges of a table; nothing for other files."""
         return _notes_of_file(self) if Path(self.path).stat().st_size < LARGEST_TABLE else ()
 
 

@@ -97,7 +97,9 @@ def test_table_needs_a_temperature_or_a_reference():
 def test_the_fit_says_how_well_it_holds():
     fitted = material(dma_table={"file": TABLE, "table_temperature": 298.0, "poisson_ratio": 0.5})
     (note,) = fit_notes(fitted)
-    assert re.search(rf"table {TABLE}: \d+ arms for .* rad/s, rms error [\d.]+% in G', .*% in G'', largest .*%", note)
+    assert re.search(
+        rf"table {TABLE}: \d+ Prony terms .* rad/s, rms error [\d.]+% in G', .*% in G'', largest .*%", note
+    )
     error = fit_error(fitted)
     assert 0.005 < error < 0.05  # the scatter of the data is 2 %
     denser = fitted.model_copy(update={"dma_table": fitted.dma_table.model_copy(update={"arms_per_decade": 3.0})})

@@ -134,7 +134,7 @@ def test_what_is_not_positive_or_not_finite_is_a_failed_case(name, called):
 def test_overflowing_numbers_are_a_failed_case():
     result = MODEL.compute(make({"normal_force": [1e300, 1.5], "rms_roughness": [1e-300, 5e-7]}))
     assert result.status.tolist() == [[Status.FAILED] * 2, [Status.DONE] * 2]
-    assert "look at the units" in result.messages[0, 0]
+    assert "check the units" in result.messages[0, 0]
 
 
 def test_finer_accuracy_takes_finer_grids_and_is_met():

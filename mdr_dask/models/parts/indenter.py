@@ -1,4 +1,4 @@
-"""Indenters as a campaign names them."""
+"""Indenters in a campaign."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 
 class Plane(Parameters):
-    """A nominally flat body: the rough line alone, periodic."""
+    """A nominally flat body: the rough line is periodic."""
 
     shape: Literal["plane"] = "plane"
 
     def line(self) -> None:
-        """Return what is under the roughness: nothing."""
+        """Return None: there is no shape beside the roughness."""
 
 
 class _PowerLaw(Parameters):
@@ -31,14 +31,14 @@ class _PowerLaw(Parameters):
         raise NotImplementedError
 
     def line(self) -> Shape:
-        """Return the line that acts like the body, by the MDR rule, in metres."""
+        """Return the equivalent one-dimensional profile by the rule of MDR, in metres."""
         from mdr_dask.physics.surfaces.shapes import PowerLaw
 
         return PowerLaw.of_body(*self.power_law())
 
 
 class Cone(_PowerLaw):
-    """A cone, rough or smooth."""
+    """A cone."""
 
     shape: Literal["cone"]
     angle: float = quantity("rad", "angle between the cone's surface and the plane", usual="10 deg", gt=0, lt=np.pi / 2)
@@ -49,7 +49,7 @@ class Cone(_PowerLaw):
 
 
 class Parabola(_PowerLaw):
-    """A paraboloid, which stands for a sphere."""
+    """A paraboloid, the usual approximation of a sphere."""
 
     shape: Literal["parabola"]
     radius: float = quantity("m", "radius of curvature R at the apex", usual="10 mm", gt=0)
@@ -72,20 +72,20 @@ class Power(_PowerLaw):
 
 
 class RoundedCone(Parameters):
-    """A cone with a rounded tip, which goes over into the cone without a kink."""
+    """A cone with a rounded tip; the slope is continuous where they meet."""
 
     shape: Literal["rounded_cone"]
     angle: float = quantity("rad", "angle between the cone's surface and the plane", gt=0, lt=np.pi / 2)
     tip_radius: float = quantity("m", "radius of curvature R of the tip", gt=0)
 
     def line(self) -> Shape:
-        """Return the line that acts like the body, by the MDR rule, in metres."""
+        """Return the equivalent one-dimensional profile by the rule of MDR, in metres."""
         from mdr_dask.physics.surfaces.shapes import RoundedCone as Line
 
         steepness = math.tan(self.angle)
         return Line(steepness, self.tip_radius * steepness)
 
 
-#: Bodies of revolution that are no power law, for sliding and wear alike.
+#: Bodies of revolution other than power laws, for sliding and wear.
 Other = RoundedCone
 Indenter = Annotated[Plane | Cone | Parabola | Power | Other, Field(discriminator="shape")]

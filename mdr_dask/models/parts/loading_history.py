@@ -27,7 +27,7 @@ class Jump(Parameters):
 
 
 class _History(Parameters):
-    """What all histories but the jump have in common."""
+    """Base of all histories but the jump."""
 
     start: Literal["steady", "rest"] = Field(
         default="steady", description="before t = 0: steady sliding at `velocity`, or rest, under `normal_force`"
@@ -49,7 +49,7 @@ class Steps(_History):
 
 
 class Ramp(_History):
-    """Velocity and load that change linearly from t = 0 on, and are constant then."""
+    """Velocity and load that change linearly from t = 0 for a duration, and are constant afterwards."""
 
     shape: Literal["ramp"]
     duration: float = quantity("s", "time that the ramp takes", usual="4 ms", gt=0)
@@ -58,7 +58,7 @@ class Ramp(_History):
 
 
 class Oscillation(_History):
-    """A velocity that oscillates about `velocity`, and perhaps a load about `normal_force`."""
+    """A velocity that oscillates about `velocity`, and optionally a load about `normal_force`."""
 
     shape: Literal["oscillation"]
     amplitude: float = quantity("m/s", "amplitude of the velocity", usual="20 mm/s", ge=0)
@@ -70,7 +70,7 @@ class TableFile(_History):
     """Velocity and load from a table, linear between its rows; two rows at the same time are a jump."""
 
     shape: Literal["table"]
-    file: NamedFile = Field(description="table with columns time, velocity and perhaps force")
+    file: NamedFile = Field(description="table with columns time, velocity and optionally force")
 
     @model_validator(mode="after")
     def _holds_a_history(self, info: ValidationInfo) -> TableFile:
@@ -96,12 +96,12 @@ def _check_rows(times: tuple[float, ...], velocities: tuple[float, ...], forces:
 
 
 def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> tuple[tuple[float, float], list[Piece]]:
-    """Return velocity and normal force before t = 0, and the loading history from t = 0 on without end.
+    """Return velocity and normal force before t = 0, and the loading history from t = 0 on; the last piece never ends.
 
     Raises
     ------
     DataError
-        If a table does not hold a loading history, or contradicts the state before t = 0.
+        If a table is not a loading history, or contradicts the state before t = 0.
     """
     from mdr_dask.physics.transients.elements.loading_history import Piece
 

@@ -28,21 +28,21 @@ class Kelvin(Parameters):
 
 
 class StandardSolid(Parameters):
-    """A spring beside one relaxing arm."""
+    """A spring beside one Prony term."""
 
     static_modulus: float = quantity("Pa", "shear modulus of slow deformation", usual="3 MPa", gt=0)
     glass_modulus: float = quantity(
         "Pa", "shear modulus of sudden deformation, above the static one", usual="1 GPa", gt=0
     )
-    relaxation_time: float = quantity("s", "relaxation time of the arm", usual="1 ms", gt=0)
+    relaxation_time: float = quantity("s", "relaxation time of the Prony term", usual="1 ms", gt=0)
 
 
 class PronySeries(Parameters):
-    """A spring beside any number of relaxing arms and perhaps a dashpot."""
+    """A spring beside any number of Prony terms, with or without a dashpot."""
 
     static_modulus: float = quantity("Pa", "shear modulus of slow deformation", usual="3 MPa", gt=0)
-    moduli: Numbers = quantity("Pa", "shear modulus of each arm", usual="10 MPa")
-    times: Numbers = quantity("s", "relaxation time of each arm", usual="1 ms")
+    moduli: Numbers = quantity("Pa", "shear modulus of each Prony term", usual="10 MPa")
+    times: Numbers = quantity("s", "relaxation time of each Prony term", usual="1 ms")
     viscosity: float = quantity("Pa s", "viscosity of the dashpot", default=0.0, ge=0)
 
     @model_validator(mode="after")
@@ -64,17 +64,17 @@ class PowerLaw(Parameters):
 
 
 KINDS = ("kelvin", "standard_solid", "prony", "power_law", "dma_table")
-SOFTEST, STIFFEST = 100.0, 1e12  # shear moduli, Pa: of a gel, and above that of diamond
+SOFTEST, STIFFEST = 100.0, 1e12  # shear moduli of solids, Pa: from a gel to above diamond
 LAWS = ("wlf", "arrhenius", "shift_factors")
 
 
 class Material(Parameters):
-    """One linear viscoelastic material, and perhaps its temperature."""
+    """One linear viscoelastic material, with or without a temperature."""
 
     alternatives: ClassVar[tuple[Alternatives, ...]] = (tuple((kind,) for kind in KINDS),)
     kelvin: Kelvin | None = Field(default=None, description="spring and dashpot")
-    standard_solid: StandardSolid | None = Field(default=None, description="spring and one relaxing arm")
-    prony: PronySeries | None = Field(default=None, description="spring and any number of relaxing arms")
+    standard_solid: StandardSolid | None = Field(default=None, description="spring and one Prony term")
+    prony: PronySeries | None = Field(default=None, description="spring and any number of Prony terms")
     power_law: PowerLaw | None = Field(default=None, description="loss modulus as a power of frequency")
     dma_table: ModulusTable | None = Field(default=None, description="fit to measured moduli")
     temperature: float | None = quantity(
@@ -86,7 +86,7 @@ class Material(Parameters):
 
     @property
     def law(self) -> Law | None:
-        """How relaxation times move with temperature."""
+        """The law by which relaxation times depend on the temperature."""
         return self.wlf or self.arrhenius or self.shift_factors
 
     @model_validator(mode="after")
@@ -108,18 +108,18 @@ class Material(Parameters):
         return self
 
     def notes(self) -> tuple[str, ...]:
-        """Say how well the Prony series of a law or a table holds, and whether the temperature lies in the data."""
+        """Return notes on the error of a fitted Prony series, and on unusual temperatures and moduli."""
         return (*fit_notes(self), *_outside(self), *_unusual(self))
 
 
 @lru_cache(maxsize=256)
 def solid_of(material: Material) -> LinearSolid:
-    """Return the material's springs, arms and dashpot at its temperature.
+    """Return static modulus, Prony terms and dashpot of the material at its temperature.
 
     Raises
     ------
     DataError, ValueError
-        If the numbers do not make a solid or the table cannot be fitted.
+        If the numbers are not those of a solid, or the table cannot be fitted.
     """
     from mdr_dask.physics import solids as rheology
 
@@ -128,7 +128,7 @@ def solid_of(material: Material) -> LinearSolid:
 
 
 def _shift(material: Material) -> float | None:
-    """Return the factor of the relaxation times from where they were given to the material's temperature."""
+    """Return the factor of relaxation times from the temperature where they are given to that of the material."""
     law, temperature = material.law, material.temperature
     if law is None or temperature is None:
         return None
@@ -145,15 +145,15 @@ def _solid(material: Material) -> LinearSolid:
         one = material.standard_solid
         return rheology.standard_solid(one.static_modulus, one.glass_modulus, one.relaxation_time)
     if material.prony is not None:
-        arms = material.prony
-        return rheology.prony(arms.static_modulus, arms.moduli, arms.times, arms.viscosity)
+        series = material.prony
+        return rheology.prony(series.static_modulus, series.moduli, series.times, series.viscosity)
     fit = _fit_of(material)
     assert fit is not None
     return fit.solid
 
 
 def _fit_of(material: Material) -> SeriesFit | None:
-    """Return the Prony series that stands for a law or a table, None for other materials."""
+    """Return the Prony series fitted to a power law or a table; None for other materials."""
     if material.power_law is not None:
         return _power_law_fit(material.power_law)
     return None if material.dma_table is None else _table_fit(material.dma_table, material.law)
@@ -181,7 +181,7 @@ def _power_law_fit(law: PowerLaw) -> SeriesFit:
 
 
 def fit_error(material: Material | None) -> float:
-    """Return the rms relative error of the Prony series that stands for a law or a table; 0 for other materials.
+    """Return the rms relative error of the Prony series fitted to a power law or a table; 0 for other materials.
 
     Raises as `solid_of` does.
     """
@@ -190,7 +190,7 @@ def fit_error(material: Material | None) -> float:
 
 
 def frequencies(material: Material) -> tuple[float, float] | None:
-    """Return lowest and highest angular frequency, rad/s, that a law or a table tells at the material's temperature."""
+    """Return lowest and highest angular frequency, rad/s, of a power law or a table at the material's temperature."""
     fit = _fit_of(material)
     if fit is None:
         return None
@@ -199,7 +199,7 @@ def frequencies(material: Material) -> tuple[float, float] | None:
 
 
 def fit_notes(material: Material | None) -> tuple[str, ...]:
-    """Return how well the Prony series of a law or a table holds, in one sentence, if there is one."""
+    """Return a note with the error of the Prony series fitted to a power law or a table, if there is one."""
     fit = None if material is None else _fit_of(material)
     if material is None or fit is None:
         return ()
@@ -209,13 +209,13 @@ def fit_notes(material: Material | None) -> tuple[str, ...]:
     lowest, highest = fit.range
     errors = [f"{error:.1%} in {modulus}" for modulus, error in _errors(fit).items()]
     return (
-        f"{what}: {how and how + '; '}{fit.solid.times.size} arms for {lowest:.3g} to {highest:.3g} rad/s, rms error "
-        f"{', '.join(errors)}, largest {fit.largest_error:.1%} at {fit.worst_frequency:.3g} rad/s",
+        f"{what}: {how and how + '; '}{fit.solid.times.size} Prony terms for {lowest:.3g} to {highest:.3g} rad/s, "
+        f"rms error {', '.join(errors)}, largest {fit.largest_error:.1%} at {fit.worst_frequency:.3g} rad/s",
     )
 
 
 def _outside(material: Material) -> tuple[str, ...]:
-    """Say that the temperature lies beyond those measured."""
+    """Return a note if the temperature lies outside those measured."""
     table, temperature = material.dma_table, material.temperature
     measured = None if table is None else _curve(table, material.law).measured
     if table is None or temperature is None or measured is None:
@@ -230,7 +230,7 @@ def _outside(material: Material) -> tuple[str, ...]:
 
 
 def _unusual(material: Material) -> tuple[str, ...]:
-    """Say that the moduli of a table are those of no solid: its unit may be wrong."""
+    """Return a note if no solid has such moduli, because the unit may be wrong."""
     table = material.dma_table
     if table is None:
         return ()

@@ -1,4 +1,4 @@
-"""A measured line as a campaign names it."""
+"""A measured line in a campaign."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
 
 class ProfileFile(NamedByFile):
-    """A measured line; a bare file name stands for it with all options at their defaults."""
+    """A measured line, given by a file name alone or with options."""
 
     file: NamedFile = Field(
         description="two columns x, z; other formats are read by SurfaceTopography if it is installed"
     )
-    unit: str = Field(default="", description="unit of the heights, where the file does not say")
-    x_unit: str = Field(default="", description="unit of the positions, where the file does not say")
+    unit: str = Field(default="", description="unit of the heights, if the file has none")
+    x_unit: str = Field(default="", description="unit of the positions, if the file has none")
     detrend: Literal["none", "mean", "line", "parabola"] = Field(default="mean", description="polynomial subtracted")
-    taper: float = quantity("1", "part of the line brought to its mean so that it closes", default=0.0, ge=0, le=1)
+    taper: float = quantity("1", "part of the line faded to its mean so that the ends meet", default=0.0, ge=0, le=1)
     shortest_wavelength: float | None = quantity(
         "m", "wavelength below which there is no roughness", default=None, gt=0
     )
@@ -35,7 +35,7 @@ class ProfileFile(NamedByFile):
 
     @model_validator(mode="after")
     def _holds_a_line(self, info: ValidationInfo) -> ProfileFile:
-        """Refuse a bad file where a campaign names it, before any case fails of it."""
+        """Refuse a bad file when the campaign is read, before any case fails."""
         if info.context is not None:
             try:
                 line_of(self)

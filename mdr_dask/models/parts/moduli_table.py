@@ -1,4 +1,4 @@
-"""Tables of a dynamic-mechanical analysis as a campaign names them, and their curves as one."""
+"""Tables of a dynamic mechanical analysis in a campaign, and one curve of moduli from each."""
 
 from __future__ import annotations
 
@@ -17,35 +17,35 @@ from mdr_dask.models.parts.temperature import Law
 from mdr_dask.tables import Column, TableError, is_called, read_sheet, read_table
 from mdr_dask.units import shown
 
-SAME_TEMPERATURE = 1.0  # K: what an instrument scatters about its set point
-#: Neighbouring curves whose moduli are apart by more than this cannot overlap, decades: what instruments scatter.
+SAME_TEMPERATURE = 1.0  # K: scatter of an instrument about its set point
+#: Gap between the moduli of neighbouring curves above which they cannot overlap, decades: scatter of instruments.
 APART = 0.02
 
 
 class ModulusTable(NamedByFile):
-    """A Prony series fitted to a table of frequency, storage and loss modulus, and perhaps temperature."""
+    """A Prony series fitted to a table of frequency, storage and loss modulus, measured at one or more temperatures."""
 
     file: NamedFile = Field(
-        description="table with columns frequency, storage modulus, loss modulus or tan delta, and perhaps temperature"
+        description="table with columns frequency, storage modulus, loss modulus or tan delta, optionally temperature"
     )
-    frequency_unit: str = Field(default="", description="unit of the frequencies, where the table does not say")
-    modulus_unit: str = Field(default="", description="unit of the moduli, where the table does not say")
+    frequency_unit: str = Field(default="", description="unit of the frequencies, if the table has none")
+    modulus_unit: str = Field(default="", description="unit of the moduli, if the table has none")
     table_temperature: float | None = quantity("K", "measured temperature to use", default=None, gt=0)
     reference: float | None = quantity(
         "K",
-        "temperature at which a table of several is superposed by its own curves; with neither, the shift factors of "
-        "wlf, arrhenius or shift_factors superpose it",
+        "temperature to which the curves of several temperatures are shifted until they overlap; without it and "
+        "table_temperature they are shifted by wlf, arrhenius or shift_factors",
         default=None,
         gt=0,
     )
     poisson_ratio: float | None = quantity(
-        "1", "given where the moduli are of tension: divides them by 2 (1 + nu)", default=None, ge=-1, le=0.5
+        "1", "for moduli in tension, which are divided by 2 (1 + nu)", default=None, ge=-1, le=0.5
     )
-    arms_per_decade: float = quantity("1", "density of relaxation times", default=1.0, gt=0, le=5)
+    arms_per_decade: float = quantity("1", "Prony terms per factor of ten in time", default=1.0, gt=0, le=5)
 
     @model_validator(mode="after")
     def _holds_moduli(self, info: ValidationInfo) -> ModulusTable:
-        """Refuse a bad table where a campaign names it, before any case fails of it."""
+        """Refuse a bad table when the campaign is read, before any case fails."""
         if info.context is not None:
             try:
                 _measured(self)
@@ -63,11 +63,11 @@ class Moduli:
     omega, storage, loss : array, shape (points,)
         Angular frequency, rad/s, and moduli of shear, Pa.
     temperature : float or None
-        Where it holds, K; None if the table does not say.
+        Temperature of the curve, K; None if the table has none.
     measured : tuple of float or None
         Lowest and highest temperature of the table, K.
     superposed : str
-        How several temperatures became one curve, in a sentence; empty for one temperature.
+        How the curves of several temperatures were superposed; empty for one temperature.
     """
 
     omega: FloatArray
@@ -79,12 +79,12 @@ class Moduli:
 
 
 def one_curve(chosen: ModulusTable, law: Law | None) -> Moduli:
-    """Return the moduli of a table at one temperature, superposed if it has several and none is named.
+    """Return the shear moduli of a table at one temperature; several temperatures are superposed if none is chosen.
 
     Raises
     ------
     DataError
-        If the table does not hold moduli, or its curves do not make one.
+        If the table has no moduli, or its curves cannot be superposed.
     """
     found = _as_measured(chosen, law)
     divisor = 1.0 if chosen.poisson_ratio is None else 2 * (1 + chosen.poisson_ratio)
@@ -92,7 +92,7 @@ def one_curve(chosen: ModulusTable, law: Law | None) -> Moduli:
 
 
 def _as_measured(chosen: ModulusTable, law: Law | None) -> Moduli:
-    """Return the moduli at one temperature, of tension where the table has those."""
+    """Return the moduli at one temperature, in shear or in tension as the table has them."""
     omega, storage, loss, temperature = _measured(chosen)
     if temperature is None:
         return Moduli(omega, storage, loss, None, None)
@@ -113,7 +113,7 @@ def _near(temperature: FloatArray, wanted: float) -> FloatArray:
 
 
 def _levels(temperature: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return which of the temperatures each row was measured at, and these temperatures, ascending."""
+    """Return the temperature of every row as an index, and the temperatures, ascending."""
     order = np.argsort(temperature, kind="stable")
     member = np.empty(order.size, dtype=np.intp)
     member[order] = np.append(0, np.cumsum(np.diff(temperature[order]) > SAME_TEMPERATURE))
@@ -126,7 +126,7 @@ Rows = tuple[FloatArray, FloatArray, FloatArray]
 def _by_law(
     chosen: ModulusTable, law: Law | None, rows: Rows, member: IntArray, levels: FloatArray, ends: tuple[float, float]
 ) -> Moduli:
-    """Shift every temperature by the factors that are known of it."""
+    """Shift the curve of every temperature by the factors of a law."""
     if law is None:
         raise DataError(
             f"{chosen.file.name}: has several temperatures: name one by table_temperature, a reference to superpose "
@@ -134,27 +134,27 @@ def _by_law(
         )
     omega, storage, loss = rows
     reference = law.reference
-    told = f"superposed at {shown(reference, 'K')} by the shift factors given"
-    return Moduli(omega * law.factor(levels)[member], storage, loss, reference, ends, told)
+    text = f"superposed at {shown(reference, 'K')} by the shift factors given"
+    return Moduli(omega * law.factor(levels)[member], storage, loss, reference, ends, text)
 
 
 def _by_curves(
     reference: float, law: Law | None, rows: Rows, member: IntArray, levels: FloatArray, ends: tuple[float, float]
 ) -> Moduli:
-    """Shift every temperature to the reference by its own curves of both moduli."""
+    """Shift the curves of every temperature to the reference until those of both moduli overlap."""
     _require_overlap(rows[1], member, levels)
-    across, along, told = _superposed(reference, tuple(levels), member.tobytes(), *(each.tobytes() for each in rows))
+    across, along, text = _superposed(reference, tuple(levels), member.tobytes(), *(each.tobytes() for each in rows))
     omega, storage, loss = rows
     rise = 10 ** np.array(along)[member]
-    told = f"superposed at {shown(reference, 'K')} by both moduli{told}{_compared(levels, across, law, reference)}"
-    return Moduli(omega * 10 ** np.array(across)[member], storage * rise, loss * rise, reference, ends, told)
+    text = f"superposed at {shown(reference, 'K')} by both moduli{text}{_compared(levels, across, law, reference)}"
+    return Moduli(omega * 10 ** np.array(across)[member], storage * rise, loss * rise, reference, ends, text)
 
 
 @lru_cache(maxsize=16)
 def _superposed(
     reference: float, levels: tuple[float, ...], member: bytes, *rows: bytes
 ) -> tuple[FloatArray, FloatArray, str]:
-    """Return horizontal and vertical shift factors of each temperature, and a sentence about them."""
+    """Return horizontal and vertical shift factors of each temperature, and a text about them."""
     from mdr_dask.physics.superposition.master_curve import rereference, superpose
 
     points, groups = np.log10([np.frombuffer(row) for row in rows]), np.frombuffer(member, dtype=np.intp)
@@ -165,15 +165,15 @@ def _superposed(
     ends = ", ".join(
         f"{found.horizontal[k]:.2f} ({low[k]:.2f}, {high[k]:.2f}) at {shown(levels[k], 'K')}" for k in (0, -1)
     )
-    told = f", log10 a_T (95 %) {ends}"
+    text = f", log10 a_T (95 %) {ends}"
     if found.undetermined:
         runs = " and ".join(f"{shown(a, 'K')} to {shown(b, 'K')}" for a, b in found.undetermined)
-        told += f"; shift factors are not determined from {runs}: give wlf, arrhenius or shift_factors instead"
-    return found.horizontal, found.vertical, told
+        text += f"; shift factors are not determined from {runs}: give wlf, arrhenius or shift_factors instead"
+    return found.horizontal, found.vertical, text
 
 
 def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, reference: float) -> str:
-    """Return how far the shift factors of the curves, log10, lie off those given, which move to other temperatures."""
+    """Return a text on the largest difference between shift factors from the curves and those of a law."""
     if law is None:
         return ""
     try:
@@ -187,7 +187,7 @@ def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, referenc
 
 
 def _require_overlap(storage: FloatArray, member: IntArray, levels: FloatArray) -> None:
-    """Refuse curves with a gap in the modulus, which no shift closes, before any is shifted."""
+    """Refuse curves with a gap in the modulus before any is shifted, because no horizontal shift closes it."""
     low, high = (
         np.array([find(storage[member == number]) for number in range(levels.size)]) for find in (np.min, np.max)
     )
@@ -204,13 +204,13 @@ def _require_overlap(storage: FloatArray, member: IntArray, levels: FloatArray) 
 
 
 def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
-    """Return angular frequency, storage and loss modulus and perhaps temperature in SI, as the file has them."""
+    """Return angular frequency, storage modulus, loss modulus and temperature (or None) of a file, in SI."""
     name = chosen.file.name
-    text = chosen.file.read_text()
+    content = chosen.file.read_text()
     try:
-        table = read_table(text, name, _columns(chosen))
+        table = read_table(content, name, _columns(chosen))
     except TableError as problem:
-        headings = [cell.text for cell in read_sheet(text, name).names]
+        headings = [cell.text for cell in read_sheet(content, name).names]
         has = {name: any(is_called(each, name) for each in headings) for name in ("time", "frequency")}
         if has["time"] and not has["frequency"]:
             raise DataError(
@@ -232,7 +232,7 @@ def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray,
 
 
 def _columns(chosen: ModulusTable) -> tuple[Column, ...]:
-    """Return the columns of a dynamic-mechanical analysis."""
+    """Return the columns of a dynamic mechanical analysis."""
     return (
         Column("frequency", "rad/s", above=0, given_unit=chosen.frequency_unit),
         Column("storage modulus", "Pa", above=0, given_unit=chosen.modulus_unit),

@@ -1,4 +1,4 @@
-"""Options of files that a campaign names: a bare file name stands for them all at their defaults."""
+"""Parameter sets about a file that may be given by its name alone."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from mdr_dask.models.base import Parameters
 
 
 class NamedByFile(Parameters):
-    """A parameter set with a field `file`, or `files`, for which a file name alone may stand."""
+    """A parameter set with a field `file` or `files`; a file name alone is this file with default options."""
 
     model_config = ConfigDict(json_schema_extra={"bare_name": True})
 

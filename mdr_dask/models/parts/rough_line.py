@@ -1,4 +1,4 @@
-"""The roughness of a line as a campaign names it: generated, of a measured surface, measured or none; all are waves."""
+"""The roughness of a line: generated, with the spectrum of a measured surface, measured, or none."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Generated:
-    """Self-affine roughness: what fixes it but for its phases, in units of its length and rms height."""
+    """Self-affine roughness in units of its length and rms height; only the phases depend on the realisation."""
 
     hurst: float
     points: int
@@ -59,8 +59,8 @@ def _slope(line: Generated) -> float:
 class OfSurface:
     """Lines with the spectrum of a measured surface, in units of their length and rms height.
 
-    Of several files realisation r takes the r-th, over and over: the scatter between the files is part of that between
-    realisations, and the mean is that of the files.
+    Of n files, realisation r uses file r modulo n. So the scatter between files is part of the scatter between
+    realisations, and the mean over realisations is the mean over files.
     """
 
     surface: Surface
@@ -69,7 +69,7 @@ class OfSurface:
     is_random = True
 
     def height(self) -> float:
-        """Return the unit of height, m: the rms height of the lines, over all files."""
+        """Return the unit of height, m: the rms height over the lines of all files."""
         return _height(self)
 
     def waves(self, seed: int, realisation: int) -> Waves:
@@ -130,7 +130,7 @@ def _waves(line: Measured) -> Waves:
 
 @dataclass(frozen=True)
 class Smooth:
-    """No roughness, on as many points as a generated line would have."""
+    """No roughness; the number of points is kept because grids depend on it."""
 
     points: int
     is_random = False

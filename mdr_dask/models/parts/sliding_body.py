@@ -16,7 +16,7 @@ from mdr_dask.models.parts.measured_line import line_of
 from mdr_dask.models.parts.surface import Surface, spectra_of, without_exponent
 from mdr_dask.units import shown
 
-#: What a generated line has and a measured surface brings with it.
+#: Parameters of a generated line that follow from the file of a measured surface.
 GENERATED = ("hurst", "rms_roughness", "rolloff_wavelength", "longest_wavelength")
 #: Dimensionless numbers of a Kelvin body on a generated line.
 NUMBERS = (
@@ -85,14 +85,14 @@ class SlidingBody(Parameters):
         return self
 
     def _problem_of_line(self) -> str:
-        """Say what stands in the way of the line that is named; an empty string if nothing does."""
+        """Return a message about missing or contradictory parameters of the line, or an empty string."""
         if self.surface is None:
             return "" if self.hurst is not None else "expected hurst with rms_roughness, got none"
         both = [name for name in GENERATED if getattr(self, name) is not None]
         if both:
-            return f"surface takes the place of {', '.join(both)}: leave out one or the other"
+            return f"surface replaces {', '.join(both)}: leave out one or the other"
         if self.surface.profile is not None and self.length is not None:
-            return "surface: {profile: ...} brings its length with it: leave out length"
+            return "surface: {profile: ...} has its own length: leave out length"
         if self.surface.profile is None and self.length is None:
             return "expected length, of the line that stands for the surface"
         return ""
@@ -115,24 +115,24 @@ class SlidingBody(Parameters):
 
 
 def frequency_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
-    """Say how the frequencies of a study, q v, meet those that a law or a table tells, at every temperature."""
+    """Return how the frequencies q v of a study compare with those of a law or a table, at every temperature."""
     velocities = [one.velocity for one in sets]
     waves = [one.wavelengths() for one in sets]
     low = 2 * math.pi * min(velocities) / max(longest for _, longest in waves)
     high = 2 * math.pi * max(velocities) / min(shortest for shortest, _ in waves)
-    told = []
+    notes = []
     for material in dict.fromkeys(one.material for one in sets if one.material is not None):
         known = frequencies(material)
         if known is None:
             continue
         at = "" if material.temperature is None else f" at {shown(material.temperature, 'K')}"
         ends = f"q v of {low:.2g} to {high:.2g} rad/s{at}, data from {known[0]:.2g} to {known[1]:.2g} rad/s"
-        told.append(f"{ends}: {_met((low, high), known)}")
-    return tuple(told)
+        notes.append(f"{ends}: {_compared((low, high), known)}")
+    return tuple(notes)
 
 
-def _met(asked: tuple[float, float], known: tuple[float, float]) -> str:
-    """Return in words how much of the decades asked for the data tell."""
+def _compared(asked: tuple[float, float], known: tuple[float, float]) -> str:
+    """Return a text on how far the frequencies of a study lie outside those of the data."""
     (low, high), (first, last) = np.log10(asked), np.log10(known)
     beyond = {"below": max(first - low, 0.0), "above": max(high - last, 0.0)}
     if high <= first or low >= last:

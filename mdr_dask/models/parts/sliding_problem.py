@@ -1,4 +1,4 @@
-"""Sliding bodies as dimensionless numbers: the one place where loads, velocities, lines and solids lose their units."""
+"""Sliding bodies as dimensionless numbers: here loads, velocities, lines and solids are divided by their units."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ LEAST = 1e-100  # squares and products of dimensionless numbers from here to its
 
 @dataclass(frozen=True)
 class Setting:
-    """Line and Prony terms of the solid (None for a Kelvin solid), without units: shared by cases solved together."""
+    """Roughness, shape (None: plane) and Prony terms (None: Kelvin solid), without units, of cases solved together."""
 
     roughness: Roughness
     body: Shape | None
@@ -49,7 +49,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class SlidingProblems:
-    """The cases of a block as dimensionless numbers: a solution depends on nothing else.
+    """The cases of a block as dimensionless numbers, on which alone a solution depends.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def refuse_immense(numbers: dict[str, FloatArray], faults: dict[int, str]) -> No
     for name, column in numbers.items():
         for j in np.flatnonzero(~((column > LEAST) & (column < 1 / LEAST))):
             number, least, most = distinguishable(column[j], LEAST, 1 / LEAST, digits=6)
-            faults.setdefault(int(j), f"expected {name} between {least} and {most}, got {number}; look at the units")
+            faults.setdefault(int(j), f"expected {name} between {least} and {most}, got {number}; check the units")
 
 
 def each(block: Block[Any], name: str) -> tuple[list[Any], IntArray]:

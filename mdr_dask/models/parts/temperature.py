@@ -1,4 +1,4 @@
-"""Laws of temperature as a campaign names them: how far relaxation times move between two temperatures."""
+"""Laws of temperature in a campaign: the factor a_T of relaxation times between two temperatures."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mdr_dask.units import shown_apart
 
 
 class Wlf(Parameters):
-    """Temperature by Williams, Landel and Ferry."""
+    """The law of Williams, Landel and Ferry."""
 
     c1: float = quantity("1", "constant c1 of the law", usual="17.4", gt=0)
     c2: float = quantity("K", "constant c2 of the law", usual="51.6 K", gt=0)
@@ -29,13 +29,13 @@ class Wlf(Parameters):
 
         lowest, end = float(np.min(temperature)), self.reference - self.c2
         if lowest <= end:
-            told, limit = shown_apart("K", lowest, end)
-            raise ValueError(f"wlf holds above reference - c2 = {limit}, got {told}")
+            got, limit = shown_apart("K", lowest, end)
+            raise ValueError(f"wlf holds above reference - c2 = {limit}, got {got}")
         return wlf_factor(temperature, self.reference, self.c1, self.c2)
 
 
 class Arrhenius(Parameters):
-    """Temperature by an activation energy."""
+    """The law of Arrhenius, with an activation energy."""
 
     activation_energy: float = quantity("J/mol", "activation energy", usual="100 kJ/mol", gt=0)
     reference: float = quantity("K", "temperature at which a_T is 1", usual="20 degC", gt=0)
@@ -48,9 +48,9 @@ class Arrhenius(Parameters):
 
 
 class ShiftFactors(Parameters):
-    """Measured shift factors; a bare file name stands for them."""
+    """Measured shift factors, given by a file name alone or with `file`."""
 
-    file: NamedFile = Field(description="table with columns temperature and a_T, or log10 a_T; a_T is 1 somewhere")
+    file: NamedFile = Field(description="table with columns temperature and a_T or log10 a_T; its a_T passes 1")
 
     @model_validator(mode="before")
     @classmethod
@@ -59,7 +59,7 @@ class ShiftFactors(Parameters):
 
     @model_validator(mode="after")
     def _holds_factors(self, info: ValidationInfo) -> ShiftFactors:
-        """Refuse a bad table where a campaign names it, before any case fails of it."""
+        """Refuse a bad table when the campaign is read, before any case fails."""
         if info.context is not None:
             try:
                 _ = self.reference
@@ -74,18 +74,18 @@ class ShiftFactors(Parameters):
         return float(np.interp(0.0, decades[::-1], temperature[::-1]))
 
     def factor(self, temperature: FloatArray | float) -> FloatArray:
-        """Return a_T, linear in the logarithm between the temperatures of the table, in K; ValueError outside."""
+        """Return a_T at temperatures in K; log a_T is interpolated linearly. ValueError outside the table."""
         known, decades = _shifts(self)
         wanted = np.asarray(temperature, dtype=np.float64)
         for outside in wanted[(wanted < known[0]) | (wanted > known[-1])].ravel():
-            told, first, last = shown_apart("K", outside, known[0], known[-1])
-            raise ValueError(f"{self.file.name}: has shift factors for {first} to {last}, got {told}")
+            got, first, last = shown_apart("K", outside, known[0], known[-1])
+            raise ValueError(f"{self.file.name}: has shift factors for {first} to {last}, got {got}")
         return np.asarray(10 ** np.interp(wanted, known, decades), dtype=np.float64)
 
 
 @lru_cache(maxsize=16)
 def _shifts(factors: ShiftFactors) -> tuple[FloatArray, FloatArray]:
-    """Return temperatures, ascending, and log10 a_T, which falls."""
+    """Return the temperatures of a table, ascending, and log10 a_T, descending."""
     name = factors.file.name
     columns = (
         Column("temperature", "K", ("T", "temp"), above=0),

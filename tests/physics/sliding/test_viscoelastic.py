@@ -153,6 +153,7 @@ def test_arms_slower_than_anything_share_one_limit():
     assert slow[0].depth == pytest.approx(slow[1].depth, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_error_estimate_covers_the_true_error():
     """200 random cases on coarse grids, none that it was tuned on: 95 % within, not 10 times too large.
 

@@ -7,7 +7,7 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import CubicLine, indented_line, periodic_line
 from mdr_dask.physics.surfaces.shapes import PowerLaw
-from mdr_dask.physics.transients.elements import edges, follow
+from mdr_dask.physics.transients.elements import edges
 from mdr_dask.physics.transients.elements.follow import (
     Response,
     follow_line,
@@ -15,7 +15,6 @@ from mdr_dask.physics.transients.elements.follow import (
     untouched,
 )
 from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation, foundation
-from mdr_dask.physics.transients.elements.loading_history import PART, STEPS_PER_DECADE, Piece
 from mdr_dask.physics.transients.elements.steps import Schedule
 from mdr_dask.physics.transients.velocity_jump import MarchRequest, velocity_jump
 
@@ -245,38 +244,6 @@ def test_rest_is_static() -> None:
 def test_elastic_solid_is_refused() -> None:
     with pytest.raises(ValueError, match="expected a solid with an arm or a dashpot"):
         foundation([], [], 0.0)
-
-
-@pytest.mark.parametrize(
-    ("velocity", "force", "swing", "time"),
-    [
-        ((1.0, 1.0), (2.0, 2.0), (0.0, 0.0, 0.0), np.inf),
-        ((1.0, 1.5), (2.0, 2.0), (0.0, 0.0, 0.0), 3.0),
-        ((1.0, 1.0), (2.0, 1.0), (0.0, 0.0, 0.0), 3.0),
-        ((1.0, 1.0), (2.0, 2.0), (0.1, 0.0, 4.0), np.pi / 2),
-    ],
-)
-def test_steps_resolve_what_changes(velocity, force, swing, time):
-    """A ramp of either takes many steps however slow the sliding; a constant piece takes those of its cells alone."""
-    piece = Piece(5.0, 8.0, velocity, force, swing)
-    assert piece.changes_in == pytest.approx(time)
-    longest = np.max(np.diff(piece.moments(5.0, 8.0, 1, STEPS_PER_DECADE)))
-    assert longest <= max(PART * time, 0) + 1e-12
-    assert np.isinf(time) or longest > 0.2 * PART * time
-
-
-def test_a_steady_start_that_does_not_bear_the_load_is_told(monkeypatch):
-    """The search ends beside the depth by as little as nobody would see: 1e-4 of the load is missed."""
-    line = periodic_line(*rough(2))
-    found = [steady_start(line, KELVIN, deborah, 0.2) for deborah in (0.0, 0.02)]
-    assert [status for _, _, status in found] == [Outcome.CONVERGED, Outcome.CONVERGED]
-    brentq = follow.brentq
-    monkeypatch.setattr(follow, "brentq", lambda *given, **options: brentq(*given, **options) + 2e-5)
-    for deborah in (0.0, 0.02):
-        state, _, status = steady_start(line, KELVIN, deborah, 0.2)
-        assert status == Outcome.DEPTH_NOT_FOUND
-        if deborah == 0:
-            assert 1e-6 < state.displacement.mean() / 0.2 - 1 < 1e-3
 
 
 @pytest.mark.parametrize("pull", [0.1, -50.0, 50.0])
