@@ -192,19 +192,23 @@ def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]
         axis = mesh.series.axes[number]
         intervals = list(_intervals(mesh, number, means))
         wide = [interval for interval in intervals if interval.width > FINEST]
-        chosen = _chosen(mesh.shares[number], wide, mesh.refinement(number).at_most)
-        found = _halved(found, number, [interval for interval in wide if interval.share in chosen])
-        left = {interval.case for interval in intervals} - {i.case for i in wide if i.share in chosen}
+        chosen = _chosen(mesh.used[number], wide, mesh.refinement(number).at_most)
+        found = _halved(found, number, chosen)
+        left = {interval.case for interval in intervals} - {interval.case for interval in chosen}
         short[axis.name] = len(left)
     return found, short
 
 
-def _chosen(shares: FloatArray, intervals: list[_Interval], at_most: int) -> set[float]:
-    """Return the places that an axis may have: the widest intervals first, so that one jump does not use up all."""
-    known = set(shares.tolist())
+def _chosen(used: BoolArray, intervals: list[_Interval], at_most: int) -> list[_Interval]:
+    """Return the intervals to halve: in each case the widest first, so that one jump does not use up all values."""
     ordered = sorted(intervals, key=lambda interval: (-interval.width, -interval.excess, interval.share))
-    new = dict.fromkeys(interval.share for interval in ordered if interval.share not in known)
-    return known | set(list(new)[: max(at_most - len(known), 0)])
+    count = np.array(used.sum(axis=-1))
+    chosen = []
+    for interval in ordered:
+        if count[interval.case] < at_most:
+            count[interval.case] += 1
+            chosen.append(interval)
+    return chosen
 
 
 def _halved(mesh: Mesh, number: int, intervals: list[_Interval]) -> Mesh:

@@ -1,6 +1,7 @@
 """Axes whose values a study chooses: enough of them and not too many, and the same however the run went."""
 
 import json
+import re
 import threading
 from contextlib import suppress
 from dataclasses import replace
@@ -110,25 +111,51 @@ def test_an_interval_is_predicted_from_earlier_values_alone():
         assert found[k] == pytest.approx(max(np.abs(f(at) - now(at)).max() for f in before))
 
 
-def test_where_there_is_room_for_few_values_the_widest_spaces_get_theirs(study):
-    """A value halves a space that is twice as wide as its place on the lattice tells."""
+def test_where_few_values_are_allowed_the_widest_intervals_are_halved_first(study):
+    """A value halves an interval that is twice as wide as its place on the lattice tells."""
 
-    def more(mesh, room):
-        x, shapes = mesh.series.axes
-        limited = replace(x, refinement=replace(x.refinement, at_most=len(x.values) + room))
-        y = np.transpose([curves.FUNCTIONS[shape](np.array(x.values), -0.7) for shape in shapes.values])
+    def more(mesh, count):
+        (x,) = mesh.series.axes
+        limited = replace(x, refinement=replace(x.refinement, at_most=len(x.values) + count))
+        y = curves.FUNCTIONS["jump"](np.array(x.values), -0.7)
         mean = Mean.of(y[..., None], np.ones((*y.shape, 1), dtype=bool), None)
-        return refined(replace(mesh, series=replace(mesh.series, axes=(limited, shapes))), {"y": mean})[0]
+        return refined(replace(mesh, series=replace(mesh.series, axes=(limited,))), {"y": mean})[0]
 
-    stage = Stage.first(study("shape: [jump, smooth], shift: -0.7"))
+    stage = Stage.first(study("shape: jump, shift: -0.7"))
     while stage:
         (mesh,) = stage.meshes
         known = mesh.shares[0].size
         wanted = {share: Fraction(share).denominator for share in more(mesh, 60).shares[0][known:].tolist()}
-        for room in range(len(wanted)):
-            found = more(mesh, room).shares[0][known:].tolist()
-            assert [wanted[share] for share in sorted(found, key=wanted.get)] == sorted(wanted.values())[:room]
+        for count in range(len(wanted)):
+            found = more(mesh, count).shares[0][known:].tolist()
+            assert sorted(wanted[share] for share in found) == sorted(wanted.values())[:count]
         stage = stage.after((more(mesh, 60),))
+
+
+def test_the_most_values_are_those_of_each_curve(study, url):
+    """Knees at different places need different values: together more than a single curve may have."""
+    shifts = np.linspace(-2, 2, 9).round(2).tolist()
+    told = []
+    execute.run(
+        study(f"shape: knee, shift: {shifts}", AXIS.replace("60", "32")),
+        url,
+        Resources(threads=1),
+        lambda _: None,
+        tell=lambda event: told.append(event.sentence),
+    )
+    values = store.datasets(url)[""].y.notnull().all("realisation")
+    assert values.sizes["x"] > 32
+    assert int(values.sum("x").max()) <= 32
+    assert not any("misses its tolerance" in sentence for sentence in told)
+    execute.run(
+        study(f"shape: knee, shift: {shifts}", AXIS.replace("60", "10")),
+        url + "2",
+        Resources(threads=1),
+        lambda _: None,
+        tell=lambda event: told.append(event.sentence),
+    )
+    assert int(store.datasets(url + "2")[""].y.notnull().all("realisation").sum("x").max()) == 10
+    assert re.search("along x misses its tolerance in . of 9 cases: 10 values are allowed", told[-1] + told[-2])
 
 
 def test_scatter_is_not_chased(study, url):

@@ -52,7 +52,9 @@ class RefinedSpec(Parameters):
         description="largest error of interpolation, relative to the largest value of the first output: 1 %; or by "
         "output: {friction_coefficient: 1 %, indentation_depth: {absolute: 2 um}}"
     )
-    at_most: int = Field(60, ge=5, le=10**4, description="largest number of values of the axis")
+    at_most: int = Field(
+        60, ge=5, le=10**4, description="largest number of values along the axis, for each case of the other axes"
+    )
 
 
 class SobolSpec(Parameters):

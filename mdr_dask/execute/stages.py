@@ -76,9 +76,9 @@ def following(
 
 def _short(series: str, mesh: Mesh, number: int, count: int) -> str:
     """Return why some cases of the other axes miss the tolerance along an adaptive one."""
-    axis, others = mesh.series.axes[number], mesh.used[number][..., 0].size
-    most = mesh.refinement(number).at_most
-    why = f"{most} values are allowed" if len(axis.values) >= most else "it jumps or bends within a 1000th of the axis"
+    axis, values = mesh.series.axes[number], mesh.used[number].sum(axis=-1)
+    others, most = values.size, mesh.refinement(number).at_most
+    why = f"{most} values are allowed" if (values >= most).any() else "it jumps or bends within a 1000th of the axis"
     where = f"{series}: " if series else ""
     return f"{where}interpolation along {axis.name} misses its tolerance in {count} of {others} cases: {why}"
 
