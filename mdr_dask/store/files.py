@@ -9,18 +9,20 @@ import itertools
 import json
 import os
 import uuid
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Awaitable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import zarr
 from zarr.core.buffer import default_buffer_prototype
 from zarr.core.sync import sync
 
 from mdr_dask.errors import MdrDaskError, StoreError
+
+T = TypeVar("T")
 
 #: Name of the study without series in a store that has series as well.
 ROOT = "-"
@@ -32,6 +34,8 @@ ASIDE = ".aside"
 KEPT = ("zarr.json", CLAIMS.rstrip("/"))
 #: Requests to a server at a time.
 AT_ONCE = 64
+#: Seconds after which a request that a server has not answered has failed.
+LONGEST_REQUEST = 120.0
 #: Threads that wait for a disk.
 FLUSHERS = 8
 #: Version of the layout; stores of a later one are refused. Since 2, records hold the digest of every chunk.
@@ -44,6 +48,26 @@ def local(url: str) -> Path | None:
     return None if "://" in path else Path(path)
 
 
+async def _answered(request: Awaitable[T]) -> T:
+    try:
+        return await asyncio.wait_for(request, LONGEST_REQUEST)
+    except TimeoutError:
+        raise TimeoutError(f"the server has not answered for {LONGEST_REQUEST:g} s") from None
+
+
+class _RemoteStore(zarr.storage.FsspecStore):
+    """A store at a URL, whose requests fail if the server does not answer."""
+
+    async def get(self, *arguments: Any, **options: Any) -> Any:
+        return await _answered(super().get(*arguments, **options))
+
+    async def set(self, *arguments: Any, **options: Any) -> None:
+        await _answered(super().set(*arguments, **options))
+
+    async def delete(self, key: str) -> None:
+        await _answered(super().delete(key))
+
+
 @lru_cache(maxsize=16)
 def bytes_of(url: str) -> Any:
     """Return the Zarr store, a map from names to bytes, at a path or URL."""
@@ -51,7 +75,7 @@ def bytes_of(url: str) -> Any:
     if path is not None:
         return zarr.storage.LocalStore(path)
     try:
-        return zarr.storage.FsspecStore.from_url(url)
+        return _RemoteStore.from_url(url)
     except (ImportError, ValueError) as error:
         raise StoreError(f"{url}: expected a path, or a URL that fsspec can open: {error}") from None
 
@@ -248,7 +272,7 @@ def create(url: str, name: str, content: bytes) -> bool:
         try:
             if path is None:
                 store = bytes_of(url)
-                sync(store.fs._pipe_file(f"{store.path}/{name}", content, mode="create"))
+                sync(_answered(store.fs._pipe_file(f"{store.path}/{name}", content, mode="create")))
             else:
                 (path / name).parent.mkdir(parents=True, exist_ok=True)
                 with (path / name).open("xb") as file:
@@ -328,7 +352,7 @@ def listed(url: str, prefix: str = "") -> list[str]:
         return sorted([name async for name in bytes_of(url).list_prefix(prefix)])
 
     with guarded(url, f"listing {prefix or 'it'}"):
-        return sync(collect())
+        return sync(_answered(collect()))
 
 
 def _raise_unless_gone(error: OSError) -> None:
