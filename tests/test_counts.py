@@ -1,4 +1,4 @@
-"""What is computed or loaded once only: equal cases, lines of a block, tasks of a block, packages of a light command."""
+"""What is computed or loaded only once: equal cases, lines and tasks of a block, packages of a light command."""
 
 import subprocess
 import sys
