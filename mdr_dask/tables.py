@@ -52,10 +52,9 @@ SYNONYMS = {
     "kinematic viscosity": ("nu", "ν", "kin viscosity", "viscosity"),
     "dynamic viscosity": ("eta", "η", "mu", "dyn viscosity", "viscosity"),
     "wavenumber": ("q", "k", "wave number", "wavevector", "wave vector"),
-    "log10 wavenumber": ("log10 q", "log q", "lg q", "log10(q)", "log(q)"),
     "wavelength": ("lambda", "λ"),
-    "C2D": ("c iso", "areal spectrum", "psd 2d", "psd", "c(q)"),
-    "C1D": ("line spectrum", "psd 1d", "psd", "c(q)"),
+    "C2D": ("C", "c iso", "areal spectrum", "psd 2d", "psd", "c(q)"),
+    "C1D": ("C", "line spectrum", "psd 1d", "psd", "c(q)"),
     "height": ("z", "h"),
 }
 _ALIKE = str.maketrans({"’": "'", "′": "'", "″": "''", '"': "''", "µ": "μ", "δ": "δ"})
@@ -72,6 +71,8 @@ JOINED = {
     "n": "N",
 }
 _DEGREES = {"c": "degC", "°c": "degC", "ºc": "degC", "deg c": "degC", "f": "degF", "°f": "degF", "deg f": "degF"}
+#: A heading for the common logarithms of a quantity: ``log10 q``, ``lg(q)``.
+_LOGARITHM = re.compile(r"(?:log10|log|lg)(?:[\s_]+|\s*(?=\())(.+)", re.IGNORECASE)
 _BRACKETED = re.compile(r"(.*?)[\s,/]*(?:\[([^\]]*)\]|\(([^()]*)\)|\{([^}]*)\}|<([^>]*)>)\s*\Z")
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?\Z")
 _STATED = re.compile(
@@ -272,6 +273,10 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
     sheet = read_sheet(text, source)
     first, problems, read = sheet.names or sheet.rows[0], [], Read()
     matched = [(i, *match(cell.text, sheet.units[i], columns)) for i, cell in enumerate(sheet.names)]
+    logarithms = {
+        i: plain for i, column, unit in matched if column is None and (plain := _of_logarithm(sheet, i, columns))
+    }
+    matched = [(i, *logarithms[i]) if i in logarithms else (i, column, unit) for i, column, unit in matched]
     if not sheet.names and len(first) > len(columns):
         raise TableError(
             source, [first[0].problem(f"expected the names of the {len(first)} columns in the first line")]
@@ -293,7 +298,10 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
         except ValueError as error:
             problems.append(first[index].problem(f"column {column.name}: {error}"))
             continue
-        values, wrong = _values([row[index] for row in sheet.rows], column, unit, allow_missing)
+        cells = [row[index] for row in sheet.rows]
+        if index in logarithms:
+            cells = [replace(cell, text=_antilogarithm(cell.text)) for cell in cells]
+        values, wrong = _values(cells, column, unit, allow_missing)
         problems += wrong
         if column.name in taken and not wrong:
             other = first[taken[column.name]].text
@@ -323,6 +331,28 @@ def match(heading: str, unit: str, columns: Sequence[Column]) -> tuple[Column | 
         if best:
             return best[0], written
     return None, unit
+
+
+def _of_logarithm(sheet: Sheet, index: int, columns: Sequence[Column]) -> tuple[Column, str] | None:
+    """Return the column whose common logarithms a heading names (``log10 q``, ``log(C2D [m^4])``), and its unit."""
+    found = _LOGARITHM.fullmatch(sheet.names[index].text)
+    if not found:
+        return None
+    inner = found[1].strip()
+    inner = inner[1:-1] if inner[0] == "(" and inner[-1] == ")" else inner
+    if not re.search(r"[\[(]", inner):
+        inner = re.sub(r"\s*/\s*(.+)", r" [\1]", inner)  # log10(C / m^4)
+    (name,), (unit,) = _headings((replace(sheet.names[index], text=inner),), (), 1)
+    column, written = match(name.text, sheet.units[index] or unit, columns)
+    return (column, written) if column else None
+
+
+def _antilogarithm(text: str) -> str:
+    """Return ten to the power of a number; other texts as they are."""
+    if not _NUMBER.match(text) or len(text) > LONGEST_NUMBER:
+        return text
+    exponent = float(text.replace(",", "."))
+    return repr(10.0**exponent) if abs(exponent) < 300 else text
 
 
 def _fits(unit: str, column: Column) -> bool:

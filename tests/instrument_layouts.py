@@ -106,6 +106,13 @@ READ = {
     "psd": ("Wavevector (m^-1),PSD (m^4)\n1e3,1e-16\n1e4,1e-20\n", SPECTRUM, {"wavenumber": 1e3, "C2D": 1e-16}),
     "C(q)": ("q [1/m],C(q) [m^4]\n1e3,1e-16\n1e4,1e-20\n", SPECTRUM, {"C2D": 1e-16}),
     "names in a remark": ("# q [1/m]  PSD [m^4]\n1e3 1e-16\n1e4 1e-20\n", SPECTRUM, {"C2D": 1e-16}),
+    "logarithms": ("log10 q [1/m],log C [m^4]\n3,-20\n4,-24\n", SPECTRUM, {"wavenumber": 1e3, "C2D": 1e-20}),
+    "logarithms in brackets": (
+        "log10(q [1/mm]);log10(C2D / m^4)\n3;-20\n4;-24\n",
+        SPECTRUM,
+        {"wavenumber": 1e6, "C2D": 1e-20},
+    ),
+    "logarithms with a row of units": ("lg(q)\tpsd\n1/m\tm^4\n3\t1e-20\n4\t1e-24\n", SPECTRUM, {"wavenumber": 1e3}),
     "shift factors": ("T [°C],log aT,bT\n0,1.0,1\n20,0,1\n", SHIFTS, {"temperature": 273.15, "log10 a_T": 1.0}),
     "aT in words": ("Temperature (C);log(aT)\n0;1,0\n20;0,0\n", SHIFTS, {"log10 a_T": 1.0}),
     "quotes": ('"Frequency (Hz)","Storage modulus (MPa)"\n"1","5"\n"2","6"\n', DMA, {"storage modulus": 5e6}),

@@ -137,7 +137,7 @@ def _kind(file: str, options: dict[str, Any]) -> str:
         return "map"
     if file.lower().endswith(TEXT):
         head = Path(file).read_text(errors="replace")[:2000].lower()
-        if re.search(r"c_?(2d|1d|cut|iso)|psd|c\(q\)|wave ?(number|vector)", head):
+        if re.search(r"c_?(2d|1d|cut|iso)|psd|c\(q\)|wave ?(number|vector)|\b(log|log10|lg)[ _(]+[qk]\b", head):
             return "spectrum"
     return "map" if dimensions(DataFile.of(Path(file))) == 2 else "scan"
 

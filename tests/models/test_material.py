@@ -5,6 +5,7 @@ import pytest
 from pydantic import ValidationError
 
 from mdr_dask.errors import DataError
+from mdr_dask.models.base import notes_of
 from mdr_dask.models.parts.material import Material, fit_error, fit_notes, solid_of
 from mdr_dask.models.parts.sliding_body import frequency_notes
 from mdr_dask.models.sliding_friction.declaration import SlidingFriction
@@ -243,3 +244,11 @@ def test_a_temperature_beyond_those_measured_is_told(tmp_path):
     at = {t: material(dma_table={"file": file}, temperature=t, wlf=LAW).notes() for t in (280.0, 330.0, 350.0)}
     told = f"table {file}: measured at 6.85 degC to 56.85 degC; 76.85 degC is reached by shift factors alone"
     assert [told in notes for notes in at.values()] == [False, False, True]
+
+
+def test_columns_of_moduli_that_are_not_used_are_named(tmp_path):
+    file = tmp_path / "dma.csv"
+    rows = "".join(f"{f},{3 + f**0.3:.4g},{0.4 * f**0.3:.4g},2\n" for f in (0.01, 0.1, 1, 10, 100))
+    file.write_text(f"f [Hz],E' [MPa],E'' [MPa],Torque\n{rows}")
+    notes = notes_of(material(dma_table={"file": str(file)}))
+    assert f"table {file}: not used: Torque" in notes

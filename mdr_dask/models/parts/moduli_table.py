@@ -14,7 +14,7 @@ from mdr_dask.models.base import quantity
 from mdr_dask.models.data_file import NamedFile
 from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.models.parts.temperature import Law
-from mdr_dask.tables import Column, TableError, is_called, read_sheet, read_table
+from mdr_dask.tables import Column, Read, TableError, is_called, read_sheet, read_table
 from mdr_dask.units import shown
 
 SAME_TEMPERATURE = 1.0  # K: scatter of an instrument about its set point
@@ -52,6 +52,11 @@ class ModulusTable(NamedByFile):
             except DataError as problem:
                 raise ValueError(str(problem)) from None
         return self
+
+    def notes(self) -> tuple[str, ...]:
+        """Return the columns of the table that are not used, in a sentence, if there are any."""
+        remark = _table(self).remark
+        return (f"table {self.file.name}: {remark}",) if remark else ()
 
 
 @dataclass(frozen=True)
@@ -203,12 +208,12 @@ def _require_overlap(storage: FloatArray, member: IntArray, levels: FloatArray) 
         )
 
 
-def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
-    """Return angular frequency, storage modulus, loss modulus and temperature (or None) of a file, in SI."""
+def _table(chosen: ModulusTable) -> Read:
+    """Return the columns of the file."""
     name = chosen.file.name
     content = chosen.file.read_text()
     try:
-        table = read_table(content, name, _columns(chosen))
+        return read_table(content, name, _columns(chosen))
     except TableError as problem:
         headings = [cell.text for cell in read_sheet(content, name).names]
         has = {name: any(is_called(each, name) for each in headings) for name in ("time", "frequency")}
@@ -218,6 +223,11 @@ def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray,
                 "(`mdr-dask master-curve` merges relaxation curves)"
             ) from problem
         raise
+
+
+def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
+    """Return angular frequency, storage modulus, loss modulus and temperature (or None) of a file, in SI."""
+    name, table = chosen.file.name, _table(chosen)
     omega, storage, loss = table["frequency"], table["storage modulus"], table.get("loss modulus")
     if loss is None and "tan delta" in table:
         loss = storage * table["tan delta"]

@@ -63,7 +63,7 @@ class SpectrumTables(Files):
 
     def found(self) -> tuple[Found, ...]:
         """Return the spectrum of every table."""
-        return tuple(Found(_tabulated(file)) for file in self.files)
+        return tuple(_tabulated(file) for file in self.files)
 
 
 class ScanFiles(Files):
@@ -101,7 +101,7 @@ class MapFiles(Files):
 
 
 @lru_cache(maxsize=64)
-def _tabulated(file: DataFile) -> Spectrum:
+def _tabulated(file: DataFile) -> Found:
     """Return the spectrum of a table."""
     import numpy as np
 
@@ -131,10 +131,12 @@ def _tabulated(file: DataFile) -> Spectrum:
     q, density = q[order], table[kinds[0]][order]
     try:
         if kinds == ["C cut"]:
-            return of_cut(averaged(q, density, CUT_ERROR**-2))
-        return Spectrum(q, density / (np.pi * q) if kinds == ["C1D"] else density)
+            spectrum = of_cut(averaged(q, density, CUT_ERROR**-2))
+        else:
+            spectrum = Spectrum(q, density / (np.pi * q) if kinds == ["C1D"] else density)
     except DataError as problem:
         raise DataError(f"{file.name}: {problem}") from None
+    return Found(spectrum, remarks=(table.remark,) if table.remark else ())
 
 
 @lru_cache(maxsize=64)
