@@ -272,25 +272,15 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
     """
     sheet = read_sheet(text, source)
     first, problems, read = sheet.names or sheet.rows[0], [], Read()
-    matched = [(i, *match(cell.text, sheet.units[i], columns)) for i, cell in enumerate(sheet.names)]
-    logarithms = {
-        i: plain for i, column, unit in matched if column is None and (plain := _of_logarithm(sheet, i, columns))
-    }
-    matched = [(i, *logarithms[i]) if i in logarithms else (i, column, unit) for i, column, unit in matched]
-    if not sheet.names and len(first) > len(columns):
-        raise TableError(
-            source, [first[0].problem(f"expected the names of the {len(first)} columns in the first line")]
-        )
-    if not sheet.names:
-        matched = [(i, column, sheet.units[i]) for i, column in enumerate(columns[: len(first)])]
-    absent = [each for each in columns if each not in [column for _, column, _ in matched]]
-    unknown = [sheet.names[i] for i, column, _ in matched if column is None]
+    matched = _matched(sheet, columns)
+    absent = [each for each in columns if each not in [one.column for one in matched]]
+    unknown = [sheet.names[i] for i, one in enumerate(matched) if one.column is None]
     for cell in unknown:
         hint = did_you_mean(cell.text, [each.name for each in absent])
         if "mean" in hint:
             problems.append(cell.problem(f"unknown column {cell.text!r}{hint}"))
     taken: dict[str, int] = {}
-    for index, column, written in matched:
+    for index, (column, written, is_logarithm) in enumerate(matched):
         if column is None:
             continue
         try:
@@ -298,9 +288,7 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
         except ValueError as error:
             problems.append(first[index].problem(f"column {column.name}: {error}"))
             continue
-        cells = [row[index] for row in sheet.rows]
-        if index in logarithms:
-            cells = [replace(cell, text=_antilogarithm(cell.text)) for cell in cells]
+        cells = [_antilogarithm(row[index]) if is_logarithm else row[index] for row in sheet.rows]
         values, wrong = _values(cells, column, unit, allow_missing)
         problems += wrong
         if column.name in taken and not wrong:
@@ -319,6 +307,45 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
     return read
 
 
+class _Match(NamedTuple):
+    """The column of a heading, None if it has none, its unit, and whether its entries are common logarithms."""
+
+    column: Column | None
+    unit: str
+    is_logarithm: bool = False
+
+
+def _matched(sheet: Sheet, columns: Sequence[Column]) -> list[_Match]:
+    """Return what each column of a table is; without names the columns are taken in the order given."""
+    if sheet.names:
+        return [_match_of(cell, unit, columns) for cell, unit in zip(sheet.names, sheet.units, strict=True)]
+    if len(sheet.rows[0]) > len(columns):
+        what = f"expected the names of the {len(sheet.rows[0])} columns in the first line"
+        raise TableError(sheet.source, [sheet.rows[0][0].problem(what)])
+    return [_Match(column, unit) for column, unit in zip(columns, sheet.units, strict=False)]
+
+
+def _match_of(heading: Cell, unit: str, columns: Sequence[Column]) -> _Match:
+    """Return what a column is, also if its heading is ``log10 q``, ``lg(q)`` or ``log10(C2D / m^4)``."""
+    column, written = match(heading.text, unit, columns)
+    found = _LOGARITHM.fullmatch(heading.text)
+    if column or not found:
+        return _Match(column, written)
+    inner = found[1].strip()
+    inner = inner[1:-1] if inner[0] == "(" and inner[-1] == ")" else inner
+    if not re.search(r"[\[(]", inner):
+        inner = re.sub(r"\s*/\s*(.+)", r" [\1]", inner)
+    (name,), (own,) = _headings((replace(heading, text=inner),), (), 1)
+    return _Match(*match(name.text, unit or own, columns), is_logarithm=True)
+
+
+def _antilogarithm(cell: Cell) -> Cell:
+    """Return ten to the power of a number; other entries as they are."""
+    if not _NUMBER.match(cell.text) or len(cell.text) > LONGEST_NUMBER or abs(float(cell.text)) > 300:
+        return cell
+    return replace(cell, text=repr(10.0 ** float(cell.text)))
+
+
 def match(heading: str, unit: str, columns: Sequence[Column]) -> tuple[Column | None, str]:
     """Return the column of a heading, None if it has none, and its unit, which may be joined to it (``freq_hz``)."""
     names = [(heading, unit)]
@@ -331,28 +358,6 @@ def match(heading: str, unit: str, columns: Sequence[Column]) -> tuple[Column | 
         if best:
             return best[0], written
     return None, unit
-
-
-def _of_logarithm(sheet: Sheet, index: int, columns: Sequence[Column]) -> tuple[Column, str] | None:
-    """Return the column whose common logarithms a heading names (``log10 q``, ``log(C2D [m^4])``), and its unit."""
-    found = _LOGARITHM.fullmatch(sheet.names[index].text)
-    if not found:
-        return None
-    inner = found[1].strip()
-    inner = inner[1:-1] if inner[0] == "(" and inner[-1] == ")" else inner
-    if not re.search(r"[\[(]", inner):
-        inner = re.sub(r"\s*/\s*(.+)", r" [\1]", inner)  # log10(C / m^4)
-    (name,), (unit,) = _headings((replace(sheet.names[index], text=inner),), (), 1)
-    column, written = match(name.text, sheet.units[index] or unit, columns)
-    return (column, written) if column else None
-
-
-def _antilogarithm(text: str) -> str:
-    """Return ten to the power of a number; other texts as they are."""
-    if not _NUMBER.match(text) or len(text) > LONGEST_NUMBER:
-        return text
-    exponent = float(text.replace(",", "."))
-    return repr(10.0**exponent) if abs(exponent) < 300 else text
 
 
 def _fits(unit: str, column: Column) -> bool:
