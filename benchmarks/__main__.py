@@ -1,42 +1,35 @@
-"""Every benchmark by subject and kind.
+"""Every benchmark: ``python -m benchmarks KIND [ARGUMENTS]``; without a kind, what there is."""
 
-python -m benchmarks                              what there is
-python -m benchmarks friction                     all kinds of a subject, one after the other
-python -m benchmarks friction honesty 500 89      one kind, with its own arguments
-"""
-
+import importlib
 import os
-import runpy
 import sys
-from pathlib import Path
 
-HERE = Path(__file__).parent
-#: As in the runner's workers: a second thread that waits would count as time.
+#: As in the runner's workers: threads of linear algebra that wait for each other would count as time.
 os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
+#: Name, module whose `main` runs it, and one line about it.
+KINDS = {
+    "accuracy": ("benchmarks.accuracy", "error, time and stated errors of every solver: docs/accuracy-and-speed.md"),
+    "campaigns": ("benchmarks.campaigns", "error and time of whole campaigns that are given an accuracy"),
+    "peers": ("benchmarks.peers", "solvers beside other programs: docs/comparison.md"),
+    "runner": ("benchmarks.runner.compare", "the runner beside joblib, dask, xyzpy and pipefunc, and after a kill"),
+    "kills": ("benchmarks.runner.kills", "a campaign in parts that are killed at random"),
+    "validity": ("benchmarks.surfaces.validity", "the method beside a half-space: docs/validity.md"),
+    "persson": ("benchmarks.surfaces.persson", "friction of lines beside Persson's theory: docs/validity.md"),
+    "road": ("benchmarks.surfaces.road", "the generated road of campaigns/road.yaml"),
+    "high_speed": ("benchmarks.high_speed", "friction at very high velocity: docs/high-speed.md"),
+    "published_factors": ("benchmarks.published_factors", "shift factors beside published ones: docs/master-curves.md"),
+    "thesis": ("benchmarks.thesis.page", "the thesis, claim by claim: docs/thesis.md"),
+}
 
-def kinds(subject):
-    """Return the kinds of a subject: its modules that can be run."""
-    modules = sorted((HERE / subject).glob("*.py"))
-    return [path.stem for path in modules if '__name__ == "__main__"' in path.read_text()]
 
-
-def subjects():
-    """Return the kinds of every subject."""
-    return {path.name: found for path in sorted(HERE.iterdir()) if path.is_dir() and (found := kinds(path.name))}
-
-
-def main(subject=None, kind=None, *arguments):
-    known = subjects()
-    if subject is None:
-        print("\n".join(f"{name}: {', '.join(found)}" for name, found in known.items()))
-        return
-    if subject not in known or (kind is not None and kind not in known[subject]):
-        sys.exit(f"no benchmark {' '.join(filter(None, (subject, kind)))}; known: {known.get(subject, list(known))}")
-    for each in known[subject] if kind is None else (kind,):
-        print(f"# {subject} {each}", flush=True)
-        sys.argv = [f"{subject} {each}", *arguments]
-        runpy.run_module(f"benchmarks.{subject}.{each}", run_name="__main__")
+def main(kind: str = "", *arguments: str) -> None:
+    """Run one kind, or print the kinds."""
+    if kind in KINDS:
+        importlib.import_module(KINDS[kind][0]).main(*arguments)
+    else:
+        known = "\n".join(f"{name:18} {about}" for name, (_, about) in KINDS.items())
+        sys.exit(f"no benchmark {kind}; known:\n{known}" if kind else known)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,4 @@
-"""One table of extremes: what must hold of every solver for whatever it is given, searched by hypothesis.
-
-A short search runs with the tests; ``python -m benchmarks stress search MINUTES`` goes on for as long as it is told
-to, in all files of extremes.
-"""
+"""One table of extremes: what must hold of every solver for whatever it is given, searched by hypothesis."""
 
 import contextlib
 

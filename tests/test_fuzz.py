@@ -1,4 +1,4 @@
-"""Made-up files of strangers, a few of each kind; ``python -m benchmarks runner fuzz`` looks for new ones."""
+"""Made-up files of strangers, a few of each kind."""
 
 import json
 import shutil

@@ -51,7 +51,7 @@ OF_SERIES = [("copy of the layout", "truncate"), ("root metadata", "empty")]
     ],
 )
 def test_harm_is_named_and_mended(toy, whole, tmp_path, kind, harm, series):
-    """Every kind of file once; ``python -m benchmarks runner damage 700`` tries every harm to each, many times."""
+    """Every kind of file once."""
     draw = random.Random(f"{kind} {harm}")
     trial = damage.try_harm(toy, *whole[series], tmp_path / "harmed.zarr", kind, harm, draw)
     assert trial.changed

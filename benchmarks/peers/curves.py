@@ -1,29 +1,27 @@
-"""Shift factors beside mastercurves and pyvisco: ``python -m benchmarks peers curves [FAMILIES]``."""
+"""Shift factors beside mastercurves and pyvisco."""
 
 from __future__ import annotations
 
-import sys
 import warnings
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.stats import t as student
 
-from benchmarks.accuracy.points import Point
-from benchmarks.measures import timed
-from benchmarks.peers.beside import OURS, called, single_threaded
-from benchmarks.peers.page import tell
-from benchmarks.superposition.accuracy import SHAPES, family
+from benchmarks.peers import OURS, installed
+from benchmarks.rows import Row, timed
+from benchmarks.solvers.curves import on_a_shape
 from mdr_dask.physics.superposition.master_curve import superpose
 
-FIRST_SEED, SCATTER = 700_000, 0.01
+SCATTER, FAMILIES = 0.01, 4
+CASES = ("sigmoid", "bump", "flat plateau")
 DECADE = np.log(10)
 
 
 def ours(groups, pieces):
     """Return factors and half widths of 95 %, the first curve's factor being zero."""
     found = superpose(groups, pieces, reference=groups[0])
-    return found.horizontal, student.ppf(0.975, found.freedom) * found.horizontal_error
+    low, high = found.interval()[:, : found.groups.size]
+    return found.horizontal, (high - low) / 2
 
 
 def by_gaussian_processes(groups, pieces, noise):
@@ -60,40 +58,33 @@ def by_power_laws(groups, pieces):
 def ways():
     """Return the methods that are installed."""
     found = {(OURS, ""): ours}
-    if name := called("mastercurves"):
+    if name := installed("mastercurves"):
         for setting, noise in (("", 0.04), ("scatter known", SCATTER * DECADE)):
             found[name, setting] = lambda groups, pieces, noise=noise: by_gaussian_processes(groups, pieces, noise)
-    if name := called("pyvisco"):
+    if name := installed("pyvisco"):
         found[name, ""] = by_power_laws
     return found
 
 
-def compared(families: int = 4, shapes: tuple[str, ...] = tuple(SHAPES)) -> Iterator[Point]:
+def compared() -> Iterator[Row]:
     """Yield median time, error and half width of each method, and the share of factors inside, for each shape."""
+    warnings.simplefilter("ignore")  # of Gaussian processes that end at a bound, and of pandas about attributes
     methods = ways()
-    for method in methods.values():
-        method(*family(FIRST_SEED - 1, SCATTER, "sigmoid", False)[:2])  # compiles
-    for shape in shapes:
+    for shape in CASES:
         judged = {name: [] for name in methods}
-        for seed in range(FIRST_SEED, FIRST_SEED + families):
-            groups, pieces, shifts, _ = family(seed, SCATTER, shape, False)
+        for index in range(FAMILIES):
+            family = on_a_shape(shape, np.random.default_rng((7, index)), SCATTER)
             for name, method in methods.items():
                 with np.errstate(all="ignore"):
-                    (factors, half), seconds = timed(method, groups, pieces)
-                errors = np.abs(factors - (shifts - shifts[0]))[1:]
+                    (factors, half), seconds = timed(method, family.groups, family.curves)
+                errors = np.abs(factors - (family.factors - family.factors[0]))[1:]
                 judged[name].append((np.full(errors.size, seconds), errors, half[1:]))
         for (name, setting), rows in judged.items():
             seconds, errors, half = np.array(rows).transpose(1, 0, 2)
             known = np.isfinite(errors).all(axis=1)
             if not known.all():
-                setting = f"{known.sum()} of {families} found"
-            stated = np.median(half)
-            inside = np.mean(errors <= half) if np.isfinite(stated) else np.nan
-            middle = np.median(seconds), np.median(errors[known]) if known.any() else np.nan
-            yield Point("master curves", shape, name, setting, *middle, stated, inside)
-
-
-if __name__ == "__main__":
-    single_threaded()
-    warnings.simplefilter("ignore")  # of Gaussian processes that end at a bound, and of pandas about attributes
-    tell(compared(*map(int, sys.argv[1:])))
+                setting = f"{known.sum()} of {FAMILIES} found"
+            error = float(np.median(errors[known])) if known.any() else np.nan
+            stated = float(np.median(half))
+            inside = float(np.mean(errors <= half)) if np.isfinite(stated) else np.nan
+            yield Row("master curves", shape, name, setting, FAMILIES, float(np.median(seconds)), error, stated, inside)

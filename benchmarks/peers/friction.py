@@ -1,4 +1,4 @@
-"""Steady friction beside stepping in time, as the thesis did: ``python -m benchmarks peers friction``.
+"""Steady friction beside stepping in time, as the thesis did.
 
 All springs of a line stand on it at rest, then it moves on by a cell in each step. A step of backward Euler finds the
 depth that carries the load. Friction is the mean over the last part of the way.
@@ -10,14 +10,22 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from benchmarks.accuracy import sliding
-from benchmarks.accuracy.points import Point
-from benchmarks.peers.beside import OURS, in_turns, single_threaded
-from benchmarks.peers.page import tell
-from mdr_dask.physics.sliding.problem import Request, solve
+from benchmarks.peers import OURS
+from benchmarks.rows import Row, timed_in_turns
+from benchmarks.solvers import sliding
+from mdr_dask.physics.sliding.problem import Request
+from mdr_dask.physics.surfaces import roughness
+from mdr_dask.physics.surfaces.rough_line import RoughLine
+from mdr_dask.physics.surfaces.waves import Waves
 
 GRIDS = (1, 2, 4, 8, 16, 32, 64, 128)
-GOALS = (0.1, 0.03, 0.01)
+GOALS = (0.1, 0.01)
+#: Hurst exponent, depth in rms heights, v tau / L.
+CASES = {
+    "full contact": (0.7, 8.0, 0.01),
+    "transition": (0.7, 0.3, 0.003),
+    "few peaks": (0.3, -2.0, 0.003),
+}
 #: Relaxation times for which the line moves on, and the part of the way that counts.
 WAY, LAST = 12, 0.1
 
@@ -51,31 +59,21 @@ def _carrying(load: float, summits: np.ndarray, depth: float) -> float:
     return (load * falling.size - sums[count - 1]) / count
 
 
-def compared() -> Iterator[Point]:
-    """Yield what the least errors that reach a goal take of each method."""
-    for case, (hurst, depth, deborah) in sliding.CASES.items():
-        line, reference = sliding.rough(hurst)
-        truth = sliding.exact(reference, depth, sliding.slow.Body(np.empty(0), np.empty(0), deborah), True, False)
-
-        def ours(accuracy, line=line, deborah=deborah, truth=truth):
-            aim = Request(accuracy, "auto", "hermite")
-            steady, _ = solve(line, None, np.array([deborah]), np.array([truth.load]), aim)
-            return steady.drag[0] / truth.load
-
-        def thesis(grid, line=line, deborah=deborah, truth=truth):
-            return stepped(line, deborah, truth.load, 2 * sliding.MODES * grid)
-
-        errors = {grid: abs(thesis(grid) / truth.friction - 1) for grid in GRIDS}
+def compared() -> Iterator[Row]:
+    """Yield the least time of each method with which its error is at most a goal."""
+    modes = sliding.MODES
+    for name, (hurst, depth, deborah) in CASES.items():
+        amplitude, phase = roughness.amplitudes(modes, hurst), roughness.phases(0, 1, modes)
+        line = RoughLine(Waves(0.5 * amplitude * np.exp(1j * phase), 2 * modes))
+        case, truth = sliding.known(line, sliding.slow.waves(amplitude, phase), None, deborah, depth)
+        errors = {grid: abs(stepped(line, deborah, case.load, 2 * modes * grid) / truth.values - 1) for grid in GRIDS}
         for goal in GOALS:
+            methods = {(OURS, f"accuracy {goal:g}"): lambda case=case, goal=goal: case.found(Request(goal)).values}
             grid = next((grid for grid in GRIDS if errors[grid] <= goal), None)
-            methods = {(OURS, f"accuracy {goal:g}"): lambda ours=ours, goal=goal: ours(goal)}
             if grid:
-                methods["all springs, NumPy", f"grid {grid}"] = lambda thesis=thesis, grid=grid: thesis(grid)
-            for (name, setting), (friction, seconds) in in_turns(methods).items():
-                error = max(abs(friction / truth.friction - 1), truth.doubt)
-                yield Point("steady sliding", f"{case}, {goal:g}", name, setting, seconds, error)
-
-
-if __name__ == "__main__":
-    single_threaded()
-    tell(compared())
+                methods["all springs, NumPy", f"grid {grid}"] = lambda line=line, case=case, nodes=2 * modes * grid: (
+                    stepped(line, case.deborah, case.load, nodes)
+                )
+            for (method, setting), (friction, seconds) in timed_in_turns(methods, 3).items():
+                error = max(abs(friction / truth.values - 1), truth.doubt / truth.scale)
+                yield Row("steady sliding", f"{name}, {goal:g}", method, setting, 1, seconds, float(error))

@@ -1,4 +1,4 @@
-"""Statistics of lines and maps beside SurfaceTopography: ``python -m benchmarks peers statistics``."""
+"""Statistics of lines and maps beside SurfaceTopography."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from benchmarks.accuracy.points import Point
-from benchmarks.peers.beside import OURS, called, in_turns, single_threaded
-from benchmarks.peers.page import tell
+from benchmarks.peers import OURS, installed
+from benchmarks.rows import Row, timed_in_turns
 from benchmarks.surfaces.punches import areal_surface
 from mdr_dask.physics.surfaces import measured, roughness
 from mdr_dask.physics.surfaces.maps import SurfaceMap, spectrum_of_map, wavenumbers
@@ -66,22 +65,17 @@ def peer_of_map(height):
     return *rms, *found.power_spectrum_from_area(window="None")
 
 
-def compared() -> Iterator[Point]:
+def compared() -> Iterator[Row]:
     """Yield the error of height and slope, with the time of both and of the spectrum."""
-    name = called("SurfaceTopography")
+    name = installed("SurfaceTopography")
     for what, made, ours, theirs in (("line", lines, of_line, peer_of_line), ("map", maps, of_map, peer_of_map)):
         for waves, shortest in SHORTEST.items():
             height, truth = made(shortest)
             methods = {OURS: lambda h=height, ours=ours: ours(h)}
             if name:
                 methods[name] = lambda h=height, theirs=theirs: theirs(h)
-            found = in_turns(methods)
+            found = timed_in_turns(methods, 3)
             for place, (quantity, known) in enumerate(truth.items()):
                 for method, (values, seconds) in found.items():
                     error = max(abs(values[place] / known - 1), 1e-16)
-                    yield Point("statistics of surfaces", f"{what}, {waves}: {quantity}", method, "", seconds, error)
-
-
-if __name__ == "__main__":
-    single_threaded()
-    tell(compared())
+                    yield Row("statistics of surfaces", f"{what}, {waves}: {quantity}", method, "", 1, seconds, error)

@@ -1,4 +1,4 @@
-"""Pressure from a line load beside PyAbel: ``python -m benchmarks peers transforms``."""
+"""Pressure from a line load beside PyAbel."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from benchmarks.accuracy.points import Point
-from benchmarks.peers.beside import OURS, called, in_turns, single_threaded
-from benchmarks.peers.page import tell
+from benchmarks.peers import OURS, installed
+from benchmarks.rows import Row, timed_in_turns
 from mdr_dask.physics.mdr.transforms import pressure
 
-SAMPLES = (101, 401, 1601)
+SAMPLES = (101, 1601)
 WIDTH = 0.3
 
 
@@ -33,7 +32,7 @@ CASES = {"smooth: Gaussian": (bell, 2.0), "edge: Hertz": (hertz, 1.0)}
 
 def peers(load, spacing):
     """Return PyAbel's methods for one row of samples."""
-    name = called("PyAbel")
+    name = installed("PyAbel")
     if name is None:
         return {}
     from abel import basex, dasch, daun, hansenlaw
@@ -47,10 +46,10 @@ def peers(load, spacing):
     }
 
 
-def compared(samples: tuple[int, ...] = SAMPLES) -> Iterator[Point]:
+def compared() -> Iterator[Row]:
     """Yield the largest error of each method on ever more radii."""
     for case, (function, edge) in CASES.items():
-        for number in samples:
+        for number in SAMPLES:
             radius = np.linspace(0, 2, number)  # the edge is among them
             load, _, truth = function(radius)
 
@@ -63,11 +62,6 @@ def compared(samples: tuple[int, ...] = SAMPLES) -> Iterator[Point]:
                 return pressure(lambda x: -slope(x), radius, edge).value
 
             methods = {(OURS, ""): known, (OURS, "spline"): sampled} | peers(load, radius[1])
-            for (name, setting), (found, seconds) in in_turns(methods).items():
+            for (name, setting), (found, seconds) in timed_in_turns(methods, 3).items():
                 error = max(np.max(np.abs(np.ravel(found) - truth)), 1e-16)
-                yield Point("Abel transform", f"{case}, {number} radii", name, setting, seconds, error)
-
-
-if __name__ == "__main__":
-    single_threaded()
-    tell(compared())
+                yield Row("Abel transform", f"{case}, {number} radii", name, setting, 1, seconds, float(error))

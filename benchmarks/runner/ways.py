@@ -1,14 +1,13 @@
-"""One study computed in the ways of other programs and in ours: what `peers` starts, each in a process of its own.
+"""One study computed by our runner and in the ways of other programs; `compare` starts each in its own process.
 
 The friction of one rough line at one speed is a case; twenty speeds and any number of lines make the study. All ways
-call the same function, case by case, and work in forty equal blocks on two cores, each as its own manual advises.
-Every way computes what it does not find done; `read` returns what it has left, NaN where nothing is.
+call the same function, case by case, and work in forty equal blocks on two cores, each as its own manual recommends.
+Every way computes what is missing; `read` returns the results found, NaN where there are none.
 """
 
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -69,7 +68,7 @@ class Study:
         return speed, slice(half * self.block_size, (half + 1) * self.block_size)
 
     def block(self, number: int) -> np.ndarray:
-        """Compute a block."""
+        """Return the results of a block."""
         speed, lines = self.region(number)
         return np.array([friction(speed, line) for line in range(lines.start, lines.stop)])
 
@@ -177,24 +176,6 @@ def read_pipefunc(study: Study) -> np.ndarray:
     return np.ma.filled(np.ma.asarray(found).astype(float), np.nan)
 
 
-SNAKEFILE = """
-rule all:
-    input: expand("{{number}}.npz", number=range({blocks}))
-rule block:
-    output: "{{number}}.npz"
-    shell: "{python} -m benchmarks.runner.ways block . {lines} {{wildcards.number}}"
-"""
-
-
-def run_snakemake(study: Study) -> None:
-    text = SNAKEFILE.format(blocks=BLOCKS, python=sys.executable, lines=study.lines)
-    (study.folder / "Snakefile").write_text(text)
-    snakemake = [sys.executable, "-m", "snakemake", "--cores", "2", "--quiet", "all"]
-    if (study.folder / ".snakemake/locks").exists():
-        subprocess.run([*snakemake, "--unlock"], cwd=study.folder, check=True)
-    subprocess.run([*snakemake, "--rerun-incomplete"], cwd=study.folder, check=True)
-
-
 class Case(Parameters):
     """A line and a speed, by their numbers."""
 
@@ -250,24 +231,19 @@ WAYS = {
     "dask.delayed, to_zarr(region)": Way(run_dask, read_dask),
     "xyzpy": Way(run_xyzpy, read_xyzpy),
     "pipefunc": Way(run_pipefunc, read_pipefunc),
-    "Snakemake": Way(run_snakemake, read_blocks),
 }
 
 
-def main(act: str, folder: str, lines: str, what: str) -> None:
+def main(act: str, folder: str, lines: str, way: str) -> None:
+    """Run a way in a folder, or read what it has left into a file."""
     study = Study(Path(folder), int(lines))
-    if act == "block":
-        save_block(study, int(what))
-    elif act == "run":
-        WAYS[what].run(study)
+    if act == "run":
+        WAYS[way].run(study)
     else:
-        np.save(study.folder.with_suffix(".read.npy"), WAYS[what].read(study))
+        np.save(study.folder.with_suffix(".read.npy"), WAYS[way].read(study))
 
 
 if __name__ == "__main__":
     from benchmarks.runner import ways  # so that workers find what is pickled
 
-    if sys.argv[1:]:
-        ways.main(*sys.argv[1:])
-    else:
-        print("\n".join(ways.WAYS))
+    ways.main(*sys.argv[1:])

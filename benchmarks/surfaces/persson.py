@@ -1,4 +1,4 @@
-"""Friction of lines beside Persson's theory at loads and spectra of tyres and seals: ``benchmarks surfaces persson``.
+"""Friction of lines beside Persson's theory for tyres and seals: ``python -m benchmarks persson``.
 
 B. N. J. Persson, J. Chem. Phys. 115, 3840 (2001), with his correction S = 1/2 + P^2/2 of the elastic energy in partial
 contact. Both get the same isotropic spectrum and the same Kelvin or standard solid. A line of length L carries the load
@@ -8,6 +8,7 @@ on a disc of diameter L, as in docs/validity.md. The theory is an approximation 
 import numpy as np
 from scipy.special import erf
 
+from benchmarks.rows import table
 from mdr_dask.physics.sliding.problem import PronyTerms, Request, solve
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.rough_line import RoughLine
@@ -71,10 +72,7 @@ def lines(spectrum, solid, pressure, velocity, length, points):
 
 def main():
     """Print a table: friction of lines over that of the theory."""
-    names = "surface", "solid", "v m/s", "pressure MPa", "F / (E* L h)", "line in contact", "area, theory"
-    columns = *names, "mu, lines", "mu, theory", "ratio"
-    print(f"| {' | '.join(columns)} |")
-    print("|---" * len(columns) + "|")
+    rows = []
     for name, (hurst, longest, rolloff, shortest, rms, length, points) in SURFACES.items():
         spectrum = self_affine(hurst, longest, shortest, rms, rolloff)
         for kind, solid in SOLIDS.items():
@@ -82,11 +80,7 @@ def main():
                 for pressure in PRESSURES:
                     theory, area = persson(spectrum, solid, pressure * 1e6, velocity)
                     mean, error, fraction, load = lines(spectrum, solid, pressure * 1e6, velocity, length, points)
-                    row = f"{load:.2g} | {fraction:.2g} | {area:.2g} | {mean:.3g} ± {error:.1g} | {theory:.3g}"
-                    print(
-                        f"| {name} | {kind} | {velocity:g} | {pressure:g} | {row} | {mean / theory:.2f} |", flush=True
-                    )
-
-
-if __name__ == "__main__":
-    main()
+                    numbers = (f"{load:.2g}", f"{fraction:.2g}", f"{area:.2g}", f"{mean:.3g} ± {error:.1g}")
+                    rows.append((name, kind, velocity, pressure, *numbers, f"{theory:.3g}", f"{mean / theory:.2f}"))
+    columns = ("surface", "solid", "v m/s", "pressure MPa", "F / (E* L h)", "line in contact", "area, theory")
+    print(table((*columns, "mu, lines", "mu, theory", "ratio"), rows))

@@ -1,6 +1,6 @@
 """Rough circular punches on an elastic half-space by ContactMechanics, and the lines of the method beside them.
 
-``python -m benchmarks surfaces punches [SURFACES POINTS]`` computes what is missing in docs/evidence/punches.csv.
+``python -m benchmarks validity`` computes what is missing in docs/evidence/punches.csv.
 """
 
 import csv
@@ -113,7 +113,3 @@ def compute(surfaces=20, points=512):
                     writer.writerows([COLUMNS] if new else [])
                     for load, *numbers in zip(LOADS, *columns, strict=True):
                         writer.writerow([body, hurst, points, index, *(f"{x:.6g}" for x in (load, *numbers))])
-
-
-if __name__ == "__main__":
-    compute(*map(int, sys.argv[1:]))

@@ -1,6 +1,6 @@
 """Make the road of campaigns/road.yaml: three maps of one generated asphalt, and their spectrum as `surface` writes it.
 
-``python -m benchmarks surfaces road [FOLDER]``: C2D ~ q^(-2 - 2 H) with H = 0.8 from 2.5 mm down to 10 um, constant
+``python -m benchmarks road [FOLDER]``: C2D ~ q^(-2 - 2 H) with H = 0.8 from 2.5 mm down to 10 um, constant
 above, rms height 50 um; 20 nm of white noise of the instrument; 1024 x 1024 points 5 um apart, cut out of a larger
 periodic surface and tilted.
 """
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mdr_dask.cli import main
+from mdr_dask import cli
 from mdr_dask.physics.surfaces.spectrum import self_affine
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
@@ -20,8 +20,9 @@ SPACING, POINTS, SEED = 5e-6, 1024, 2026
 SPECTRUM = self_affine(0.8, 8e-3, 1e-5, 5e-5, 2.5e-3)
 
 
-def make(folder):
-    """Write maps, spectrum and figure into a folder; return the spectrum."""
+def main(folder=str(Path(__file__).parents[2] / "campaigns/data/road")):
+    """Write maps, spectrum and figure into a folder."""
+    folder = Path(folder)
     side = POINTS * 3 // 2
     names = []
     for k in range(3):
@@ -30,10 +31,5 @@ def make(folder):
         tilt = 1e-7 * np.arange(POINTS)
         names.append(str(folder / f"road{k}.npy"))
         np.save(names[-1], 1e6 * (whole[:POINTS, :POINTS] + noise + tilt).astype(np.float32))
-    files = ["-o", str(folder / "road.csv"), "--plot", str(folder / "road.png")]
-    main(["surface", *names, "--spacing", "5um", "--unit", "um", *files])
-    return folder / "road.csv"
-
-
-if __name__ == "__main__":
-    make(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[2] / "campaigns/data/road")
+    files = ["-o", str(folder / "road.csv"), "--plot", str(folder / "road-spectrum.png")]
+    cli.main(["surface", *names, "--spacing", "5um", "--unit", "um", *files])

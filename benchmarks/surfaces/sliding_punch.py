@@ -1,7 +1,6 @@
 """A rough circular punch that slides over a Kelvin half-space at constant speed, and the lines of the method beside it.
 
-``python -m benchmarks surfaces sliding_punch [POINTS SURFACES]`` computes what is missing in
-docs/evidence/sliding_punch.csv and prints it.
+``python -m benchmarks validity`` computes what is missing in docs/evidence/sliding_punch.csv.
 """
 
 import csv
@@ -14,7 +13,7 @@ import numpy as np
 from scipy import fft
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from benchmarks.measures import alone, print_table
+from benchmarks.solvers.solver import one_case
 from benchmarks.surfaces.punches import areal_surface, free_half_space, spectrum
 from mdr_dask.models.parts.surface import Surface
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
@@ -34,7 +33,7 @@ LINES = 40
 
 @lru_cache(maxsize=8)
 def response(points, deborah):
-    """Return what takes forces to displacements of unit modulus E* = 4 G in the frame of the punch.
+    """Return the response of displacements of unit modulus E* = 4 G to forces, in the frame of the punch.
 
     A Kelvin half-space has u + v tau du/dx = u_el, with the displacements u_el of the elastic one.
     """
@@ -90,7 +89,7 @@ def lines(points, load, deborah, count=LINES):
         velocity=deborah,
         normal_force=load,
     )
-    found = [alone(MODEL, parameters, k, ("friction_coefficient", "contact_fraction"), SEED) for k in range(count)]
+    found = [one_case(MODEL, parameters, ("friction_coefficient", "contact_fraction"), k, SEED) for k in range(count)]
     friction, fraction = (np.array([float(one[name]) for one in found]) for name in found[0])
     return friction.mean(), fraction.mean(), friction.std(ddof=1) / np.sqrt(count)
 
@@ -161,7 +160,3 @@ def table_of_cases():
 
 
 HEAD = ("points", "surfaces", "v tau / L", "F / (E* L h)", "μL/h, half-space", "μL/h, lines", "ratio", "area", "length")
-
-if __name__ == "__main__":
-    compute(*map(int, sys.argv[1:]))
-    print_table(HEAD, table_of_cases())

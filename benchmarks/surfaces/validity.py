@@ -1,19 +1,23 @@
-"""Make docs/validity.md: ``python -m benchmarks surfaces validity [SURFACES POINTS]``, from what is known or missing.
+"""Where the method holds: data, figure and tables of docs/validity.md.
+
+python -m benchmarks validity               computes what is missing (20 surfaces of 512 x 512 points), then the tables
+python -m benchmarks validity page          figure and tables again
 
 Stiffness, approach and contact of rough circular punches on a half-space (ContactMechanics), and of the lines of the
-method beside them, without a free parameter.
+method beside them, without a free parameter; and the friction of a sliding punch.
 """
 
-import sys
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.rows import table
 from benchmarks.surfaces import punches, sliding_punch
 
 PAGE = Path(__file__).parents[2] / "docs/validity.md"
 FIGURE = PAGE.parent / "evidence/validity.png"
-TEXT = Path(__file__).with_name("validity.txt")
+TABLES = ("stiffness", "approach", "contact", "gap", "sliding")
+POINTS = 512
 BODIES = ("half-space", "line")
 
 
@@ -42,28 +46,19 @@ def ratio(line, surface, draws=2000):
 
 
 def tables(found):
-    """Return the rows of the tables of stiffness, approach and contact as Markdown."""
-    between = np.sqrt(punches.LOADS[1:] * punches.LOADS[:-1])
-    parts = ["| H | " + " | ".join(f"{load:.1e}" for load in between) + " |\n|" + "---|" * (between.size + 1)]
+    """Yield the tables of stiffness, approach, contact and gap."""
+    between, rows = np.sqrt(punches.LOADS[1:] * punches.LOADS[:-1]), []
     for hurst in punches.HURST:
-        line, surface = (stiffness(found[body, hurst][0]) for body in ("line", "half-space"))
-        cells = [
-            f"{middle:.2f} ({low:.2f}, {high:.2f})" for middle, low, high in zip(*ratio(line, surface), strict=True)
-        ]
-        parts.append(f"| {hurst} | " + " | ".join(cells) + " |")
-    yield "\n".join(parts)
-    head = (
-        "| H | | " + " | ".join(f"{load:.0e}" for load in punches.LOADS) + " |\n|" + "---|" * (punches.LOADS.size + 2)
-    )
+        numbers = zip(*ratio(*(stiffness(found[body, hurst][0]) for body in ("line", "half-space"))), strict=True)
+        rows.append((hurst, *(f"{middle:.2f} ({low:.2f}, {high:.2f})" for middle, low, high in numbers)))
+    yield table(("H", *(f"{load:.1e}" for load in between)), rows)
     for column in range(3):
-        rows = [head]
-        for hurst in punches.HURST:
-            for body in BODIES:
-                each = found[body, hurst][column]
-                error = 1.96 * each.std(axis=0, ddof=1) / np.sqrt(len(each))
-                cells = [f"{m:.3g} ± {e:.1g}" for m, e in zip(each.mean(axis=0), error, strict=True)]
-                rows.append(f"| {hurst} | {body} | " + " | ".join(cells) + " |")
-        yield "\n".join(rows)
+        rows = []
+        for (body, hurst), numbers in sorted(found.items(), key=lambda item: (item[0][1], item[0][0])):
+            each = numbers[column]
+            error = 1.96 * each.std(axis=0, ddof=1) / np.sqrt(len(each))
+            rows.append((hurst, body, *(f"{m:.3g} ± {e:.1g}" for m, e in zip(each.mean(axis=0), error, strict=True))))
+        yield table(("H", "", *(f"{load:.0e}" for load in punches.LOADS)), rows)
 
 
 def draw(found):
@@ -98,45 +93,21 @@ def draw(found):
     figure.savefig(FIGURE, dpi=110)
 
 
-def main(surfaces=20, points=512):
-    punches.compute(surfaces, points)
-    sliding_punch.compute()
-    page(points)
+def main(*arguments):
+    """Compute what is missing, or nothing if only the page is wanted, and write figure and tables."""
+    if "page" not in arguments:
+        punches.compute(20, POINTS)
+        sliding_punch.compute()
+    draw(collected(POINTS))
+    PAGE.write_text(with_tables(PAGE.read_text()))
 
 
-def page(points):
-    """Write page and figure from the tables of evidence."""
-    draw(collected(points))
-    PAGE.write_text(text(points))
-
-
-def text(points):
-    """Return the page from the tables of evidence."""
-    found = collected(points)
-    ratios, approach, contact, gap = tables(found)
-    number = min(len(found["half-space", hurst][0]) for hurst in punches.HURST)
-    worst = [
-        ratio(*(stiffness(found[body, hurst][0]) for body in ("line", "half-space")))[0] for hurst in punches.HURST
-    ]
-    head, *cases = sliding_punch.HEAD, *sliding_punch.table_of_cases()
-    sliding = "\n".join(f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *cases))
-    shares = [row["line"] / row["friction"] for row in sliding_punch.rows()]
-    return TEXT.read_text().format(
-        sliding=sliding,
-        friction_low=min(shares),
-        friction_high=max(shares),
-        miss=np.max(np.abs(np.array(worst) - 1)),
-        surfaces=number,
-        points=points,
-        lines=punches.LINES,
-        low=np.min(worst),
-        high=np.max(worst),
-        ratios=ratios,
-        approach=approach,
-        contact=contact,
-        gap=gap,
-    )
-
-
-if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+def with_tables(page):
+    """Return the page with the tables of today's evidence between its marks."""
+    *parts, sliding = *tables(collected(POINTS)), table(sliding_punch.HEAD, sliding_punch.table_of_cases())
+    for name, text in zip(TABLES, (*parts, sliding), strict=True):
+        start, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
+        before, _, rest = page.partition(start)
+        _, _, after = rest.partition(end)
+        page = f"{before}{start}{text}\n{end}{after}"
+    return page

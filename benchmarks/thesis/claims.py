@@ -7,7 +7,7 @@ from typing import Any
 from benchmarks.thesis import measures
 from benchmarks.thesis.ledger import Claim, FromFit
 
-PAGE = "python -m benchmarks thesis page"
+PAGE = "python -m benchmarks thesis"
 
 
 def run(campaign: str) -> str:
@@ -548,7 +548,7 @@ WEAR = (
     Claim(
         "6.4.2, 6.5",
         "The fast rule is 600 times faster",
-        "python -m benchmarks accuracy measure wear",
+        "python -m benchmarks accuracy wear",
         "approximately: 8 times at 100 nodes, 570 at 1600 (an independent study)",
         "It depends on the grid; error against time is the fair figure.",
     ),
@@ -571,7 +571,7 @@ WEAR = (
     Claim(
         "abstract",
         "The method is orders of magnitude faster than finite or boundary elements",
-        "python -m benchmarks peers page",
+        "python -m benchmarks peers contact",
         "yes: for bodies of revolution, where both give the same numbers (comparison.md)",
     ),
     Claim("7.2", "Prony series", run("measured_polymer"), "yes: as a material"),

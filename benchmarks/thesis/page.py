@@ -1,6 +1,5 @@
-"""Make docs/thesis.md: ``python -m benchmarks thesis page [LINES]`` (60 rough lines if not given)."""
+"""Make docs/thesis.md: ``python -m benchmarks thesis [LINES]`` (60 rough lines if not given)."""
 
-import sys
 from pathlib import Path
 
 from benchmarks.thesis import CHAPTERS, Studies, page
@@ -17,17 +16,13 @@ several. The other answers use the same scale: **yes** up to a departure of 5 % 
 that the thesis shows measurements that are not public, **not modelled** that there is no such model.
 
 Numbers in brackets are 95 % intervals from {lines} rough lines, or as many as the campaign has. The page is made by
-`python -m benchmarks thesis page {lines}`. A test repeats every row on a reduced study and fails if an answer is
+`python -m benchmarks thesis {lines}`. A test repeats every row on a reduced study and fails if an answer is
 contradicted. Figures of version 0.1 and of independent studies are marked and are not repeated.
 
 """
 
 
-def main(lines: int = 60) -> None:
+def main(lines: str = "60") -> None:
     """Write the page."""
-    PAGE.write_text(HEAD.format(lines=lines) + page(CHAPTERS, Studies(lines)) + "\n" + table())
+    PAGE.write_text(HEAD.format(lines=lines) + page(CHAPTERS, Studies(int(lines))) + "\n" + table())
     print(PAGE)
-
-
-if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from benchmarks.mixed import honesty
 from mdr_dask.models import load
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.mixed_lubrication.declaration import STEEL
@@ -207,16 +206,6 @@ def test_errors_of_a_revolution_come_from_other_splines_of_its_waves(force, part
     specific = 2e-7 / found["independent_squares"]
     assert found["contact_conductance_error"] == pytest.approx(off / specific, rel=1e-9)
     assert found["contact_resistance_error"] == pytest.approx(specific / (length - off) - specific / length, rel=1e-6)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("number", [50_000, 100_000])
-def test_errors_of_revolutions_hold(number):
-    """Three in thirty of random rollers, layers, edge rules and creeps may lie beyond, none threefold."""
-    errors, stated = honesty.judged(15, 77, number)
-    assert np.mean(errors <= stated) >= 0.9
-    assert np.max(errors / stated) < 3
-    assert np.median(stated / errors) < 15
 
 
 def test_points_that_the_accuracy_chooses_meet_it_or_it_is_said():

@@ -159,7 +159,7 @@ def _solved(w, body, periodic, arms):
     return None
 
 
-def reference(line, depth, body, periodic=True):
+def reference(line, depth, body, periodic=True, agreed=AGREED, work=WORK):
     """Return the steady state at a depth of a function line(nodes) that gives heights at nodes, both ends included."""
     cells, before, earlier = COARSEST, None, np.inf
     arms = np.full(body.moduli.size, np.maximum(depth + line(cells + 1), 0.0).mean())
@@ -172,7 +172,7 @@ def reference(line, depth, body, periodic=True):
             change = abs(load / before[0] - 1) + abs(friction / before[1] - 1)
             # two grids may agree by chance
             doubt = max(change, earlier / 3)
-            if doubt < AGREED or 2 * cells * (body.moduli.size + 1) > WORK:
+            if doubt < agreed or 2 * cells * (body.moduli.size + 1) > work:
                 return Reference(load, friction, doubt)
             earlier = change
         cells, before = 2 * cells, (load, friction)

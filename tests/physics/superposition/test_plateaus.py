@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.superposition.accuracy import PLATEAUS, on_plateau, plateau_family
+from benchmarks.solvers.curves import PLATEAUS, on_a_plateau
 from mdr_dask.physics.superposition.master_curve import superpose
 
 
@@ -11,19 +11,20 @@ from mdr_dask.physics.superposition.master_curve import superpose
 @pytest.mark.parametrize("setting", PLATEAUS)
 def test_intervals_of_95_percent_hold_and_no_factor_lies_beyond_three_half_widths(setting):
     """Eight families, whose factors are wrong together."""
-    ratios = np.array([on_plateau(setting, seed)[0] for seed in range(5000, 5008)])
+    ratios = np.array([on_a_plateau(setting, np.random.default_rng(seed)).judged() for seed in range(5000, 5008)])
     assert np.mean(ratios <= 1) >= 0.85
     assert np.all(ratios <= 3)
 
 
 def test_steps_that_the_curves_do_not_determine_are_named():
-    groups, curves, _ = plateau_family("decay", 8, 20, 0.02, 0.3, 1)
-    found = superpose(10 * groups, curves)
+    family = on_a_plateau(("decay", 8, 20, 0.02, 0.3), np.random.default_rng(1))
+    found = superpose(10 * family.groups, family.curves)
     ((first, last),) = found.undetermined
     assert first == 0
     assert 10 <= last <= 40
     assert found.horizontal_error[0] > 20 * found.horizontal_error[-1]
-    assert superpose(*plateau_family("sigmoid", 5, 20, 0.005, 0.5, 1)[:2]).undetermined == ()
+    determined = on_a_plateau(("sigmoid", 5, 20, 0.005, 0.5), np.random.default_rng(1))
+    assert superpose(determined.groups, determined.curves).undetermined == ()
 
 
 def test_flat_noisy_curves_are_answered_with_intervals_as_long_as_a_curve():

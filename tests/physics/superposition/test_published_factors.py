@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.superposition import published_factors
+from benchmarks import published_factors
 
 
 @pytest.mark.slow

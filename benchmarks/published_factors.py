@@ -13,7 +13,7 @@ from scipy.optimize import curve_fit
 from mdr_dask.fits.curve_tables import read_table
 from mdr_dask.physics.superposition.master_curve import superpose
 
-DATA = Path(__file__).parents[2] / "tests" / "data" / "dma"
+DATA = Path(__file__).parents[1] / "tests" / "data" / "dma"
 REFERENCE = 7
 """Number of the curve at 3 C, counted from the coldest, at which the published factors are zero."""
 

@@ -1,10 +1,11 @@
-"""Our runner beside others: ``python -m benchmarks runner peers [CASES...]``, where `pip install ".[peers]"` was done.
+"""Our runner beside others: processor time, memory, files, and what is left after a kill.
 
-Each way of `ways` computes the same cases with the same function in the same blocks, in a process tree of its own. Its
-processor time, with starting and importing, is that of the operating system for the whole tree, and above the bare
-loop what is more than that of a plain loop on one core. Memory is the largest sum of proportional set sizes (PSS). Then
-it is done again: all processes of the way are killed (SIGKILL) once half of the cases are computed, what is left is
-read, and a second run finishes. A way that passes the limit of time is ended and has no figures.
+python -m benchmarks runner 4000       the same 4000 cases by each way; prints a table
+
+Every way of `ways` computes the same cases with the same function in the same blocks, in a process tree of its own.
+Its processor time is that of the whole tree, with starting and importing; "above the loop" is what is more than that
+of a plain loop on one core. Memory is the largest sum of proportional set sizes (PSS). Then each way runs again: all
+its processes are killed (SIGKILL) once half of the cases are computed, what is left is read, and a second run finishes.
 """
 
 from __future__ import annotations
@@ -23,13 +24,13 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-from benchmarks.measures import print_table
+from benchmarks.rows import table
 from benchmarks.runner.ways import SPEEDS, WAYS
 
 ROOT = Path(__file__).parents[2]
 #: Seconds after which a run is ended.
 LIMIT = 400.0
-#: Starts a program, adopts what outlives its parent (PR_SET_CHILD_SUBREAPER), and tells what all of them used.
+#: Starts a program, adopts what outlives its parent (PR_SET_CHILD_SUBREAPER), and prints the time that all used.
 LAUNCHER = """
 import ctypes, os, resource, subprocess, sys
 ctypes.CDLL(None).prctl(36, 1, 0, 0, 0)
@@ -66,12 +67,12 @@ class Trial:
         settings |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
         module = (sys.executable, "-m", "benchmarks.runner.ways", act, str(self.folder), str(self.lines), self.way)
         self.folder.mkdir(exist_ok=True)
-        with self.folder.with_suffix(".said").open("w") as said:
+        with self.folder.with_suffix(".text").open("w") as text:
             launched = subprocess.Popen(
                 [sys.executable, "-S", "-c", LAUNCHER, *module],
                 env={**os.environ, **settings},
                 stdout=subprocess.PIPE,
-                stderr=said,
+                stderr=text,
                 text=True,
             )
             try:
@@ -92,15 +93,15 @@ class Trial:
                     raise TimeoutError(f"more than {LIMIT:.0f} s")
                 time.sleep(0.01 if kill_at else 0.1)
             wall = time.monotonic() - begun
-            told = launched.stdout.read().split()
+            printed = launched.stdout.read().split()
         if launched.returncode and kill_at is None:
-            raise RuntimeError(self.folder.with_suffix(".said").read_text().splitlines()[-1])
-        return float(told[-1]), wall, peak / 1e6
+            raise RuntimeError(self.folder.with_suffix(".text").read_text().splitlines()[-1])
+        return float(printed[-1]), wall, peak / 1e6
 
     def read(self) -> np.ndarray:
         with self.started("read") as launched:
             if launched.wait():
-                raise RuntimeError(self.folder.with_suffix(".said").read_text().splitlines()[-1])
+                raise RuntimeError(self.folder.with_suffix(".text").read_text().splitlines()[-1])
         return np.load(self.folder.with_suffix(".read.npy"))
 
 
@@ -139,14 +140,14 @@ def after_a_kill(trial: Trial, expected: np.ndarray) -> tuple[str, str, str]:
     trial.watched(expected.size // 2)
     before = trial.computed
     left = attempt(trial.read)
-    said = left if isinstance(left, str) else f"{np.isfinite(left).sum()} of {before}"
+    text = left if isinstance(left, str) else f"{np.isfinite(left).sum()} of {before}"
     kept = 0 if isinstance(left, str) else int(np.isfinite(left).sum())
     second = attempt(trial.watched)
     if isinstance(second, str):
-        return said, "", second
+        return text, "", second
     again = trial.computed - expected.size
     same = attempt(lambda: np.array_equal(trial.read(), expected))
-    return said, f"{again} ({before - kept} not left)", "yes" if same is True else "NO" if same is False else same
+    return text, f"{again} ({before - kept} not left)", "yes" if same is True else "NO" if same is False else same
 
 
 def compare(folder: Path, cases: int, names: list[str]) -> Iterator[tuple[str, ...]]:
@@ -171,22 +172,11 @@ def compare(folder: Path, cases: int, names: list[str]) -> Iterator[tuple[str, .
         yield name, *times, f"{memory:.0f} MB", str(files), *killed
 
 
-def main(*counts: int) -> None:
+def main(cases: str = "4000", *names: str) -> None:
+    """Compare the ways with these names, or all."""
     head = ("way", "processors", "above the loop", "wall", "peak memory", "files")
     head += ("left after the kill", "computed again", "ends with the same numbers")
-    names = [name for name in WAYS if name != "bare loop"]
     with tempfile.TemporaryDirectory() as scratch:
         Trial("bare loop", Path(scratch, "warm"), 2).watched()  # compiles
-        for cases in counts:
-            folder = Path(scratch, str(cases))
-            folder.mkdir()
-            rows = []
-            for row in compare(folder, cases, names):
-                rows.append(row)
-                print(*row, sep=" | ", flush=True)
-            print(f"\n{cases} cases\n")
-            print_table(head, rows)
-
-
-if __name__ == "__main__":
-    main(*map(int, sys.argv[1:] or ["4000"]))
+        rows = compare(Path(scratch), int(cases), list(names or [name for name in WAYS if name != "bare loop"]))
+        print(table(head, rows))

@@ -1,9 +1,7 @@
-"""Friction at very high velocity, the figure of docs/high-speed.md: ``python -m benchmarks friction high_speed [PNG]``.
+"""Friction at very high velocity, the figure of docs/high-speed.md: ``python -m benchmarks high_speed [PNG]``.
 
 Twenty lines of H = 0.7, 1000 Nyquist points, F_N / (G h L) = 0.3. Prints the figures that the page quotes.
 """
-
-import sys
 
 import numpy as np
 
@@ -86,7 +84,3 @@ def _draw(means: dict[str, np.ndarray], path: str) -> None:
     axes.set_ylim(3e-3, 3)
     axes.legend(fontsize="small")
     figure.savefig(path, dpi=150)
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])

@@ -1,0 +1,194 @@
+"""Films of line contacts against another solver, and breakthrough of rollers against finer lines."""
+
+from __future__ import annotations
+
+import csv
+from functools import cache, partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from benchmarks.solvers.sliding import power
+from benchmarks.solvers.solver import Found, Solver, Truth, one_case
+from mdr_dask.models.mixed_lubrication import MODEL, declaration
+from mdr_dask.physics.lubrication import breakthrough, film_formulas, grids, line_contact
+from mdr_dask.physics.lubrication.clusters import find_clusters
+from mdr_dask.physics.lubrication.newton import Grid, Pace, newton
+from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.surfaces import roughness
+from mdr_dask.physics.surfaces.splines import closest
+from mdr_dask.physics.surfaces.waves import series
+
+E_STAR = 115.385e9
+HEAVY = Path(__file__).parents[2] / "tests/references/heavy_line_contacts.csv"
+KNOWN = 5e-6  # relative error of those films
+BOX = ((2e-6, 5e-4), (1e-13, 1e-9), (500.0, 8000.0))  # W, U, G
+OPTIONS = (
+    {},
+    {"compressible": False},
+    {"viscosity_law": "roelands", "viscosity": 0.08},
+    {"viscosity_law": "roelands", "viscosity": 0.5},
+    {"inlet": -1.2},
+)
+
+
+def films(case: line_contact.LineContact, accuracy: float) -> Found | None:
+    """Return central and minimum film to an accuracy."""
+    found = line_contact.solve_film(case, accuracy)
+    if found.outcome != Outcome.CONVERGED:
+        return None
+    both = found.central_film, found.minimum_film
+    return Found([float(film.value) for film in both], [float(film.error) for film in both])
+
+
+def uniform(case: line_contact.LineContact, count: int) -> Found | None:
+    """Return both films by Newton on equal cells from a Hertzian pressure, as is usual in the literature."""
+    guess = 1.5 * film_formulas.expected_film(case.M, case.L)
+    start = max(grids.inlet_position(guess), -20 * np.sqrt(2 * guess) - 1)
+    grid = Grid.of(np.linspace(start, 1.5, count))
+    pressure = np.sqrt(np.maximum(1 - grid.nodes**2, 0))
+    found = newton(grid, case.liquid, case.film_number, pressure, guess, Pace(0.12, 200))
+    return Found([found.central, float(found.film.min())]) if found.outcome == Outcome.CONVERGED else None
+
+
+def any_contact(random: np.random.Generator) -> tuple[line_contact.LineContact, Truth] | None:
+    """Draw a contact of the whole box and its films to 1e-6."""
+    numbers = (float(np.exp(random.uniform(np.log(low), np.log(high)))) for low, high in BOX)
+    case = line_contact.line_contact(numbers, E_STAR, **OPTIONS[random.integers(len(OPTIONS))])
+    exact = films(case, 1e-6)
+    return exact and (case, Truth(exact.values, exact.stated, exact.values))
+
+
+@cache
+def heavy_contacts() -> list[dict[str, str]]:
+    """Return the heavy contacts that another solver has solved."""
+    with HEAVY.open() as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+def heavy_contact(random: np.random.Generator) -> tuple[line_contact.LineContact, Truth]:
+    """Draw one of the heavy contacts, with the films of the other solver."""
+    row = heavy_contacts()[random.integers(len(heavy_contacts()))]
+    law = {"viscosity_law": row["viscosity_law"], "compressible": row["compressible"] == "true"}
+    law |= {"viscosity": float(row["viscosity"])} if row["viscosity"] else {}
+    case = line_contact.line_contact([float(row[name]) for name in ("W", "U", "G")], E_STAR, **law)
+    exact = np.array([float(row["central_film"]), float(row["minimum_film"])])
+    return case, Truth(exact, KNOWN * exact, exact)
+
+
+OUTPUTS = ("breakthrough_probability", "breakthrough_probability_error")
+PERIMETER, FINER = 2 * np.pi * 0.05, 8
+
+
+def rollers(random: np.random.Generator) -> tuple[declaration.MixedLubrication, Truth] | None:
+    """Draw rollers, a layer, an edge rule and in one of five cases creep; the truth is on eight times the points."""
+    case = declaration.MixedLubrication(
+        normal_force=random.uniform(200, 1200),
+        rotation_speed=power(random, -1, 1),
+        temperature=random.uniform(315, 370),
+        rms_roughness=2e-7,
+        layer_thickness=power(random, -9, -7.5),
+        edge_rule=random.choice(breakthrough.EDGE_RULES),
+        slide_roll_ratio=random.choice([0.0, 0.0, 0.0, 0.0, 0.03]),
+        points=50_000,
+        shortest_wavelength=2.5 * 8 ** random.uniform() * PERIMETER / 50_000,
+    )
+    exact = revolution(case, points=200_000 * FINER)
+    if exact is None or not 0 < exact.values < 1:
+        return None
+    return case, Truth(exact.values, exact.stated)
+
+
+def revolution(case: declaration.MixedLubrication, points: int | str, accuracy: float | None = None) -> Found | None:
+    """Return the probability of one revolution on so many points, or on as many as an accuracy needs."""
+    found = one_case(MODEL, case.model_copy(update={"points": points}), OUTPUTS, accuracy=accuracy)
+    return found and Found(*(float(found[name]) for name in OUTPUTS))
+
+
+class Revolution(NamedTuple):
+    """Waves of both rollers together, m, the level above which they touch, and the window, as a share of the line."""
+
+    waves: np.ndarray
+    level: float
+    window: float
+
+
+STRENGTH = float(breakthrough.layer_strength(1e6, E_STAR, 5e-9))
+LEVELS = (1.0431e-6, 0.5317e-6, 0.3080e-6)  # films at 40, 60 and 80 C and 800 N, m
+WINDOW = 945.4e-6  # contact width at 800 N over the perimeter
+
+
+def splines(case: Revolution, points: int) -> Found:
+    """Return the probability by splines of the line on so many points, their transform included."""
+    clusters = find_clusters(closest(case.waves, points), case.level, PERIMETER / points, STRENGTH)
+    return Found(float(np.mean(breakthrough.contact_lengths(clusters, case.window * points) > 0)))
+
+
+def window_by_window(case: Revolution, points: int) -> Found:
+    """Return the probability as the thesis counts it: window by window, a cluster is a run of points."""
+    width, limit = round(case.window * points), STRENGTH * (PERIMETER / points) ** 2
+    return Found(_breaking(series(case.waves, points) - case.level, width, limit) / points)
+
+
+@numba.njit
+def _breaking(overlap: np.ndarray, width: int, limit: float) -> int:
+    """Return the number of windows with a cluster that breaks the layer."""
+    points, found = overlap.size, 0
+    for p in range(points):
+        n, total, breaks = 0, 0.0, False
+        for k in range(p, p + width):
+            here = overlap[k if k < points else k - points]
+            if here > 0:
+                n, total = n + 1, total + here
+            if n and (here <= 0 or k == p + width - 1):
+                breaks = breaks or total > limit * n**3
+                n, total = 0, 0.0
+        found += breaks
+    return found
+
+
+def thesis_rollers(random: np.random.Generator) -> tuple[Revolution, Truth]:
+    """Draw a revolution of the thesis's rollers at 800 N; the truth is splines on two million points."""
+    amplitude = 0.2e-6 * roughness.amplitudes(100_000, 0.7, longest=748.0)
+    phase = random.uniform(0, 2 * np.pi, (100_000, 2))
+    waves = 0.5 * amplitude * np.exp(1j * phase).sum(axis=1)
+    case = Revolution(waves, float(random.choice(LEVELS)), WINDOW)
+    return case, Truth(splines(case, 2_000_000).values, 1e-6)
+
+
+SOLVERS = (
+    Solver(
+        "line contact (EHL)",
+        "Error of the worse of central and minimum film. Reference of the heavy contacts (M > 200): another solver on "
+        "up to 10 241 nodes, known to 5e-6; of the whole box, where one in five is starved: the solver itself at 1e-6.",
+        {"whole box": any_contact, "heavy": heavy_contact},
+        {
+            "accuracy": {f"{a:g}": partial(films, accuracy=a) for a in (1e-2, 1e-3, 3e-4, 1e-4)},
+            "equal cells, Newton": {f"{count} nodes": partial(uniform, count=count) for count in (201, 401, 801)},
+        },
+    ),
+    Solver(
+        "mixed lubrication",
+        "Absolute error of the probability of breakthrough in one revolution of random rollers. Reference: the same "
+        "waves on 1.6 million points.",
+        {"random rollers": rollers},
+        {
+            "points": {f"{points}": partial(revolution, points=points) for points in (50_000, 200_000)},
+            "accuracy": {f"{a:g}": partial(revolution, points="auto", accuracy=a) for a in (0.1, 0.02)},
+        },
+    ),
+    Solver(
+        "breakthrough of one revolution",
+        "The same for the rollers of the thesis at 800 N and 40, 60 or 80 C, with the time of the transform. "
+        "Reference: splines on two million points; the thesis's sums over points tend to the same.",
+        {"800 N": thesis_rollers},
+        {
+            "splines": {f"{points}": partial(splines, points=points) for points in (250_000, 500_000)},
+            "point by point (thesis)": {
+                f"{points}": partial(window_by_window, points=points) for points in (250_000, 500_000, 1_000_000)
+            },
+        },
+    ),
+)

@@ -1,0 +1,140 @@
+"""Bodies of revolution: worn profiles by every rule, and transforms between profile and image."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache, partial
+from typing import NamedTuple
+
+import numpy as np
+from references.literal_wear import literal
+from scipy.special import j0
+
+from benchmarks.solvers.sliding import power
+from benchmarks.solvers.solver import Found, Solver, Truth
+from mdr_dask.physics.mdr import transforms
+from mdr_dask.physics.mdr.revolution import PowerProfile
+from mdr_dask.physics.mdr.uniform_grid import uniform_grid
+from mdr_dask.physics.wear.exact import exact
+from mdr_dask.physics.wear.history import LoadBlock, history
+from mdr_dask.physics.wear.rules import fast
+from mdr_dask.physics.wear.worn import Worn, virgin_load
+
+FEW = 20.0  # amounts of wear beyond which cycles are not followed one by one
+
+
+class Wearing(NamedTuple):
+    """A body r^n, its c / a0 (0 is gross slip), amount of wear, whether the force is held, and radii to compare at."""
+
+    profile: PowerProfile
+    stick: float
+    amount: float
+    held: bool
+    radii: np.ndarray = np.zeros(1)
+
+    @property
+    def scale(self) -> float:
+        """The depth that can wear, over that of the contact."""
+        return 1 - float(self.profile.image(np.array(self.stick)))
+
+    def heights(self, worn: Worn) -> Found:
+        """Return the worn profile without an error."""
+        return Found(worn.height(self.radii))
+
+    def exact(self, accuracy: float) -> Found:
+        """Return the worn profile by the exact rule, and its error."""
+        (worn,) = exact(self.profile, self.stick, [self.amount], accuracy, constant_force=self.held)
+        return Found(worn.height(self.radii), worn.error("worn_profile", self.radii))
+
+    def by_blocks(self, cells: int) -> Found:
+        """Return the worn profile by a block of load, stepped on a uniform grid."""
+        kept = {"force": 2 * virgin_load(self.profile, 1.0)} if self.held else {"depth": 1.0}
+        block = LoadBlock(self.amount, self.scale if self.stick > 0 else np.inf, **kept)
+        return self.heights(history(self.profile, [block], cells=cells)[0])
+
+    def by_fast_rule(self) -> Found | None:
+        """Return the worn profile by the thesis's fast rule."""
+        if self.held or self.stick == 0:
+            return None
+        return self.heights(fast(self.profile, self.stick, self.amount, 0.8))
+
+    def by_cycles(self, cells: int) -> Found | None:
+        """Return the worn profile by simulating every cycle."""
+        if self.stick == 0 or self.amount > FEW:
+            return None
+        held = self.held
+        return self.heights(literal(self.profile, self.stick, self.amount, cells=cells, constant_force=held))
+
+
+def wearing(slips: bool, held: bool, random: np.random.Generator) -> tuple[Wearing, Truth]:
+    """Draw a body and an amount of wear; the truth is the exact rule at 1e-5."""
+    stick = 0.0 if slips else random.uniform(0.1, 0.95)
+    case = Wearing(PowerProfile(power(random, -0.2, 0.9)), stick, power(random, -1, 1), held)
+    (worn,) = exact(case.profile, stick, [case.amount], 1e-5, constant_force=held)
+    case = case._replace(radii=np.linspace(0, 1.2 * worn.contact_radius, 400))
+    return case, Truth(worn.height(case.radii), 1e-5 * case.scale, case.scale)
+
+
+class Image(NamedTuple):
+    """An image g(x), its kinks, and radii at which its profile is wanted."""
+
+    image: Callable[[np.ndarray], np.ndarray]
+    breaks: tuple[float, ...]
+    radii: np.ndarray
+
+    def by_sums(self, tolerance: float) -> Found:
+        """Return the profile by Gauss sums."""
+        found = transforms.inverse_transform(self.image, self.radii, breaks=self.breaks, tolerance=tolerance)
+        return Found(found.value, found.error)
+
+    def by_matrix(self, cells: int) -> Found:
+        """Return the profile by the matrix of a uniform grid, which is kept from the first call on."""
+        grid, flat = _grid(cells), self.image(np.zeros(1))
+        return Found(np.interp(self.radii, grid.nodes, grid.inverse @ (self.image(grid.nodes) - flat) + flat))
+
+
+_grid = cache(lambda cells: uniform_grid(cells, 2.0))
+
+
+def waves(random: np.random.Generator) -> tuple[Image, Truth]:
+    """Draw the image cos(q x), whose profile is J0(q r)."""
+    wave, radii = power(random, 0, 2), random.uniform(0, 2, 40)
+    return Image(lambda x: np.cos(wave * x), (), radii), Truth(j0(wave * radii), 1e-15)
+
+
+def kink(random: np.random.Generator) -> tuple[Image, Truth]:
+    """Draw the image max(x^2 - b^2, 0) and its profile."""
+    b, radii = random.uniform(0.2, 1.5), random.uniform(0, 2, 40)
+    outside = np.maximum(radii, b)
+    profile = (outside**2 - 2 * b**2) * np.arccos(b / outside) + b * np.sqrt(outside**2 - b**2)
+    return Image(lambda x: np.maximum(x**2 - b**2, 0), (b,), radii), Truth(profile / np.pi, 1e-15)
+
+
+SOLVERS = (
+    Solver(
+        "wear",
+        "Largest error of the worn profile over the depth that can wear. Reference: the exact rule at 1e-5; simulating "
+        "every cycle, as the thesis did, tends to the same with the cells of its grid.",
+        {
+            "depth held": partial(wearing, False, False),
+            "force held": partial(wearing, False, True),
+            "gross slip": partial(wearing, True, False),
+        },
+        {
+            "exact rule": {f"accuracy {a:g}": partial(Wearing.exact, accuracy=a) for a in (0.1, 0.01, 1e-3)},
+            "fast rule": {"ξ = 0.8": Wearing.by_fast_rule},
+            "blocks of load": {f"{cells} cells": partial(Wearing.by_blocks, cells=cells) for cells in (50, 200)},
+            "every cycle (thesis)": {f"{cells} cells": partial(Wearing.by_cycles, cells=cells) for cells in (50, 100)},
+        },
+    ),
+    Solver(
+        "transforms",
+        "Largest error of the profile of an image: waves of 1 to 100 radians, and a parabola beyond a kink. Reference: "
+        "Bessel's J0 and a closed form.",
+        {"waves": waves, "a kink": kink},
+        {
+            "Gauss sums": {f"tolerance {t:g}": partial(Image.by_sums, tolerance=t) for t in (1e-2, 1e-4, 1e-8)},
+            "matrix of a uniform grid": {f"{n} cells": partial(Image.by_matrix, cells=n) for n in (50, 200, 800)},
+        },
+    ),
+)
