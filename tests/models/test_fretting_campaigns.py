@@ -66,19 +66,6 @@ def test_units_in_the_store(write, parameters, units):
     assert "path" not in data.coords or data["path"].attrs["units"] == "1"
 
 
-def test_a_grid_is_solved_once_for_each_stick_radius(write, capsys):
-    """Two frictions make two c; wear coefficient, hardness and cycles are only other moments of the same evolution."""
-    varied = STEEL.replace("friction: 0.6", "friction: [0.6, 0.7]").replace("1e-4", "[1e-5, 1e-4, 1e-3]")
-    varied = varied.replace("hardness: 2 GPa", "hardness: [1 GPa, 2 GPa]")
-    path = write(varied + "  cycles: [1e3, 1e4, 1e5, 1e6]\n  wear_rule: exact\n")
-    assert main(["run", str(path), "--dry-run"]) == 0
-    assert "2 solves remain after sharing" in capsys.readouterr().out
-    assert main(["run", str(path)]) == 0
-    streams = capsys.readouterr()
-    assert streams.out == "wear.zarr: 48 done, 0 failed\n"
-    assert " 2 solves (95.8% of the results" in streams.err
-
-
 def test_a_grid_over_friction_and_stiffness_is_solved_once_for_each_distinct_stick_radius(write, capsys):
     """G* U0 / (mu E*) takes 6 values in 18 combinations; the blocks hold all the cases of each of them."""
     varied = STEEL.replace("normal_force: 50 N", "depth: 5 um").replace("115 GPa", "[100 GPa, 200 GPa, 400 GPa]")
@@ -91,15 +78,6 @@ def test_a_grid_over_friction_and_stiffness_is_solved_once_for_each_distinct_sti
     streams = capsys.readouterr()
     assert streams.out == "wear.zarr: 72 done, 0 failed\n"
     assert " 6 solves (91.7% of the results" in streams.err
-
-
-def test_cases_that_only_differ_in_stiffness_share_the_closed_forms(write, capsys):
-    """With the depth given, c depends on G*/(mu E*) alone."""
-    varied = STEEL.replace("normal_force: 50 N", "depth: 5 um").replace("115 GPa", "[100 GPa, 200 GPa]")
-    varied = varied.replace("90 GPa", "[80 GPa, 160 GPa]").replace("hardness: 2 GPa", "hardness: [2 GPa, 4 GPa]")
-    path = write(varied + "  wear_rule: limit\n")
-    assert main(["run", str(path)]) == 0
-    assert " 3 solves (62.5% of the results" in capsys.readouterr().err  # G*/E* = 0.4, 0.8, 1.6
 
 
 def test_sliding_from_a_campaign(write):

@@ -4,7 +4,7 @@ from pydantic import ValidationError
 
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.data_file import DataFile
-from mdr_dask.models.fretting_wear import MODEL, solve
+from mdr_dask.models.fretting_wear import MODEL
 from mdr_dask.models.fretting_wear.declaration import Cone, FrettingWear, LoadStep, Parabola, Power, Table
 from mdr_dask.physics.mdr.revolution import PowerProfile
 from mdr_dask.physics.wear import rules as wear
@@ -30,14 +30,6 @@ def run(parameters, columns=None, outputs=SCALARS, realisations=(0,), seed=1):
     return MODEL.compute(Block(parameters, columns, cases, realisations, seed, outputs))
 
 
-def test_dimensionless_fast_is_the_physics():
-    result = run(FrettingWear(wear_rule="fast", stick_radius=0.455, cycles=2.0, xi=0.9))
-    worn = wear.fast(PowerProfile(2.0), 0.455, 2.0, 0.9)
-    assert result.values["wear_volume"][0, 0] == pytest.approx(worn.wear_volume, rel=1e-6)
-    assert result.values["contact_radius"][0, 0] == pytest.approx(worn.contact_radius, rel=1e-6)
-    assert result.values["stick_border"][0, 0] == pytest.approx(0.455, rel=1e-14)
-
-
 @pytest.mark.parametrize("wear_rule", ["limit", "fast", "exact"])
 def test_every_rule_has_every_output(wear_rule):
     outputs = MODEL.with_companions([output.name for output in MODEL.outputs])
@@ -54,15 +46,6 @@ def test_every_rule_has_every_output(wear_rule):
     assert result.values["worn_depth"][0, 0] == pytest.approx(np.max(f - r**2 / 2), abs=0.01)
 
 
-def test_exact_cases_that_share_n_and_c_are_solved_once():
-    cycles, friction = np.meshgrid([1e4, 1e5, 1e6], [0.5, 0.7], indexing="ij")
-    columns = {"cycles": cycles.ravel(), "friction": friction.ravel()}
-    parameters = FrettingWear(**STEEL, wear_rule="exact")
-    result = run(parameters, columns)
-    assert result.solves == 2
-    assert np.all(result.status == Status.DONE)
-
-
 def test_dimensional_case_is_the_dimensionless_one_in_its_units():
     result = run(FrettingWear(**STEEL, wear_rule="exact"))
     R, E, F = 0.01, 115e9, 50.0
@@ -74,18 +57,6 @@ def test_dimensional_case_is_the_dimensionless_one_in_its_units():
     assert result.values["wear_volume"][0, 0] == pytest.approx(worn.wear_volume * a0**2 * d0, rel=1e-8)
     assert result.values["contact_force"][0, 0] == pytest.approx(worn.normal_force * E * a0 * d0, rel=1e-8)
     assert result.values["stick_border"][0, 0] == pytest.approx(c * a0, rel=1e-10)
-
-
-def test_virgin_force_is_the_load_for_every_indenter():
-    for indenter in (
-        Parabola(radius=0.01),
-        Cone(shape="cone", angle=0.1),
-        Power(shape="power", exponent=3.0, coefficient=3e3),
-    ):
-        settings = {**STEEL, "indenter": indenter, "cycles": 0.0, "amplitude": 1e-9}
-        result = run(FrettingWear(**settings))
-        assert result.values["contact_force"][0, 0] == pytest.approx(50.0, rel=1e-6)
-        assert result.values["wear_volume"][0, 0] == 0.0
 
 
 @pytest.mark.parametrize("wear_rule", ["fast", "exact"])
@@ -162,14 +133,6 @@ def test_constant_force():
     assert "constant depth only" in mixed.messages[0, 0]
 
 
-def test_history_of_amplitudes():
-    steps = (LoadStep(cycles=0.5), LoadStep(cycles=0.5, amplitude_factor=1.2))
-    result = run(FrettingWear(stick_radius=0.5, wear_rule="exact", history=steps, cells=60))
-    one = run(FrettingWear(stick_radius=0.5, wear_rule="exact", history=steps[:1], cells=60))
-    assert result.values["wear_volume"][0, 0] > one.values["wear_volume"][0, 0]
-    assert result.values["stick_border"][0, 0] < one.values["stick_border"][0, 0]
-
-
 def test_a_history_may_slip_everywhere():
     history = (LoadStep(cycles=1e4),)
     steel = {name: value for name, value in STEEL.items() if name != "cycles"} | {"amplitude": 1e-4}
@@ -207,50 +170,6 @@ def test_table_of_a_ball(tmp_path):
         assert measured.values[name][0, 0] == pytest.approx(smooth.values[name][0, 0], rel=1e-5)
 
 
-def test_a_table_of_a_profile_may_have_its_columns_in_any_order_and_unit(tmp_path):
-    """Names and units were ignored: such a table was read as radii of heights, in metres."""
-    path = tmp_path / "profile.csv"
-    r = np.linspace(0, 1.0, 51).tolist()
-    texts = (
-        "radius [m],height [m]\n" + "".join(f"{x / 1e3!r},{x**2 / 2e4!r}\n" for x in r),
-        "# stylus\nHeight [um];radius [mm]\n" + "".join(f"{50 * x**2!r};{x!r}\n".replace(".", ",") for x in r),
-    )
-    found = []
-    for text in texts:
-        path.write_text(text)
-        found.append(table_case(named(path)).values["wear_volume"][0, 0])
-    assert found[0] > 0
-    assert found[1] == pytest.approx(found[0], rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("problem", "status"), [(ValueError("no body"), Status.FAILED), (ArithmeticError("no end"), Status.NOT_CONVERGED)]
-)
-def test_a_contact_that_cannot_be_solved_says_why_and_leaves_the_others(problem, status, monkeypatch):
-    solved = solve._contacts
-
-    def contacts(task, *given):
-        if task.level > 0.3:  # the square of the radius of stick
-            raise problem
-        return solved(task, *given)
-
-    monkeypatch.setattr(solve, "_contacts", contacts)
-    columns = {"stick_radius": np.array([0.3, 0.6, 0.6]), "cycles": np.array([0.7, 0.7, 3.0])}
-    found = run(FrettingWear(stick_radius=0.3, wear_rule="exact"), columns)
-    assert found.status[:, 0].tolist() == [Status.DONE, status, status]
-    assert found.messages == {(1, 0): str(problem), (2, 0): str(problem)}
-    assert np.isfinite(found.values["wear_volume"][:, 0]).tolist() == [True, False, False]
-
-
-def test_a_block_of_gross_slip_alone_has_messages_and_no_solution():
-    columns = {"friction": np.full(3, 1e-3)}
-    for rule in ("fast", "limit", "exact"):
-        found = run(FrettingWear(**STEEL, wear_rule=rule), columns, ("wear_volume", "contact_radius"))
-        assert found.status[:, 0].tolist() == [Status.FAILED] * 3
-        assert len(found.messages) == 3
-        assert np.all(np.isnan(found.values["wear_volume"]))
-
-
 def test_contact_beyond_the_table(tmp_path):
     result = table_case(table(tmp_path, [(0.0, 0.0), (1e-6, 1e-10), (2e-6, 4e-10), (3e-6, 9e-10)]), (0, 1))
     assert result.status.tolist() == [[Status.FAILED] * 2]
@@ -271,27 +190,6 @@ def test_contact_beyond_the_table(tmp_path):
 def test_bad_parameters(changes, message):
     with pytest.raises(ValidationError, match=message):
         FrettingWear(**{**STEEL, **changes})
-
-
-@pytest.mark.parametrize("c", [1e-3, 0.999])
-@pytest.mark.parametrize("exponent", [0.5, 2.0, 20.0])
-@pytest.mark.parametrize("cycles", [1e-9, 1e4])
-def test_extremes_of_the_fast_rule(exponent, c, cycles):
-    result = run(
-        FrettingWear(indenter=Power(shape="power", exponent=exponent), wear_rule="fast", stick_radius=c, cycles=cycles)
-    )
-    assert result.status[0, 0] == Status.DONE
-    assert 0 <= result.values["wear_volume"][0, 0] < 10
-    assert result.values["contact_radius"][0, 0] >= 1
-
-
-def test_distinct_and_seconds_are_cheap_estimates():
-    block = Block(
-        FrettingWear(wear_rule="fast", stick_radius=0.5), {"cycles": np.arange(6.0) // 2}, 6, (0,), 1, SCALARS
-    )
-    assert MODEL.distinct is not None
-    assert MODEL.distinct(block) == 3
-    assert 0 < MODEL.seconds(block) < 0.1
 
 
 @pytest.mark.parametrize("hold", ["depth", "force"])

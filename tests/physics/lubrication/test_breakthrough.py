@@ -45,14 +45,6 @@ def test_clusters_of_a_wave():
     assert np.all(errors[0] / errors[2] > 60)
 
 
-def test_clusters_come_in_the_order_of_their_starts_and_one_across_the_seam_ends_beyond_it():
-    step = 2 * np.pi / 60
-    found = clusters_of(np.cos(3 * step * np.arange(60)), 0.0)
-    np.testing.assert_allclose(found.start, [15, 35, 55], atol=1e-4)
-    np.testing.assert_allclose(found.end, [25, 45, 65], atol=1e-4)
-    np.testing.assert_allclose(found.total * step, 2 / 3, rtol=1e-3)
-
-
 def test_the_integral_of_a_closed_line_does_not_depend_on_where_it_is_closed():
     """Ends before, on and after the seam, and in the first cell beyond it."""
     line = np.random.default_rng(3).normal(size=40)
@@ -77,10 +69,6 @@ def test_a_line_wholly_in_contact_is_one_cluster():
         assert bt.contact_lengths(found, 3.0, rule).tolist() == [spacings * bt.PARTS] * 8
 
 
-def test_no_contact_gives_an_empty_trace():
-    assert not bt.contact_lengths(clusters_of(np.zeros(8), 1.0), 3.0).any()
-
-
 def test_a_parabolic_asperity_breaks_if_its_curvature_exceeds_twelve_strengths():
     """pi tau0/(E* h_c) is the critical curvature whatever the indentation; a spline is exact for a parabola."""
     spacing = 1e-8
@@ -92,20 +80,6 @@ def test_a_parabolic_asperity_breaks_if_its_curvature_exceeds_twelve_strengths()
             found = clusters_of(depth - curvature * x**2 / 2, 0.0, spacing, STRENGTH)
             np.testing.assert_allclose(found.length, width_points, rtol=1e-6)
             assert found.broken.tolist() == [broken]
-
-
-def test_only_the_ratio_of_strength_stiffness_and_thickness_matters():
-    assert bt.layer_strength(1e6, E_STAR, 5e-9) == pytest.approx(bt.layer_strength(3e6, E_STAR / 2, 30e-9), rel=1e-14)
-
-
-@pytest.mark.parametrize("factor", [2.0**-20, 2.0**10])
-def test_results_do_not_depend_on_the_unit_of_length(factor):
-    """Scaling all lengths by a power of two changes no bit of the trace."""
-    line, _, _ = rough_line(4096, 8, 400, 0.7, 1, rms=1e-6)
-    trace = bt.contact_lengths(clusters_of(line, 1e-6, 1e-6, 1e4), 50.3)
-    scaled = bt.contact_lengths(clusters_of(line * factor, 1e-6 * factor, 1e-6 * factor, 1e4 / factor), 50.3)
-    assert trace.any()
-    np.testing.assert_array_equal(trace, scaled)
 
 
 @pytest.mark.parametrize("rule", bt.EDGE_RULES)
@@ -188,19 +162,6 @@ def test_geometric_length_of_a_gaussian_line():
     assert abs(mean - ndtr(-1.5)) < 4 * error
 
 
-def test_number_of_clusters_by_rice():
-    """Upcrossings per turn: (1/2 pi) sqrt(m2/m0) exp(-h^2/2 m0) L; a spline misses none."""
-    points, counts = 100_000, []
-    for seed in range(24):
-        line, amplitude, k = rough_line(points, 40, 5000, 0.7, seed)
-        counts.append(clusters_of(line, 1.5).start.size)
-    second = np.sum((amplitude * 2 * np.pi * k) ** 2) / 2
-    expected = np.sqrt(second) / (2 * np.pi) * np.exp(-(1.5**2) / 2)
-    error = np.std(counts, ddof=1) / np.sqrt(24)
-    assert abs(np.mean(counts) - expected) < 4 * error
-    assert error < 0.03 * expected
-
-
 def test_resistance_is_inverse_to_the_length_and_infinite_without_contact():
     assert bt.contact_resistance(2e-7, [1e-6, 0.0]).tolist() == [0.2, np.inf]
 
@@ -254,24 +215,6 @@ def test_probabilities_of_the_rig():
     assert np.all(error < 1.0)
 
 
-def test_number_of_points_does_not_matter_at_a_fixed_cut_off():
-    """N = a half, 1 and 2 million: the same wave sampled more finely moves P by less than 0.05 points."""
-    fine = rig_line(2_000_000, 0)
-    values = [100 * rig_probability(fine[::step], (800, 100, 60)) for step in (4, 2, 1)]
-    assert np.ptp(values) < 0.05
-
-
-def test_trends_of_figure_5_9():
-    line = rig_line(10**6, 1)
-
-    def probabilities(cases):
-        return [rig_probability(line, case) for case in cases]
-
-    assert np.all(np.diff(probabilities([(800, 100, t) for t in (40, 50, 60, 70, 80)])) > 0)
-    assert np.all(np.diff(probabilities([(f, 100, 60) for f in (100, 200, 400, 800, 1600)])) > 0)
-    assert np.all(np.diff(probabilities([(800, n, 60) for n in (86, 100, 130, 160, 200)])) < 0)
-
-
 def test_edge_rules_differ_by_a_few_points_and_in_this_order():
     line = rig_line(10**6, 2)
     part, clip, inside = (100 * rig_probability(line, (800, 100, 80), rule=r) for r in ("part", "clip", "inside"))
@@ -294,19 +237,3 @@ def test_creep_leaves_the_expected_probability():
     assert 0.1 < means[0.0] < 0.9
     for slip in (0.05, 1.0):
         assert abs(means[slip] - means[0.0]) < 4 * np.hypot(errors[slip], errors[0.0])
-
-
-def test_sparse_windows_have_the_mean_of_all():
-    line, _, _ = rough_line(100_000, 100, 10_000, 0.7, 3)
-    found = clusters_of(line, 1.0, 1.0, 1e-3)
-    every = bt.contact_lengths(found, 200.0) > 0
-    positions = bt.creep_positions(np.arange(0, 100_000, 25), 100_000, 0.0)
-    sparse = bt.judge_windows(bt.Pair(through_heights(line), np.zeros(100_000), 1.0, 1.0, 1e-3), 200.0, positions) > 0
-    # the trace changes state a few times a window at most: a grid of eighths misses part of an eighth each time
-    assert sparse.mean() == pytest.approx(every.mean(), abs=0.01)
-
-
-def test_creep_moves_the_lines_apart_by_the_slide_roll_ratio():
-    first, second = bt.creep_positions(np.arange(0, 1000, 10), 1000, 0.2)
-    assert first.size == 100
-    assert (first[1] - first[0], second[1] - second[0]) == (11, 9)

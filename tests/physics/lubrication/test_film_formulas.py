@@ -108,12 +108,6 @@ def test_regime_of_extreme_points(point, name):
     assert film.REGIMES[int(film.regime(*point))] == name
 
 
-def test_arrays_broadcast():
-    films = film.limiting_films(np.array([1e-5, 1e-4])[:, None], np.array([1e-12, 1e-11, 1e-10]), 5000.0)
-    assert films.shape == (4, 2, 3)
-    assert film.regime(np.array([1e-5, 1e-4]), 1e-11, 5000.0).shape == (2,)
-
-
 def test_gap_beside_a_dry_contact_starts_at_zero_and_ends_at_the_parabola():
     gap = film.hertz_gap(np.array([0.0, 1e-4, 1e-1]), 1e-4, 0.025)
     assert gap[:2].tolist() == [0.0, 0.0]

@@ -84,11 +84,3 @@ def test_a_front_lies_in_the_middle_of_a_cell_of_every_aligned_grid(front: float
         assert abs(nodes.size / count - 1) < 0.15
         middle = 0.5 * (nodes[:-2] + nodes[1:-1])
         np.testing.assert_allclose(np.diff(nodes[:-1]) * np.interp(middle, positions, density), spacing, rtol=0.02)
-
-
-@pytest.mark.parametrize("front", [np.nan, 1.037, 1.5, 1.037 - 1e-13])
-def test_a_front_that_is_none_or_hardly_before_the_end_hardly_matters(front: float) -> None:
-    positions, density = np.linspace(-5.0, 2.0, 60), np.ones(60)
-    nodes, _ = aligned(positions, density, 114, 1.037, front)
-    assert abs(nodes.size / 114 - 1) < 0.15
-    assert np.all(np.diff(nodes) > 0)

@@ -5,9 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.linear import Factors, factorise
-from mdr_dask.physics.lubrication import newton as module
 from mdr_dask.physics.lubrication import oil
 from mdr_dask.physics.lubrication.newton import (
     Grid,
@@ -103,27 +100,6 @@ def test_result_is_complementary_and_carries_the_load() -> None:
     assert np.all(R[~carrying][1:-1] <= 0)
     assert P.min() >= 0
     assert 0.05 * P.sum() == pytest.approx(np.pi / 2, rel=1e-12)
-
-
-def test_factors_serve_while_steps_shrink(monkeypatch: pytest.MonkeyPatch) -> None:
-    """From a guess nearby, one factorisation takes every step; what it leaves is below the square of the tolerance."""
-    exact, spent = _uniform_case(60), []
-
-    def counted(matrix: FloatArray) -> Factors | None:
-        spent.append(matrix.shape)
-        return factorise(matrix)
-
-    monkeypatch.setattr(module, "factorise", counted)
-    found = newton(GRID, BARUS, 0.2, 1.001 * exact.pressure, 1.001 * exact.central, Pace(0.12, 30))
-    assert len(spent) == 1 < found.steps
-    np.testing.assert_allclose(found.pressure, exact.pressure, atol=1e-8)
-    assert found.central == pytest.approx(exact.central, rel=1e-8)
-
-
-def test_weights_are_those_of_the_trapezoidal_rule() -> None:
-    nodes = np.array([-2.0, -1.5, 0.0, 0.25, 3.0])
-    values = np.array([1.0, -2.0, 0.5, 4.0, 1.0])
-    assert Grid.of(nodes).weights @ values == pytest.approx(np.trapezoid(values, nodes), rel=1e-14)
 
 
 def test_failures_are_values() -> None:

@@ -138,16 +138,6 @@ def test_a_step_that_leaves_the_numbers_fails_without_a_warning():
     assert worn.depth > 1.0
 
 
-def test_few_cycles_of_the_review_state_their_error():
-    """Errors of 1.2e-6 and 2.5e-4 were stated as 7.2e-9 and 3.7e-6."""
-    for exponent, c, cycles in ((1.37, 0.8, 0.004905), (4.608, 0.1109, 0.05509)):
-        profile = PowerProfile(exponent)
-        rough, fine = (exact(profile, c, [cycles], accuracy)[0] for accuracy in (1e-2, 2e-5))
-        gap = np.abs(rough.height(PLACES) - fine.height(PLACES))
-        assert np.max(gap) <= np.max(rough.error("worn_profile", PLACES)) <= 1e-2
-        assert np.max(fine.error("worn_profile", PLACES)) < np.max(rough.error("worn_profile", PLACES))
-
-
 @pytest.mark.slow
 def test_the_estimate_under_constant_force_falls_with_the_accuracy():
     """It grew from 4.9e-3 to 1.3e-2 at N = 8 when the accuracy went from 1e-3 to 1e-4, then stayed from 4e-4 on."""

@@ -12,9 +12,8 @@ from mdr_dask.physics.mdr.half_integrals import graded_panels
 from mdr_dask.physics.mdr.revolution import PowerProfile, from_table
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear import evolution
-from mdr_dask.physics.wear import rules as wear
 from mdr_dask.physics.wear.exact import exact, limit_under_force
-from mdr_dask.physics.wear.forced_slip import BEYOND, forced_slip
+from mdr_dask.physics.wear.forced_slip import forced_slip
 
 PARABOLA = PowerProfile(2.0)
 exact_forced = partial(exact, constant_force=True)
@@ -113,21 +112,6 @@ def test_the_rise_of_the_plateau_is_the_integral_along_the_path():
     assert problem.frozen_depth(path, np.array([cut]))[0] == pytest.approx(rise - virgin, rel=1e-12)
 
 
-def test_a_contact_that_grows_past_the_panels_of_the_moment_before_remembers_the_path():
-    """The rise of the plateau is kept on panels that end a little beyond the edge; past them it is integrated."""
-    problem = forced_slip(PARABOLA, 0.455, graded_panels(8, 6, 4), 3.0)
-    moving, start = problem.move(evolution.settled(problem))
-    last = evolution.march(moving, 0.5, 1e-3, 1e-4, start)[-1]
-    unknowns, size = last.unknowns.copy(), moving.size
-    unknowns[size - 1] *= 3.0 * BEYOND
-    border, width, _ = moving.place(unknowns)
-    places = border + width * moving.panels.nodes
-    beyond = places > border + width / 3.0
-    virgin = np.exp(moving.virgin.virgin_slip(moving.body.width * places[beyond]))
-    known = moving.memory([last], np.ones(1))(unknowns)[:size][beyond]
-    np.testing.assert_allclose(known, virgin - moving.plateau_rise(last.path, places[beyond]), rtol=1e-12)
-
-
 def test_the_image_is_at_the_depth_at_the_edge(worn):
     """At the very edge, too, where rounding may put its place just outside of the ring."""
     for contact in worn[1:]:
@@ -208,27 +192,8 @@ def test_a_table_that_ends_before_the_last_contact_is_refused():
         limit_under_force(body, 0.455, 1e-3)
 
 
-def test_gross_slip_is_refused():
-    with pytest.raises(ValueError, match="the stick radius must lie between 0 and 1"):
-        exact_forced(PARABOLA, 1.0, [1.0])
-
-
 def test_a_result_does_not_depend_on_what_else_was_asked_for():
     alone = exact_forced(PARABOLA, 0.5, [1.3], accuracy=1e-3)[0]
     among = exact_forced(PARABOLA, 0.5, [9.0, 1.3, 0.2], accuracy=1e-3)[1]
     assert (alone.wear_volume, alone.depth) == (among.wear_volume, among.depth)
     np.testing.assert_array_equal(alone.height(RADII), among.height(RADII))
-
-
-@pytest.mark.slow
-def test_virgin_contact_is_unworn():
-    contact = exact_forced(PARABOLA, 0.455, [0.0], accuracy=1e-3)[0]
-    assert (contact.wear_volume, contact.stick_border) == (0.0, 0.455)
-    assert wear.limit(PARABOLA, 0.455).wear_volume < limit_under_force(PARABOLA, 0.455, 1e-3).wear_volume
-
-
-def test_a_march_may_begin_with_steps_as_short_as_it_needs():
-    """Next to gross slip a steep body moves its border at once: the first step is a ten-thousandth and less."""
-    profile, c = PowerProfile(4.916810571353128), 0.10792076652241178
-    (worn,) = exact(profile, c, [0.04], 2e-5, constant_force=True, errors=False)
-    assert worn.stick_border > c

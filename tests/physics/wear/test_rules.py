@@ -6,7 +6,6 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from mdr_dask.physics.mdr.revolution import PowerProfile, from_table
-from mdr_dask.physics.mdr.transforms import forward_transform, power_factor
 from mdr_dask.physics.wear import rules as wear
 
 PARABOLA, CONE = PowerProfile(2.0), PowerProfile(1.0)
@@ -34,13 +33,6 @@ def test_limit_radius_is_the_parametric_form(t):
     for profile, form in ((PARABOLA, limit_of_a_parabola), (CONE, limit_of_a_cone)):
         c, a = form(t)
         assert wear.limit_radius(profile, float(c)) == pytest.approx(float(a), rel=1e-12)
-
-
-def test_printed_limit_of_the_parabola_is_low_by_at_most_3_6_percent():
-    c, a = limit_of_a_parabola(np.linspace(0.01, 1.57, 400))
-    low = 1 - (np.sqrt(2.0 + c**2 / 4) - c / 2) / a  # thesis eq. 6.16
-    assert low.min() > -1e-12
-    assert low.max() == pytest.approx(0.036, abs=0.0005)
 
 
 @pytest.mark.parametrize("exponent", [0.5, 1.0, 2.0, 3.3, 10.0])
@@ -180,8 +172,3 @@ def test_scar_beyond_the_table():
 def test_no_partial_slip(c):
     with pytest.raises(ValueError, match="gross slip"):
         wear.limit(PARABOLA, c)
-
-
-def test_power_factor_is_consistent():
-    g = forward_transform(lambda r: r / power_factor(2.0) * 2, [1.0]).value
-    assert g[0] == pytest.approx(1.0)
