@@ -1,4 +1,4 @@
-"""Shift factors of measured moduli beside published ones: ``python -m benchmarks superposition published_factors``
+"""Shift factors of measured moduli beside published ones: ``python -m benchmarks published_factors``
 
 The published factors are those of straight lines: to each curve a power of the frequency is fitted by least squares of
 the modulus itself, and neighbours are brought together at one modulus, half way between the lowest of the curve
@@ -32,10 +32,6 @@ def published():
 
 def by_straight_lines(curves):
     """Return log10 of the factors as they were published: see above."""
-    return _chained(curves)
-
-
-def _chained(curves):
     factors = np.zeros(len(curves))
     for other in range(REFERENCE - 1, -1, -1):
         factors[other] = factors[other + 1] + _met_by_lines(curves[other + 1], curves[other])
@@ -72,7 +68,3 @@ def main():
     for row in zip(temperatures, ours, low, high, theirs, strict=True):
         inside = "yes" if row[2] <= row[4] <= row[3] else "no"
         print("{:6.1f} {:8.3f} {:8.3f} {:8.3f} {:8.3f} {}".format(*row, inside))
-
-
-if __name__ == "__main__":
-    main()

@@ -18,7 +18,7 @@ LEAST_GROWTH, MOST_GROWTH = 1.25, 4.0
 GROWTH = 1.5
 #: With `FEWEST` or more results, the estimated standard error is used as it is. Fewer results estimate their scatter
 #: badly: stopping by it, 95 % intervals would cover as little as 89 %. So from `FEW` results on, a case may stop if a
-#: variance `DOUBT` times as large would meet the tolerance as well. Measured: ``python -m benchmarks friction``.
+#: variance `DOUBT` times as large would meet the tolerance as well. Measured: ``python -m benchmarks campaigns``.
 FEWEST, FEW, DOUBT = 12, 7, 2.0
 #: Part of the tolerance that the standard error of fewer results must meet: all realisations give the same.
 NEGLIGIBLE = 1e-3

@@ -1,6 +1,7 @@
 """Every kind of benchmark in a short form, and the pages that benchmarks make."""
 
 import importlib
+import re
 import sys
 from pathlib import Path
 
@@ -23,6 +24,16 @@ CASES = {"wear": 2, "breakthrough of one revolution": 1, "transforms": 20, "leve
 def test_all_kinds_exist():
     for module, _ in command.KINDS.values():
         assert callable(importlib.import_module(module).main)
+
+
+def test_every_command_that_is_named_exists():
+    """In pages, and in docstrings and comments of the package."""
+    root = Path(__file__).parents[1]
+    for path in [*root.glob("*.md"), *root.glob("docs/**/*.md"), *root.glob("mdr_dask/**/*.py")]:
+        for kind, argument in re.findall(r"python -m benchmarks (\w+)(?: (\w+))?", path.read_text()):
+            assert kind in command.KINDS, f"{path}: no benchmark {kind}"
+            if kind == "accuracy" and argument:
+                assert argument in SOLVERS, f"{path}: no solver {argument}"
 
 
 def test_the_page_of_accuracy_is_what_its_table_says():

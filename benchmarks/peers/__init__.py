@@ -54,15 +54,15 @@ ABOUT = {
         "pyvisco is made for moduli that only rise. A row says so where some of its fits end without a result.",
     ),
     "Abel transform": (
-        "Pressure from the line load at equidistant radii; the error is the largest one. PyAbel (MIT) has its matrices "
-        "in memory. Ours is given the function, or a cubic spline through the same samples.",
+        "Largest error of the pressure from the line load at 1601 equidistant radii. PyAbel (MIT) has its matrices in "
+        "memory. Ours is given the function, or a cubic spline through the same samples.",
         "PyAbel is made for images: a matrix serves hundreds of rows at once, and no edge of the contact is needed. "
         "Ours is given the edge.",
     ),
     "statistics of surfaces": (
-        "A line of 65 536 points and a map of 512 x 512 points with known spectra, either without waves of less than "
-        "eight points or with all waves of the grid. Relative error, and time of height, slope and spectrum together. "
-        "SurfaceTopography (MIT) takes differences of neighbours.",
+        "Relative error of the rms slope of a line of 65 536 points, or of the rms gradient of a map of 512 x 512 "
+        "points, with known spectra, either without waves of less than eight points or with all waves of the grid; and "
+        "time of height, slope and spectrum together. SurfaceTopography (MIT) takes differences of neighbours.",
         "Differences suit measured points with noise, which the derivative of a Fourier series makes larger. The "
         "series suits generated lines, whose waves are known.",
     ),

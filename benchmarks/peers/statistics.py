@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -19,24 +20,23 @@ POINTS, SIDE, HURST = 2**16, 512, 0.8
 SHORTEST = {"smooth": 8, "to the grid": 2}
 
 
-def lines(shortest: int) -> tuple[np.ndarray, dict[str, float]]:
-    """Return a line of unit length, with its rms height and slope from the amplitudes."""
+def lines(shortest: int) -> tuple[np.ndarray, float]:
+    """Return a line of unit length, with its rms slope from the amplitudes."""
     modes = POINTS // shortest - (shortest == 2)
     amplitude = roughness.amplitudes(modes, HURST)
     height = roughness.line(amplitude, roughness.phases(1, 0, modes), POINTS)
     q = 2 * np.pi * np.arange(1, modes + 1)
-    powers = {"rms height": amplitude, "rms slope": amplitude * q}
-    return height, {name: float(np.sqrt(np.sum(each**2) / 2)) for name, each in powers.items()}
+    return height, float(np.sqrt(np.sum((amplitude * q) ** 2) / 2))
 
 
-def maps(shortest: int) -> tuple[np.ndarray, dict[str, float]]:
-    """Return a map of unit size, with its rms height and gradient from the amplitudes."""
+def maps(shortest: int) -> tuple[np.ndarray, float]:
+    """Return a map of unit size, with its rms gradient from the amplitudes."""
     spectrum = self_affine(HURST, 1.0, shortest / SIDE)
     height = areal_surface(spectrum, (SIDE, SIDE), (1.0, 1.0), 1, 0)
     q = np.hypot(*np.meshgrid(*wavenumbers((SIDE, SIDE), (1.0, 1.0)), indexing="ij"))
-    power = (2 * np.pi) ** 2 * spectrum.at(q)
+    power = (2 * np.pi * q) ** 2 * spectrum.at(q)
     power[:, 1:-1] *= 2
-    return height, {"rms height": float(np.sqrt(power.sum())), "rms gradient": float(np.sqrt((power * q**2).sum()))}
+    return height, float(np.sqrt(power.sum()))
 
 
 def of_line(height):
@@ -66,16 +66,12 @@ def peer_of_map(height):
 
 
 def compared() -> Iterator[Row]:
-    """Yield the error of height and slope, with the time of both and of the spectrum."""
+    """Yield the error of the rms slope or gradient, with the time of height, slope and spectrum."""
     name = installed("SurfaceTopography")
     for what, made, ours, theirs in (("line", lines, of_line, peer_of_line), ("map", maps, of_map, peer_of_map)):
         for waves, shortest in SHORTEST.items():
             height, truth = made(shortest)
-            methods = {OURS: lambda h=height, ours=ours: ours(h)}
-            if name:
-                methods[name] = lambda h=height, theirs=theirs: theirs(h)
-            found = timed_in_turns(methods, 3)
-            for place, (quantity, known) in enumerate(truth.items()):
-                for method, (values, seconds) in found.items():
-                    error = max(abs(values[place] / known - 1), 1e-16)
-                    yield Row("statistics of surfaces", f"{what}, {waves}: {quantity}", method, "", 1, seconds, error)
+            methods = {OURS: partial(ours, height)} | ({name: partial(theirs, height)} if name else {})
+            for method, (values, seconds) in timed_in_turns(methods, 3).items():
+                error = max(abs(values[1] / truth - 1), 1e-16)
+                yield Row("statistics of surfaces", f"{what}, {waves}", method, "", 1, seconds, float(error))

@@ -24,7 +24,7 @@ _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
 
 
 class Settings(NamedTuple):
-    """Tuned numbers of the march; `python -m benchmarks wear` measures them.
+    """Tuned numbers of the march; `python -m benchmarks accuracy wear` measures them.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ from mdr_dask.physics.wear.worn import Scar, Worn, check_stick_radius, contact_p
 #: Accuracy above which solutions are no coarser.
 COARSEST = 1e-2
 #: At constant depth: how much wider steps are for accuracies, over which 1 - c, and the share of the second rougher
-#: solution; ``python -m benchmarks accuracy measure wear``.
+#: solution; ``python -m benchmarks accuracy wear``.
 WIDER, THIN, SECOND = ((1e-4, 1.0), (3e-4, 1.5), (1e-3, 4.0), (3e-3, 5.0), (1e-2, 3.0)), 0.1, 0.25
 #: At constant depth: panels are chosen for so many times the accuracy, where that is less than the second number.
 COARSER, COARSER_UNTIL = 1.6, 5e-3

@@ -32,7 +32,7 @@ JUMP_WIDTH = 1e-9
 
 
 class Settings(NamedTuple):
-    """Tuned numbers of the error estimate; `python -m benchmarks wear` measures what it covers.
+    """Tuned numbers of the error estimate; `python -m benchmarks accuracy wear` measures what it covers.
 
     Parameters
     ----------
