@@ -90,7 +90,7 @@ def judged(found: Found, truth: Truth) -> tuple[float, float, float]:
     errors = np.abs(np.asarray(found.values) - truth.values)
     held = errors <= found.stated + np.asarray(truth.doubt) + ROUNDING * np.asarray(truth.scale)
     largest = [float(np.max(each / np.asarray(truth.scale))) for each in (errors, truth.doubt, found.stated)]
-    return max(largest[:2]), largest[2], float(np.mean(held)) if np.all(np.isfinite(found.stated)) else np.nan
+    return max(largest[:2]), largest[2], np.nan if np.all(np.isnan(found.stated)) else float(np.mean(held))
 
 
 def one_case(
