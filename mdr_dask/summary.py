@@ -125,6 +125,7 @@ def cost_lines(costs: Estimate) -> Iterator[str]:
     times = " to ".join(dict.fromkeys(seconds(START + count * costs.seconds) for count in (1, more)))
     compiling = f"; compiling, the first time, about {seconds(costs.compiling)} more" if costs.compiling else ""
     yield f"{sizes} uncompressed, about {times} on one core{compiling}"
+    yield "the time is the model's estimate: nothing was timed on this machine"
     if more > 1:
         yield "from the first round to the last one, if no case meets its tolerance before"
 

@@ -69,7 +69,7 @@ def test_check_tells_axes_tables_lines_and_how_they_meet(capsys):
     assert "table rubber.csv: superposed at 20 degC by the shift factors given; " in text
     for temperature in (0, 20, 50):
         assert f"q v of 0.0063 to 3.1e+05 rad/s at {temperature} degC, data from" in text
-    assert " uncompressed, about " in said[-1]
+    assert " uncompressed, about " in text
 
 
 def test_check_tells_the_same_to_a_program(capsys):

@@ -181,12 +181,21 @@ def read_only(toy, tmp_path, monkeypatch):
     return campaign, str(study)
 
 
-def test_a_finished_study_is_verified_and_run_on_a_disk_that_is_read_only(toy, read_only, capsys):
+def test_a_finished_study_is_verified_and_run_on_a_disk_that_is_read_only(toy, read_only, tmp_path, capsys):
     campaign, url = read_only
     before = sorted(Path(url).parent.iterdir())
     assert store.verify(url).findings == []
     assert main(["status", url]) == 0
-    assert "permission" not in capsys.readouterr().out.lower()
+    told = capsys.readouterr().out
+    assert "toy: toy, version 1 of the model" in told
+    assert "permission" not in told.lower()
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    assert main(["verify", url]) == 0
+    assert main(["show", url]) == 0
+    assert main(["report", url, "-o", str(elsewhere / "page.html")]) == 0
+    assert main(["publish", url, "-o", str(elsewhere / "study.zip")]) == 0
+    assert main(["verify", str(elsewhere / "study.zip")]) == 0
     assert execute.run(campaign, url, Resources(threads=1), lambda _: None).kept == 12
     more = toy.campaign(toy.axis("position", [1.0, 2.0, 3.0]))
     with pytest.raises(StoreError, match="nothing can be written here"):

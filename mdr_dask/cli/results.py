@@ -60,7 +60,9 @@ def status(store: str, failures: bool, messages: bool, watch: bool, form: str | 
         watching.watch(store, lambda: progress.counts(store))
         return
     if not (failures or messages):
-        _print_counts(progress.counts(store), watching.at_work(store), form)
+        of_store = room.attributes(store)
+        study = {"study": of_store["title"], "model": of_store["model"], "model_version": of_store["model_version"]}
+        _print_counts(study, progress.counts(store), watching.at_work(store), form)
         room.require_sound(store, room.series_names(store))
         return
     studies = room.datasets(store)
@@ -77,10 +79,11 @@ def status(store: str, failures: bool, messages: bool, watch: bool, form: str | 
         click.echo("no failures" if not messages else "no messages")
 
 
-def _print_counts(rows: list[dict[str, Any]], at_work: list[str], form: str | None) -> None:
+def _print_counts(study: dict[str, Any], rows: list[dict[str, Any]], at_work: list[str], form: str | None) -> None:
     if form == "json":
-        print_json({"units": {}, "rows": rows, "at_work": at_work})
+        print_json({**study, "units": {}, "rows": rows, "at_work": at_work})
         return
+    say("{study}: {model}, version {model_version} of the model".format(**study))
     print_rows(rows, {}, "table")
     if at_work:
         click.echo(f"at work: {', '.join(at_work)}")
