@@ -71,7 +71,7 @@ def test_factors_and_merged_curve_go_into_tables_and_kept_results_are_known_by_w
     other = kept.rename(tmp_path / "kept.dat")
     assert main(["master-curve", str(other), "--reference", "60", "--show", "curve", "-o", str(curve)]) == 0
     assert factors.read_text().splitlines()[0].startswith("T [degC],shift_factor,shift_factor_error")
-    assert curve.read_text().splitlines()[0] == "curve,curve_abscissa [s],curve_ordinate [MPa],curve_error"
+    assert curve.read_text().splitlines()[0] == "curve,t [s],E_relax [MPa],curve_error"
     printed = capsys.readouterr()
     assert "the law wlf misses the factors by" in printed.err
     assert "shifted: E_relax; a modulus: b_T" in printed.err

@@ -58,6 +58,7 @@ KEPT = (".json", ".csv")
     "--keep", "-o", type=click.Path(path_type=Path), help="Keep all in FILE.json, a later SOURCE; FILE.csv: the table."
 )
 @click.option("--plot", "figure", type=click.Path(path_type=Path), help="Draw all into FILE.png, .pdf or .svg.")
+@click.option("--size", metavar="WIDTH[xHEIGHT]", help="Printed size of the figure: 85mm, 170x120mm.")
 @click.option("--show", "part", type=click.Choice(PARTS), default=PARTS[0], show_default=True, help="What to print.")
 @json_option
 @csv_option
@@ -72,6 +73,7 @@ def master_curve(
     reference: float | None,
     keep: Path | None,
     figure: Path | None,
+    size: str | None,
     part: str,
     form: str | None,
 ) -> None:
@@ -105,9 +107,11 @@ def master_curve(
             _keep(curve, part, keep)
     if figure is not None:
         from mdr_dask.cli.figures import save
+        from mdr_dask.plots import page
         from mdr_dask.plots.master_curve import draw_master_curve
 
-        save(draw_master_curve(curve), figure, {"mdr_dask": f"{__version__}, master-curve", "source": source})
+        with page.drawing_for(page.Page(*(page.size(size) if size else (None, None))), None):
+            save(draw_master_curve(curve), figure, {"mdr_dask": f"{__version__}, master-curve", "source": source})
     _print(curve, part, form)
 
 
@@ -184,8 +188,10 @@ def _print_table(curve: xr.Dataset, part: str, form: str) -> None:
         for names in (kept, ("second_factor", "second_vertical_factor")):
             found = [f"{name}{column}" for name in names for column in columns if f"{name}{column}" in curve]
             shown.extend([curve[found]] if found else [])
+    attrs = ("abscissa", "ordinate", "companion", "group")
+    names = {f"{part.removesuffix('s')}_{key}": str(curve.attrs[key]) for key in attrs if curve.attrs.get(key)}
     for dataset in shown:
-        rows, units = table(dataset)
+        rows, units = table(dataset.rename({old: new for old, new in names.items() if old in dataset}))
         print_rows(rows, units, form)
 
 

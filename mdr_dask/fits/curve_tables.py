@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.physics.superposition.master_curve import Vertical
-from mdr_dask.tables import JOINED, decoded, is_called, numbers, read_sheet
+from mdr_dask.tables import JOINED, SYNONYMS, decoded, is_called, numbers, read_sheet
 from mdr_dask.units import conversion, is_unit
 
 ALIASES = {"normal_force": "normal force", "friction_coefficient": "friction coefficient"} | {
@@ -79,7 +79,8 @@ def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
     columns = [str(name) for name in frame.columns]
     if wanted in columns:
         return wanted
-    loose = [each for each in columns if is_called(each, wanted, ALIASES.get(wanted, wanted)) or _joined(each, wanted)]
+    names = [wanted, ALIASES.get(wanted, wanted), *(name for name in SYNONYMS if is_called(wanted, name))]
+    loose = [each for each in columns if is_called(each, *names) or _joined(each, wanted)]
     return loose[0] if len(loose) == 1 else None
 
 
@@ -131,20 +132,21 @@ def columns_to_use(
 
 
 def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, str]) -> Vertical:
-    """Return which vertical factors suit the columns: those of a modulus or compliance of a polymer, or none.
+    """Return the vertical factors that suit the columns: those of a modulus or compliance of a polymer, or none.
 
-    The abscissa must be a time or a frequency, and the group a temperature. The ordinate is known by its name, or by a
-    unit of pressure.
+    The abscissa must be a time or a frequency, and the group a temperature. Names and units are compared, so that a
+    column of any name is recognised by its unit.
     """
-    if not (is_temperature(by) and (_is(over, "frequency") or _is(over, "time"))):
+
+    def is_one(column: str, *names: str, unit: str) -> bool:
+        return any(_is(column, name) for name in names) or _has_unit(units.get(column, ""), unit)
+
+    dynamic = is_one(over, "frequency", unit="rad/s") or is_one(over, "frequency", unit="Hz")
+    if not (is_temperature(by, units.get(by, "")) and (dynamic or is_one(over, "time", unit="s"))):
         return "none"
-    for kind, names, unit in (
-        ("modulus", ("modulus", "storage_modulus", "loss_modulus"), "Pa"),
-        ("compliance", ("compliance",), "1/Pa"),
-    ):
-        if all(any(_is(each, name) for name in names) or _has_unit(units.get(each, ""), unit) for each in ordinates):
-            return kind  # type: ignore[return-value]
-    return "none"
+    if all(is_one(each, "modulus", "storage_modulus", "loss_modulus", unit="Pa") for each in ordinates):
+        return "modulus"
+    return "compliance" if all(is_one(each, "compliance", unit="1/Pa") for each in ordinates) else "none"
 
 
 def _is(column: str, name: str) -> bool:
@@ -183,7 +185,7 @@ def curves_of(
         names = " and ".join(repr(name) for name in (over, *ordinates))
         raise DataError(f"{names} must be positive: curves are shifted along logarithmic axes")
     groups = frame[by].to_numpy(dtype=np.float64)
-    labels = clusters(groups)
+    labels = clusters(groups, rows[:, 0])
     parts = [labels == label for label in np.unique(labels)]
     centres = np.array([np.median(groups[part]) for part in parts])
     return centres, [(np.log10(rows[part, 0]), np.log10(rows[part, 1:].T)) for part in parts]
@@ -210,23 +212,30 @@ def pairs_of(
     return np.array(keys), curves
 
 
-def clusters(values: FloatArray) -> NDArray[np.intp]:
+def clusters(values: FloatArray, abscissa: FloatArray | None = None) -> NDArray[np.intp]:
     """Return the number of the group of each value.
 
-    Measured values that scatter about a few set ones are split at the largest jump among their gaps. Values that occur
-    again, or whose gaps are much alike, are set ones themselves.
+    Measured values that scatter about a few set values are split at the largest jump among their gaps. They are taken
+    as set values if most of them occur several times, unless they alternate within one sweep of the abscissa, as
+    rounded readings do, or if their gaps are nearly equal.
     """
     distinct, place, times = np.unique(values, return_inverse=True, return_counts=True)
-    if distinct.size <= values.size / 3 or distinct.size < 3 or times.min() > 1:
+    if distinct.size < 3:
         return place
     gaps = np.sort(np.diff(distinct))
     jump = int(np.argmax(gaps[1:] / gaps[:-1]))
     if gaps[jump + 1] < LEAST_JUMP * gaps[jump]:
         return place
     threshold = np.sqrt(gaps[jump] * gaps[jump + 1])
-    return np.asarray(np.append(0, np.cumsum(np.diff(distinct) > threshold))[place], dtype=np.intp)
+    merged = np.asarray(np.append(0, np.cumsum(np.diff(distinct) > threshold))[place], dtype=np.intp)
+    if distinct.size > values.size / 3 and times.min() == 1:
+        return merged
+    runs = 1 + np.count_nonzero(np.diff(values))
+    one_sweep = abscissa is not None and len(set(zip(merged, abscissa, strict=True))) == values.size
+    return merged if one_sweep and runs > distinct.size else place
 
 
-def is_temperature(by: str) -> bool:
-    """Return whether a column is one of temperatures, by its name."""
-    return column_of(pd.DataFrame(columns=[by]), "temperature") is not None or "temperature" in by.casefold()
+def is_temperature(by: str, unit: str = "") -> bool:
+    """Return whether a column contains temperatures, by its name or its unit."""
+    named = column_of(pd.DataFrame(columns=[by]), "temperature") is not None or "temperature" in by.casefold()
+    return named or _has_unit(unit, "K")

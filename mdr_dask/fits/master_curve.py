@@ -160,7 +160,9 @@ def _of_two_groups(
             dataset[f"second_vertical_factor{part}"] = extra[f"vertical_factor{part}"]
     verdicts: dict[str, str] = {}
     for one, name in zip((found.first, found.second), by, strict=True):
-        laws, said = laws_of(one, over, units.get(name, ""), one.reference, is_temperature=is_temperature(name))
+        laws, said = laws_of(
+            one, over, units.get(name, ""), one.reference, is_temperature=is_temperature(name, units.get(name, ""))
+        )
         dataset, verdicts = dataset.assign(constants_of(laws)), verdicts | said
     return with_verdict(dataset, verdicts)
 
@@ -184,7 +186,8 @@ def _with_laws(
     attrs: Mapping[str, Any],
 ) -> xr.Dataset:
     """Return a master curve at a reference, with the laws of its factors and a verdict."""
-    unit, warm = units.get(by, ""), is_temperature(by)
+    unit = units.get(by, "")
+    warm = is_temperature(by, unit)
     laws, verdicts = laws_of(found, over, unit, zero, is_temperature=warm)
     holding = [law for law in laws if verdicts[law.name].startswith("yes")]
     best = min(holding, key=lambda law: law.residual, default=None)

@@ -7,8 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.fits.curve_tables import is_temperature
 from mdr_dask.plots import colours, curves, labels
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Bar, Figure, Key, Mean, Panel, Trace, columns
@@ -29,8 +31,10 @@ def draw_master_curve(curve: xr.Dataset) -> Figure:
     rising = bool(curve["vertical_factor"].any())
     groups, keys, bar = _groups(curve)
     panels = [_measured(curve, groups), _merged(curve, groups)]
+    channels = [Key(_words(curve.attrs[name]), "#777777", "", marker) for name, marker in _channels(curve)]
     panels[0].keys = panels[1].keys = [
         *keys,
+        *(channels if len(channels) > 1 else []),
         Key("reached by shifting", "#000000", "--"),
         Key("measured at the reference", "#000000", "-"),
     ]
@@ -67,8 +71,25 @@ def _unit(curve: xr.Dataset, name: str) -> str:
     return "" if unit == "1" else unit
 
 
+def _words(name: str) -> str:
+    return str(name).replace("_", " ")
+
+
 def _label(name: str, values: xr.DataArray) -> str:
-    return labels.with_unit(name.replace("_", " "), str(values.attrs.get("units", "")))
+    return labels.with_unit(_words(name), str(values.attrs.get("units", "")))
+
+
+def _channels(curve: xr.Dataset) -> list[tuple[str, str]]:
+    """Return the ordinates that were shifted together, each with its marker."""
+    return [(name, marker) for name, marker in (("ordinate", "."), ("companion", "x")) if f"curve_{name}" in curve]
+
+
+def _axes(curve: xr.Dataset, shifted: str = "") -> tuple[Axis, Axis]:
+    """Return the axes of the curves; two ordinates share one."""
+    names = [_words(curve.attrs[name]) for name, _ in _channels(curve)]
+    unit = str(curve["curve_ordinate"].attrs.get("units", ""))
+    across = _label(curve.attrs["abscissa"], curve["curve_abscissa"])
+    return Axis(f"{shifted}{across}", log=True), Axis(labels.with_unit(", ".join(names), unit), log=True)
 
 
 class _Group(NamedTuple):
@@ -88,13 +109,15 @@ def _groups(curve: xr.Dataset) -> tuple[list[_Group], list[Key], Bar | None]:
     values = curve[by].to_numpy()
     bar = colours.bar(_label(by, curve[by]), values) if values.size > colours.most() else None
     points = curve[[name for name in curve.data_vars if curve[name].dims == ("point",)]]
+    # readings scatter about round values: a hundredth of the smallest step is enough to distinguish them
+    digits = -int(np.floor(np.log10(np.min(np.diff(np.sort(values))) / 100)))
     found = [
         _Group(
             float(value),
             points.isel(point=np.flatnonzero(curve["point_group"].to_numpy() == value)),
             float(curve["shift_factor"][k]),
             float(curve["vertical_factor"][k]),
-            f"{value:.3g} {_unit(curve, by)}".strip(),
+            f"{round(float(value), digits):.6g} {labels.printed_unit(_unit(curve, by))}".strip(),
             colours.shade(bar, float(value)) if bar else colours.colour(k),
         )
         for k, value in enumerate(values)
@@ -104,32 +127,39 @@ def _groups(curve: xr.Dataset) -> tuple[list[_Group], list[Key], Bar | None]:
 
 
 def _measured(curve: xr.Dataset, groups: list[_Group]) -> Panel:
-    across, up = (_label(curve.attrs[name], curve[f"curve_{name}"]) for name in ("abscissa", "ordinate"))
-    panel = Panel(Axis(across, log=True), Axis(up, log=True), title="as measured")
+    panel = Panel(*_axes(curve), title="as measured")
     for group in groups:
         points = group.points
         x = points["point_abscissa"] / 10 ** points.get("point_shift", group.shift)
-        y = points["point_ordinate"] / 10 ** points.get("point_rise", group.rise)
         second = points["point_second"].to_numpy() if "point_second" in points else np.zeros(x.size)
-        for value in np.unique(second):
-            one = np.flatnonzero(second == value)
-            data = columns(x=x[one].values, y=y[one].values)
-            panel.traces.append(Trace("curve", data, label=group.label, colour=group.colour, line="-", marker="."))
+        for channel, marker in _channels(curve):
+            y = points[f"point_{channel}"] / 10 ** points.get("point_rise", group.rise)
+            for value in np.unique(second):
+                one = np.flatnonzero(second == value)
+                data = columns(x=x[one].values, y=y[one].values)
+                look = {"label": group.label, "colour": group.colour, "line": "-", "marker": marker}
+                panel.traces.append(Trace("curve", data, **look))
     return panel
 
 
 def _merged(curve: xr.Dataset, groups: list[_Group]) -> Panel:
-    across, up = (_label(curve.attrs[name], curve[f"curve_{name}"]) for name in ("abscissa", "ordinate"))
-    panel = Panel(Axis(f"shifted {across}", log=True), Axis(up, log=True), title="merged")
-    for group in groups:
-        data = columns(x=group.points["point_abscissa"].values, y=group.points["point_ordinate"].values)
-        panel.traces.append(Trace("curve", data, label=group.label, colour=group.colour, marker="."))
-    x, y = curve["curve_abscissa"].to_numpy(), curve["curve_ordinate"].to_numpy()
-    error = 10 ** curve["curve_error"].to_numpy()
+    panel = Panel(*_axes(curve, "shifted "), title="merged")
+    x = curve["curve_abscissa"].to_numpy()
     low, high = (curve["curve_abscissa"].attrs[f"measured_{end}"] for end in ("low", "high"))
     inside = (x >= low) & (x <= high)
+    for channel, marker in _channels(curve):
+        for group in groups:
+            data = columns(x=group.points["point_abscissa"].values, y=group.points[f"point_{channel}"].values)
+            panel.traces.append(Trace("curve", data, label=group.label, colour=group.colour, marker=marker))
+        error = curve["curve_error" if channel == "ordinate" else "curve_companion_error"].to_numpy()
+        panel.traces += _lines(x, curve[f"curve_{channel}"].to_numpy(), 10**error, inside)
+    return panel
+
+
+def _lines(x: FloatArray, y: FloatArray, error: FloatArray, inside: NDArray[np.bool_]) -> list[Trace]:
+    """Return a merged curve with its band, solid where the reference itself was measured."""
     black: dict[str, Any] = {"colour": "#000000"}
-    panel.traces += [
+    return [
         Trace("band", columns(x=x, y=Mean(y, y / error, y * error)), "merged curve", **black),
         Trace("law", columns(x=x, y=y), "reached by shifting", "reached by shifting", line="--", **black),
         Trace(
@@ -141,7 +171,6 @@ def _merged(curve: xr.Dataset, groups: list[_Group]) -> Panel:
             **black,
         ),
     ]
-    return panel
 
 
 def _factors(curve: xr.Dataset, by: str, factor: str, reference: float) -> Panel:
@@ -149,7 +178,7 @@ def _factors(curve: xr.Dataset, by: str, factor: str, reference: float) -> Panel
     value, error = curve[factor], curve[f"{factor}_error"]
     across = "vertical" not in factor
     moved = str(curve.attrs["abscissa" if across else "ordinate"]).replace("_", " ")
-    power = "power_exponent" in curve and "temperature" not in by.lower() and by not in ("T", "temp")
+    power = "power_exponent" in curve and not is_temperature(by, _unit(curve, by))
     y = Axis(labels.with_unit(f"shift of log10 {moved}", "decades"))
     panel = Panel(Axis(_label(by, curve[by]), log=power), y, title="shift factors" if across else "vertical factors")
     points = columns(value, x=groups, y=Mean(value, value - error, value + error))

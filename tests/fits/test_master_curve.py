@@ -6,7 +6,7 @@ import pytest
 import xarray as xr
 
 from mdr_dask.errors import DataError
-from mdr_dask.fits.curve_tables import read_table
+from mdr_dask.fits.curve_tables import clusters, read_table
 from mdr_dask.fits.master_curve import FITS, friction_of_roughness, master_curve, rereferenced
 
 DATA = Path(__file__).parents[1] / "data" / "dma"
@@ -115,6 +115,37 @@ def wlf_table(seed, reference=0.0):
     table = pd.DataFrame(rows, columns=["frequency", "modulus", "temperature"])
     table.attrs["units"] = {"frequency": "rad/s", "modulus": "Pa", "temperature": "degC"}
     return table
+
+
+def moduli_of_a_rubber(readings):
+    """Return G' and G'' of one relaxation spectrum, shifted; readings scatter about the temperatures."""
+    rows = []
+    for temperature in (0.0, 15.0, 30.0, 45.0):
+        for k, frequency in enumerate(np.geomspace(0.1, 30, 12)):
+            w = 1j * frequency * 10 ** (-0.05 * (temperature - 30))
+            modulus = 1e6 * (1 + sum(w * t / (1 + w * t) * t**-0.3 for t in np.geomspace(1e-4, 1e2, 13)))
+            rows.append((frequency, modulus.real, modulus.imag, temperature + readings[k % len(readings)]))
+    return rows
+
+
+@pytest.mark.parametrize("names", [("Kreisfrequenz", "Speicher", "Verlust", "Temperatur"), ("f", "G'", "G''", "T")])
+def test_moduli_are_recognised_by_their_units(names):
+    """Offsets and b_T do not depend on what the columns are called."""
+    table = pd.DataFrame(moduli_of_a_rubber([0.0]), columns=list(names))
+    table.attrs["units"] = dict(zip(names, ("rad/s", "Pa", "Pa", "degC"), strict=True))
+    curve = master_curve(table, names[0], names[1:3], names[3])
+    assert curve.attrs["vertical"].startswith("a modulus")
+    assert curve["shift_factor"].to_numpy() == pytest.approx([1.5, 0.75, 0.0, -0.75], abs=0.05)
+
+
+def test_rounded_readings_of_one_sweep_are_one_temperature():
+    table = pd.DataFrame(moduli_of_a_rubber([0.1, 0.0, -0.1, 0.0]), columns=["f", "G'", "G''", "T"])
+    curve = master_curve(table)
+    assert curve["T"].to_numpy() == pytest.approx([0, 15, 30, 45], abs=0.05)
+    set_values = np.repeat([20.0, 21.0, 22.0, 40.0, 60.0], 6)
+    sweep = np.tile(np.geomspace(1, 10, 6), 5)
+    assert np.unique(clusters(set_values, sweep)).size == 5
+    assert np.unique(clusters(np.sort(set_values), np.arange(30.0))).size == 5
 
 
 def test_wlf_constants_do_not_depend_on_whether_the_reference_was_measured():
