@@ -189,9 +189,9 @@ def _print_table(curve: xr.Dataset, part: str, form: str) -> None:
             found = [f"{name}{column}" for name in names for column in columns if f"{name}{column}" in curve]
             shown.extend([curve[found]] if found else [])
     attrs = ("abscissa", "ordinate", "companion", "group")
-    names = {f"{part.removesuffix('s')}_{key}": str(curve.attrs[key]) for key in attrs if curve.attrs.get(key)}
+    own = {f"{part.removesuffix('s')}_{key}": str(curve.attrs[key]) for key in attrs if curve.attrs.get(key)}
     for dataset in shown:
-        rows, units = table(dataset.rename({old: new for old, new in names.items() if old in dataset}))
+        rows, units = table(dataset.rename({old: new for old, new in own.items() if old in dataset}))
         print_rows(rows, units, form)
 
 

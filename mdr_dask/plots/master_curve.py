@@ -137,8 +137,8 @@ def _measured(curve: xr.Dataset, groups: list[_Group]) -> Panel:
             for value in np.unique(second):
                 one = np.flatnonzero(second == value)
                 data = columns(x=x[one].values, y=y[one].values)
-                look = {"label": group.label, "colour": group.colour, "line": "-", "marker": marker}
-                panel.traces.append(Trace("curve", data, **look))
+                trace = Trace("curve", data, label=group.label, colour=group.colour, line="-", marker=marker)
+                panel.traces.append(trace)
     return panel
 
 
