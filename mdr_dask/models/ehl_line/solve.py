@@ -9,7 +9,7 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.models.base import Block, Result, Status
 from mdr_dask.models.ehl_line.declaration import ACCURACY, MODEL, EhlLineParameters, groups, positions
-from mdr_dask.models.parts.accuracy import missed, share
+from mdr_dask.models.parts.accuracy import missed_accuracy
 from mdr_dask.physics.lubrication import traction
 from mdr_dask.physics.lubrication.film_formulas import (
     PAN_HAMROCK_CENTRAL,
@@ -104,13 +104,6 @@ def _estimates(
     return {name: estimate() for name, estimate in found.items() if name in outputs}
 
 
-def _relative_error(name: str, found: Estimate) -> float:
-    """Return the largest error of an output over its largest value, or over the half width if it is a position."""
-    known = np.isfinite(found.value)
-    size = 1.0 if name in _POSITIONS else np.max(np.abs(found.value), initial=0.0, where=known)
-    return float(share(np.max(found.error, initial=0.0, where=known), size))
-
-
 def compute(block: Block[EhlLineParameters]) -> Result:
     """Solve every different case of a block once; realisations of a case are the same."""
     parameters = _groups(block)
@@ -147,9 +140,14 @@ def compute(block: Block[EhlLineParameters]) -> Result:
                 found |= {name: estimate.value, f"{name}_error": estimate.error}
             found["load_error"] = solution.load_error
             film = float(solution.central_film.value) * square_of_half_width(W)
-            errors = {name: _relative_error(name, estimate) for name, estimate in estimates.items()}
-            nodes = f" on {solution.finest.nodes.size} nodes"
-            notes += [missed(errors, accuracy, nodes), thick_film(film)]
+            missed = missed_accuracy(
+                {name: [estimate.value] for name, estimate in estimates.items()},
+                {name: [estimate.error] for name, estimate in estimates.items()},
+                accuracy,
+                dict.fromkeys(_POSITIONS, 1.0),
+                f" on {solution.finest.nodes.size} nodes",
+            )
+            notes += [missed.get(0, ""), thick_film(film)]
         else:
             result.status[index] = Status.NOT_CONVERGED
         notes += _warnings(block, index, [float(group[index]) for group in parameters])

@@ -20,7 +20,7 @@ from mdr_dask.models.fretting_wear.reduction import (
     refuse_gross_slip,
     table_profile,
 )
-from mdr_dask.models.parts.accuracy import missed, share
+from mdr_dask.models.parts.accuracy import missed_accuracy
 from mdr_dask.physics.mdr.revolution import PowerProfile, Profile
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear import rules
@@ -251,13 +251,14 @@ class _Demand:
         """Return which outputs miss the relative accuracy and by how much, empty if none does."""
         if self.accuracy is None:
             return ""
-        return missed({name: self._share(records, name) for name in self.outputs}, self.accuracy)
+        values = {name: self._finite(records, name) for name in self.outputs}
+        errors = {name: self._finite(records, MODEL.companions[name].name) for name in self.outputs}
+        return missed_accuracy(values, errors, self.accuracy).get(0, "")
 
-    def _share(self, records: Sequence[Worn], name: str) -> float:
-        """Return the error of an output over its largest value; 0 over 0 is none."""
-        error, value = (np.asarray(_answer(records, each, self.places)) for each in (MODEL.companions[name].name, name))
-        known = np.isfinite(error) & np.isfinite(value)
-        return float(share(*(np.max(np.abs(each), initial=0.0, where=known) for each in (error, value))))
+    def _finite(self, records: Sequence[Worn], name: str) -> FloatArray:
+        """Return an output as that of one case, NaN where it is infinite, as the pressure below a sharp tip."""
+        answer = np.asarray(_answer(records, name, self.places))
+        return np.where(np.isfinite(answer), answer, np.nan)[None]
 
 
 def _solves_of(task: Task, wanted: Collection[tuple[float, float]]) -> int:

@@ -16,7 +16,7 @@ from mdr_dask.models.mixed_lubrication.declaration import MODEL, MixedLubricatio
 from mdr_dask.models.mixed_lubrication.lines import Source
 from mdr_dask.models.mixed_lubrication.operation import NoFilmError, Operation, fixed_values, operation_of
 from mdr_dask.models.mixed_lubrication.revolution import Revolution
-from mdr_dask.models.parts.accuracy import missed, share
+from mdr_dask.models.parts.accuracy import missed_accuracy
 
 #: Film ratio below which overlapping asperities merge into clusters that no longer break.
 LEAST_FILM_RATIO = 0.5
@@ -93,21 +93,17 @@ def _missed(
     block: Block[MixedLubrication],
     found: Mapping[str, float],
     advice: str = "",
-    sizes: Mapping[str, float] | None = None,
+    floors: Mapping[str, float] | None = None,
 ) -> str:
-    """Return which requested outputs miss the accuracy of the campaign, empty if none does.
-
-    `sizes` has the values relative to which errors count, where it is not the output itself.
-    """
+    """Return which requested outputs miss the accuracy of the campaign, empty if none does."""
     if block.accuracy is None:
         return ""
-    values = {**found, **(sizes or {})}
-    known = {name: values[name] for name in block.outputs if np.isfinite(values.get(name, np.nan))}
-    shares = {
-        name: float(share(found.get(f"{name}_error", 0.0), value, _FLOORS.get(name, 0.0)))
-        for name, value in known.items()
-    }
-    text = missed(shares, block.accuracy)
+    known = [name for name in block.outputs if np.isfinite(found.get(name, np.nan))]
+    values, errors = (
+        {name: [found[name]] for name in known},
+        {name: [found.get(f"{name}_error", 0.0)] for name in known},
+    )
+    text = missed_accuracy(values, errors, block.accuracy, {**_FLOORS, **(floors or {})}).get(0, "")
     return f"{text}{advice}" if text else ""
 
 

@@ -64,17 +64,6 @@ def missed_accuracy(
     return {int(k): missed({name: float(share[k]) for name, share in shares.items()}, accuracy, where) for k in late}
 
 
-def share(error: ArrayLike, value: ArrayLike, whole: ArrayLike = 0.0) -> FloatArray:
-    """Return errors relative to their values, 0 where there is no error.
-
-    A value that is zero within its error has no relative error: it counts relative to ``whole``.
-    """
-    errors, size = np.asarray(error, dtype=np.float64), np.abs(np.asarray(value, dtype=np.float64))
-    with np.errstate(all="ignore"):
-        shares = errors / np.where(size > errors, size, np.maximum(size, np.abs(whole)))
-    return np.where(errors == 0, 0.0, shares)
-
-
 def missed(shares: Mapping[str, float], accuracy: float, where: str = "") -> str:
     """Return the message about the outputs that miss an accuracy; an empty string if none does."""
     named = [f"{name} by {_amount(share, accuracy)}" for name, share in shares.items() if share > accuracy]
