@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mdr_dask import fits
+from mdr_dask import fits, plots
 from mdr_dask.campaign import load
 
 ROOT = Path(__file__).parents[1]
@@ -44,6 +44,10 @@ def test_every_row_has_a_word_of_the_scale_and_a_command_that_exists(claim):
     assert word(answer(claim)) in WORDS
     for name in re.findall(r"campaigns/(\w+)\.yaml", claim.command):
         load(ROOT / f"campaigns/{name}.yaml")
+    for script in re.findall(r"python (\S+\.py)", claim.command):
+        assert (ROOT / script).is_file()
+    for campaign, name in re.findall(r"mdr-dask plot results/(\w+)\.zarr (\w+)", claim.command):
+        assert name in plots.available(load(ROOT / f"campaigns/{campaign}.yaml").model)
     of_fit = re.match(r"mdr-dask fit results/(\w+)\.zarr (\w+)", claim.command)
     if of_fit:
         campaign, law = of_fit.groups()

@@ -542,7 +542,7 @@ WEAR = (
     Claim(
         "(6.11)-(6.15)",
         "The fast rule meets exact profiles for any number of cycles",
-        "mdr-dask plot results/fast_wear_error.zarr fast_wear_error",
+        "python docs/examples/fast_rule.py results/fast_wear_error.zarr",
         measures.fast_rule,
     ),
     Claim(
