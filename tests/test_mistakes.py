@@ -24,113 +24,73 @@ parameters:
 accuracy: 1 %
 """
 VELOCITY = "{geometric: [1 mm/s, 1 m/s, 4]}"
-LENGTH = "expected a length (such as '20 mm'), got"
-VELOCITIES = "13:13: parameters.velocity: expected a velocity (such as '1 mm/s'), got"
-SEVERAL = "(several values are [a, b, c], a range {linear: [a, b, n]} or {geometric: [a, b, n]})"
 
-#: What is changed into what, and the sentence: line and column, key, what was expected, what to do.
+#: What is changed into what, and the parts of the sentence: line and column, key, value, remedy.
 MISTAKES = [
     # words
-    ("normal_force", "normal_forse", "12:3: parameters.normal_forse: unknown key (did you mean 'normal_force'?)"),
-    ("normal_force", "load", "12:3: parameters.load: unknown key (did you mean 'normal_force'?)"),
-    ("velocity", "speed", "13:3: parameters.speed: unknown key (did you mean 'velocity'?)"),
-    ("shear_modulus", "youngs_modulus", "10:3: parameters.youngs_modulus: unknown key (did you mean 'shear_modulus'?)"),
-    ("realisations", "repeats", "4:1: repeats: unknown key (did you mean 'realisations'?)"),
-    ("parameters:", "parameter:", "5:1: parameter: unknown key (did you mean 'parameters'?)"),
-    ("sliding_friction", "friction", "2:8: model: unknown model 'friction' (did you mean 'sliding_friction'?)"),
-    ("sliding_friction", "json:MODEL", "'json' has no attribute 'MODEL' (expected module:NAME of a Model)"),
-    ("accuracy: 1 %", "outputs: [mu]", "outputs[0]: unknown output 'mu' (did you mean 'friction_coefficient'?)"),
-    ("accuracy: 1 %", "outputs: film", "14:10: outputs: expected a list, got 'film' (write [film])"),
-    ("accuracy: 1 %", "output: [mu]", "14:1: output: unknown key (did you mean 'outputs'?)"),
-    ("accuracy: 1 %", "store: a.zarr", "14:8: store: expected a mapping, got 'a.zarr' (write {path: a.zarr})"),
-    ("accuracy: 1 %", "sampling: sobol", "expected 'grid' or 'zip', got 'sobol' (write {sobol: ...})"),
-    ("name: study", "name: my study", "1:7: name: expected a file name of letters, digits, '-', '_' and '.', got"),
+    ("normal_force", "normal_forse", "12:3: parameters.normal_forse: ", "did you mean 'normal_force'?"),
+    ("velocity", "speed", "13:3: parameters.speed: ", "did you mean 'velocity'?"),
+    ("realisations", "repeats", "4:1: repeats: ", "did you mean 'realisations'?"),
+    ("sliding_friction", "friction", "2:8: model: ", "did you mean 'sliding_friction'?"),
+    ("sliding_friction", "json:MODEL", "2:8: model: ", "expected module:NAME"),
+    ("accuracy: 1 %", "outputs: [mu]", "14:11: outputs[0]: ", "did you mean 'friction_coefficient'?"),
+    ("accuracy: 1 %", "outputs: film", "14:10: outputs: ", "got 'film'", "write [film]"),
+    ("accuracy: 1 %", "store: a.zarr", "14:8: store: ", "write {path: a.zarr}"),
+    ("accuracy: 1 %", "sampling: sobol", "14:11: sampling: ", "write {sobol: ...}"),
+    ("name: study", "name: my study", "1:7: name: ", "got 'my study'"),
+    ("name: study", f"name: {'a' * 101}", "1:7: name: ", "at most 100"),
     (
         "realisations: 2",
         "realisations: {at_least: 4, at_most: 40, until: {zone_one.alpha: little}}",
-        "4:66: realisations.until.zone_one.alpha: expected a number, got 'little'",
-    ),
-    ("name: study", f"name: {'a' * 101}", "1:7: name: expected a file name with at most 100 characters, got"),
-    (
-        "name: study",
-        f"name: {'a' * 92}.partial",
-        "name: expected a file name with another ending, got",
+        "4:66: ",
+        "little",
     ),
     # numbers
-    ("hurst: 0.7", "hurst: 0,7", "8:10: parameters.hurst: expected a number, got '0,7' (write a decimal point: '0.7')"),
-    ("0.5 um", "0,5 um", f"{LENGTH} '0,5 um' (write a decimal point: '0.5 um')"),
-    ("points: 500", "points: 1,000", "got '1,000' (write '1000', or '1.000' with a decimal point)"),
-    ("points: 500", "points: 5e2", "7:11: parameters.points: expected a whole number, got 500.0 (write 500)"),
-    ("hurst: 0.7", "hurst: .nan", "8:10: parameters.hurst: expected a finite number, got nan"),
-    (
-        "hurst: 0.7",
-        "hurst: 70",
-        "parameters.hurst: expected a number of at most 1, got 70 (write '70 %' if you mean tha",
-    ),
-    (
-        "accuracy: 1 %",
-        "accuracy: 1",
-        "14:11: accuracy: expected a number below 1, got 1 (write '1 %' if you mean that)",
-    ),
-    ("hurst: 0.7", "hurst: 70 %%", "8:10: parameters.hurst: expected a number, got '70 %%'"),
-    ("[0.1 N, 1 N]", "[0.1 N, -1 N]", "12:25: parameters.normal_force: expected a number above 0, got '-1 N'"),
+    ("hurst: 0.7", "hurst: 0,7", "8:10: parameters.hurst: ", "'0.7'"),
+    ("0.5 um", "0,5 um", "9:18: parameters.rms_roughness: ", "'0.5 um'"),
+    ("points: 500", "points: 1,000", "7:11: ", "'1000'", "'1.000'"),
+    ("points: 500", "points: 5e2", "7:11: ", "write 500"),
+    ("hurst: 0.7", "hurst: .nan", "8:10: ", "finite"),
+    ("hurst: 0.7", "hurst: 70", "8:10: ", "at most 1", "'70 %'"),
+    ("[0.1 N, 1 N]", "[0.1 N, -1 N]", "12:25: ", "above 0", "'-1 N'"),
     # units
-    ("20 mm", "20 milimeters", "unknown unit 'milimeters' (did you mean 'millimeter'?), got '20 milimeters'"),
-    ("10 MPa", "10 Mpa", "10:18: parameters.shear_modulus: unknown unit 'Mpa' (did you mean 'MPa'?), got '10 Mpa'"),
-    ("10 MPa", "10 N/mm2", "unknown unit 'mm2' (write mm^2), got '10 N/mm2'"),
-    ("20 mm", "20 kg", f"6:11: parameters.length: {LENGTH} '20 kg'"),
-    ("hurst: 0.7", "hurst: 0.7 mm", "8:10: parameters.hurst: expected a number, got '0.7 mm'"),
-    ("1 ms", "1 Hz", "11:20: parameters.relaxation_time: expected a time (such as '1 ms'), got '1 Hz'"),
-    ("[0.1 N, 1 N]", "[0.1 Newtn]", "unknown unit 'Newtn' (did you mean 'newton'?), got '0.1 Newtn'"),
-    ("{geometric: [1 mm/s,", "{geometric: [1 kmh,", "unknown unit 'kmh' (did you mean 'km/h'?), got '1 kmh'"),
-    (
-        "10 MPa",
-        "10 grad",
-        "10:18: parameters.shear_modulus: unknown unit 'grad', expected a pressure (such as '10 MPa')",
-    ),
-    ("[0.1 N, 1 N]", "10 kg", "expected a force (such as '1 mN') (1 kg weighs 9.81 N), got '10 kg'"),
+    ("20 mm", "20 milimeters", "6:11: ", "did you mean 'millimeter'?"),
+    ("10 MPa", "10 N/mm2", "10:18: ", "write mm^2"),
+    ("20 mm", "20 kg", "6:11: parameters.length: ", "a length (such as '20 mm')"),
+    ("hurst: 0.7", "hurst: 0.7 mm", "8:10: ", "expected a number"),
+    ("10 MPa", "10 grad", "10:18: ", "'10 MPa'"),
+    ("[0.1 N, 1 N]", "10 kg", "12:17: ", "1 kg weighs 9.81 N"),
     # ranges
-    (VELOCITY, "1 mm/s, 1 m/s", f"{VELOCITIES} '1 mm/s, 1 m/s' {SEVERAL}"),
-    (VELOCITY, "1 mm/s to 1 m/s", f"{VELOCITIES} '1 mm/s to 1 m/s' {SEVERAL}"),
-    (VELOCITY, "1 mm/s - 1 m/s", f"{VELOCITIES} '1 mm/s - 1 m/s' {SEVERAL}"),
-    (VELOCITY, "{logspace: [1 mm/s, 1 m/s, 4]}", f"{VELOCITIES} a mapping (a range is {{linear: [a, b, n]}} or"),
-    (VELOCITY, "{linear: [1 mm/s, 1 m/s]}", "expected [first, last, count], got ['1 mm/s', '1 m/s']"),
-    (VELOCITY, "{geometric: [0, 1 m/s, 4]}", "expected an end above 0 for a geometric range, got 0"),
+    (VELOCITY, "1 mm/s to 1 m/s", "13:13: ", "{geometric: [a, b, n]}"),
+    (VELOCITY, "{logspace: [1 mm/s, 1 m/s, 4]}", "13:13: ", "{geometric: [a, b, n]}"),
+    (VELOCITY, "{linear: [1 mm/s, 1 m/s]}", "[first, last, count]"),
+    (VELOCITY, "{geometric: [0, 1 m/s, 4]}", "above 0", "got 0"),
     # YAML
-    ("hurst: 0.7", "hurst:0.7", "could not find expected ':' (a blank is missing after 'hurst:' in line 8)"),
-    (
-        "geometric: ",
-        "geometric:",
-        "expected ',' or '}', but got '[' (a blank is missing after 'geometric:' in line 13)",
-    ),
-    ("  points", "\tpoints", "(indent with blanks, not with tabs)"),
-    ("  length", "   length", "(entries of one mapping begin in the same column)"),
-    ("hurst: 0.7", "hurst: 0.7\n  hurst: 0.8", "9:3: parameters.hurst: this key was already given in line 8"),
-    ("name: study", "name: my: study", "1:9: not YAML: mapping values are not allowed here (put quotation marks"),
-    ("hurst: 0.7", "hurst: *h", "not YAML: found undefined alias 'h' (put quotation marks around a string that begins"),
+    ("hurst: 0.7", "hurst:0.7", "a blank is missing after 'hurst:' in line 8"),
+    ("  points", "\tpoints", "not with tabs"),
+    ("  length", "   length", "same column"),
+    ("hurst: 0.7", "hurst: 0.7\n  hurst: 0.8", "9:3: parameters.hurst: ", "line 8"),
+    ("name: study", "name: my: study", "1:9: ", "put quotation marks"),
     # files
-    ("hurst: 0.7", "material: rubber.csv", "expected a mapping, got 'rubber.csv' (write {dma_table: rubber.csv})"),
-    ("hurst: 0.7", "material: {dma: rubber.csv}", "dma: unknown key (did you mean 'dma_table'?)"),
-    ("hurst: 0.7", "surface: road.txt", "expected a mapping, got 'road.txt' (write|{profile: road.txt}"),
-    ("accuracy: 1 %", "measured: rig.csv", "measured: expected a mapping, got 'rig.csv' (write {table: rig.csv})"),
-    ("hurst: 0.7", "surface: {profile: no.csv}", "no.csv (names begin at the folder of the campaign file)"),
-    ("hurst: 0.7", "surface: {profile: README.ms}", "README.ms (did you mean 'README.md'?)"),
+    ("hurst: 0.7", "material: rubber.csv", "8:13: ", "write {dma_table: rubber.csv}"),
+    ("hurst: 0.7", "surface: {profile: no.csv}", "no.csv", "folder of the campaign file"),
+    ("hurst: 0.7", "surface: {profile: README.ms}", "did you mean 'README.md'?"),
     # bodies
-    ("hurst: 0.7", "indenter: {shape: sphere}", "8:21: parameters.indenter.shape: expected 'plane', 'cone', '"),
-    ("hurst: 0.7", "indenter: ball", "expected a mapping with shape: 'plane', 'cone', "),
-    ("hurst: 0.7", "indenter: cone", "got 'cone' (write {shape: cone, angle: ...})"),
-    ("hurst: 0.7", "indenter: {shape: cone, angle: 30}", "below 1.57079632679 rad, got 30 (write '30 deg' if you mean"),
-    ("hurst: 0.7", "material: {kelvin: {}}", "parameters.material.kelvin.shear_modulus: missing, expected a pressure"),
+    ("hurst: 0.7", "indenter: {shape: sphere}", "8:21: parameters.indenter.shape: ", "'plane', 'cone'"),
+    ("hurst: 0.7", "indenter: cone", "write {shape: cone, angle: ...}"),
+    ("hurst: 0.7", "indenter: {shape: cone, angle: 30}", "'30 deg'"),
+    ("hurst: 0.7", "material: {kelvin: {}}", "parameters.material.kelvin.shear_modulus: missing"),
 ]
 
 
-@pytest.mark.parametrize(("right", "wrong", "told"), MISTAKES, ids=[wrong for _, wrong, _ in MISTAKES])
-def test_a_mistake_is_a_sentence_that_says_what_to_do(right, wrong, told):
+@pytest.mark.parametrize("case", MISTAKES, ids=[case[1] for case in MISTAKES])
+def test_a_mistake_is_a_sentence_that_says_where_it_is_and_what_to_do(case):
+    right, wrong, *parts = case
     with pytest.raises(CampaignError) as caught:
         loads(CAMPAIGN.replace(right, wrong, 1), "study.yaml", ".")
     sentences = str(caught.value).splitlines()
     assert all(sentence.startswith("study.yaml:") for sentence in sentences)
-    assert any(all(part in sentence for part in told.split("|")) for sentence in sentences), sentences
+    assert any(all(part in sentence for part in parts) for sentence in sentences), sentences
 
 
 QUOTED = ("seed: 1", "realisations: 2", "points: 500", "hurst: 0.7")
