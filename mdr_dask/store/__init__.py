@@ -16,11 +16,10 @@ from mdr_dask.store.packing import contents, verify_packed
 from mdr_dask.store.reading import datasets, is_damage, readable, save
 from mdr_dask.store.records import attempts, kinds, merge_records, record, records
 from mdr_dask.store.study import attributes, exists, is_study, series_names
-from mdr_dask.store.verification import CHECKSUMS, CRATE, PUBLISHED, Finding, Inspection, repair, verify
+from mdr_dask.store.verification import CHECKSUMS, PUBLISHED, Finding, Inspection, repair, verify
 
 __all__ = [
     "CHECKSUMS",
-    "CRATE",
     "PUBLISHED",
     "Finding",
     "Inspection",

@@ -38,7 +38,8 @@ IGNORED = (".partial", ASIDE, "status/seal.json")  # the last one was written by
 #: Files of a published store beside those of the study.
 PUBLISHED = "published/"
 CHECKSUMS = f"{PUBLISHED}checksums.sha256"
-CRATE = "ro-crate-metadata.json"
+#: What earlier versions published beside them.
+_CRATE = "ro-crate-metadata.json"
 
 #: Digests of the chunks that each attempt at a block has written, by array, in the order of the attempts.
 History = list[Mapping[str, str]]
@@ -156,7 +157,7 @@ def repair(url: str) -> tuple[Inspection, Inspection]:
 def of_store(names: Iterable[str]) -> Iterator[str]:
     """Yield the names of files that belong to a study, not to a run, a repair or a publication."""
     for name in names:
-        if not name.endswith(IGNORED) and not name.startswith((CLAIMS, PUBLISHED)) and name != CRATE:
+        if not name.endswith(IGNORED) and not name.startswith((CLAIMS, PUBLISHED)) and name != _CRATE:
             yield name
 
 
