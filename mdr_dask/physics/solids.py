@@ -1,7 +1,7 @@
-"""Linear viscoelastic solids as a spring, relaxing arms and a dashpot side by side; their moduli, fits and temperature.
+"""Linear viscoelastic solids: a spring, Prony terms and a dashpot in parallel; their moduli, fits and temperature laws.
 
-A solid follows a shear strain u by the stress ``G_inf u + sum G_m (u - a_m) + eta du/dt``, with
-``da_m/dt = (u - a_m) / tau_m``. No arms: Kelvin; one arm and no dashpot: standard solid; many arms: Prony series.
+The stress under a shear strain u is ``G_inf u + sum G_m (u - a_m) + eta du/dt`` with ``da_m/dt = (u - a_m) / tau_m``. A
+solid without Prony terms is a Kelvin solid, one with a term and no dashpot a standard solid.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ class LinearSolid:
     ----------
     static_modulus : float
         Shear modulus G_inf at zero frequency, Pa.
-    moduli : array, shape (arms,)
-        Shear modulus G_m of each arm, Pa, not negative.
-    times : array, shape (arms,)
-        Relaxation time tau_m of each arm, s, ascending and distinct.
+    moduli : array, shape (terms,)
+        Shear modulus G_m of each Prony term, Pa, not negative.
+    times : array, shape (terms,)
+        Relaxation time tau_m of each term, s, ascending and distinct.
     viscosity : float
         Viscosity eta of the dashpot beside them, Pa s.
     """
@@ -43,7 +43,7 @@ class LinearSolid:
 
     @property
     def glass_modulus(self) -> float:
-        """Shear modulus at a sudden strain, the dashpot left out, Pa."""
+        """Shear modulus at a sudden strain, without the dashpot, Pa."""
         return float(self.static_modulus + self.moduli.sum())
 
 
@@ -53,8 +53,14 @@ def kelvin(shear_modulus: float, relaxation_time: float) -> LinearSolid:
 
 
 def standard_solid(static_modulus: float, glass_modulus: float, relaxation_time: float) -> LinearSolid:
-    """Return the standard solid: modulus `static_modulus` slowly, `glass_modulus` suddenly (Pa), one arm of that
-    time (s).
+    """Return the standard solid: a spring and one Prony term.
+
+    Parameters
+    ----------
+    static_modulus, glass_modulus : float
+        Shear modulus at slow and at sudden deformation, Pa.
+    relaxation_time : float
+        Of the Prony term, s.
 
     Raises
     ------
@@ -67,16 +73,16 @@ def standard_solid(static_modulus: float, glass_modulus: float, relaxation_time:
 
 
 def prony(static_modulus: float, moduli: ArrayLike, times: ArrayLike, viscosity: float = 0.0) -> LinearSolid:
-    """Return a solid of any number of arms: sorted by time, equal times merged, arms without stiffness left out.
+    """Return a solid with any number of Prony terms: sorted by time, equal times merged, terms of modulus 0 left out.
 
     Parameters
     ----------
     static_modulus : float
-        G_inf, Pa, positive: without it a periodic contact carries no load in the steady state.
-    moduli, times : array_like, shape (arms,)
+        G_inf, Pa, positive, because without it a periodic contact carries no load in the steady state.
+    moduli, times : array_like, shape (terms,)
         G_m >= 0, Pa, and tau_m > 0, s.
     viscosity : float
-        eta >= 0 of a dashpot beside the arms, Pa s.
+        eta >= 0 of a dashpot in parallel, Pa s.
 
     Raises
     ------
@@ -91,11 +97,13 @@ def prony(static_modulus: float, moduli: ArrayLike, times: ArrayLike, viscosity:
     """
     stiffness, time = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (moduli, times))
     if stiffness.shape != time.shape:
-        raise ValueError(f"each arm needs a modulus and a time, got {stiffness.size} moduli and {time.size} times")
+        raise ValueError(
+            f"each Prony term needs a modulus and a time, got {stiffness.size} moduli and {time.size} times"
+        )
     if not (np.isfinite(static_modulus) and static_modulus > 0):
         raise ValueError(f"the static modulus must be positive, got {static_modulus!r}")
     if not (np.all(np.isfinite(stiffness)) and np.all(stiffness >= 0)):
-        raise ValueError(f"the moduli of the arms must not be negative, got {stiffness.tolist()!r}")
+        raise ValueError(f"the moduli of the terms must not be negative, got {stiffness.tolist()!r}")
     if not (np.all(np.isfinite(time)) and np.all(time > 0)):
         raise ValueError(f"the relaxation times must be positive, got {time.tolist()!r}")
     if not (np.isfinite(viscosity) and viscosity >= 0):
@@ -106,31 +114,31 @@ def prony(static_modulus: float, moduli: ArrayLike, times: ArrayLike, viscosity:
 
 
 def complex_modulus(solid: LinearSolid, angular_frequency: ArrayLike) -> NDArray[np.complex128]:
-    """Return G*(omega) = G' + i G'', Pa, for angular frequencies in rad/s, of their shape."""
+    """Return G*(omega) = G' + i G'', Pa, at angular frequencies in rad/s."""
     omega = np.asarray(angular_frequency, dtype=np.float64)
     product = omega[..., None] * solid.times
-    arms = solid.moduli * product / (product - 1j)
-    modulus = solid.static_modulus + 1j * omega * solid.viscosity + arms.sum(axis=-1)
+    terms = solid.moduli * product / (product - 1j)
+    modulus = solid.static_modulus + 1j * omega * solid.viscosity + terms.sum(axis=-1)
     return np.asarray(modulus, dtype=np.complex128)
 
 
 def relaxation_modulus(solid: LinearSolid, time: ArrayLike) -> FloatArray:
-    """Return G(t), Pa, the stress after a unit step of strain at t > 0, s; the dashpot's impulse at t = 0 is over."""
+    """Return G(t), Pa, the stress at times t > 0, s, after a unit step of strain; without the impulse of a dashpot."""
     elapsed = np.asarray(time, dtype=np.float64)
-    arms = solid.moduli * np.exp(-elapsed[..., None] / solid.times)
-    return np.asarray(solid.static_modulus + arms.sum(axis=-1), dtype=np.float64)
+    terms = solid.moduli * np.exp(-elapsed[..., None] / solid.times)
+    return np.asarray(solid.static_modulus + terms.sum(axis=-1), dtype=np.float64)
 
 
 @dataclass(frozen=True)
 class SeriesFit:
-    """A Prony series fitted to moduli, and how well it holds.
+    """A Prony series fitted to moduli, and its errors.
 
     Parameters
     ----------
     solid : LinearSolid
         The series.
     storage_error, loss_error : float
-        Root mean square of the relative error of G' and G''; NaN for one that was not given.
+        Root mean square of the relative error of G' and G''; NaN for a modulus without data.
     largest_error : float
         Largest relative error of either.
     worst_frequency : float
@@ -148,7 +156,7 @@ class SeriesFit:
 
     @property
     def error(self) -> float:
-        """Root mean square of the relative errors of the moduli that were given."""
+        """Root mean square of the relative errors of all moduli with data."""
         return _rms(np.array([error for error in (self.storage_error, self.loss_error) if np.isfinite(error)]))
 
 
@@ -159,7 +167,7 @@ def power_law_series(
     exponent: float,
     lowest: float,
     highest: float,
-    arms_per_decade: int = 2,
+    terms_per_decade: int = 2,
 ) -> SeriesFit:
     """Return a Prony series with G'' = loss_modulus (omega / frequency)^exponent (thesis eq. 3.45) over a range.
 
@@ -172,9 +180,9 @@ def power_law_series(
     exponent : float
         beta, above 0 and below 1.
     lowest, highest : float
-        Range of angular frequency in which the law is to hold, rad/s. Arms reach a decade beyond.
-    arms_per_decade : int
-        Two keep G'' within 1 % inside the range.
+        Range of angular frequency of the law, rad/s. Relaxation times extend a decade beyond.
+    terms_per_decade : int
+        With two, G'' is within 1 % of the law inside the range.
 
     Raises
     ------
@@ -186,8 +194,8 @@ def power_law_series(
     if not 0 < lowest < highest:
         raise ValueError(f"the range of frequency must be positive and not empty, got {(lowest, highest)!r}")
     decades = np.log10(highest / lowest)
-    times = np.geomspace(0.1 / highest, 10 / lowest, round((decades + 2) * arms_per_decade) + 1)
-    omega = np.geomspace(lowest, highest, int(np.ceil(10 * decades * arms_per_decade)) + 1)
+    times = np.geomspace(0.1 / highest, 10 / lowest, round((decades + 2) * terms_per_decade) + 1)
+    omega = np.geomspace(lowest, highest, int(np.ceil(10 * decades * terms_per_decade)) + 1)
     wanted = loss_modulus * (omega / frequency) ** exponent
     moduli, _ = nnls(_loss_columns(omega, times) / wanted[:, None], np.ones_like(omega), maxiter=100 * times.size)
     solid = prony(static_modulus, moduli, times)
@@ -200,7 +208,7 @@ def fit_series(
     angular_frequency: ArrayLike,
     storage: ArrayLike,
     loss: ArrayLike,
-    arms_per_decade: float = 1.0,
+    terms_per_decade: float = 1.0,
     dashpot: bool = False,
 ) -> SeriesFit:
     """Fit a Prony series to a table of measured moduli by non-negative least squares of the relative errors.
@@ -211,10 +219,10 @@ def fit_series(
         omega, rad/s, at least one decade wide; order does not matter.
     storage, loss : array_like, shape (points,)
         G' and G'', Pa, positive. For moduli in tension divide by 2 (1 + Poisson's ratio) before.
-    arms_per_decade : float
-        Density of the relaxation times, which cover the range of 1 / omega and half a decade on each side.
+    terms_per_decade : float
+        Relaxation times per decade; they cover the range of 1 / omega and half a decade on each side.
     dashpot : bool
-        Whether to allow a dashpot beside the arms.
+        Whether to fit a dashpot too.
 
     Raises
     ------
@@ -226,7 +234,7 @@ def fit_series(
         raise ValueError(f"a frequency needs both moduli, got {omega.size}, {stored.size} and {lost.size} values")
     if not all(np.all(np.isfinite(a) & (a > 0)) for a in (omega, stored, lost)):
         raise ValueError("frequencies and moduli must be positive and finite")
-    times = _times_covering(omega, arms_per_decade)
+    times = _times_covering(omega, terms_per_decade)
     design = _relative_design(omega, stored, lost, times, dashpot)
     weights, _ = nnls(design, np.ones(2 * omega.size), maxiter=100 * design.shape[1])
     static, moduli = weights[0], weights[1 : 1 + times.size]
@@ -241,10 +249,10 @@ def fit_series(
     return SeriesFit(solid, _rms(errors[0]), _rms(errors[1]), float(larger[worst]), float(omega[worst]), covered)
 
 
-def _times_covering(omega: FloatArray, arms_per_decade: float) -> FloatArray:
+def _times_covering(omega: FloatArray, terms_per_decade: float) -> FloatArray:
     slowest, fastest = 10**0.5 / omega.min(), 10**-0.5 / omega.max()
-    arms = max(2, round(np.log10(slowest / fastest) * arms_per_decade) + 1)
-    return np.geomspace(fastest, slowest, arms)
+    terms = max(2, round(np.log10(slowest / fastest) * terms_per_decade) + 1)
+    return np.geomspace(fastest, slowest, terms)
 
 
 def _loss_columns(omega: FloatArray, times: FloatArray) -> FloatArray:
@@ -317,15 +325,15 @@ def at_temperature(solid: LinearSolid, factor: float) -> LinearSolid:
 class Recovery:
     """Free recovery (zero stress) of a solid as a sum of decaying modes, all of the sign of the strain.
 
-    In mode k the strain is u = c_k exp(-t / lambda_k) and the stretch of arm m is u - a_m = stretch[m, k] u.
+    In mode k the strain is u = c_k exp(-t / lambda_k), and the stretch of term m is u - a_m = stretch[m, k] u.
 
     Parameters
     ----------
-    times : array, shape (arms,)
-        lambda_k, s, ascending: each lies between the relaxation time of its arm and the next.
-    stretch : array, shape (arms, arms)
+    times : array, shape (terms,)
+        lambda_k, s, ascending: each lies between the relaxation time of its term and the next.
+    stretch : array, shape (terms, terms)
         tau_m / (tau_m - lambda_k).
-    amplitude : array, shape (arms, arms)
+    amplitude : array, shape (terms, terms)
         Rows that give c_k = amplitude[k] @ (u - a) for a state of zero stress.
     """
 
@@ -335,13 +343,13 @@ class Recovery:
 
 
 def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
-    """Return the modes of free recovery of arms beside a unit spring.
+    """Return the modes of free recovery of Prony terms with a spring of modulus 1.
 
     Parameters
     ----------
-    moduli : array, shape (arms,)
+    moduli : array, shape (terms,)
         G_m / G_inf, positive.
-    times : array, shape (arms,)
+    times : array, shape (terms,)
         tau_m, ascending and distinct, in any unit of time.
 
     Notes
@@ -374,7 +382,7 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
     Parameters
     ----------
     weight : array, shape (modes,)
-        G_m tau_m / G_inf of an arm, eta / G_inf of a dashpot; positive.
+        G_m tau_m / G_inf of a Prony term, eta / G_inf of a dashpot; positive.
     times : array, shape (modes,)
         tau_m, ascending and distinct; 0 for a dashpot.
 
@@ -383,26 +391,26 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
     times : array, shape (modes,)
         lambda_k, ascending: each lies between tau_k and the next.
     distance : array, shape (modes, modes)
-        tau_m - lambda_k. Each zero is found as its distance from the nearer pole, so that these keep their relative
-        precision over any number of decades.
+        tau_m - lambda_k. Each zero is computed as its distance from the nearer pole, so that the relative precision
+        of these differences does not suffer over many decades.
     """
-    arms = times.size
-    zeros, distance = np.empty(arms), np.empty((arms, arms))
-    for k in range(arms):
-        last = k == arms - 1
+    terms = times.size
+    zeros, distance = np.empty(terms), np.empty((terms, terms))
+    for k in range(terms):
+        last = k == terms - 1
         gap = 2 * weight.sum() if last else times[k + 1] - times[k]
         left = last or _imbalance(k, gap / 2, weight, times)[0] >= 0
         pole, sign = (k, 1.0) if left else (k + 1, -1.0)
         offset = sign * _distance_to_zero(pole, sign, gap, weight, times)
         zeros[k] = times[pole] + offset
-        for m in range(arms):
+        for m in range(terms):
             distance[m, k] = (times[m] - times[pole]) - offset
     return zeros, distance
 
 
 @jit
 def _distance_to_zero(pole: int, sign: float, gap: float, weight: FloatArray, times: FloatArray) -> float:
-    """Return how far the zero beside a pole is from it: bisection of its logarithm, ended by Newton's method."""
+    """Return the distance of a zero from the pole beside it, by bisection of its logarithm and Newton's method."""
     high = np.log(gap)
     low = high - 80.0
     place = 0.5 * (low + high)

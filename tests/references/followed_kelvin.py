@@ -4,10 +4,9 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
-from mdr_dask.physics.transients.elements.edges import under_elements
-from mdr_dask.physics.transients.elements.follow import Response, follow_line, untouched
 from mdr_dask.physics.transients.elements.foundation import KELVIN
-from mdr_dask.physics.transients.elements.steps import Schedule
+from mdr_dask.physics.transients.elements.loading_history import Response, follow_line, untouched
+from mdr_dask.physics.transients.elements.steps import Schedule, under_elements
 
 TOUCHING = 1e-12  # of its height: what touches but for rounding
 

@@ -1,9 +1,9 @@
-"""The papers' method: the stationary state of a Kelvin foundation by backward Euler, many cases on a line at once.
+"""The method of the papers: the steady state of a Kelvin foundation by backward Euler, many cases on a line at once.
 
-u_i = max(w_i, lambda u_(i-1)) with w = depth + height and lambda = 1 / (1 + dt / tau). Because a turn closes,
+u_i = max(w_i, lambda u_(i-1)) with w = depth + height and lambda = 1 / (1 + dt / tau). Because u is periodic,
 F_N / (4 G dx) is the sum of u, and F_x / (4 G) that of (u_i - lambda u_(i-1)) / (1 - lambda) (w_i - w_(i-1)).
-Blocks of nodes that a case passes wholly in contact or wholly free are closed sums; over the others the inner loops run
-over cases, so that they are vector instructions. Each case does the same arithmetic whatever runs beside it.
+Blocks of nodes that are wholly in contact or wholly free are closed sums; in the others the inner loops run over cases,
+as vector instructions. The arithmetic of a case does not depend on the other cases.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from mdr_dask.physics.sliding.cases import Cases
 
 ITERATIONS = 200
 COARSENING = 8
-COARSEST = 64  # nodes of the grid that the search for the depth starts on
+COARSEST = 64  # nodes of the grid on which the search for the depth starts
 CONVERGED = 1e-9  # product of the last two relative steps, which bounds the error of a secant
 EXACT_STEP = 1e-13  # relative change of the depth that is rounding
 COARSE = 1e-3
@@ -28,24 +28,24 @@ COARSE = 1e-3
 BLOCK = 256  # nodes
 LANES = 8  # cases that share a vector instruction
 
-# What a sweep writes for every case, in this order
+# The results of a sweep for every case, in this order
 CARRIED, STIFFNESS, DRAG = range(3)
 SUMS = 3
-# What is known of a block of nodes, in this order: bounds of height and rise, the height before, and sums
+# Bounds and sums of a block of nodes, in this order: bounds of height and rise, the height before, sums
 PEAK, LOWEST, STEEPEST, BEFORE, HEIGHTS, RISES, WORK, SQUARES = range(8)
 KNOWN = 8
-# What a sweep holds of a case, in this order; the last four while it goes from node to node
+# The state of a case in a sweep, in this order; the last three are sums from node to node
 U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS = range(7)
 ROWS = 7
 
 
 class Nodal(NamedTuple):
-    """A line known at its nodes, from the highest one on.
+    """Heights of a line at its nodes, beginning after the highest one.
 
     Parameters
     ----------
     height, rise : array, shape (n,)
-        Heights, and what each is above that of the node before.
+        Heights, and the rise from the node before.
     blocks : array, shape (n // BLOCK, KNOWN)
         From `_blocks`.
     periodic : bool
@@ -59,7 +59,7 @@ class Nodal(NamedTuple):
 
 
 class Moving(NamedTuple):
-    """Cases that go along a line: v tau in cells, lambda, and the penetration of the highest node."""
+    """Cases: v tau in cells, lambda, and the penetration of the highest node."""
 
     deborah: FloatArray
     decay: FloatArray
@@ -76,7 +76,7 @@ class Lanes(NamedTuple):
     packed : array, shape (ROWS + 2, cases + LANES)
         The state of the cases of the queue, with their decay and depth.
     queue : array, shape (cases,)
-        Cases that touch or leave in a block.
+        Cases in which contact begins or ends in a block.
     sums : array, shape (SUMS, cases)
         Written: sum of u, its derivative by the depth, F_x / (4 G) times 1 - lambda.
     """
@@ -99,14 +99,14 @@ def _step(h: float, t: float, decay: float, depth: float, u: float, fade: float)
     """Go on by one node: return u, its derivative by the depth, and the drag times 1 - lambda."""
     free = decay * u
     w = h + depth
-    touches = w > free
-    now = w if touches else free
-    return now, 1.0 if touches else decay * fade, (now - free) * t
+    is_pressed = w > free
+    now = w if is_pressed else free
+    return now, 1.0 if is_pressed else decay * fade, (now - free) * t
 
 
 @jit
 def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
-    """Return what is known of every block, shape (n // BLOCK, KNOWN)."""
+    """Return bounds and sums of every block, shape (n // BLOCK, KNOWN)."""
     blocks = np.empty((height.size // BLOCK, KNOWN))
     for j in range(blocks.shape[0]):
         first = j * BLOCK
@@ -129,7 +129,7 @@ def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
 
 @jit
 def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) -> int:
-    """Take every case over a block by closed sums; queue those that touch or leave in it, and return their number."""
+    """Pass a block by closed sums; queue the cases in which contact begins or ends in it, and return their number."""
     peak, lowest, steepest, before = block[PEAK], block[LOWEST], block[STEEPEST], block[BEFORE]
     heights, rises, work, squares = block[HEIGHTS], block[RISES], block[WORK], block[SQUARES]
     deborah, decay, depth = moving
@@ -155,7 +155,7 @@ def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) ->
 
 @jit
 def _walk(height: FloatArray, rise: FloatArray, decay: FloatArray, depth: FloatArray, workspace: FloatArray) -> None:
-    """Take all cases from node to node, adding to their `LOAD`, `RATE` and `LOSS`."""
+    """Follow all cases from node to node, and add to their `LOAD`, `RATE` and `LOSS`."""
     whole = height.size // 4 * 4
     for i in range(0, whole, 4):
         h0, h1, h2, h3 = height[i], height[i + 1], height[i + 2], height[i + 3]
@@ -182,7 +182,7 @@ def _walk(height: FloatArray, rise: FloatArray, decay: FloatArray, depth: FloatA
 
 @jit
 def _walk_some(height: FloatArray, rise: FloatArray, moving: Moving, lanes: Lanes, queued: int) -> None:
-    """Take the cases of the queue from node to node, together."""
+    """Follow the cases of the queue from node to node together."""
     decay, depth = moving.decay, moving.depth
     workspace, packed, queue, sums = lanes
     for q in range(queued):
@@ -190,7 +190,7 @@ def _walk_some(height: FloatArray, rise: FloatArray, moving: Moving, lanes: Lane
         packed[U, q], packed[FADE, q] = workspace[U, k], workspace[FADE, k]
         packed[ROWS, q], packed[ROWS + 1, q] = decay[k], depth[k]
         packed[LOAD, q] = packed[RATE, q] = packed[LOSS, q] = 0.0
-    # full vectors are quicker than the rest of one
+    # full vectors are faster than a remainder
     full = -(-queued // LANES) * LANES
     packed[:, queued:full] = 0.0
     _walk(height, rise, packed[ROWS, :full], packed[ROWS + 1, :full], packed)
@@ -206,7 +206,7 @@ def _walk_some(height: FloatArray, rise: FloatArray, moving: Moving, lanes: Lane
 def _sweep(line: Nodal, moving: Moving, lanes: Lanes) -> None:
     """Follow one element of every case along the line: from its highest node back to it, or undeformed from its start.
 
-    A queue is what the closed sums of a block do not take.
+    The queue has the cases that a block cannot pass by closed sums.
     """
     height, rise, blocks, periodic = line
     deborah, depth = moving.deborah, moving.depth
@@ -239,8 +239,9 @@ def _newton(
 ) -> None:
     """Find the depth of every case; `depths` holds the guesses on entry, `drags` is NaN where none was found.
 
-    The load is convex, increasing and piecewise linear in the depth, so that Newton comes down from the right after its
-    first step. The last step is taken without another sweep: its load from the tangent, its drag from the secant.
+    The load is a convex, increasing, piecewise linear function of the depth, so that Newton's method approaches the
+    root from above after its first step. The last step needs no further sweep: the drag is
+    extrapolated along the secant.
     """
     count = depths.size
     active, lanes, before = np.arange(count), lanes_for(count), np.full((2, count), np.nan)
@@ -254,7 +255,7 @@ def _newton(
         kept = 0
         for k in range(count):
             case = active[k]
-            # behind a line that does not close, u and its derivative fade away undisturbed
+            # behind a line that is not periodic, u and its derivative decay freely
             carried = sums[CARRIED, k] + ends * deborah[k] * workspace[U, k]
             step = (load[k] - carried) / (sums[STIFFNESS, k] + ends * deborah[k] * workspace[FADE, k])
             drag = sums[DRAG, k] * (1 + deborah[k])

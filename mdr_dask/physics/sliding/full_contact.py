@@ -1,8 +1,8 @@
 """Full contact of any linear solid with a rough plane: the harmonics are independent.
 
-The foundation follows the line, u = d + h, and every wave c_k needs the pressure G*(q_k v) c_k (thesis eq. 3.14 for the
-Kelvin solid). So the drag is a sum over the spectrum, whatever the phases. This holds where the pressure is positive
-everywhere, which is checked at nodes: between m nodes a sum of waves of up to k periods is at most
+The displacement is u = d + h, and every wave c_k takes the pressure G*(q_k v) c_k (thesis eq. 3.14 for the Kelvin
+solid). So the drag is a sum over the spectrum and does not depend on the phases. This holds where the pressure is
+positive everywhere, which is checked at nodes: between m nodes a sum of waves of up to k periods is at most
 1 / cos(pi k / m) times its largest value on them (Ehlich and Zeller, 1964).
 """
 
@@ -18,13 +18,13 @@ from mdr_dask.physics.sliding.cases import Steady
 from mdr_dask.physics.surfaces.waves import Waves, series
 
 OVERSAMPLING = 2  # nodes per Nyquist point: the pressure between them is bounded to 41 %
-DEEP = 4.0  # load over the rms pressure of the waves, below which full contact is too rare to be worth the check
+DEEP = 4.0  # load over the rms pressure of the waves; below it full contact is too rare for a check to pay
 ROUNDING = 1e-12  # relative error of sums over a spectrum
 
 
 def steady_full_contact(
     waves: Waves,
-    arms: Sequence[tuple[float, float]],
+    terms: Sequence[tuple[float, float]],
     nodes: tuple[FloatArray, FloatArray],
     deborah: FloatArray,
     loads: FloatArray,
@@ -35,8 +35,8 @@ def steady_full_contact(
     ----------
     waves : Waves
         The line, of length 1.
-    arms : sequence of (float, float)
-        G_m / G_inf and tau_m v / L of the relaxing arms; none of a Kelvin solid.
+    terms : sequence of (float, float)
+        G_m / G_inf and tau_m v / L of the Prony terms; none for a Kelvin solid.
     nodes : pair of array, shape (nodes,)
         Heights and slopes of the line on a grid of more than two nodes for the shortest wave.
     deborah : array, shape (cases,)
@@ -52,21 +52,21 @@ def steady_full_contact(
     [19.7392] [5.]
     """
     height, slope = nodes
-    # sums over the nodes are those over the spectrum; arms only add to the pressure of a wave
+    # sums over the nodes are those over the spectrum; terms only add to the pressure of a wave
     pressure, heaviest = height, np.max(loads, initial=0.0)
     if not heaviest > DEEP * np.sqrt(height @ height / height.size):
         return None
-    if arms:
+    if terms:
         wave = 2j * np.pi * np.arange(1, waves.coefficients.size + 1)
-        relaxing = sum((stiffness * (1 - 1 / (1 + wave * time)) for stiffness, time in arms), np.zeros(1))
+        relaxing = sum((stiffness * (1 - 1 / (1 + wave * time)) for stiffness, time in terms), np.zeros(1))
         pressure = height + series(waves.coefficients * relaxing, height.size)
     elastic = pressure @ pressure / height.size
     if not heaviest > DEEP * np.sqrt(elastic):
         return None
-    lost, stretch = (pressure @ slope / height.size if arms else 0.0), slope @ slope / height.size
+    lost, stretch = (pressure @ slope / height.size if terms else 0.0), slope @ slope / height.size
     with np.errstate(over="ignore", invalid="ignore"):
         drag = lost + deborah * stretch
-        moves = np.isfinite(deborah) & (deborah >= 0 if arms else deborah > 0)
+        moves = np.isfinite(deborah) & (deborah >= 0 if terms else deborah > 0)
         full = moves & np.isfinite(loads) & (loads > DEEP * np.sqrt(elastic + deborah * (lost + drag)))
     speeds, which = np.unique(deborah[full], return_inverse=True)
     highest = np.array([np.max(np.abs(pressure + speed * slope)) for speed in speeds])

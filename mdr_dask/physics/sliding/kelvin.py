@@ -1,9 +1,9 @@
-"""One sweep along a line of cubic cells: a Kelvin foundation in its stationary state at a given depth.
+"""One sweep along a line of cubic cells: the steady state of a Kelvin foundation at a given depth.
 
 Everything here is measured in cells: a cell has length 1, a slope is the rise over one cell, ``deborah`` is v tau / dx.
-Heights point into the elastomer and are measured from the highest point of the line, so that the penetration is
-w = depth + height with depth > 0. In contact u = w, free u decays as exp(-s / deborah). By the envelope theorem
-du/d(depth) is 1 in contact and decays with u in free flight, whatever the touching and leaving points do.
+Heights are positive towards the elastomer and are measured from the highest point of the line, so that the penetration
+is w = depth + height with depth > 0. In contact u = w; a free element recovers as exp(-s / deborah). The derivative
+du/d(depth) is 1 in contact and decays with u behind it: that contact begins and ends elsewhere is of second order.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, summit
 
-BLOCK = 16  # cells that are skipped at once where all are in contact, or none can be reached
+BLOCK = 16  # cells that are skipped together if all are in contact, or all are free
 TINY = 1e-290
-CLOSE = 1e-8  # a Newton step after which the next one is below rounding
+CLOSE = 1e-8  # cells: after a Newton step of this size the next one is below rounding
 ITERATIONS = 80
 
-# What a sweep returns, in this order
+# The results of a sweep, in this order
 DISPLACEMENT, STIFFNESS, DRAG, DRAG_RATE, LENGTH, STRETCH, OUTSIDE = range(7)
 SUMS = 7
 
@@ -37,7 +37,7 @@ class Blocks(NamedTuple):
 
 @jit_inline
 def _four(column: FloatArray, i: int) -> float:
-    """Return the sum of two cells and of those half a block after them."""
+    """Return the sum over two neighbouring cells and over the two half a block after them."""
     half = BLOCK // 2
     here, after = column[np.uintp(i)] + column[np.uintp(i + half)], column[np.uintp(i + 1)]
     return float(here + (after + column[np.uintp(i + 1 + half)]))
@@ -45,7 +45,7 @@ def _four(column: FloatArray, i: int) -> float:
 
 @jit
 def blocks_of(cells: Cells) -> Blocks:
-    """Return the blocks of a line; the cells that do not fill the last one are in none."""
+    """Return the blocks of a line; cells after the last whole block are in none."""
     blocks = (cells.mean.size - 1) // BLOCK
     peak, mean, stretch = np.empty(blocks), np.empty(blocks), np.empty(blocks)
     for block in range(blocks):
@@ -60,9 +60,10 @@ def blocks_of(cells: Cells) -> Blocks:
 
 
 class Barriers(NamedTuple):
-    """The depths that keep cells and blocks pressed at a Deborah number; NaN for blocks not needed yet.
+    """Depths of cells and blocks at a Deborah number; the blocks are NaN until they are needed.
 
-    Up to those in `idle` no part of a cell is pressed.
+    At a depth above `cell` or `block` the force on an element in contact is positive everywhere in the cell or block.
+    At a depth up to `idle` it is positive nowhere in the cell.
     """
 
     cell: FloatArray
@@ -72,20 +73,20 @@ class Barriers(NamedTuple):
 
 @jit
 def barriers_for(cells: int) -> Barriers:
-    """Return barriers of a line of which none is known."""
+    """Return the barriers of a line, all of them to be computed."""
     return Barriers(np.empty(cells), np.full(cells // BLOCK + 1, np.nan), np.empty(cells))
 
 
 class Places(NamedTuple):
-    """Where patches begin and end, in cells."""
+    """Where contact begins and ends, in cells."""
 
-    touches: FloatArray
-    leaves: FloatArray
+    begins: FloatArray
+    ends: FloatArray
 
 
 @jit
 def places_for(patches: int) -> Places:
-    """Return arrays for the places of some patches."""
+    """Return arrays with a capacity of some patches."""
     return Places(np.empty(patches), np.empty(patches))
 
 
@@ -93,9 +94,9 @@ def places_for(patches: int) -> Places:
 def write_barriers(
     height: FloatArray, enter: FloatArray, leave: FloatArray, deborah: float, block: int, barriers: Barriers
 ) -> None:
-    """Write the depth that keeps each whole cell of a block pressed, w + deborah w' > 0, and their maximum.
+    """Write the barriers of the cells of a block, from the force w + deborah w', and that of the block, their maximum.
 
-    That up to which none of a cell is pressed follows from the control points of the force, which bound it.
+    `idle` follows from the control points of the force, which bound it.
     """
     every, written, idle = -np.inf, barriers.cell, barriers.idle
     for i in range(block * BLOCK, min((block + 1) * BLOCK, written.size)):
@@ -118,18 +119,18 @@ def write_barriers(
 
 @jit
 def _decayed(x: float) -> float:
-    """Return 1 - exp(-x) for x >= 0; its series where that is exact to rounding and quicker."""
+    """Return 1 - exp(-x) for x >= 0; for small x by its series, which is faster and exact to rounding."""
     if x > 1 / 32:
         return -math.expm1(-x)
-    # by products: divisions would take a tenth of a sweep
+    # products instead of divisions, which would take a tenth of the time of a sweep
     rest = 1 - x * (1 / 5) * (1 - x * (1 / 6) * (1 - x * (1 / 7)))
     return x * (1 - x * (1 / 2) * (1 - x * (1 / 3) * (1 - x * (1 / 4) * rest)))
 
 
 @jit
-def leaving(w0: float, a: float, b: float, c: float, deborah: float, start: float) -> float:
-    """Return where w + deborah w', not negative at the start, falls through 0 first from there to 1, or `NONE`."""
-    # the force is a cubic itself, cut into its monotone pieces; at the start its sign may be lost in rounding
+def contact_end(w0: float, a: float, b: float, c: float, deborah: float, start: float) -> float:
+    """Return where the force w + deborah w', not negative at the start, first falls to 0 up to 1, or `NONE`."""
+    # the force is a cubic: its monotone pieces are searched; at the start its sign may be lost to rounding
     p, q, r = w0 + deborah * a, a + 2 * deborah * b, b + 3 * deborah * c
     low, positive = start, True
     discriminant = r * r - 3 * c * q
@@ -150,7 +151,7 @@ def leaving(w0: float, a: float, b: float, c: float, deborah: float, start: floa
 
 @jit
 def _falling(p: float, q: float, r: float, c: float, low: float, high: float) -> float:
-    """Return the root of a cubic that falls monotonously from low to high."""
+    """Return the root of a cubic that decreases from low to high."""
     x = low + (high - low) * 0.5
     for _ in range(ITERATIONS):
         force = p + x * (q + x * (r + x * c))
@@ -166,8 +167,8 @@ def _falling(p: float, q: float, r: float, c: float, low: float, high: float) ->
     return x
 
 
-class Flight(NamedTuple):
-    """An element that is free from a place in a cell on: the cubic w there, its displacement u, and that place."""
+class FreeElement(NamedTuple):
+    """A free element in a cell: the cubic w of the cell, its displacement u at a place, and that place."""
 
     w0: float
     a: float
@@ -178,9 +179,9 @@ class Flight(NamedTuple):
 
 
 @jit
-def _touching(flight: Flight, deborah: float, low: float, high: float) -> float:
+def _contact_begin_between(element: FreeElement, deborah: float, low: float, high: float) -> float:
     """Return where w rises to u exp(-(x - start) / deborah) between low and high, where it is known to be above."""
-    w0, a, b, c, u, start = flight
+    w0, a, b, c, u, start = element
     if w0 + low * (a + low * (b + low * c)) >= u - u * _decayed((low - start) / deborah):
         return low
     first, end, x = low, high, high
@@ -200,20 +201,20 @@ def _touching(flight: Flight, deborah: float, low: float, high: float) -> float:
 
 
 @jit
-def _touch(flight: Flight, deborah: float, low: float, stop: float) -> float:
-    """Return where from low to stop a free element touches first, or `NONE`.
+def _contact_begin(element: FreeElement, deborah: float, low: float, stop: float) -> float:
+    """Return where contact with a free element begins first between low and stop, or `NONE`.
 
-    The lead of the line, (w - u_free) exp(x / deborah), rises while the force w + deborah w' is positive.
+    The product (w - u_free) exp(x / deborah) increases while the force w + deborah w' is positive.
     """
-    w0, a, b, c, u, start = flight
+    w0, a, b, c, u, start = element
     for _ in range(3):
         force = w0 + low * (a + low * (b + low * c)) + deborah * (a + low * (2 * b + low * 3 * c))
-        first = low if force > 0 else leaving(-w0, -a, -b, -c, deborah, low)
+        first = low if force > 0 else contact_end(-w0, -a, -b, -c, deborah, low)
         if first >= stop:
             return NONE
-        high = min(leaving(w0, a, b, c, deborah, first), stop)
+        high = min(contact_end(w0, a, b, c, deborah, first), stop)
         if w0 + high * (a + high * (b + high * c)) > u - u * _decayed((high - start) / deborah):
-            return _touching(flight, deborah, first, high)
+            return _contact_begin_between(element, deborah, first, high)
         if high >= stop:
             return NONE
         low = high + CLOSE
@@ -222,7 +223,7 @@ def _touch(flight: Flight, deborah: float, low: float, stop: float) -> float:
 
 @jit
 def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) -> tuple[float, float]:
-    """Return the integrals of w and w'^2 from start to end: Gauss, exact for these polynomials."""
+    """Return the integrals of w and w'^2 from start to end, by Gauss's rule, which is exact for these polynomials."""
     half, middle = 0.5 * (end - start), 0.5 * (end + start)
     x, y = middle - half * 0.7745966692414834, middle + half * 0.7745966692414834
     before, centre, after = (
@@ -236,22 +237,22 @@ def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) 
 
 
 @jit
-def _landed(u: float, flown: float, deborah: float, slope: float) -> tuple[float, float, float, float]:
-    """Return what a flight adds to the integral of u, its derivative by the depth, the drag and its derivative.
+def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> tuple[float, float, float, float]:
+    """Return the integral of u over a free recovery from u, its derivative by the depth, the drag and its derivative.
 
-    Over a flight from u the integral of u is deborah times what u loses, and the drag is half of what u^2 loses; the
-    derivative of the drag has a part from the point of touching, where the line has that slope.
+    The integral of u is deborah times the decrease of u, and the drag is half of the decrease of u^2. The derivative of
+    the drag has a part from the place where contact begins, where the line has the given slope.
     """
-    lost = _decayed(flown / deborah) if u > 0 else 1.0
+    lost = _decayed(travelled / deborah) if u > 0 else 1.0
     memory = deborah * lost
     return u * memory, memory if u > 0 else 0.0, 0.5 * u * u * lost * (2 - lost), memory * (u / deborah + slope)
 
 
 @jit_inline
-def _flown_over(
+def _skip_free(
     peak: FloatArray, block_peak: FloatArray, depth: float, decay: float, block_decay: float, i: int, free: float
 ) -> tuple[int, float]:
-    """Pass cells that a free element cannot touch; return the first other one, and the displacement there."""
+    """Skip cells that a free element passes without contact; return the next cell, and the displacement there."""
     n, blocks = peak.size - 1, block_peak.size
     while i < n and peak[i] + depth <= free * decay:
         if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_peak[i // BLOCK] + depth <= free * block_decay:
@@ -260,7 +261,7 @@ def _flown_over(
         else:
             free *= decay
             i += 1
-        # numbers below the normal ones cost a hundred times as much
+        # arithmetic with subnormal numbers takes a hundred times as long
         free = free if free > TINY else 0.0
     return i, free
 
@@ -269,26 +270,26 @@ def _flown_over(
 def sweep_cells(
     cells: Cells, every: Blocks, barriers: Barriers, deborah: float, depth: float, sums: FloatArray, places: Places
 ) -> int:
-    """Follow an element once along the line; return how many patches it touches.
+    """Follow an element once along the line; return the number of its contact patches.
 
     Parameters
     ----------
     cells, every : Cells, Blocks
         The line, and its blocks.
     barriers : Barriers
-        Those of blocks that are NaN, all of them at first, are written here when an element in contact comes there.
+        Barriers of blocks that are still NaN are written when an element in contact reaches them.
     deborah : float
         v tau in cells.
     depth : float
         Penetration of the highest point.
     sums : array, shape (SUMS,)
         Written: the integral of u (F_N / (4 G dx)), its derivative by the depth, F_x / (4 G), its derivative by the
-        depth, the length in contact, the integral of w'^2 over it, and 1 if the contact leaves a line
+        depth, the length in contact, the integral of w'^2 over it, and 1 if the contact ends a line
         that is not periodic.
     places : Places
-        Written, as far as they reach: where each patch begins and ends.
+        Written up to its capacity: where each patch begins and ends.
     """
-    # arrays by name: a tuple of arrays costs more to look into than a cell does to compute
+    # local names, because reading an array from a tuple takes longer than a cell
     height, enter, leave, peak, mean, stretches = (
         cells.height,
         cells.enter,
@@ -299,16 +300,16 @@ def sweep_cells(
     )
     block_peak, block_mean, block_stretch = every.peak, every.mean, every.stretch
     barrier, block_barrier = barriers.cell, barriers.block
-    touches, leaves = places.touches, places.leaves
+    begins, ends = places.begins, places.ends
     n, blocks, start = mean.size - 1, block_peak.size, cells.start
     decay, block_decay = np.exp(-1 / deborah), np.exp(-BLOCK / deborah)
     area = rate = drag = drag_rate = length = stretch = 0.0
     i, x, contact, patches = 0, start, cells.periodic, 0
-    if contact and touches.size > 0:
-        touches[0] = start
-    # displacement where the contact was left and at the start of this cell; place of leaving
+    if contact and begins.size > 0:
+        begins[0] = start
+    # displacement where contact ended and at the start of this cell; place where it ended
     u = free = left = 0.0
-    # the turn ends in a part of a cell that repeats the first, at the highest point again
+    # the period ends at the highest point again, in a part of a cell that repeats the first one
     last = n if cells.periodic and start > 0 else n - 1
     while i <= last:
         if contact and x == 0:
@@ -328,7 +329,7 @@ def sweep_cells(
                     length += 1
                     i += 1
         elif not contact:
-            i, free = _flown_over(peak, block_peak, depth, decay, block_decay, i, free)
+            i, free = _skip_free(peak, block_peak, depth, decay, block_decay, i, free)
         if i > last:
             break
         stop = 1.0 if i < n else start
@@ -338,7 +339,7 @@ def sweep_cells(
         while True:
             if contact:
                 pressed = w0 + x * (c1 + x * (c2 + x * c3)) + deborah * (c1 + x * (2 * c2 + x * 3 * c3)) > 0
-                place = leaving(w0, c1, c2, c3, deborah, x) if pressed else x
+                place = contact_end(w0, c1, c2, c3, deborah, x) if pressed else x
                 end = min(place, stop)
                 part, part_stretch = _pressed(w0, c1, c2, c3, x, end)
                 area += part
@@ -348,30 +349,30 @@ def sweep_cells(
                 if place >= stop:
                     break
                 contact, left, x = False, i + place, place
-                if patches < leaves.size:
-                    leaves[patches] = left
+                if patches < ends.size:
+                    ends[patches] = left
                 patches += 1
                 free = u = w0 + place * (c1 + place * (c2 + place * c3))
-            # a force that is a cubic falls through 0 twice at most
+            # a cubic force falls through 0 at most twice
             low = x + CLOSE if visits > 0 else x
-            flies = visits < 2 and low < stop
-            touch = _touch(Flight(w0, c1, c2, c3, free, x), deborah, low, stop) if flies else NONE
-            if touch > stop:
+            may_begin = visits < 2 and low < stop
+            begin = _contact_begin(FreeElement(w0, c1, c2, c3, free, x), deborah, low, stop) if may_begin else NONE
+            if begin > stop:
                 free -= free * _decayed((stop - x) / deborah)
                 break
-            flight = _landed(u, i + touch - left, deborah, c1 + touch * (2 * c2 + touch * 3 * c3))
-            area, rate, drag, drag_rate = area + flight[0], rate + flight[1], drag + flight[2], drag_rate + flight[3]
-            contact, x = True, touch
-            if patches < touches.size:
-                touches[patches] = i + touch
+            gain = _over_recovery(u, i + begin - left, deborah, c1 + begin * (2 * c2 + begin * 3 * c3))
+            area, rate, drag, drag_rate = area + gain[0], rate + gain[1], drag + gain[2], drag_rate + gain[3]
+            contact, x = True, begin
+            if patches < begins.size:
+                begins[patches] = i + begin
         x = 0.0
         i += 1
-    # the last flight: to the highest point, or without end
+    # the last free recovery: to the highest point, or for ever
     if not contact:
-        flown = n + start - left if cells.periodic else np.inf
+        travelled = n + start - left if cells.periodic else np.inf
         slope = enter[n] if cells.periodic and start == 0 else 0.0
-        flight = _landed(u, flown, deborah, slope)
-        area, rate, drag, drag_rate = area + flight[0], rate + flight[1], drag + flight[2], drag_rate + flight[3]
+        gain = _over_recovery(u, travelled, deborah, slope)
+        area, rate, drag, drag_rate = area + gain[0], rate + gain[1], drag + gain[2], drag_rate + gain[3]
     sums[DISPLACEMENT] = area
     sums[STIFFNESS] = rate + length
     sums[DRAG] = drag + deborah * stretch
@@ -381,9 +382,9 @@ def sweep_cells(
     sums[OUTSIDE] = 0.0 if cells.periodic or not (contact or depth + height[0] > 0) else 1.0
     if not (cells.periodic or contact):
         return patches
-    # a turn ends on the highest point, which an element that is still free touches at that very point
-    if patches < leaves.size:
-        touches[patches], leaves[patches] = touches[patches] if contact else n + start, n + start
+    # a period ends at the highest point, where contact begins for an element that is still free
+    if patches < ends.size:
+        begins[patches], ends[patches] = begins[patches] if contact else n + start, n + start
     return patches + 1
 
 
@@ -395,7 +396,7 @@ def patches_at(
     n = cells.mean.size - 1
     places = places_for(n // 8 + 2)
     count = sweep_cells(cells, every, barriers, deborah, depth, sums, places)
-    if count > places.touches.size:
+    if count > places.begins.size:
         places = places_for(count)
         sweep_cells(cells, every, barriers, deborah, depth, sums, places)
-    return places.touches[:count], places.leaves[:count]
+    return places.begins[:count], places.ends[:count]

@@ -1,56 +1,301 @@
 """Steady sliding of a Kelvin foundation from node to node of a periodic line, for many cases at once.
 
 In a cell the line is a cubic through heights and slopes at its ends, w = d + h + s x + ..., and De is the Deborah
-number v tau in cells. An element leaves contact where the force w + De w' falls to 0 and touches where the gap closes.
-A cell that is partly in contact adds positive terms only, so that nothing cancels in slow sliding: over the piece in
-contact the integrals of w and of De w'^2, over a free piece those of u and u^2 / De. Cells wholly in contact are
-integrated exactly, so that full contact is exact on any grid. Everything is measured in cells, as in `kelvin`.
+number v tau in cells. Contact ends where the force w + De w' falls to 0, and begins where the gap closes.
+A cell that is partly in contact adds positive terms only, so that no digits are lost in slow sliding: the integrals of
+w and De w'^2 over the part in contact, and of u and u^2 / De over the free part. Cells wholly in contact are integrated
+exactly, so that full contact is exact on any grid. Lengths are in cells, as in `kelvin`.
 
-The cases pass the line together, block by block. Whether a block is wholly in contact or wholly free is decided for
-all cases at once by vector instructions, and its integrals are closed sums. Through the other blocks each case goes
-from cell to cell. Every case does the same arithmetic whichever cases run beside it. The depth that carries the load
-is found by Newton's method, on finer and finer grids, each from the depth on the grid before.
+All cases are followed along the line together, block by block. Whether a block is wholly in contact or wholly free is
+decided for all cases at once by vector instructions, and its integrals are closed sums. In the other blocks each case
+is followed from cell to cell. The arithmetic of a case does not depend on the other cases. The depth that carries
+the load is found by Newton's method on finer and finer grids, each of which starts from the depth on the grid before.
 """
 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Solution
 from mdr_dask.physics.sliding.cases import Cases
-from mdr_dask.physics.sliding.nodes import (
-    AFTER,
-    BEFORE,
-    BLOCK,
-    HEIGHT,
-    HEIGHTS,
-    IN_A_TILE,
-    LOWEST,
-    MEAN,
-    NO_ENDS,
-    PEAK,
-    SLOPE,
-    SQUARE,
-    SQUARES,
-    STEEPEST,
-    TOP,
-    Nodes,
-    ends_of,
-    fill,
-    nodes,
-    weights,
-    with_summit,
-)
 from mdr_dask.physics.surfaces.cubic_line import highest_point
 
-LANES = 64  # cases that pass the line together
+BLOCK = 32  # cells
+WING = 4  # nodes on either side from which a finer grid is interpolated
+BEFORE, AFTER = WING + 1, WING + 2  # nodes added from the periods before and after, as many as `refine` reads
+ABOVE = 4 / 27  # times the slopes at both ends: most by which a cubic cell rises above its ends
+SUMMIT = 64  # nodes in the cell of the highest point, of which the highest is taken
+
+NO_ENDS: FloatArray = np.empty((2, 0))
+# Bounds and sums of a block of cells, in this order
+PEAK, LOWEST, STEEPEST, HEIGHTS, SQUARES = range(5)
+KNOWN = 5
+# Rows of a tile: at nodes, beginning with the one before it, then of cells
+HEIGHT, SLOPE, MEAN, SQUARE, TOP = range(5)
+IN_A_TILE = 5
+
+
+class Nodes(NamedTuple):
+    """A periodic line on a grid of n cells.
+
+    Parameters
+    ----------
+    height, slope : array, shape (BEFORE + n + AFTER,)
+        With nodes of the periods before and after. Heights are measured from the first node; slopes are rises over a
+        cell.
+    ends : array, shape (2, BEFORE + n + AFTER) or (2, 0)
+        From `ends_of`, with the same additional nodes.
+    blocks : array, shape (n // BLOCK, KNOWN)
+        Bounds and sums over the cells of a block.
+    top : float
+        The height of the first node.
+    rise : float
+        Height of the highest point in the cell before, above the first node; 0 on coarse grids.
+    """
+
+    height: FloatArray
+    slope: FloatArray
+    ends: FloatArray
+    blocks: FloatArray
+    top: float
+    rise: float
+
+
+@jit
+def _take(given: FloatArray, first: int, stride: int, period: FloatArray) -> None:
+    """Write every stride-th number of a period from `first` on, and those needed of the periods before and after."""
+    n = period.size - BEFORE - AFTER
+    left = -(-(given.size - first) // stride)
+    filled = left if left < n else n  # up to the end of the given array
+    for i in range(filled):
+        period[BEFORE + i] = given[first + i * stride]
+    first -= given.size
+    for i in range(filled, n):
+        period[BEFORE + i] = given[first + i * stride]
+    for i in range(BEFORE):
+        period[i] = period[n + i]
+    for i in range(n + BEFORE, period.size):
+        period[i] = period[i - n]
+
+
+@lru_cache(maxsize=4)
+def _end_factors(n: int) -> NDArray[np.complex128]:
+    """Return the factors of `ends_of` for the mean and every wave of a line of n nodes."""
+    wave = 2 * np.pi / n * np.arange(1, n // 2 + 1)
+    return np.append(0.0, 1j * (1 / wave - 0.5 / np.tan(wave / 2)))
+
+
+def ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
+    """Return corrections of the trapezium rule for the integrals of height and slope squared, shape (2, n).
+
+    The integral from one node to another is the trapezium sum plus the correction at the first node minus that at the
+    last one. This is exact, for slopes as rises over a cell. Corrections from local derivatives would miss the shortest
+    waves, which decide the integrals over small contacts.
+    """
+    n = height.size
+    parts = fft.rfft([height, (slope / n) ** 2])
+    parts *= _end_factors(n)
+    return np.asarray(fft.irfft(parts, n, overwrite_x=True), dtype=np.float64)
+
+
+def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolved: bool, ends: FloatArray) -> Nodes:
+    """Take every stride-th node of a line; slopes are differences of heights if it is not resolved.
+
+    Parameters
+    ----------
+    height, slope : array, shape (n,)
+        Heights and derivatives by position over the length of the line.
+    first : int
+        First node; heights are measured from it.
+    ends : array, shape (2, n) or (2, 0)
+        From `ends_of`; without it, integrals over cells follow from the neighbouring nodes.
+    """
+    n = height.size // stride
+    h, s = np.empty((2, BEFORE + n + AFTER))
+    terms = np.empty((2, ends.shape[1] and h.size))
+    line = Nodes(h, s, terms, np.empty((n // BLOCK, KNOWN)), float(height[first]), 0.0)
+    _take_line(height, slope if resolved else slope[:0], ends, first, stride, line, np.empty((3, BLOCK + 1)))
+    return line
+
+
+@jit
+def _take_line(
+    height: FloatArray,
+    slope: FloatArray,
+    ends: FloatArray,
+    first: int,
+    stride: int,
+    line: Nodes,
+    cells: FloatArray,
+) -> None:
+    """Write the nodes and blocks of a line; slopes are differences of heights if none are given."""
+    h, s, of_height, of_square, blocks = line.height, line.slope, line.ends[0], line.ends[1], line.blocks
+    n = h.size - BEFORE - AFTER
+    _take(height, first, stride, h)
+    for i in range(h.size):
+        h[i] -= line.top
+    if slope.size > 0:
+        _take(slope, first, stride, s)
+        for i in range(s.size):
+            s[i] /= n
+    else:
+        for i in range(1, s.size - 1):
+            s[i] = 0.5 * (h[i + 1] - h[i - 1])
+        s[0], s[s.size - 1] = s[n], s[s.size - 1 - n]
+    if of_height.size > 0:
+        _take(ends[0], first, stride, of_height)
+        _take(ends[1], first, stride, of_square)
+    mean, square, above = cells[0], cells[1], cells[2]
+    for j in range(blocks.shape[0]):
+        before, begin, last = BEFORE + j * BLOCK - 1, BEFORE + j * BLOCK, BEFORE + (j + 1) * BLOCK
+        # first cell by cell, in vector instructions, and then the sums
+        _integrals(h[before:], s[before:], of_height[before:], of_square[before:], BLOCK, mean, square)
+        for k in range(BLOCK):
+            i = begin + k
+            above[k] = max(h[i], h[i + 1]) + ABOVE * (max(s[i], 0.0) + max(-s[i + 1], 0.0))
+        peak, lowest, steepest, heights, squares = -np.inf, h[last], s[last], 0.0, 0.0
+        for k in range(BLOCK):
+            peak, lowest, steepest = (
+                max(peak, above[k]),
+                min(lowest, h[begin + k]),
+                min(steepest, s[begin + k]),
+            )
+            heights += mean[k]
+            squares += square[k]
+        blocks[j, PEAK], blocks[j, LOWEST], blocks[j, STEEPEST] = peak, lowest, steepest
+        blocks[j, HEIGHTS], blocks[j, SQUARES] = heights, squares
+
+
+@jit
+def _integrals(
+    h: FloatArray,
+    s: FloatArray,
+    of_height: FloatArray,
+    of_square: FloatArray,
+    cells: int,
+    mean: FloatArray,
+    square: FloatArray,
+) -> None:
+    """Write the integrals of the height and of the slope squared over cells; `square` is one longer.
+
+    The arrays begin with the node before the first cell. Without exact corrections those of Euler and Maclaurin are
+    used, with derivatives from heights and slopes at the neighbouring nodes; over a whole line they cancel.
+    """
+    if of_height.size > 0:
+        for k in range(cells):
+            mean[k] = 0.5 * (h[k + 1] + h[k + 2]) + of_height[k + 1] - of_height[k + 2]
+            square[k] = 0.5 * (s[k + 1] * s[k + 1] + s[k + 2] * s[k + 2]) + of_square[k + 1] - of_square[k + 2]
+        return
+    for k in range(cells + 1):
+        rise, fall = h[k + 2] - h[k], (h[k + 2] - h[k + 1]) - (h[k + 1] - h[k])
+        tilt, bow = s[k + 2] + s[k], s[k + 2] - s[k]
+        second, third, fourth = 2 * fall - 0.5 * bow, 7.5 * rise - 1.5 * (tilt + 8 * s[k + 1]), 6 * bow - 12 * fall
+        square[k] = s[k + 1] * second / 6 - (s[k + 1] * fourth + 3 * second * third) / 360
+    for k in range(cells):
+        mean[k] = 0.5 * (h[k + 1] + h[k + 2]) + (s[k + 1] - s[k + 2]) / 12
+        square[k] = 0.5 * (s[k + 1] * s[k + 1] + s[k + 2] * s[k + 2]) + square[k] - square[k + 1]
+
+
+@jit
+def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
+    """Write the highest points of cells; the first cell begins at the second node."""
+    for k in range(cells):
+        h0, h1, s0, s1 = h[k + 1], h[k + 2], s[k + 1], s[k + 2]
+        rise = h1 - h0
+        a, b = 3 * rise - 2 * s0 - s1, s0 + s1 - 2 * rise
+        inside = a * a - 3 * s0 * b
+        root = math.sqrt(inside) if inside > 0 else 0.0
+        above, below = (s0, root - a) if a <= 0 else (a + root, -3 * b)  # the form without cancellation
+        x = above / below if below > 0 else 0.0
+        x = x if (x > 0) & (x < 1) else 0.0
+        top, ends = h0 + x * (s0 + x * (a + x * b)), max(h0, h1)
+        peak[k] = top if top > ends else ends
+
+
+@jit_inline
+def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatArray) -> int:
+    """Write a tile of a line on the finer grid of the weights, and return the number of its cells.
+
+    Parameters
+    ----------
+    line : Nodes
+    first, cells : int
+        First node, and number of the cells of the line.
+    weights : array, shape (2, refinement, 4 WING)
+        From :func:`weights`.
+    tile : array, shape (IN_A_TILE, cells refinement + 3)
+        Written. Rows: heights and slopes, also at the node before the first and after the last one; integrals of height
+        and slope squared over each cell; its highest point.
+    """
+    refinement, h, s = weights.shape[1], tile[HEIGHT], tile[SLOPE]
+    # exact corrections exist only at the nodes of the line
+    here = first - 1 if refinement == 1 else line.ends.shape[1]
+    if refinement == 1:
+        h[: cells + 3] = line.height[first - 1 : first + cells + 2]
+        s[: cells + 3] = line.slope[first - 1 : first + cells + 2]
+    else:
+        refine(line, first, cells, weights, h, s)
+    cells *= refinement
+    _integrals(h, s, line.ends[0, here:], line.ends[1, here:], cells, tile[MEAN], tile[SQUARE])
+    _peaks(h, s, cells, tile[TOP])
+    return cells
+
+
+@lru_cache
+def weights(refinement: int) -> FloatArray:
+    """Return the weights of `WING` nodes on either side for the nodes of a finer grid, shape (2, refinement, 4 WING).
+
+    The first index is 0 for the height and 1 for the slope, the second the node of the finer grid in a cell, the third
+    the heights and then the slopes at the 2 WING nodes: the Hermite polynomial through them has degree 15. With two
+    nodes per Nyquist point its error is below 1e-7 of the shortest wave.
+    """
+    places, x = np.arange(1.0 - WING, 1.0 + WING), np.arange(refinement) / refinement
+    table = np.empty((2, refinement, 4 * WING))
+    for i, place in enumerate(places):
+        others = np.delete(places, i)
+        lagrange = np.poly(others) / np.prod(place - others)
+        value, rate = np.polyval(lagrange, x), np.polyval(np.polyder(lagrange), x)
+        tilt, away = 2 * np.sum(1 / (place - others)), x - place
+        table[0, :, i] = (1 - tilt * away) * value**2
+        table[0, :, places.size + i] = away * value**2
+        table[1, :, i] = -tilt * value**2 + 2 * (1 - tilt * away) * value * rate
+        table[1, :, places.size + i] = value**2 + 2 * away * value * rate
+    return table
+
+
+@jit
+def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: FloatArray, slope: FloatArray) -> None:
+    """Write heights and slopes of the finer grid over cells of a line, from the node before to the second one after."""
+    refinement = weights.shape[1]
+    h, s = line.height, line.slope
+    for place in range(-1, cells * refinement + 2):
+        cell = place // refinement
+        step, i = place - cell * refinement, first + cell + 1 - WING
+        value, rate = 0.0, 0.0
+        for k in range(2 * WING):
+            value += weights[0, step, k] * h[i + k] + weights[0, step, 2 * WING + k] * s[i + k]
+            rate += weights[1, step, k] * h[i + k] + weights[1, step, 2 * WING + k] * s[i + k]
+        height[place + 1], slope[place + 1] = value, rate / refinement
+
+
+def with_summit(line: Nodes) -> Nodes:
+    """Return a line whose highest point is in the cell before its first node, with its `rise`."""
+    table = weights(SUMMIT)
+    height, slope = np.empty((2, SUMMIT + 3))
+    refine(line, BEFORE - 1, 1, table, height, slope)
+    return line._replace(rise=max(float(np.max(height[1:-1])), 0.0))
+
+
+LANES = 64  # cases that are followed together
 SMALL, LARGE = 1e-300, 1e12
 CLOSED = 1e-9  # relative difference of the displacement before and after a period that counts as a closed period
 RESOLVED = 10  # cells in contact below which a grid does not resolve the contact
@@ -74,7 +319,7 @@ SECANTS = 3
 
 @jit_inline
 def _fading(time: float) -> float:
-    """Return exp(-time), to 1e-4 up to 1 and small where it is small."""
+    """Return exp(-time) for time >= 0, with an error of 1e-4 at most up to time 1."""
     y = time * 0.125
     y = y if y < 1.0 else 1.0
     e = 1.0 + y * (-1.0 + y * (0.5 - y * (1 / 6)))
@@ -115,12 +360,12 @@ def _tilt(cell: Cell, x: float) -> float:
 
 
 @jit_inline
-def _leaves(
+def _contact_end(
     cell: Cell, r: float, begins: float, force: float, force_end: float, inverse: float
 ) -> tuple[float, float, float]:
-    """Return where the force falls to 0 in a cell, w there, and the share of it that is left at the end of the cell.
+    """Return where the force falls to 0 in a cell, w there, and the part of it that is left at the end of the cell.
 
-    A secant from where it begins to fall, and one step of Newton.
+    The place is found by a secant from where the force begins to fall, and one step of Newton's method.
     """
     fall = (1 - begins) / (force - force_end)
     x = begins + force * fall
@@ -136,10 +381,10 @@ def _leaves(
 
 
 @jit_inline
-def _touches(cell: Cell, u: float, inverse: float, last: float, gap_last: float) -> tuple[float, float]:
-    """Return where the gap closes before a place where it is known to be, and what is left of u there.
+def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: float) -> tuple[float, float]:
+    """Return where the gap closes before a place where it is closed, and the part of u that is left there.
 
-    A parabola through the gap at both ends, and one step of Newton.
+    The place is found by a parabola through the gap at both ends, and one step of Newton's method.
     """
     gap, closing = u - cell.w0, cell.s0 + u * inverse
     bow = (gap - closing * last - gap_last) / (last * last + SMALL)
@@ -156,10 +401,12 @@ def _touches(cell: Cell, u: float, inverse: float, last: float, gap_last: float)
 
 
 @jit_inline
-def _meets(cell: Cell, r: float, u: float, kept: float, inverse: float) -> tuple[bool, float, float, float, float]:
-    """Return whether an element in flight meets the line in a cell, and where that piece of contact ends.
+def _contact_in_cell(
+    cell: Cell, r: float, u: float, kept: float, inverse: float
+) -> tuple[bool, float, float, float, float]:
+    """Return whether contact begins in a cell for a free element, and where that contact ends.
 
-    With w there, the share of it that is left at the end of the cell, and the gap if there had been no contact.
+    Also w there, the part of it that is left at the end of the cell, and the gap there without that contact.
     """
     force, gap = cell.w1 + r * cell.s1, kept - cell.w1
     if force > 0:
@@ -171,20 +418,20 @@ def _meets(cell: Cell, r: float, u: float, kept: float, inverse: float) -> tuple
         falls = _at(cell, begins)
     if falls <= 0:
         return False, 1.0, cell.w1, 1.0, gap
-    stop, crest, held = _leaves(cell, r, begins, falls, force, inverse)
+    stop, crest, held = _contact_end(cell, r, begins, falls, force, inverse)
     gap = u * _fading(stop * inverse) - crest
     return gap < 0, stop, crest, held, gap
 
 
 @jit
 def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
-    """Take a case over the cells of a tile."""
+    """Follow a case along the cells of a tile."""
     d, r = workspace[DEPTH + k], workspace[DEBORAH + k]
     decay, inverse = workspace[DECAY + k], workspace[INVERSE + k]
     u, fade = workspace[U + k], workspace[FADE + k]
     contact = workspace[CONTACT + k] > 0
     load, rate, loss, length, stretch = 0.0, 0.0, 0.0, 0.0, 0.0
-    flown, flown_rate, flown_loss = 0.0, 0.0, 0.0
+    free_load, free_rate, free_loss = 0.0, 0.0, 0.0
     i = 0
     while i < cells:
         if contact:
@@ -199,7 +446,7 @@ def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
                 u, fade = (d + tile[HEIGHT, i + 1], 1.0) if i > begun else (u, fade)
                 break
             cell = _cell(tile, i, d)
-            stop, w_stop, held = _leaves(cell, r, 0.0, cell.w0 + r * cell.s0, cell.w1 + r * cell.s1, inverse)
+            stop, w_stop, held = _contact_end(cell, r, 0.0, cell.w0 + r * cell.s0, cell.w1 + r * cell.s1, inverse)
             start, keeps = 0.0, 1.0
             contact = False
         else:
@@ -207,18 +454,18 @@ def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
             while i < cells:
                 if tile[TOP, i] + d > decay * u:
                     cell = _cell(tile, i, d)
-                    met, stop, w_stop, held, gap = _meets(cell, r, u, decay * u, inverse)
+                    met, stop, w_stop, held, gap = _contact_in_cell(cell, r, u, decay * u, inverse)
                     if met:
                         break
-                flown += u
-                flown_rate += fade
-                flown_loss += u * u
+                free_load += u
+                free_rate += fade
+                free_loss += u * u
                 u *= decay
                 fade *= decay
                 i += 1
             if not met:
                 break
-            start, keeps = _touches(cell, u, inverse, stop, gap)
+            start, keeps = _contact_begin(cell, u, inverse, stop, gap)
             contact = cell.w1 + r * cell.s1 > 0
         i += 1
         part, middle = stop - start, 0.5 * (start + stop)
@@ -233,9 +480,9 @@ def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
     lost = 1 - decay
     workspace[U + k], workspace[FADE + k] = u, fade
     workspace[CONTACT + k] = 1.0 if contact else 0.0
-    workspace[LOAD + k] += load + r * lost * flown
-    workspace[RATE + k] += rate + r * lost * flown_rate
-    workspace[LOSS + k] += loss + r * stretch + 0.5 * lost * (1 + decay) * flown_loss
+    workspace[LOAD + k] += load + r * lost * free_load
+    workspace[RATE + k] += rate + r * lost * free_rate
+    workspace[LOSS + k] += loss + r * stretch + 0.5 * lost * (1 + decay) * free_loss
     workspace[LENGTH + k] += length
     workspace[STRETCH + k] += stretch
 
@@ -244,7 +491,7 @@ def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
 def _pass_block(
     block: FloatArray, last: float, refinement: int, workspace: FloatArray, count: int, queue: NDArray[np.int64]
 ) -> int:
-    """Take cases over a block by closed sums; queue those that touch or leave in it, and return their number."""
+    """Pass a block by closed sums; queue the cases in which contact begins or ends in it, and return their number."""
     peak, lowest, steepest = block[PEAK], block[LOWEST], block[STEEPEST]
     steepest /= refinement
     cells, heights, squares = BLOCK * refinement, block[HEIGHTS] * refinement, block[SQUARES] / refinement
@@ -253,23 +500,23 @@ def _pass_block(
         u, fade, through = workspace[U + k], workspace[FADE + k], workspace[THROUGH + k]
         kept, lost = u * through, 1 - through
         memory = r * lost
-        flies = (not was) & (peak + d <= kept)
-        stays = was & (lowest + d + r * steepest > 0)
+        is_free = (not was) & (peak + d <= kept)
+        is_pressed = was & (lowest + d + r * steepest > 0)
         load, rate, loss = workspace[LOAD + k], workspace[RATE + k], workspace[LOSS + k]
         length, stretch = workspace[LENGTH + k], workspace[STRETCH + k]
-        flown_load = load + u * memory if flies else load
-        flown_rate = rate + fade * memory if flies else rate
-        flown_loss = loss + 0.5 * u * u * lost * (1 + through) if flies else loss
+        passed_load = load + u * memory if is_free else load
+        free_rate = rate + fade * memory if is_free else rate
+        free_loss = loss + 0.5 * u * u * lost * (1 + through) if is_free else loss
         kept = kept if kept > SMALL else 0.0
-        flown, faded = kept if flies else u, fade * through if flies else fade
-        workspace[LOAD + k] = load + (heights + cells * d) if stays else flown_load
-        workspace[RATE + k] = rate + cells if stays else flown_rate
-        workspace[LOSS + k] = loss + r * squares if stays else flown_loss
-        workspace[LENGTH + k] = length + cells if stays else length
-        workspace[STRETCH + k] = stretch + squares if stays else stretch
-        workspace[U + k] = last + d if stays else flown
-        workspace[FADE + k] = 1.0 if stays else faded
-        workspace[CALM + k] = 1.0 if stays | flies else 0.0
+        free_load, faded = kept if is_free else u, fade * through if is_free else fade
+        workspace[LOAD + k] = load + (heights + cells * d) if is_pressed else passed_load
+        workspace[RATE + k] = rate + cells if is_pressed else free_rate
+        workspace[LOSS + k] = loss + r * squares if is_pressed else free_loss
+        workspace[LENGTH + k] = length + cells if is_pressed else length
+        workspace[STRETCH + k] = stretch + squares if is_pressed else stretch
+        workspace[U + k] = last + d if is_pressed else free_load
+        workspace[FADE + k] = 1.0 if is_pressed else faded
+        workspace[CALM + k] = 1.0 if is_pressed | is_free else 0.0
     queued = 0
     for k in range(count):
         queue[queued] = k
@@ -288,7 +535,7 @@ def sweep(
 ) -> None:
     """Follow one element of every case along the line, from its summit back to it.
 
-    Blocks that a case touches or leaves in are gone along on the finer grid that the weights make.
+    Blocks in which contact begins or ends are followed on the finer grid of the weights.
     """
     refinement, blocks = weights.shape[1], line.blocks
     n = line.height.size - BEFORE - AFTER
@@ -297,7 +544,7 @@ def sweep(
         force = w + workspace[DEBORAH + k] / refinement * line.slope[BEFORE - 1]
         workspace[U + k], workspace[FADE + k] = max(w, 0.0), 1.0
         workspace[CONTACT + k] = 1.0 if w > 0 and force > 0 else 0.0
-    # the summit, where every case touches, lies in the cell before the first one; then blocks, and what is left
+    # first the cell of the summit, where every case is in contact, then the blocks, then the remaining cells
     first, cells = BEFORE - 1, 1
     for j in range(blocks.shape[0] + 2):
         if 0 < j <= blocks.shape[0]:
@@ -322,7 +569,7 @@ def sweep(
 
 @jit
 def load_case(workspace: FloatArray, k: int, depth: float, deborah: float, cells: int) -> None:
-    """Write what does not change of a case on a grid."""
+    """Write the constants of a case on a grid."""
     workspace[DEPTH + k], workspace[DEBORAH + k] = depth, deborah
     workspace[INVERSE + k] = min(1 / deborah, LARGE)
     workspace[DECAY + k], workspace[THROUGH + k] = math.exp(-1 / deborah), math.exp(-cells / deborah)

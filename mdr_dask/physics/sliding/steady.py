@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdr_dask.arrays import FloatArray, IntArray
+from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import backward_euler
@@ -30,17 +30,18 @@ from mdr_dask.physics.sliding.kelvin import (
     Places,
     barriers_for,
     blocks_of,
+    places_for,
     sweep_cells,
 )
 from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 
 ITERATIONS = 200
-PATIENCE = 20  # sweeps before the bracket is halved
-OUTLINES, OUTLINED = 12, 0.02  # looks at the tops of blocks for a guess of the depth, and the change that is the last
-OUTLINED_FROM = 64.0  # Deborah number in cells: of elements that fade sooner, what is between the tops counts
-LOST = 1e-13  # rise of a line where it touches, relative to its heights there, below which it is rounding
+PATIENCE = 20  # sweeps after which the bracket is halved
+OUTLINES, OUTLINED = 12, 0.02  # most iterations for a guess of the depth from the peaks of blocks, and their last step
+OUTLINED_FROM = 64.0  # least Deborah number in cells for such a guess: at less the line between the peaks matters
+LOST = 1e-13  # rise of a line where contact begins, relative to its heights there, below which it is rounding
 TRAIL = 5  # numbers of a trail: log depth, log load, slope of these and its change, Deborah number
-LATTICE_BITS = 20  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
+LATTICE_BITS = 20  # depths are searched on a lattice of relative spacing 2**-LATTICE_BITS: see `_solve`
 
 
 @jit
@@ -65,10 +66,10 @@ def _begin(trail: FloatArray, depth: float, load: float) -> None:
 
 @jit
 def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tuple[float, float]:
-    """Guess log depth at a load, and its derivative by log load, from the highest points of blocks alone.
+    """Guess log depth at a load, and its derivative by log load, from the peaks of blocks alone.
 
-    The full-contact depth is an upper bound, and so is each tangent of the load. If the load is lost to rounding, the
-    start is returned.
+    The depth of full contact is an upper bound, and so is each tangent of the load. If the load is lost to rounding,
+    the start is returned.
     """
     fade, memory = np.exp(-BLOCK / deborah), -deborah * math.expm1(-BLOCK / deborah)
     depth, most, slope = math.exp(start), load / (memory * peak.size) - peak.mean(), 1.0
@@ -97,7 +98,7 @@ def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tu
 def _follow(sums: FloatArray, depth: float, deborah: float, trail: FloatArray) -> None:
     """Write log depth, log load, their slope and its change to `trail`, from the last sweep and the one before.
 
-    At another Deborah number the slope was another one, but its change is nearly the same.
+    The change of the slope is kept from another Deborah number, where it is nearly the same.
     """
     carried = sums[DISPLACEMENT]
     load, slope = np.log(carried), carried / (sums[STIFFNESS] * depth)
@@ -124,54 +125,15 @@ class _Swept(NamedTuple):
     mean: float
 
 
-class Touching(NamedTuple):
-    """Beginnings and ends of the contact patches of cases at the lattice depths that were found.
-
-    Parameters
-    ----------
-    start, end : array, shape (cases, room)
-        The first patches of every case, up to the capacity of the arrays.
-    patches : int array, shape (cases,)
-        Number of patches of every case, also beyond the capacity; 0 where no depth was found.
-    """
-
-    start: FloatArray
-    end: FloatArray
-    patches: IntArray
-
-
-class Kept(NamedTuple):
-    """Thresholds of a line by Deborah number in cells, and its contact patches, that a caller keeps."""
-
-    barriers_at: Callable[[float], Barriers]
-    touching: Touching
-
-
-class _Found(NamedTuple):
-    """Results of some cases: columns, status, patches, and the rows of these."""
-
-    results: FloatArray
-    status: NDArray[np.int8]
-    touching: Touching
-    rows: IntArray
-
-
-def touching_for(cases: int, room: int) -> Touching:
-    """Return arrays for so many patches of each of some cases."""
-    return Touching(np.empty((cases, room)), np.empty((cases, room)), np.zeros(cases, np.int64))
-
-
 @jit
 def _solve(
     line: _Swept, deborah: float, load: float, trail: FloatArray, sums: FloatArray, places: Places
-) -> tuple[float, int]:
-    """Find the last lattice depth that carries less than the load, and leave its sums; count its patches.
-
-    They are 0 where no depth is found. Places are written as far as they reach.
+) -> tuple[float, bool]:
+    """Return the last lattice depth that carries less than the load, and whether it was found; write its sums.
 
     The load is a convex, increasing function of the depth, so that its tangents bound the root from above, as full
-    contact does: a lattice depth below the root whose tangent reaches the load before the next lattice depth is the one
-    wanted. It is unique, and so the answer does not depend on the `trail` that the search follows.
+    contact does. The depth is found when the tangent at a lattice depth below the root reaches the load before the next
+    lattice depth. There is only one such depth, so the result does not depend on the `trail` of the search.
     """
     cells, blocks, barriers, mean = line
     low, high = 0.0, np.inf
@@ -179,10 +141,10 @@ def _solve(
     depth = _floor(min(_guess(trail, load), most))
     best = np.zeros(SUMS)
     for iteration in range(ITERATIONS):
-        patches = sweep_cells(cells, blocks, barriers, deborah, depth, sums, places)
+        sweep_cells(cells, blocks, barriers, deborah, depth, sums, places)
         carried = sums[DISPLACEMENT]
         if not (carried > 0 and sums[STIFFNESS] > 0):
-            return depth, 0
+            return depth, False
         tangent = depth + (load - carried) / sums[STIFFNESS]
         if tangent > low:  # sums that overflow have none
             most = min(most, tangent)
@@ -191,14 +153,12 @@ def _solve(
             low = depth
             best[:] = sums
             if tangent < _next(depth):
-                return depth, patches
+                return depth, True
         else:
             high = depth
         if low > 0 and _next(low) >= high:
-            if carried > load and places.leaves.size > 0:
-                patches = sweep_cells(cells, blocks, barriers, deborah, low, sums, places)
             sums[:] = best
-            return low, patches
+            return low, True
         proposal = min(_guess(trail, load), most)
         if iteration > PATIENCE and high < np.inf:
             proposal = 0.5 * (low + high)
@@ -208,7 +168,7 @@ def _solve(
         elif depth >= high:
             depth = _floor(0.5 * (low + high)) if high - low > 2 * (_next(low) - low) else low
             depth = max(depth, _next(low)) if low > 0 else _floor(0.5 * high)
-    return depth, 0
+    return depth, False
 
 
 @jit
@@ -216,36 +176,27 @@ def _states(
     line: _Swept,
     cases: Cases,
     guesses: FloatArray,
-    close: float,
     first: FloatArray,
-    found: _Found,
+    results: FloatArray,
+    status: NDArray[np.int8],
 ) -> None:
     """Solve cases of one line and Deborah number, ordered by load; see `Steady` for the columns of the results.
 
-    The search for a depth follows that of the case before, that of the first one the trail given, which is then its
-    own; or it starts from its guess where that is a number. Where the tangent at a guess moves it by less than
-    ``close``, relatively, that is taken for the answer.
+    The search for a depth starts from its guess if that is a number, otherwise from the case before. The first search
+    starts from the trail `first`, which is then replaced by that of the first case.
     """
-    (cells, blocks, barriers, _), (deborahs, loads) = line, cases
-    n, (results, status, touching, rows) = cells.mean.size - 1, found
+    (cells, _, _, _), (deborahs, loads) = line, cases
+    n, places = cells.mean.size - 1, places_for(0)
     sums, trail, starts = np.empty(SUMS), np.empty(TRAIL), True
     trail[:] = first
     for k in range(loads.size):
-        deborah, depth, patches = deborahs[k], guesses[k], 0
-        places = Places(touching.start[rows[k]], touching.end[rows[k]])
         if guesses[k] > 0:
             _begin(trail, guesses[k], loads[k])
-            if close > 0:
-                patches = sweep_cells(cells, blocks, barriers, deborah, depth, sums, places)
-                if not abs(loads[k] - sums[DISPLACEMENT]) < close * depth * sums[STIFFNESS]:
-                    patches = 0
-        if patches == 0:
-            depth, patches = _solve(line, deborah, loads[k], trail, sums, places)
-        if patches == 0:
+        depth, is_found = _solve(line, deborahs[k], loads[k], trail, sums, places)
+        if not is_found:
             status[k] = Outcome.DEPTH_NOT_FOUND
             trail[:] = first
             continue
-        touching.patches[rows[k]] = patches
         if starts:
             first[:] = trail
             starts = False
@@ -262,7 +213,6 @@ def steady_sliding(
     deborah: FloatArray,
     loads: FloatArray,
     guesses: FloatArray | None = None,
-    close: float = 0.0,
 ) -> Steady:
     """Return the steady states of a Kelvin foundation that slides over a line, by exact sweeps over its cells.
 
@@ -276,9 +226,7 @@ def steady_sliding(
     loads : array, shape (cases,)
         F_N / (4 G L), the mean displacement, in the unit of height.
     guesses : array, shape (cases,), optional
-        Depths to start the search from; the answer does not depend on them while `close` is 0.
-    close : float
-        Relative change of a guess that its tangent is trusted with instead of a search: for comparisons only.
+        Depths at which the searches start; the results do not depend on them.
 
     Returns
     -------
@@ -297,7 +245,7 @@ def steady_sliding(
     [0.243 2.408]
     """
     cells = cut(line)
-    return steady_on_cells(cells, blocks_of(cells), deborah, loads, guesses, close)
+    return steady_on_cells(cells, blocks_of(cells), deborah, loads, guesses)
 
 
 def steady_on_cells(
@@ -306,36 +254,14 @@ def steady_on_cells(
     deborah: FloatArray,
     loads: FloatArray,
     guesses: FloatArray | None = None,
-    close: float = 0.0,
-    kept: Kept | None = None,
 ) -> Steady:
-    """Return what :func:`steady_sliding` does, on a line that is already cut into cells and blocks.
-
-    With ``kept`` the thresholds come from the caller, and the contact patches are written there.
-    """
+    """Return what :func:`steady_sliding` does, on a line that is already cut into cells and blocks."""
     start = np.full(loads.size, np.nan) if guesses is None else guesses
-    keeps = kept or Kept(_unknown_barriers(cells.mean.size - 1), touching_for(loads.size, 0))
-    return _solved(
-        cells,
-        deborah,
-        loads,
-        lambda good, cases: _swept(cells, blocks, cases, start[good], close, keeps, np.flatnonzero(good)),
-    )
-
-
-def _unknown_barriers(cells: int) -> Callable[[float], Barriers]:
-    """Return a function that resets one set of thresholds for each Deborah number."""
-    barriers = barriers_for(cells)
-
-    def forgotten(_: float) -> Barriers:
-        barriers.block.fill(np.nan)
-        return barriers
-
-    return forgotten
+    return _solved(cells, deborah, loads, lambda good, cases: _swept(cells, blocks, cases, start[good] + cells.top))
 
 
 def stepped_sliding(line: CubicLine, deborah: FloatArray, loads: FloatArray, contact: bool = True) -> Steady:
-    """Return the steady states by the papers' time steps of one cell, from the heights at the nodes alone.
+    """Return the steady states by the time steps of the papers, one cell long, from the heights at the nodes.
 
     Parameters
     ----------
@@ -366,38 +292,30 @@ def _solved(
     return Steady(results[0], results[1], results[2], results[3], status)
 
 
-def _swept(
-    cells: Cells,
-    blocks: Blocks,
-    cases: Cases,
-    guesses: FloatArray,
-    close: float,
-    kept: Kept,
-    rows: IntArray,
-) -> tuple[FloatArray, NDArray[np.int8]]:
-    """Solve by sweeps over cells; Deborah numbers in cells, loads over 4 G dx."""
+def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> tuple[FloatArray, NDArray[np.int8]]:
+    """Solve by sweeps over cells; Deborah numbers in cells, loads over 4 G dx, guesses for the highest point."""
     order = np.lexsort((cases.loads, cases.deborah))
     ordered, ordered_status = np.full((order.size, 4), np.nan), np.zeros(order.size, np.int8)
     deborah, loads, starts, first = (
         cases.deborah[order],
         cases.loads[order],
-        guesses[order] + cells.top,
+        guesses[order],
         np.zeros(TRAIL),
     )
     n, mean = cells.mean.size - 1, float(np.mean(cells.mean[:-1]))
     _begin(first, loads[0] / n - mean, loads[0])
     outlined, beyond = first[0], 0.0
+    barriers = barriers_for(n)
     edges = np.flatnonzero(np.diff(deborah, prepend=-1.0, append=-1.0))
     for some in (slice(*ends) for ends in pairwise(edges)):
-        alike, near = Cases(deborah[some], loads[some]), kept.barriers_at(float(deborah[some.start]))
+        barriers.block.fill(np.nan)  # they hold for one speed
         speed, load = deborah[some.start], loads[some.start]
         outlines = blocks.peak.size > 0 and speed > OUTLINED_FROM and not starts[some.start] > 0
         if outlines:
             outlined, slope = _outlined(blocks.peak, speed, load, outlined)
             first[:3] = outlined + beyond, np.log(load), slope
-        line = _Swept(cells, blocks, near, mean)
-        found = _Found(ordered[some], ordered_status[some], kept.touching, rows[order[some]])
-        _states(line, alike, starts[some], close, first, found)
+        line, alike = _Swept(cells, blocks, barriers, mean), Cases(deborah[some], loads[some])
+        _states(line, alike, starts[some], first, ordered[some], ordered_status[some])
         outlined = outlined if outlines else first[0]
         beyond = first[0] - outlined  # changes slowly with the speed
     results, status = np.empty_like(ordered), np.empty_like(ordered_status)
@@ -409,9 +327,9 @@ def _swept(
 
 
 def _is_lost(cases: Cases, near: FloatArray, depth: FloatArray) -> NDArray[np.bool_]:
-    """Return the cases whose load is carried by dashpots over a rise of the line that is no more than rounding.
+    """Return the cases in which the line rises by no more than rounding where elements come into contact.
 
-    That is by F_N / (4 G dx) over the Deborah number in cells; heights near the highest point are below it.
+    It rises by F_N / (4 G dx) over the Deborah number in cells. `near` are heights beside the highest point, below it.
     """
     fall = -np.min(near)
     with np.errstate(over="ignore"):

@@ -15,7 +15,7 @@ from mdr_dask.physics.solids import LinearSolid, recovery
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
 TOLERANCE = 1e-11  # last step of Newton's method relative to the depth: above rounding
-SHORTEST = 1e-9  # cells: Prony terms that relax within are added to the dashpot, which is a term of a tenth of it
+SHORTEST = 1e-9  # cells: faster Prony terms are added to the dashpot, which is a term of a tenth of this time
 BALANCE = 1e-3  # largest relative difference between the load carried and the load given; it counts as an error
 RESOLVED = 0.5  # largest relative change between two grids from which a result is extrapolated
 ORDER = 2.0  # of straight cells; extrapolation raises it, but less where few cells are in contact
@@ -49,8 +49,8 @@ class ViscoelasticSteady:
 def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float) -> ViscoelasticSteady:
     """Return the steady state of a foundation of independent elements that slides along a line.
 
-    An element that has travelled s along the line is pressed by ``w(s) = d + h(s)``. In contact u = w, free f = 0, with
-    f = 4 dx [G_inf u + sum G_m (u - a_m) + eta v u'] (thesis 3.3.3 for any linear rheology).
+    An element that has travelled s along the line is in contact where u = w(s) = d + h(s); a free element has f = 0,
+    with f = 4 dx [G_inf u + sum G_m (u - a_m) + eta v u'] (thesis 3.3.3 for any linear rheology).
 
     Parameters
     ----------
@@ -65,12 +65,12 @@ def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float
     Raises
     ------
     ValueError
-        If a number is not finite or not positive, or the number of cells is not one of those allowed.
+        If a number is not finite or not positive, or the number of cells is not allowed.
 
     Notes
     -----
     The line is swept exactly. The result is extrapolated from the line with every second node, and its error is
-    estimated from the same result on half as many nodes. It depends on nothing but the arguments.
+    estimated from the same result on half as many nodes.
     """
     cells = line.enter.size
     if not np.all(np.isfinite(line.height)):

@@ -1,4 +1,4 @@
-"""Newton's method for the depth and the arms' state of steady viscoelastic sliding, in the units of the sweep."""
+"""Newton's method for the depth and the stretches of the Prony terms in steady sliding, in the units of the sweep."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
-from mdr_dask.physics.sliding.viscoelastic_sweep import CLOSED, Passage, Travelling, multiply, sweep_arms
+from mdr_dask.physics.sliding.viscoelastic_sweep import CLOSED, Passage, Travelling, multiply, sweep_line
 
 DEEPEST_STEP = 0.7
-"""Largest step back of the depth on a line that elements enter undeformed, relative to it."""
+"""Largest relative decrease of the depth in a step, on a line that is not periodic."""
 
 LINEAR = 1e-10
-"""Residual of a step of Newton's method, relative to what it is to remove: far below what the next one brings."""
+"""Relative residual of the linear equations of a step: far below the reduction by the next step."""
 
 
 class Swept(NamedTuple):
-    """Contacts and flights of a sweep, and the solid that went through them.
+    """Contacts and free recoveries of a sweep, and the solid.
 
     Parameters
     ----------
-    decayed : array, shape (pieces, arms)
-        1 - exp(-length / time) of every mode in flight and of every arm in contact.
+    decayed : array, shape (pieces, terms)
+        1 - exp(-length / time) of every mode in free recovery and of every term in contact.
     lengths : array, shape (pieces,)
-        See `sweep_arms`.
+        See `sweep_line`.
     solid : Travelling
         The solid.
     """
@@ -39,55 +39,55 @@ class Swept(NamedTuple):
 def follow(
     direction: FloatArray, swept: Swept, periodic: bool, product: FloatArray, workspace: FloatArray
 ) -> None:  # pragma: no cover
-    """Differentiate a sweep along one direction: how the integrals of e_m and of u over the line change.
+    """Write the derivatives of the integrals of e_m and of u over the line along one direction.
 
-    Contacts and flights of fixed lengths act linearly on the arms, and u is continuous where they meet, so moving the
-    meeting points does not matter to first order. A piece costs two products of a matrix and a vector.
+    Contacts and free recoveries of fixed lengths act linearly on the stretches. That they begin and end elsewhere is of
+    second order, because u is continuous there. A piece takes two products of a matrix and a vector.
 
     Parameters
     ----------
-    direction : array, shape (arms + 1,)
+    direction : array, shape (terms + 1,)
         Change of e at the start and of the depth.
     swept : Swept
         The pieces.
     periodic : bool
         Whether the line closes; otherwise the recovery beyond the line counts.
-    product : array, shape (arms + 1,), output
+    product : array, shape (terms + 1,), output
         Change of the integral of e_m, and of that of u.
-    workspace : array, shape (3, arms)
+    workspace : array, shape (3, terms)
     """
     decayed, lengths, solid = swept
     moduli, deborah, times, stretch_of, amplitude_of = solid
-    arms, pieces = moduli.size, decayed.shape[0]
-    depth, glass = direction[arms], 1.0 + moduli.sum()
+    terms, pieces = moduli.size, decayed.shape[0]
+    depth, glass = direction[terms], 1.0 + moduli.sum()
     stretch, modes, integral = workspace[0], workspace[1], workspace[2]
     product[:] = 0.0
-    stretch[:arms] = direction[:arms]
+    stretch[:terms] = direction[:terms]
     for piece in range(pieces):
         if piece % 2 == 1:
-            product[arms] += depth * lengths[piece]
-            for m in range(arms):
+            product[terms] += depth * lengths[piece]
+            for m in range(terms):
                 product[m] += deborah[m] * decayed[piece, m] * stretch[m]
                 stretch[m] *= 1 - decayed[piece, m]
         elif lengths[piece] > 0:
             _take_stress(stretch, depth, moduli, glass)
             multiply(amplitude_of, stretch, modes)
             strain = 0.0
-            for k in range(arms):
+            for k in range(terms):
                 integral[k] = modes[k] * times[k] * decayed[piece, k]
-                product[arms] += integral[k] if periodic or piece < pieces - 1 else modes[k] * times[k]
+                product[terms] += integral[k] if periodic or piece < pieces - 1 else modes[k] * times[k]
                 modes[k] *= 1 - decayed[piece, k]
                 strain += modes[k]
             multiply(stretch_of, modes, stretch)
             multiply(stretch_of, integral, modes)
-            for m in range(arms):
+            for m in range(terms):
                 product[m] += modes[m]
                 stretch[m] += depth - strain
 
 
 @jit
 def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: float) -> None:  # pragma: no cover
-    """Move the strain at fixed memory so that the derivative of the stress vanishes, as it does in flight."""
+    """Change the strain at fixed memory until the derivative of the stress is 0, as in free recovery."""
     if stretch.size == 0:
         return
     stress = depth
@@ -102,7 +102,7 @@ def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: f
 
 @jit
 def _decays(lengths: FloatArray, deborah: FloatArray, times: FloatArray) -> FloatArray:  # pragma: no cover
-    """Return what modes lose in every flight and arms in every contact, shape (pieces, arms)."""
+    """Return the decrease of modes in every free recovery and of terms in every contact, shape (pieces, terms)."""
     decayed = np.empty((lengths.size, deborah.size))
     for piece in range(lengths.size):
         scales = deborah if piece % 2 == 1 else times
@@ -137,13 +137,13 @@ def newton_step(
 ) -> None:  # pragma: no cover
     """Solve the linear system of a step by minimal residuals over a Krylov space (GMRES with Givens rotations).
 
-    Rows divided by `scale`, the derivative is the identity and a smooth operator over the relaxation times, whose
-    singular values fall off fast: four to seven products whatever the number of arms.
+    With rows divided by `scale`, the derivative is the identity plus a smooth operator over the relaxation times, whose
+    singular values decrease fast. So four to seven products suffice, for any number of terms.
 
     Parameters
     ----------
     residual, scale : array, shape (n,)
-        What the integrals of e_m and u are to change by, n = arms + 1, and the size of the change for a unit of each.
+        Wanted changes of the integrals of e_m and u, n = terms + 1, and the size of these changes per unit.
     swept : Swept
         The pieces.
     krylov : Krylov
@@ -155,7 +155,7 @@ def newton_step(
     right = rotations[2]
     step[:] = 0.0
     square = 0.0
-    for k in range(size):  # an expression of whole arrays would compile the words of its error, for seconds
+    for k in range(size):  # a loop compiles seconds faster than an expression of arrays
         basis[0, k] = residual[k] / scale[k]
         square += basis[0, k] * basis[0, k]
     norm = np.sqrt(square)
@@ -185,7 +185,7 @@ def newton_step(
 
 @jit
 def _orthogonalise(basis: FloatArray, triangle: FloatArray, j: int) -> None:  # pragma: no cover
-    """Take the earlier rows out of row j + 1, twice against rounding, and leave the coefficients in column j."""
+    """Make row j + 1 orthogonal to the earlier rows, twice because of rounding; column j gets the coefficients."""
     column = basis[j + 1]
     for i in range(j + 1):
         triangle[i, j] = 0.0
@@ -209,7 +209,7 @@ def _orthogonalise(basis: FloatArray, triangle: FloatArray, j: int) -> None:  # 
 
 @jit
 def _rotate(triangle: FloatArray, rotations: FloatArray, j: int) -> None:  # pragma: no cover
-    """Turn column j into one of a triangle, and the right side with it; its last entry is the residual left."""
+    """Rotate column j to that of a triangle, and the right side too; its last entry is the residual."""
     cosine, sine, right = rotations[0], rotations[1], rotations[2]
     for i in range(j):
         upper, lower = triangle[i, j], triangle[i + 1, j]
@@ -224,7 +224,7 @@ def _rotate(triangle: FloatArray, rotations: FloatArray, j: int) -> None:  # pra
 
 @jit
 def static_depth(profile: FloatArray, strain_area: float) -> float:  # pragma: no cover
-    """Return the depth at which sum max(0, depth + profile) is `strain_area` (> 0): Newton, falling from above."""
+    """Return the depth at which sum max(0, depth + profile) is `strain_area` (> 0), by Newton's method from above."""
     depth = 0.0
     for value in profile:
         depth -= value
@@ -255,28 +255,29 @@ def solve_sliding(
     unknown: FloatArray,
     totals: FloatArray,
 ) -> tuple[bool, int, bool]:  # pragma: no cover
-    """Find the depth that carries the load, and for a periodic line the arms' state that returns after one period.
+    """Find the depth that carries the load, and for a periodic line the stretches that repeat after one period.
 
-    In the steady state the integral of the stress is that of u, so the load prescribes the latter. The strain is convex
-    and increasing in the unknowns (a contact takes the larger of two such functions), so Newton's method converges
-    from any start, from above after its first step.
+    In the steady state the integral of the stress equals that of u, which is therefore known from the load. The strain
+    is a convex, increasing function of the unknowns (in contact it is the larger of two such functions), so Newton's
+    method converges from any start, and from above after its first step.
 
     Parameters
     ----------
     profile : array, shape (nodes,)
-        Heights into the elastomer, the highest of them 0; a periodic line starts there and repeats it at the end.
+        Heights, positive towards the elastomer; the highest is 0. A periodic line starts there and repeats it at the
+        end.
     strain_area : float
-        F_N / (4 G_inf cell), the integral of u wanted, in cells times height.
+        F_N / (4 G_inf cell): the integral of u, in cells times height.
     periodic : bool
         Whether the line closes; otherwise elements enter undeformed and recover beyond its end.
     solid : Travelling
         The solid.
     tolerance : float
-        Largest last step, relative to the depth.
-    unknown : array, shape (arms + 1,), input and output
+        Step relative to the depth at which the iteration ends.
+    unknown : array, shape (terms + 1,), input and output
         Start and solution: e_m at the first node, then the depth.
     totals : array, shape (6,), output
-        See `sweep_arms`.
+        See `sweep_line`.
 
     Returns
     -------
@@ -284,14 +285,14 @@ def solve_sliding(
         `inside` is False if an element is in contact at the end of a line that is not periodic.
     """
     moduli, deborah, times = solid.moduli, solid.deborah, solid.times
-    arms, nodes = moduli.size, profile.size
-    size = arms + 1
-    passage, penetration = Passage(np.empty(2 * nodes + 4), np.empty(arms), totals), np.empty(nodes)
-    of_sweep, workspace = np.empty((10, max(arms, 1))), np.empty((3, arms))
+    terms, nodes = moduli.size, profile.size
+    size = terms + 1
+    passage, penetration = Passage(np.empty(2 * nodes + 4), np.empty(terms), totals), np.empty(nodes)
+    of_sweep, workspace = np.empty((10, max(terms, 1))), np.empty((3, terms))
     residual, scale, step, product = np.empty(size), np.empty(size), np.zeros(size), np.empty(size)
     triangle, rotations = np.empty((size + 1, size)), np.empty((3, size + 1))
     krylov = Krylov(np.empty((size + 1, size)), triangle, rotations, workspace)
-    for m in range(arms):
+    for m in range(terms):
         scale[m] = -deborah[m] * np.expm1(-(nodes - 1) / deborah[m])
     steepest = 0.0
     for i in range(nodes - 1):
@@ -299,29 +300,29 @@ def solve_sliding(
     rounding = 1e-15 * nodes * steepest  # of a place on the line, as a height
     for sweeps in range(1, 81):
         for i in range(nodes):
-            penetration[i] = unknown[arms] + profile[i]
-        start = unknown[:arms]
-        pieces, end = sweep_arms(penetration, start, solid, not periodic, passage, of_sweep)
+            penetration[i] = unknown[terms] + profile[i]
+        start = unknown[:terms]
+        pieces, end = sweep_line(penetration, start, solid, not periodic, passage, of_sweep)
         found = passage.lengths[:pieces]
         swept = Swept(_decays(found, deborah, times), found, solid)
         if periodic:
-            for m in range(arms):
+            for m in range(terms):
                 residual[m] = -passage.imbalance[m]
-            residual[arms] = strain_area - totals[0]
-            scale[arms] = totals[3]
+            residual[terms] = strain_area - totals[0]
+            scale[terms] = totals[3]
             newton_step(residual, scale, swept, krylov, step)
         else:
             residual[:] = 1.0  # a unit of depth while the memory stays: elements enter at rest
             follow(residual, swept, False, product, workspace)
-            # a contact that reaches the end of the line is larger than the sweep sees
-            step[arms] = max((strain_area - totals[1]) / product[arms], -DEEPEST_STEP * unknown[arms])
+            # contact at the end of the line would continue beyond it
+            step[terms] = max((strain_area - totals[1]) / product[terms], -DEEPEST_STEP * unknown[terms])
         largest = 0.0
         for j in range(size):
-            weight = min(1.0, moduli[j]) if j < arms else 1.0  # a soft arm cannot matter
+            weight = min(1.0, moduli[j]) if j < terms else 1.0  # a soft term has little influence
             largest = max(largest, weight * abs(step[j]))
             unknown[j] += step[j]
         if not np.isfinite(largest):
             return False, sweeps, True
-        if largest <= tolerance * unknown[arms] + rounding:
+        if largest <= tolerance * unknown[terms] + rounding:
             return True, sweeps, periodic or end == CLOSED
     return False, 80, True

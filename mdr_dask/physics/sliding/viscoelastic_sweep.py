@@ -1,8 +1,8 @@
-"""Compiled sweep of a linear viscoelastic foundation along a profile of straight cells, exact inside every cell.
+"""Sweep of a linear viscoelastic foundation along a line of straight cells, exact inside every cell.
 
-Lengths are in cells, stresses in units of the static modulus. `penetration` w is how deep the profile would press each
-node; arm m stretches by e = u - a, with de/ds = du/ds - e / deborah, deborah = tau v / cell. Contact moves the
-stretches by closed forms; free flight is the sum of recovery modes. Contact begins and ends inside cells.
+Lengths are in cells, stresses in static moduli. The penetration w is the displacement of an element in contact at each
+node. The stretch of Prony term m is e = u - a, with de/ds = du/ds - e / deborah and deborah = tau v / cell. In contact
+the stretches have closed forms; a free element recovers as a sum of modes. Contact begins and ends inside cells.
 """
 
 from __future__ import annotations
@@ -18,16 +18,17 @@ CLOSED, OPEN_END = 0, 1
 
 
 class Travelling(NamedTuple):
-    """A solid as a line passes, in static moduli and cells, and how it recovers.
+    """A solid that slides along a line, in static moduli and cells, and its recovery modes.
 
     Parameters
     ----------
-    moduli, deborah : array, shape (arms,)
-        Arms, ascending in Deborah number tau v / cell.
-    times : array, shape (arms,)
+    moduli, deborah : array, shape (terms,)
+        Prony terms, ascending in the Deborah number tau v / cell.
+    times : array, shape (terms,)
         Of the recovery modes, in cells.
-    stretch_of, amplitude_of : array, shape (arms, arms)
-        Stretches of every mode (a row each), and what the stretch of every arm (a row each) adds to the modes.
+    stretch_of, amplitude_of : array, shape (terms, terms)
+        Stretches of every mode (one row per mode), and contribution of the stretch of every term to the modes (one row
+        per term).
     """
 
     moduli: FloatArray
@@ -38,12 +39,12 @@ class Travelling(NamedTuple):
 
 
 SURFACE_LAYER = 1e-7
-"""Beginning of a cell that is searched first: arms much shorter than a cell adapt within it."""
+"""Part of a cell that is searched first: much shorter terms relax within it."""
 
 
 @jit
 def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> None:  # pragma: no cover
-    """Fill a matrix times a vector; the matrix is given by its columns, which the compiler can add as vectors."""
+    """Write the product of a matrix, given by its columns, and a vector."""
     product[:] = 0.0
     for k in range(vector.size):
         factor = vector[k]
@@ -55,7 +56,7 @@ def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> No
 def step_factors(
     length: float, deborah: FloatArray, decay: FloatArray, gain: FloatArray, area: FloatArray
 ) -> None:  # pragma: no cover
-    """Fill the factors of a straight piece: e -> decay e + gain slope; its integral is gain e + area slope."""
+    """Write the factors of a straight piece: e becomes decay e + gain slope, its integral is gain e + area slope."""
     for m in range(deborah.size):
         x = length / deborah[m]
         if x < 0.02:
@@ -73,7 +74,7 @@ def step_factors(
 def _pressure_inside(
     length: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, deborah: FloatArray
 ) -> tuple[float, float]:  # pragma: no cover
-    """Return the stress and its derivative a `length` into a straight piece."""
+    """Return the stress in a straight piece, and its derivative, at a distance `length` from its start."""
     pressure, rate = start + slope * length, slope
     for m in range(moduli.size):
         decayed = -np.expm1(-length / deborah[m])
@@ -83,10 +84,10 @@ def _pressure_inside(
 
 
 @jit
-def leaving_point(
+def separation_point(
     end: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, deborah: FloatArray
 ) -> float:  # pragma: no cover
-    """Return where the stress falls to zero in (0, end], by Newton kept inside a bracket."""
+    """Return where the stress falls to zero in (0, end], by Newton's method inside a bracket."""
     low, high = 0.0, end
     point = SURFACE_LAYER if deborah.size and deborah[0] < SURFACE_LAYER and end > SURFACE_LAYER else 0.5 * end
     for _ in range(200):
@@ -105,10 +106,10 @@ def leaving_point(
 
 
 @jit
-def touching_point(
+def contact_point(
     low: float, high: float, start: float, slope: float, modes: FloatArray, times: FloatArray
 ) -> float:  # pragma: no cover
-    """Return where the recovering strain meets the line start + slope (t - low); monotone, since it is convex."""
+    """Return where the recovering strain meets the line start + slope (t - low); both are convex."""
     point = low
     for _ in range(60):
         gap, rate = -(start + slope * (point - low)), -slope
@@ -138,12 +139,13 @@ def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[f
 
 
 @jit
-def _fly(
+def _next_contact(
     place: float, node: int, modes: FloatArray, times: FloatArray, penetration: FloatArray, last: int
 ) -> float:  # pragma: no cover
     """Return where the strain that recovers from `place` meets the profile again at `node` or later, or -1.
 
-    A convex strain that leaves a straight cell does not meet it again: `node` is the end of the next cell.
+    A strain that separates from a straight cell does not meet it again, because it is convex: `node` is the end of the
+    next cell.
 
     A sum of decaying exponentials is log-convex, so its tangent exponential is a lower bound: nodes below it are passed
     without evaluating the sum.
@@ -159,7 +161,7 @@ def _fly(
                 before = max(node - 1.0 - place, 0.0)
                 slope = penetration[node] - penetration[node - 1]
                 start = penetration[node] - slope * (node - place - before)
-                return place + touching_point(before, node - place, start, slope, modes, times)
+                return place + contact_point(before, node - place, start, slope, modes, times)
             bound = strain
             ratio = np.exp(rate / strain) if strain > 0 else 1.0
         bound *= ratio
@@ -168,13 +170,13 @@ def _fly(
 
 
 class Passage(NamedTuple):
-    """What a sweep writes.
+    """The results of a sweep.
 
     Parameters
     ----------
     lengths : array, shape (>= 2 nodes + 2,)
-        Lengths of flight, contact, flight, contact, ... in this order, the first flight possibly of length zero.
-    imbalance : array, shape (arms,)
+        Lengths of free recovery and contact in turn; the first one, of free recovery, may be 0.
+    imbalance : array, shape (terms,)
         Integral of e_m over the line.
     totals : array, shape (6,)
         Integrals of u, of the stress, of stress times slope; contact length; integral of slope^2 in contact; tail of u
@@ -187,7 +189,7 @@ class Passage(NamedTuple):
 
 
 @jit
-def sweep_arms(
+def sweep_line(
     penetration: FloatArray,
     start: FloatArray,
     solid: Travelling,
@@ -195,53 +197,53 @@ def sweep_arms(
     passage: Passage,
     workspace: FloatArray,
 ) -> tuple[int, int]:  # pragma: no cover
-    """Carry the arms once along the line and note what each contact and each flight contributes.
+    """Follow an element once along the line and add the contributions of each contact and each free recovery.
 
     Parameters
     ----------
     penetration : array, shape (nodes,)
         w at each node; the last node of a periodic line repeats the first.
-    start : array, shape (arms,)
+    start : array, shape (terms,)
         e_m at the first node under the penetration there; ignored if `undeformed`.
     solid : Travelling
         The solid.
     undeformed : bool
         Whether the elements enter free and at rest.
     passage : Passage, output
-    workspace : array, shape (10, max(arms, 1))
+    workspace : array, shape (10, max(terms, 1))
 
     Returns
     -------
     pieces, end : int
         Number of lengths; CLOSED if the last node is free, OPEN_END if it is in contact.
     """
-    # arrays by name: a tuple of arrays costs more to look into than a cell does to compute
+    # local names, because reading an array from a tuple takes longer than a cell
     moduli, deborah, times, stretch_of, amplitude_of = solid
     lengths, imbalance, totals = passage
-    arms, last = moduli.size, penetration.size - 1
+    terms, last = moduli.size, penetration.size - 1
     e, modes = workspace[0], workspace[1]
     step_factors(1.0, deborah, workspace[3], workspace[4], workspace[5])
     imbalance[:] = 0.0
     totals[:] = 0.0
     glass, push = 1.0, penetration[0]
-    for m in range(arms):
+    for m in range(terms):
         e[m] = 0.0 if undeformed else start[m]
         glass += moduli[m]
         push += moduli[m] * e[m]
         modes[m] = 0.0
     place, pieces, node = 0.0, 0, 1
-    flying, left = undeformed or push < 0, True
-    if flying and not undeformed:
-        _into_flight(penetration[0], push / glass, e, moduli, modes, amplitude_of)
+    is_free, left = undeformed or push < 0, True
+    if is_free and not undeformed:
+        _begin_recovery(penetration[0], push / glass, e, moduli, modes, amplitude_of)
     while True:
-        landing = _fly(place, node, modes, times, penetration, last) if flying else place
-        goal = landing if landing >= 0 else float(last)
+        contact = _next_contact(place, node, modes, times, penetration, last) if is_free else place
+        goal = contact if contact >= 0 else float(last)
         lengths[pieces] = goal - place
         pieces += 1
-        if flying:
-            _add_flight(goal - place, modes, times, stretch_of, e, imbalance, totals)
-        if landing < 0:
-            for k in range(arms):
+        if is_free:
+            _add_recovery(goal - place, modes, times, stretch_of, e, imbalance, totals)
+        if contact < 0:
+            for k in range(terms):
                 totals[5] += modes[k] * times[k]
             return pieces, CLOSED
         if int(goal) >= last:
@@ -252,8 +254,8 @@ def sweep_arms(
         if not left:
             return pieces, OPEN_END
         node = int(workspace[2, 0])
-        _into_flight(strain, pressure / glass, e, moduli, modes, amplitude_of)
-        flying = True
+        _begin_recovery(strain, pressure / glass, e, moduli, modes, amplitude_of)
+        is_free = True
 
 
 @jit
@@ -266,15 +268,15 @@ def _contact(
     totals: FloatArray,
     workspace: FloatArray,
 ) -> tuple[float, float, float, bool]:  # pragma: no cover
-    """Follow the profile from `begin` until the stress falls to zero or the line ends; see `sweep_arms` for the arrays.
+    """Follow the profile from `begin` until the stress falls to zero or the line ends; see `sweep_line` for the arrays.
 
     Returns
     -------
     place, strain, pressure, left
-        Where it ends, with what strain and rest of stress, and whether it left the profile there; the stretches stay in
-        ``workspace[0]``, and ``workspace[2, 0]`` is the next node that a flight may meet.
+        Where it ends, strain and remaining stress there, and whether contact ends there. The stretches are in
+        ``workspace[0]``, and ``workspace[2, 0]`` is the next node at which contact can begin.
     """
-    arms, last = moduli.size, penetration.size - 1
+    terms, last = moduli.size, penetration.size - 1
     e, following = workspace[0], workspace[9]
     place, node = begin, int(begin) + 1
     rise = penetration[node] - penetration[node - 1]
@@ -290,12 +292,12 @@ def _contact(
         pressure = _stretch(penetration[node], slope, e, following, moduli, factors)
         if pressure < 0:
             left = True
-            length = leaving_point(length, strain, slope, e, moduli, deborah)
+            length = separation_point(length, strain, slope, e, moduli, deborah)
             factors = workspace[6:9]
             step_factors(length, deborah, factors[0], factors[1], factors[2])
             pressure = _stretch(strain + slope * length, slope, e, following, moduli, factors)
         viscous = 0.0
-        for m in range(arms):
+        for m in range(terms):
             integral = factors[1, m] * e[m] + factors[2, m] * slope
             imbalance[m] += integral
             viscous += moduli[m] * integral
@@ -327,10 +329,10 @@ def _stretch(
 
 
 @jit
-def _into_flight(
+def _begin_recovery(
     strain: float, excess: float, e: FloatArray, moduli: FloatArray, modes: FloatArray, amplitude_of: FloatArray
 ) -> None:  # pragma: no cover
-    """Turn stretches into modes, after the strain has given way by `excess`; the shortest arm makes the stress zero."""
+    """Convert stretches to modes after a release of the strain by `excess`; the shortest term makes the stress zero."""
     stress = strain - excess
     for m in range(moduli.size):
         e[m] -= excess
@@ -342,7 +344,7 @@ def _into_flight(
 
 
 @jit
-def _add_flight(
+def _add_recovery(
     length: float,
     modes: FloatArray,
     times: FloatArray,
@@ -351,7 +353,7 @@ def _add_flight(
     imbalance: FloatArray,
     totals: FloatArray,
 ) -> None:  # pragma: no cover
-    """Let the modes decay over a flight, add its integrals of u and e, and leave the stretches at its end in `e`."""
+    """Decay the modes over a free recovery, add its integrals of u and e, and write the stretches at its end to `e`."""
     for m in range(e.size):
         e[m] = 0.0
     for k in range(times.size):

@@ -13,7 +13,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted, last_until
-from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, leaving, write_barriers
+from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, contact_end, write_barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
 ROOT_STEPS = 60
@@ -164,7 +164,7 @@ def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
     if near > 0 and far > 0 and end > 0:
         return NONE
     if not (begin >= near >= far >= end and begin > 0 >= end):
-        return float(leaving(p, q, r, c, 0.0, y))
+        return float(contact_end(p, q, r, c, 0.0, y))
     low, high, x = y, 1.0, y + width * begin / (begin - end)
     for _ in range(ROOT_STEPS):
         value = p + x * (q + x * (r + x * c))

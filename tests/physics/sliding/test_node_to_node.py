@@ -1,12 +1,11 @@
 import numpy as np
 import pytest
 
-from mdr_dask.physics.sliding import nodes as line_nodes
+from mdr_dask.physics.sliding import node_to_node as line_nodes
 from mdr_dask.physics.sliding import steady as sliding
 from mdr_dask.physics.sliding.cases import Cases
 from mdr_dask.physics.sliding.kelvin_refinement import FLOORS, KelvinCases
-from mdr_dask.physics.sliding.node_to_node import NodeToNode
-from mdr_dask.physics.sliding.nodes import ends_of, nodes, refine, weights
+from mdr_dask.physics.sliding.node_to_node import NodeToNode, ends_of, nodes, refine, weights
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.surfaces.rough_line import RoughLine

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mdr_dask.physics.sliding.nodes import (
+from mdr_dask.physics.sliding.node_to_node import (
     BEFORE,
     BLOCK,
     HEIGHTS,

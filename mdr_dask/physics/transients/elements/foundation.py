@@ -1,7 +1,7 @@
 """One element of a viscoelastic foundation through one step: pressed at constant speed, or recovering without force.
 
-The arms of a solid are its Prony terms, a spring and a dashpot in series each. Functions take the strains of the arms
-of all elements, shape (n, arms), and the index i of one: passing an index is cheaper than slicing.
+Functions take the strains of the dashpots of the Prony terms of all elements, shape (n, terms), and the index i of one
+element, because passing an index is faster than slicing.
 
 Units: the static modulus is 1, heights are in any unit, lengths in that of the line, times in one time of the material.
 """
@@ -23,12 +23,12 @@ class Foundation(NamedTuple):
 
     Parameters
     ----------
-    moduli, times : array, shape (arms,)
+    moduli, times : array, shape (terms,)
         G_m / G_inf and tau_m.
     viscosity : float
         eta / G_inf of the dashpot, 0 for none.
     rates : array, shape (modes,)
-        Rates of decay of the modes, positive. There is one mode for each arm, and one more for a dashpot.
+        Rates of decay of the modes, positive. There is one mode for each Prony term, and one more for a dashpot.
     outward, inward : array, shape (modes, modes)
         From modes to the state (u of a solid with a dashpot, a_1, ...), and back.
     push : array, shape (modes,)
@@ -49,10 +49,10 @@ def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundat
 
     Parameters
     ----------
-    moduli, times : array_like, shape (arms,)
+    moduli, times : array_like, shape (terms,)
         G_m / G_inf, positive, and tau_m, distinct, in the unit of time used.
     viscosity : float
-        eta / G_inf in that unit; 1 for the Kelvin body (no arms) if the unit is tau.
+        eta / G_inf in that unit; 1 for the Kelvin body (no terms) if the unit is tau.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundat
     """
     g, tau = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (moduli, times))
     if g.size == 0 and not viscosity > 0:
-        raise ValueError("expected a solid with an arm or a dashpot, got an elastic one")
+        raise ValueError("expected a solid with a Prony term or a dashpot, got an elastic one")
     order = np.argsort(tau)
     g, tau = g[order], tau[order]
     pole, weight = (np.append(0.0, tau), np.append(viscosity, g * tau)) if viscosity > 0 else (tau, g * tau)
@@ -78,23 +78,23 @@ KELVIN = foundation([], [], 1.0)
 
 
 class ElementWorkspace(NamedTuple):
-    """Workspace of one element: modes, decay over part of a step, fading over it, and arms, shape (1, arms)."""
+    """Workspace of one element: modes, decay over part of a step, fading over it, and terms, shape (1, terms)."""
 
     modes: FloatArray
     decay: FloatArray
     fades: FloatArray
-    arms: FloatArray
+    terms: FloatArray
 
 
 @jit
 def element_workspace(solid: Foundation) -> ElementWorkspace:
     """Return the workspace of one element."""
-    modes, arms = solid.rates.size, solid.times.size
-    return ElementWorkspace(np.empty(modes), np.empty(modes), np.empty(arms), np.empty((1, arms)))
+    modes, terms = solid.rates.size, solid.times.size
+    return ElementWorkspace(np.empty(modes), np.empty(modes), np.empty(terms), np.empty((1, terms)))
 
 
 class Lapse(NamedTuple):
-    """A lapse of time, the decay of modes and arms over it, and the workspace of one element."""
+    """A duration, the decay of modes and terms over it, and the workspace of one element."""
 
     time: float
     decay: FloatArray
@@ -103,7 +103,7 @@ class Lapse(NamedTuple):
 
 
 class Rise(NamedTuple):
-    """Height of the line over one element at the begin and the end of a lapse of time, and its rates there."""
+    """Height of the line over one element at the begin and the end of a duration, and its rates there."""
 
     w0: float
     w1: float
@@ -121,7 +121,7 @@ class Release(NamedTuple):
 
 @jit
 def fading(solid: Foundation, step: float, decay: FloatArray, fades: FloatArray) -> None:
-    """Write the decay of modes and arms over a time."""
+    """Write the decay of modes and terms over a time."""
     for k in range(decay.size):
         decay[k] = np.exp(-solid.rates[k] * step)
     for m in range(fades.size):
@@ -129,8 +129,8 @@ def fading(solid: Foundation, step: float, decay: FloatArray, fades: FloatArray)
 
 
 @jit
-def recover(solid: Foundation, u: float, arms: FloatArray, i: int, decay: FloatArray, modes: FloatArray) -> float:
-    """Let an element recover without force; `arms` is overwritten."""
+def recover(solid: Foundation, u: float, terms: FloatArray, i: int, decay: FloatArray, modes: FloatArray) -> float:
+    """Let an element recover without force; `terms` is overwritten."""
     if solid.times.size == 0:
         return float(u * decay[0])
     extra = 1 if solid.viscosity > 0 else 0
@@ -138,39 +138,39 @@ def recover(solid: Foundation, u: float, arms: FloatArray, i: int, decay: FloatA
     for k in range(count):
         total = solid.inward[k, 0] * u if extra else 0.0
         for m in range(solid.times.size):
-            total += solid.inward[k, m + extra] * arms[i, m]
+            total += solid.inward[k, m + extra] * terms[i, m]
         modes[k] = total * decay[k]
     for m in range(solid.times.size):
         total = 0.0
         for k in range(count):
             total += solid.outward[m + extra, k] * modes[k]
-        arms[i, m] = total
+        terms[i, m] = total
     if extra:
         total = 0.0
         for k in range(count):
             total += solid.outward[0, k] * modes[k]
         return total
-    return at_rest(solid, arms, i)
+    return at_rest(solid, terms, i)
 
 
 @jit
-def at_rest(solid: Foundation, arms: FloatArray, i: int) -> float:
+def at_rest(solid: Foundation, terms: FloatArray, i: int) -> float:
     """Return the displacement without force of an element that has no dashpot."""
     pull, glass = 0.0, 1.0
     for m in range(solid.times.size):
-        pull += solid.moduli[m] * arms[i, m]
+        pull += solid.moduli[m] * terms[i, m]
         glass += solid.moduli[m]
     return pull / glass
 
 
 @jit
 def press(
-    solid: Foundation, u0: float, u1: float, arms: FloatArray, i: int, step: float, fades: FloatArray
+    solid: Foundation, u0: float, u1: float, terms: FloatArray, i: int, step: float, fades: FloatArray
 ) -> tuple[float, float]:
     """Move an element from u0 to u1 at constant speed; return work and dissipation, whose difference is stored.
 
-    The stretch q = u - a of an arm is A + B exp(-t / tau) with A = tau du/dt. Work is the integral of f du, dissipation
-    that of G q^2 / tau and of eta (du/dt)^2.
+    The stretch q = u - a of a term is A + B exp(-t / tau) with A = tau du/dt. Work is the integral of f du,
+    dissipation that of G q^2 / tau and of eta (du/dt)^2.
     """
     if step <= 0:
         return 0.0, 0.0
@@ -180,43 +180,43 @@ def press(
     for m in range(solid.times.size):
         tau, fade = solid.times[m], fades[m]
         a = speed * tau
-        b = (u0 - arms[i, m]) - a
+        b = (u0 - terms[i, m]) - a
         work += solid.moduli[m] * speed * (a * step + b * tau * (1 - fade))
         dissipated += solid.moduli[m] * (a * a * step / tau + 2 * a * b * (1 - fade) + 0.5 * b * b * (1 - fade * fade))
-        arms[i, m] = u1 - (a + b * fade)
+        terms[i, m] = u1 - (a + b * fade)
     return work, dissipated
 
 
 @jit
-def stored(solid: Foundation, u: float, arms: FloatArray, i: int) -> float:
+def stored(solid: Foundation, u: float, terms: FloatArray, i: int) -> float:
     """Return the energy stored in an element."""
     energy = 0.5 * u * u
     for m in range(solid.times.size):
-        energy += 0.5 * solid.moduli[m] * (u - arms[i, m]) ** 2
+        energy += 0.5 * solid.moduli[m] * (u - terms[i, m]) ** 2
     return energy
 
 
 @jit
-def pull(solid: Foundation, u: float, arms: FloatArray, i: int) -> float:
-    """Return the force of spring and arms."""
+def pull(solid: Foundation, u: float, terms: FloatArray, i: int) -> float:
+    """Return the force of the spring and the Prony terms."""
     force = 1.0 * u
     for m in range(solid.times.size):
-        force += solid.moduli[m] * (u - arms[i, m])
+        force += solid.moduli[m] * (u - terms[i, m])
     return float(force)
 
 
 @jit_inline
-def release(solid: Foundation, lapse: Lapse, rise: Rise, arms: FloatArray, i: int) -> tuple[float, float]:
+def release(solid: Foundation, lapse: Lapse, rise: Rise, terms: FloatArray, i: int) -> tuple[float, float]:
     """Return the part of a time after which an element in contact separates, and where; 1 if it does not.
 
     The force is taken as linear in time, the rise as cubic.
     """
-    begin = pull(solid, rise.w0, arms, i) + solid.viscosity * rise.rise0
+    begin = pull(solid, rise.w0, terms, i) + solid.viscosity * rise.rise0
     if begin <= 0:
         return 0.0, rise.w0
-    strains = lapse.workspace.arms
+    strains = lapse.workspace.terms
     for m in range(solid.times.size):
-        strains[0, m] = arms[i, m]
+        strains[0, m] = terms[i, m]
     press(solid, rise.w0, rise.w1, strains, 0, lapse.time, lapse.fades)
     end = pull(solid, rise.w1, strains, 0) + solid.viscosity * rise.rise1
     if end >= 0:
@@ -228,18 +228,18 @@ def release(solid: Foundation, lapse: Lapse, rise: Rise, arms: FloatArray, i: in
 
 @jit_inline
 def free_after(
-    solid: Foundation, lapse: Lapse, u0: float, part: float, leaves: float, arms: FloatArray, i: int
+    solid: Foundation, lapse: Lapse, u0: float, part: float, leaves: float, terms: FloatArray, i: int
 ) -> float:
     """Return the displacement at the end if an element is pressed to `leaves` for a part of a time and then free."""
     workspace = lapse.workspace
     for m in range(solid.times.size):
-        workspace.arms[0, m] = arms[i, m]
+        workspace.terms[0, m] = terms[i, m]
     if part <= 0:
-        return recover(solid, u0, workspace.arms, 0, lapse.decay, workspace.modes)
+        return recover(solid, u0, workspace.terms, 0, lapse.decay, workspace.modes)
     fading(solid, part * lapse.time, workspace.decay, workspace.fades)
-    press(solid, u0, leaves, workspace.arms, 0, part * lapse.time, workspace.fades)
+    press(solid, u0, leaves, workspace.terms, 0, part * lapse.time, workspace.fades)
     fading(solid, (1 - part) * lapse.time, workspace.decay, workspace.fades)
-    return recover(solid, leaves, workspace.arms, 0, workspace.decay, workspace.modes)
+    return recover(solid, leaves, workspace.terms, 0, workspace.decay, workspace.modes)
 
 
 @jit_inline
@@ -249,34 +249,34 @@ def advance(
     w: tuple[float, float],
     element: tuple[float, bool],
     separation: Release,
-    arms: FloatArray,
+    terms: FloatArray,
     i: int,
 ) -> tuple[float, bool, float, float]:
-    """Move one element through a time; return displacement, contact, work and dissipation. `arms` is overwritten.
+    """Move one element through a time; return displacement, contact, work and dissipation. `terms` is overwritten.
 
     `w` is the height of the line at begin and end, `element` displacement and contact at the begin.
     """
     (w0, w1), (u0, touching), step, workspace = w, element, lapse.time, lapse.workspace
-    before = stored(solid, u0, arms, i)
+    before = stored(solid, u0, terms, i)
     if w1 > separation.after:
         if touching:
-            work, dissipated = press(solid, u0, w1, arms, i, step, lapse.fades)
+            work, dissipated = press(solid, u0, w1, terms, i, step, lapse.fades)
             return w1, True, work, dissipated
         part = (u0 - w0) / ((u0 - w0) + (w1 - separation.after)) if u0 > w0 else 0.0
         fading(solid, part * step, workspace.decay, workspace.fades)
-        u = recover(solid, u0, arms, i, workspace.decay, workspace.modes) if part > 0 else u0
-        loss = before - stored(solid, u, arms, i) if part > 0 else 0.0
+        u = recover(solid, u0, terms, i, workspace.decay, workspace.modes) if part > 0 else u0
+        loss = before - stored(solid, u, terms, i) if part > 0 else 0.0
         rest = (1 - part) * step
         fading(solid, rest, workspace.decay, workspace.fades)
-        work, dissipated = press(solid, u, w1, arms, i, rest, workspace.fades)
+        work, dissipated = press(solid, u, w1, terms, i, rest, workspace.fades)
         return w1, True, work, dissipated + loss
     part, leaves = separation.part, separation.leaves
     if not touching or part <= 0:
-        u = recover(solid, u0, arms, i, lapse.decay, workspace.modes)
-        return u, False, 0.0, before - stored(solid, u, arms, i)
+        u = recover(solid, u0, terms, i, lapse.decay, workspace.modes)
+        return u, False, 0.0, before - stored(solid, u, terms, i)
     fading(solid, part * step, workspace.decay, workspace.fades)
-    work, dissipated = press(solid, u0, leaves, arms, i, part * step, workspace.fades)
+    work, dissipated = press(solid, u0, leaves, terms, i, part * step, workspace.fades)
     fading(solid, (1 - part) * step, workspace.decay, workspace.fades)
-    before = stored(solid, leaves, arms, i)
-    u = recover(solid, leaves, arms, i, workspace.decay, workspace.modes)
-    return u, False, work, dissipated + before - stored(solid, u, arms, i)
+    before = stored(solid, leaves, terms, i)
+    u = recover(solid, leaves, terms, i, workspace.decay, workspace.modes)
+    return u, False, work, dissipated + before - stored(solid, u, terms, i)

@@ -10,10 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import BoolArray, FloatArray
-from mdr_dask.physics.jit import jit
+from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
-from mdr_dask.physics.transients.elements.edges import Contact, Drive, Edges, carrying_rate, depth_for, under_elements
 from mdr_dask.physics.transients.elements.foundation import (
     ElementWorkspace,
     Foundation,
@@ -31,6 +30,193 @@ from mdr_dask.physics.transients.elements.foundation import (
     stored,
 )
 
+
+class Edges(NamedTuple):
+    """Place in the cell before each element where the force last put an edge, -1 for none, and the gap outside then."""
+
+    place: FloatArray
+    gap: FloatArray
+
+
+class Contact(NamedTuple):
+    """Elements under a line at one moment, shape (n,) each, and the edges of their contact.
+
+    Parameters
+    ----------
+    gaps, slope : array
+        From the line to the displacement that an element would have without contact, and the slope of the line.
+    pulls, force, power : array
+        Force of springs and Prony terms of elements at the line; the whole force, and that times the slope (written).
+    touching : bool array
+    edges : Edges
+    """
+
+    gaps: FloatArray
+    pulls: FloatArray
+    slope: FloatArray
+    force: FloatArray
+    power: FloatArray
+    touching: BoolArray
+    edges: Edges
+
+
+class Drive(NamedTuple):
+    """Deborah number and load of a moment, and the element at the start of a line that does not close, else -1."""
+
+    deborah: float
+    load: float
+    first: int
+
+
+@jit
+def under_elements(line: CubicLine, travel: float, under: FloatArray, slope_under: FloatArray) -> int:
+    """Write height and slope over the line's length above every element after a travel; return its whole cells."""
+    n = under.size
+    cells = travel * n
+    shift = int(np.floor(cells))
+    y = cells - shift
+    a0, a1 = (1 + 2 * y) * (1 - y) ** 2, y * y * (3 - 2 * y)
+    b0, b1 = y * (1 - y) ** 2, y * y * (y - 1)
+    g0, k0, k1 = 6 * y * (y - 1), (1 - y) * (1 - 3 * y), y * (3 * y - 2)
+    i = shift % n
+    for j in range(n):
+        before, after, enter, leave = line.height[i], line.height[i + 1], line.enter[i], line.leave[i]
+        under[j] = a0 * before + a1 * after + b0 * enter + b1 * leave
+        slope_under[j] = n * (g0 * (before - after) + k0 * enter + k1 * leave)
+        i = i + 1 if i + 1 < n else 0
+    return shift
+
+
+@jit
+def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) -> tuple[float, bool]:
+    """Find the depth at which the mean displacement max(d + p, free) has its value; convex and increasing in d."""
+    n = under.size
+    for _ in range(200):
+        total, touching = 0.0, 0
+        for j in range(n):
+            w = depth + under[j]
+            if w > free[j]:
+                total += w
+                touching += 1
+            else:
+                total += free[j]
+        if touching == 0:
+            nearest = np.inf
+            for j in range(n):
+                nearest = min(nearest, free[j] - under[j])
+            if abs(total - mean * n) <= 1e-12 * abs(mean) * n:
+                return nearest, True
+            depth = nearest + (mean * n - total)
+            continue
+        step = (mean * n - total) / touching
+        depth += step
+        if abs(step) <= 1e-12 * (abs(depth) + abs(mean)):
+            return depth, True
+    return depth, False
+
+
+@jit_inline
+def _whole(values: FloatArray, j: int) -> float:
+    """Return the integral over the cell before node j of the cubic through four nodes."""
+    n = values.size
+    return float((13 * (values[j - 1] + values[j]) - values[j - 2] - values[(j + 1) % n]) / 24)
+
+
+@jit_inline
+def _limit(inner: float, outer: float, place: float, gap: float) -> float:
+    """Return the part of a cell up to the edge, seen from the element in contact."""
+    if place < 0:
+        inner = max(inner, 0.0)
+        return inner / (inner - outer) if outer < 0 else 1.0
+    return place + (1 - place) * np.sqrt(max(1 - outer / gap, 0.0)) if gap < 0 else place
+
+
+@jit_inline
+def _cell(
+    j: int, gaps: FloatArray, force: FloatArray, touching: BoolArray, edges: Edges, keep: bool
+) -> tuple[float, float]:
+    """Return begin and end of contact in the cell before element j, as parts of the cell."""
+    f0, f1 = force[j - 1], force[j]
+    before, after = touching[j - 1], touching[j]
+    if keep and before == after:
+        edges.place[j] = -1.0
+    if f0 <= 0 and f1 <= 0:
+        return 0.0, 0.0
+    low, high = 0.0, 1.0
+    if not after:
+        high = _limit(gaps[j - 1], gaps[j], edges.place[j], edges.gap[j])
+    elif not before:
+        low = 1 - _limit(gaps[j], gaps[j - 1], edges.place[j], edges.gap[j])
+    zero = f0 / (f0 - f1) if (f0 < 0) != (f1 < 0) else -1.0
+    by_force = (f0 < 0 and zero > low) or (f1 < 0 and zero < high)
+    if by_force and f0 < 0:
+        low = zero
+    elif by_force:
+        high = zero
+    if keep and by_force and before != after and high > low:
+        edges.place[j], edges.gap[j] = (high, gaps[j]) if before else (1 - low, gaps[j - 1])
+    return low, high
+
+
+@jit
+def _forces(contact: Contact, first: int, keep: bool) -> tuple[float, float, float]:
+    """Return mean load, drag and fraction in contact; `first` has no element before it. Write the edges if `keep`."""
+    force, power, slope, touching, edges = contact.force, contact.power, contact.slope, contact.touching, contact.edges
+    n = force.size
+    load, drag, length = 0.0, 0.0, 0.0
+    for j in range(n):
+        if j == first or not (touching[j - 1] or touching[j]):
+            edges.place[j] = -1.0
+            continue
+        low, high = _cell(j, contact.gaps, force, touching, edges, keep)
+        width, middle = high - low, 0.5 * (low + high)
+        if width >= 1:
+            load += _whole(force, j)
+            drag += _whole(power, j)
+            length += 1
+        elif width > 0:
+            rise, bend = force[j] - force[j - 1], slope[j] - slope[j - 1]
+            f, s = force[j - 1] + rise * middle, slope[j - 1] + bend * middle
+            load += width * f
+            drag += width * (f * s + width * width / 12 * rise * bend)
+            length += width
+    return load / n, drag / n, length / n
+
+
+@jit
+def _pressing_rate(contact: Contact, weight: float, deborah: float) -> float:
+    """Return the least rate at which the force on every element in contact is positive."""
+    rate = -np.inf
+    for j in range(contact.force.size):
+        if contact.touching[j]:
+            rate = max(rate, -contact.pulls[j] / weight - deborah * contact.slope[j])
+    return rate
+
+
+@jit
+def carrying_rate(contact: Contact, weight: float, rate: float, drive: Drive) -> tuple[float, float, float]:
+    """Return the rate of the depth at which the load is carried, drag and fraction in contact; write the edges.
+
+    The force of an element pressed to the line is `pulls` and `weight` times ``rate + deborah * slope``: with a dashpot
+    its viscosity and the rate of the depth, without one the glass modulus and a correction of the depth, deborah 0.
+    """
+    force, power, slope = contact.force, contact.power, contact.slope
+    drag, length = 0.0, 0.0
+    for iteration in range(60):
+        for j in range(force.size):
+            force[j] = contact.pulls[j] + weight * (rate + drive.deborah * slope[j])
+            power[j] = force[j] * slope[j]
+        carried, drag, length = _forces(contact, drive.first, False)
+        if abs(carried - drive.load) <= 1e-11 * drive.load or iteration == 59:
+            break
+        if length > 0:
+            rate += (drive.load - carried) / (length * weight)
+        else:
+            rate = max(rate, _pressing_rate(contact, weight, drive.deborah)) + drive.load / weight
+    _forces(contact, drive.first, True)
+    return rate, drag, length
+
+
 DRAG, DEPTH, RATE, CONTACT, STORED, WORK, DISSIPATED = range(7)
 ROWS = 7
 CORRECTIONS = 2  # of the times of separation and the depth within a step
@@ -41,19 +227,19 @@ class State(NamedTuple):
 
     Parameters
     ----------
-    displacement, arms : array, shape (n,) and (n, arms)
-        u, and the strain of the arms.
-    free, free_arms : array, shape (n,) and (n, arms)
-        The same without contact; `free_arms` is valid only for elements in contact.
+    displacement, terms : array, shape (n,) and (n, terms)
+        u, and the strain of the terms.
+    free, free_terms : array, shape (n,) and (n, terms)
+        The same without contact; `free_terms` is valid only for elements in contact.
     touching : array, shape (n,)
         Whether in contact.
     edges : Edges
     """
 
     displacement: FloatArray
-    arms: FloatArray
+    terms: FloatArray
     free: FloatArray
-    free_arms: FloatArray
+    free_terms: FloatArray
     touching: BoolArray
     edges: Edges
 
@@ -62,11 +248,11 @@ class State(NamedTuple):
 def mean_after(solid: Foundation, state: State, load: float, next_load: float, step: float, modes: FloatArray) -> float:
     """Return the mean displacement after a step: the load decides it, whatever is in contact."""
     n, extra = state.displacement.size, 1 if solid.viscosity > 0 else 0
-    count, arms = solid.rates.size, solid.times.size
-    inward, strain, mean = solid.inward, state.arms, state.displacement.sum() / n
+    count, terms = solid.rates.size, solid.times.size
+    inward, strain, mean = solid.inward, state.terms, state.displacement.sum() / n
     for k in range(count):
         modes[k] = inward[k, 0] * mean if extra else 0.0
-    for m in range(arms):
+    for m in range(terms):
         total = 0.0
         for j in range(n):
             total += strain[j, m]
@@ -82,7 +268,7 @@ def mean_after(solid: Foundation, state: State, load: float, next_load: float, s
         for k in range(count):
             total += solid.outward[0, k] * modes[k]
         return total
-    for m in range(arms):
+    for m in range(terms):
         glass += solid.moduli[m]
         for k in range(count):
             total += solid.moduli[m] * solid.outward[m, k] * modes[k]
@@ -97,15 +283,15 @@ def _instant(
     n = under.size
     mean, work, glass = 0.0, 0.0, 1.0 + solid.moduli.sum()
     for j in range(n):
-        state.free[j] = at_rest(solid, state.arms, j)
+        state.free[j] = at_rest(solid, state.terms, j)
         mean += state.free[j] / n
     depth, good = depth_for(under, state.free, mean + load / glass, depth)
     for j in range(n):
-        before = stored(solid, state.displacement[j], state.arms, j)
+        before = stored(solid, state.displacement[j], state.terms, j)
         w = depth + under[j]
         state.touching[j] = w > state.free[j]
         state.displacement[j] = max(w, state.free[j])
-        work += stored(solid, state.displacement[j], state.arms, j) - before
+        work += stored(solid, state.displacement[j], state.terms, j) - before
     return depth, work / n, good
 
 
@@ -115,9 +301,9 @@ def _forget(solid: Foundation, state: State, old: int, new: int) -> float:
     n, dissipated = state.displacement.size, 0.0
     for j in range(n):
         if (j + old) // n != (j + new) // n:
-            dissipated += stored(solid, state.displacement[j], state.arms, j)
+            dissipated += stored(solid, state.displacement[j], state.terms, j)
             state.displacement[j] = state.free[j] = 0.0
-            state.arms[j, :] = 0.0
+            state.terms[j, :] = 0.0
             state.edges.place[j] = -1.0
             state.touching[j] = False
     return dissipated / n
@@ -161,7 +347,7 @@ class StepWorkspace(NamedTuple):
     old_under: FloatArray
     old_slope: FloatArray
     after: FloatArray
-    after_arms: FloatArray
+    after_terms: FloatArray
     parts: FloatArray
     leaves: FloatArray
     gaps: FloatArray
@@ -208,9 +394,9 @@ def _separate(solid: Foundation, state: State, workspace: StepWorkspace, step: S
         if plain and u + damping * rise0 > 0 and w1 + damping * rise1 >= 0:
             workspace.parts[j], workspace.leaves[j], workspace.after[j] = 1.0, w1, u * workspace.decay[0]
             continue
-        part, leaves = release(solid, lapse, Rise(u, w1, rise0, rise1), state.arms, j)
+        part, leaves = release(solid, lapse, Rise(u, w1, rise0, rise1), state.terms, j)
         if part < 1 or workspace.parts[j] < 1:
-            workspace.after[j] = free_after(solid, lapse, u, part if part < 1 else 0.0, leaves, state.arms, j)
+            workspace.after[j] = free_after(solid, lapse, u, part if part < 1 else 0.0, leaves, state.terms, j)
         workspace.parts[j], workspace.leaves[j] = part, leaves
 
 
@@ -226,19 +412,19 @@ def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step,
         if not was:
             state.free[j] = after[j]
             for m in range(solid.times.size):
-                state.free_arms[j, m] = workspace.after_arms[j, m]
+                state.free_terms[j, m] = workspace.after_terms[j, m]
         elif plain:
             state.free[j] *= workspace.decay[0]
         elif damping > 0:
-            state.free[j] = recover(solid, state.free[j], state.free_arms, j, workspace.decay, workspace.element.modes)
+            state.free[j] = recover(solid, state.free[j], state.free_terms, j, workspace.decay, workspace.element.modes)
         if not was and w1 <= after[j]:
             if plain:
                 dissipated += 0.5 * (u[j] * u[j] - after[j] * after[j])
             else:
-                dissipated += stored(solid, u[j], state.arms, j) - stored(solid, after[j], workspace.after_arms, j)
+                dissipated += stored(solid, u[j], state.terms, j) - stored(solid, after[j], workspace.after_terms, j)
             u[j] = after[j]
             for m in range(solid.times.size):
-                state.arms[j, m] = workspace.after_arms[j, m]
+                state.terms[j, m] = workspace.after_terms[j, m]
             continue
         if was and plain and w1 > after[j]:
             gone = damping * (w1 - u[j]) ** 2 / step.time
@@ -247,7 +433,7 @@ def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step,
             u[j] = w1
             continue
         separation = Release(workspace.parts[j], workspace.leaves[j], after[j])
-        u[j], touching[j], done, gone = advance(solid, lapse, (w0, w1), (u[j], was), separation, state.arms, j)
+        u[j], touching[j], done, gone = advance(solid, lapse, (w0, w1), (u[j], was), separation, state.terms, j)
         if not touching[j]:
             state.free[j] = u[j]
         work += done
@@ -272,9 +458,9 @@ def _step(
             workspace.after[j] = state.displacement[j] * workspace.decay[0]
             continue
         for m in range(solid.times.size):
-            workspace.after_arms[j, m] = state.arms[j, m]
+            workspace.after_terms[j, m] = state.terms[j, m]
         workspace.after[j] = recover(
-            solid, state.displacement[j], workspace.after_arms, j, workspace.decay, workspace.element.modes
+            solid, state.displacement[j], workspace.after_terms, j, workspace.decay, workspace.element.modes
         )
     depth = guess
     for _ in range(CORRECTIONS):
@@ -297,7 +483,7 @@ def _state_energy(solid: Foundation, state: State) -> float:
             energy += 0.5 * state.displacement[j] * state.displacement[j] / n
         return energy
     for j in range(n):
-        energy += stored(solid, state.displacement[j], state.arms, j) / n
+        energy += stored(solid, state.displacement[j], state.terms, j) / n
     return energy
 
 
@@ -313,7 +499,7 @@ def forces_now(
     plain = solid.times.size == 0
     for j in range(workspace.under.size):
         w = depth + workspace.under[j]
-        workspace.pulls[j] = w if plain else pull(solid, w, state.arms, j)
+        workspace.pulls[j] = w if plain else pull(solid, w, state.terms, j)
         workspace.gaps[j] = w - state.free[j] if solid.viscosity > 0 else workspace.pulls[j]
     contact = Contact(
         workspace.gaps,
