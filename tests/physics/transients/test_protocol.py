@@ -242,7 +242,7 @@ def test_rest_is_static() -> None:
 
 
 def test_elastic_solid_is_refused() -> None:
-    with pytest.raises(ValueError, match="expected a solid with an arm or a dashpot"):
+    with pytest.raises(ValueError, match="expected a solid with a Prony term or a dashpot"):
         foundation([], [], 0.0)
 
 
