@@ -152,7 +152,11 @@ def test_encodings_of_windows_are_read(tmp_path):
         (joined(np.c_[Y**1.5, ROWS]), UNITS, "expected positions on a regular grid"),
         ("Unit: nm\n" + joined(ROWS), UNITS, "the file says nm, got 'um': leave out `unit`"),
         ("Unit: nm\nz in um\n" + joined(ROWS), Units("", "", STEP), "states more than one height"),
-        ("pixel size,2 um\n" + joined(ROWS, ","), UNITS, "`spacing` 2.5 um: leave out `spacing`"),
+        (
+            "pixel size,2 um\n" + joined(ROWS, ","),
+            UNITS,
+            "the spacing is 2 um in its heading and 2.5 um in `spacing`: leave out",
+        ),
         ("x [um] y [um] z [nm]\n" + joined(xyz(), " "), Units("um"), "the file says nm, got 'um': leave out `unit`"),
         (
             "x [um] y [um] z [nm]\n" + joined(xyz(), " "),

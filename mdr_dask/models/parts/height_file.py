@@ -156,16 +156,15 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
     for option, step, stated, given in zip(
         ("spacing", "spacing_y"), grid.steps, grid.stated[2:], units[2:], strict=True
     ):
-        known = [length for length in (step and metre and step * metre, stated, given) if length]
-        for other in known[1:]:
-            if abs(other - known[0]) > SAME * known[0]:
-                own, option_or_heading = ("positions", "heading") if step and metre else ("heading", "option")
-                source = f"`{option}`" if other == given else f"the {option_or_heading}"
+        sources = {"its positions": step and metre and step * metre, "its heading": stated, f"`{option}`": given}
+        known = [(source, length) for source, length in sources.items() if length]
+        for source, length in known[1:]:
+            if abs(length - known[0][1]) > SAME * known[0][1]:
                 raise DataError(
-                    f"{file.name}: the {own} have a {option} of {shown(known[0], 'm')}, {source} {shown(other, 'm')}: "
-                    f"leave out `{option}` or correct the file"
+                    f"{file.name}: the spacing is {shown(known[0][1], 'm')} in {known[0][0]} and "
+                    f"{shown(length, 'm')} in {source}: leave out `{option}` or correct the file"
                 )
-        spacings.append(known[0] if known else None)
+        spacings.append(known[0][1] if known else None)
     unsaid = []
     if any(grid.steps) and metre is None:
         unsaid.append("the unit of its positions: give `x_unit`, such as um")
@@ -284,6 +283,8 @@ def _is_grid(lines: list[str]) -> bool:
 
 def _grid_of_text(file: DataFile) -> _Grid:
     """Return the heights of a text, and what it states about them."""
+    import numpy as np
+
     lines = file.read_text().splitlines()
     if _is_grid(lines):
         return _surfer(file, lines) if lines[0].startswith("DSAA") else _esri(file, lines)
@@ -291,12 +292,13 @@ def _grid_of_text(file: DataFile) -> _Grid:
     stated = _stated(file, lines[:first], lines[first])
     if cells.shape[1] <= MOST_COLUMNS < len(cells):
         return _scattered(file, lines, first, cells, stated)
-    words = cells.size - int(cells.notna().to_numpy().sum())
     before = sum(bool(line.strip()) and line.lstrip()[0] not in "#%" for line in lines[:first])
     remarks = [f"lines before the heights: {before}"] if before else []
-    if words:
-        remarks.append(f"cells without a number, taken as missing points: {words}")
-    return _without_positions(file, cells.to_numpy(dtype="float64"), stated, tuple(remarks))
+    grid = _without_positions(file, cells.to_numpy(dtype="float64"), stated, tuple(remarks))
+    if words := int(np.count_nonzero(np.isnan(grid.rows))):
+        remark = f"cells without a number, taken as missing points: {words}"
+        return grid._replace(remarks=(*grid.remarks, remark))
+    return grid
 
 
 def _without_positions(file: DataFile, rows: FloatArray, stated: Units, remarks: tuple[str, ...]) -> _Grid:
