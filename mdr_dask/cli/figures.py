@@ -99,6 +99,7 @@ def plot(
         if where:
             groups = selection.where_all(groups, where)
             figures = {name: _without(figure, where) for name, figure in figures.items()}
+        figures = {name: _warned(figure, _warnings(urls)) for name, figure in figures.items()}
         if measured is not None:
             from mdr_dask.plots.measured import with_points
 
@@ -129,6 +130,25 @@ def _without(figure: Plot, where: str) -> Plot:
         return drawn
 
     return replace(figure, draw=draw)
+
+
+def _warnings(urls: Sequence[str]) -> list[str]:
+    """Return the warnings of finished results, equal ones once with their count."""
+    from mdr_dask import store as stores
+    from mdr_dask.questions import progress
+
+    found = []
+    for url in urls:
+        studies = stores.datasets(url)
+        messages = [message for name, data in studies.items() for message in progress.messages(url, name, data)]
+        done = [message for message in messages if message["status"] == "done"]
+        found += [f"{group.results} results of the store: {group.reason}" for group in progress.grouped(done, studies)]
+    return found
+
+
+def _warned(figure: Plot, warnings: list[str]) -> Plot:
+    """Return a figure that repeats the warnings of its results."""
+    return replace(figure, draw=lambda groups: replace(figure.draw(groups), warnings=warnings))
 
 
 def _split(words: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -253,8 +273,10 @@ def save(description: Figure, path: Path, origin: Mapping[str, str]) -> None:
     with writing(render.table_beside(path)), writing(path):
         drawn.save(path)
     asked = page.current()
-    if (asked.title is not None or asked.width is not None) and description.fixed:
-        click.echo(f"{path.name}: {labels.plain(description.fixed)}", err=True)
+    if asked.title is not None or asked.width is not None:
+        for text in (description.fixed, *(f"warning: {warning}" for warning in description.warnings)):
+            if text:
+                click.echo(f"{path.name}: {labels.plain(text)}", err=True)
     if description.left_out:
         click.echo(f"{path.name}: not drawn: {labels.plain('; '.join(description.left_out))}", err=True)
 

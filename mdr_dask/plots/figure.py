@@ -167,6 +167,8 @@ class Figure:
         What bars and bands mean.
     left_out : list of str
         What is not drawn.
+    warnings : list of str
+        Warnings about the results of the study.
     columns : int, optional
         Most panels in a row.
     stack : int
@@ -182,6 +184,7 @@ class Figure:
     fixed: str = ""
     bars: str = ""
     left_out: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
     columns: int | None = None
     stack: int = 1
     ratio: float = 0.7
@@ -223,6 +226,7 @@ class Figure:
         lines = [f"{name}: {text}" for name, text in origin.items()]
         lines.append(f"title: {'; '.join(part for part in (self.subject, self.fixed, self.bars) if part)}")
         lines += [f"not drawn: {'; '.join(self.left_out)}"] * bool(self.left_out)
+        lines += [f"warning: {warning}" for warning in self.warnings]
         lines += [f"held fixed: {', '.join(f'{name} = {value}' for name, value in held.items())}"] * bool(held)
         lines += [f"units: {', '.join(f'{name} [{units[name]}]' for name in varied)}"] * bool(varied)
         for number, panel in enumerate(self.panels):

@@ -70,18 +70,31 @@ def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
 
 
 def _add(panel: Panel, measured: Measured, data: xr.Dataset) -> int:
-    """Add the points at the conditions of a panel, in the colours of its curves; return their number."""
+    """Add the points at the conditions of a panel, in the colours of its curves; return their number.
+
+    If the table does not have a parameter in which the curves differ, a point belongs to none of them and is black.
+    """
     found = 0
     left = np.ones(measured.values.size, dtype=bool)
-    for trace in [trace for trace in panel.traces if trace.kind == "curve" and trace.what == "data"]:
+    curves = [trace for trace in panel.traces if trace.kind == "curve" and trace.what == "data"]
+    of_curves = _differing([trace.data for trace in curves]) <= {*measured.conditions, panel.x.quantity}
+    for trace in curves:
         here = left & _at(trace.data, measured, panel.x.quantity)
         if here.any():
-            panel.traces.append(_points(panel, measured, data, here, trace.colour, trace.label))
+            colour, label = (trace.colour, trace.label) if of_curves else ("#000000", "")
+            panel.traces.append(_points(panel, measured, data, here, colour, label))
             left &= ~here
             found += int(here.sum())
     if found:
         panel.keys = [*panel.entries(), Key(f"{NAME}, 95 %", "#000000", "", "D")]
     return found
+
+
+def _differing(curves: list[xr.Dataset]) -> set[str]:
+    """Return the parameters in which curves differ."""
+    held = [{str(name): value.item() for name, value in each.coords.items() if value.ndim == 0} for each in curves]
+    names = {name for each in held for name in each}
+    return {name for name in names if len({each.get(name) for each in held}) > 1}
 
 
 def _at(curve: xr.Dataset, measured: Measured, along: str) -> np.ndarray:

@@ -289,6 +289,7 @@ def _title(figure: Drawn, description: Figure) -> None:
     else:
         left_out = f"not drawn: {'; '.join(description.left_out)}" if description.left_out else ""
         lines = [part for part in (description.subject, description.fixed, description.bars, left_out) if part]
+        lines += [f"warning: {warning}" for warning in description.warnings]
     if not lines:
         return
     size = mpl.rcParams["axes.titlesize" if len(lines) == 1 else "legend.fontsize"]

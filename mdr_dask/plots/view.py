@@ -24,12 +24,13 @@ from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 MOST_PANELS, LONGEST_WORD = 6, 20
 #: Main effects of a sampled study: cases in a bin, most bins, most parameters, and most cases that are drawn as points.
 IN_A_BIN, MOST_BINS, MOST_EFFECTS, MOST_POINTS = 8, 10, 12, 5000
-#: Marks for cases without a value.
+#: Marks for cases without a value, and for cases whose mean lacks some realisations: the others may differ from these.
 MARKS = {
     Status.FAILED: ("x", "failed"),
     Status.NOT_CONVERGED: ("+", "did not converge"),
     Status.MISSING: ("1", "missing"),
 }
+SOME = "v", "mean without realisations that failed"
 
 
 @dataclass(frozen=True)
@@ -202,7 +203,8 @@ def _axis(name: str, arrays: list[xr.DataArray], view: View, which: str) -> Axis
         words = [textwrap.fill(str(word), LONGEST_WORD) for word in np.atleast_1d(first.values)]
         return Axis(label, ticks=[*enumerate(words)])
     every = np.concatenate([np.ravel(labels.shown(name, each)) for each in arrays])
-    return Axis(label, log=view.is_log(which, every), quantity=name)
+    has_zero = view.log is not None or not labels.quantity(name, first).offset
+    return Axis(label, log=view.is_log(which, every) and has_zero, quantity=name)
 
 
 # curves
@@ -215,8 +217,9 @@ def _lines(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     x = _axis(along, [data[along] for data in found.values()], view, "x")
     families = [{name: curves.family(data, output, along, view.by) for name, data in p.series.items()} for p in parts]
     panels = [_panel(part, each, view, output, x) for part, each in zip(parts, families, strict=True)]
-    log = view.is_log("y", np.concatenate([_values(panel) for panel in panels]))
     first = next(iter(found.values()))
+    log = view.is_log("y", np.concatenate([_values(panel) for panel in panels]))
+    log &= view.log is not None or not labels.quantity(output, first[output]).offset  # degrees Celsius have no zero
     y = Axis(labels.label(output, first[output]), log, quantity=output)
     for panel in panels:
         panel.y = y
@@ -285,7 +288,7 @@ def _panel(part: _Part, families: Mapping[str, curves.Family], view: View, outpu
     marked: dict[str, str] = {}
     several_styles = any(one.bar or len({curve.line for curve in one.curves}) > 1 for one in families.values())
     for curve, one in _coloured(families):
-        data = curve.data
+        data = _counted(curve.data, output)
         place, value = _places(data, along), curves.mean(data, output)
         shades = data[view.by] if view.by in data.coords and data[view.by].ndim else None
         if shades is not None and shades.dtype.kind in "fiu":
@@ -345,16 +348,28 @@ def _law(curve: curves.Curve, law: laws.Law, along: str, output: str) -> Trace:
     return Trace("law", data, law.name, label, curve.colour, "--")
 
 
+def _counted(data: xr.Dataset, output: str) -> xr.Dataset:
+    """Return a series with the number of realisations of each mean as a coordinate ``realisations``."""
+    if "realisation" not in data[output].dims:
+        return data
+    count = xr.DataArray(aggregation.count(data[output]).variable, attrs={"units": "1"})
+    return data.assign_coords(realisations=count)
+
+
 def _absent(curve: curves.Curve, x: xr.DataArray, output: str, marked: dict[str, str]) -> list[Trace]:
-    """Return marks at the foot of a panel where no realisation has a value, with the reason."""
+    """Return marks at the foot of a panel where all or some realisations have no value, with the reason."""
     data = curve.data
     if "status" not in data:
         return []
     found = []
     rest = data[output].isnull().all("realisation")
-    for state, (mark, reason) in MARKS.items():
-        here = rest & (data["status"] == state.value).any("realisation")
-        rest = rest & ~here
+    here_of = {}
+    for state, look in MARKS.items():
+        here_of[look] = rest & (data["status"] == state.value).any("realisation")
+        rest = rest & ~here_of[look]
+    failed = data["status"].isin([Status.FAILED.value, Status.NOT_CONVERGED.value])
+    here_of[SOME] = failed.any("realisation") & data[output].notnull().any("realisation")
+    for (mark, reason), here in here_of.items():
         if bool(here.any()):
             place = np.flatnonzero(np.atleast_1d(here.values))
             part = data.isel({here.dims[0]: place}) if here.ndim else data

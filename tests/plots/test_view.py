@@ -13,7 +13,9 @@ from curves import register
 from mdr_dask import aggregation, execute
 from mdr_dask.campaign import loads
 from mdr_dask.errors import DataError
+from mdr_dask.models.base import Status
 from mdr_dask.plots import page
+from mdr_dask.plots.render import render
 from mdr_dask.plots.view import View, draw, figure_of
 from mdr_dask.store import datasets
 
@@ -208,3 +210,24 @@ def test_figures_do_not_change_the_study(groups):
     described(groups, MU, "velocity")
     for name, data in groups.items():
         xr.testing.assert_identical(data, before[name])
+
+
+def test_means_without_failed_realisations_are_marked_and_counted(groups):
+    data = groups[""].isel(hurst=0).load()
+    bad = {"normal_force": 1, "velocity": 3, "realisation": 0}
+    status, values = data["status"].copy(), data[MU].copy()
+    status[bad], values[bad] = Status.FAILED.value, np.nan
+    figure = described({"": data.assign({"status": status, MU: values})}, MU, "velocity", by="normal_force")
+    (marked,) = rows(figure, "mean without realisations that failed").itertuples()
+    assert (marked.normal_force, marked.velocity) == (float(data.normal_force[1]), float(data.velocity[3]))
+    counts = rows(figure).set_index(["normal_force", "velocity"])["realisations"]
+    most = data.sizes["realisation"]
+    assert counts.min() == counts[marked.normal_force, marked.velocity] == most - 1
+    assert counts.max() == most
+
+
+def test_warnings_of_results_are_in_figure_and_table(groups):
+    figure = described(groups, MU, "velocity")
+    figure.warnings = ["3 results of the store: outside the range tested"]
+    assert "warning: 3 results" in render(figure).get_suptitle()
+    assert "warning: 3 results of the store: outside the range tested" in figure.head({})
