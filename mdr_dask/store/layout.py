@@ -8,10 +8,10 @@ import platform
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import cache, lru_cache
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import zarr
@@ -204,7 +204,7 @@ def _signpost(members: Mapping[str, Any]) -> dict[str, str]:
 def _laid_out_files(template: Template) -> dict[str, bytes]:
     """Return the metadata of all arrays of a group, and the chunks of its coordinates."""
     coordinates = _coordinates(template)
-    held = [_coordinate_files(name, _Numbers.of(*coordinate)) for name, coordinate in coordinates.items()]
+    held = [_coordinate_files(name, *coordinate) for name, coordinate in coordinates.items()]
     along = " ".join(name for name, (dims, _, _) in coordinates.items() if dims != (name,))
     arrays = {}
     for output in template.outputs:
@@ -226,76 +226,45 @@ def _laid_out_files(template: Template) -> dict[str, bytes]:
     return {name: content for each in (*held, files) for name, content in each.items()}
 
 
-def _contents(files: dict[str, Any]) -> dict[str, bytes]:
-    """Return the files of a group in memory, without its own."""
-    del files["zarr.json"]
-    return {name: content.to_bytes() for name, content in files.items()}
-
-
 def _array_file(
     template: Template, further: tuple[str, ...], extra: tuple[int, ...], dtype: str, attrs: dict[str, Any]
 ) -> bytes:
     """Return the metadata of an array of blocks."""
-    chunks = tuple(max(1, length) for length in (*(template.chunks[dim] for dim in template.dims), *extra))
-    held = json.loads(_one_block(chunks, (*template.dims, *further), dtype, json.dumps(attrs)))
-    return json.dumps({**held, "shape": [*template.shape, *extra]}, indent=2).encode()
-
-
-@lru_cache(maxsize=64)
-def _one_block(chunks: tuple[int, ...], dims: tuple[str, ...], dtype: str, attrs: str) -> bytes:
-    """Return the metadata of an array of one block. They are cached because a round changes the shape alone."""
     files: dict[str, Any] = {}
     zarr.create_array(
         zarr.storage.MemoryStore(files),
-        shape=chunks,
-        chunks=chunks,
+        shape=(*template.shape, *extra),
+        chunks=tuple(max(1, length) for length in (*(template.chunks[dim] for dim in template.dims), *extra)),
         dtype=dtype,
         fill_value=np.nan if dtype == "float64" else int(Status.MISSING),
-        compressors=[ZstdCodec(level=1), Crc32cCodec()],
-        dimension_names=dims,
-        attributes=json.loads(attrs),
+        compressors=_compressors(),
+        dimension_names=(*template.dims, *further),
+        attributes=attrs,
     )
     return bytes(files["zarr.json"].to_bytes())
 
 
-class _Numbers(NamedTuple):
-    """A coordinate that can be hashed."""
-
-    dims: tuple[str, ...]
-    dtype: np.dtype[Any]
-    shape: tuple[int, ...]
-    values: bytes | tuple[str, ...]
-    attrs: str
-
-    @classmethod
-    def of(cls, dims: tuple[str, ...], values: NDArray[Any], attrs: dict[str, Any]) -> _Numbers:
-        """Take dimensions, values and attributes."""
-        held = tuple(values.tolist()) if values.dtype == object else values.tobytes()
-        return cls(dims, values.dtype, values.shape, held, json.dumps(attrs))
-
-    def array(self) -> NDArray[Any]:
-        """Return the values."""
-        if isinstance(self.values, tuple):
-            return np.array(self.values, dtype=object)
-        return np.frombuffer(self.values, self.dtype).reshape(self.shape)
-
-
-@lru_cache(maxsize=64)
-def _coordinate_files(name: str, numbers: _Numbers) -> dict[str, bytes]:
-    """Return the files of a coordinate. They are cached because a round changes one of them."""
+def _coordinate_files(
+    name: str, dims: tuple[str, ...], values: NDArray[Any], attrs: dict[str, Any]
+) -> dict[str, bytes]:
+    """Return the files of a coordinate."""
     files: dict[str, Any] = {}
-    group = zarr.create_group(zarr.storage.MemoryStore(files))
-    array = group.create_array(
-        name,
-        shape=numbers.shape,
-        chunks=(_COORDINATE_CHUNK,) * len(numbers.shape),
-        dtype="str" if numbers.dtype == object else numbers.dtype,
-        compressors=[ZstdCodec(level=1), Crc32cCodec()],
-        dimension_names=numbers.dims,
-        attributes=json.loads(numbers.attrs),
+    array = zarr.create_array(
+        zarr.storage.MemoryStore(files),
+        name=name,
+        shape=values.shape,
+        chunks=(_COORDINATE_CHUNK,) * values.ndim,
+        dtype="str" if values.dtype == object else values.dtype,
+        compressors=_compressors(),
+        dimension_names=dims,
+        attributes=attrs,
     )
-    array[...] = numbers.array()
-    return _contents(files)
+    array[...] = values
+    return {file: content.to_bytes() for file, content in files.items() if file.startswith(f"{name}/")}
+
+
+def _compressors() -> list[Any]:
+    return [ZstdCodec(level=1), Crc32cCodec()]
 
 
 def _coordinates(template: Template) -> dict[str, _Coordinate]:
