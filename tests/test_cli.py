@@ -98,13 +98,13 @@ def test_a_fitted_material_says_how_well_it_holds(campaign, capsys):
     note = r"rms error 1\.6% in G', 4\.2% in G'', largest 8\.7% at 62\.8 rad/s"
     for command in (["check"], ["run", "--dry-run"]):
         assert main([*command, str(campaign)]) == 0
-        assert re.search(note, capsys.readouterr().out)
+        assert re.search(note, " ".join(capsys.readouterr().out.split()))
     assert main(["check", str(campaign), "--json"]) == 0
     (row,) = json.loads(capsys.readouterr().out)["rows"]
-    assert re.search(note, row["notes"][1])
+    assert re.search(note, " ".join(row["notes"]))
     assert main(["run", str(campaign), "--quiet"]) == 0
     kept = xr.open_zarr("results/small.zarr")
-    assert re.search(note, kept.attrs["notes"][1])
+    assert re.search(note, " ".join(kept.attrs["notes"]))
     np.testing.assert_allclose(kept["material_error"], np.hypot(0.016, 0.042) / np.sqrt(2), rtol=0.03)
 
 
@@ -276,9 +276,10 @@ def test_an_interrupted_process_group_ends_quietly_and_leaves_nobody_behind(camp
     os.killpg(process.pid, word)
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
-    assert errors.strip().splitlines() == [
-        "interrupted; finished results are kept, and the same command goes on with the others"
-    ]
+    assert (
+        " ".join(errors.split())
+        == "interrupted; finished results are kept, and the same command goes on with the others"
+    )
     _, alive = psutil.wait_procs(children, timeout=PATIENCE)
     assert not alive
     assert not list(Path().glob(".live.zarr.*.runner"))
