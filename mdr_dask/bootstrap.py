@@ -176,11 +176,16 @@ def scatter(residuals: FloatArray, count: int) -> float:
 
 
 def _caused(residuals: FloatArray, count: int, draws: int) -> FloatArray:
-    """Return the rms residuals that scatter and errors alone cause, one per resample; none if there are too few."""
+    """Return the rms residuals that scatter and errors alone cause, one per resample; none if there are too few.
+
+    The errors of different groups move different cases, so the squares of the residuals that they cause are added.
+    """
     flat = residuals.reshape(residuals.shape[0], -1)
     away = np.sqrt(np.mean((flat[1:] - flat[0]) ** 2, axis=1))
     known = away[:draws][~np.isnan(away[:draws])]
     if count < 2 or known.size < FEWEST:
         return np.empty(0)
-    caused: FloatArray = widening(count) * known + _reach(away[draws:])
+    moves = away[draws:]
+    by_errors = np.sqrt(np.nansum(np.fmax(moves[0::2], moves[1::2]) ** 2))
+    caused: FloatArray = widening(count) * known + by_errors
     return caused

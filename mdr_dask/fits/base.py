@@ -128,6 +128,8 @@ class Fitted:
 
     def holds(self, where: Callable[[int], str] | None = None) -> str:
         """Say whether the law with the fitted constants holds; arguments as in `verdict`."""
+        if np.isnan(self.constants[0]).any():
+            return f"not tested: these cases do not determine the constants; departs by {100 * self.rms:.2g} % rms"
         return verdict(self.residuals, self.count, self.constants.shape[1], where)
 
 
@@ -279,7 +281,7 @@ def law_holds(
 
 
 def _probability(chance: float | None) -> str:
-    return f"probability {chance:.2g}" if chance else f"a probability below {1 / bootstrap.RESAMPLES:g}"
+    return f"probability {chance:.2g}" if chance else f"probability below {1 / bootstrap.RESAMPLES:g}"
 
 
 def _signed(number: float, digits: str) -> str:

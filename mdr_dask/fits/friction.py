@@ -222,6 +222,8 @@ def stated_power(x: FloatArray, logs: FloatArray, power: float, count: int, wher
     """Say whether a stack of logarithms follows a power law with a stated power and any factor."""
     rest = logs - power * x
     free = power_law(x, logs, count).constants[:, 0]
+    if np.isnan(free[0]):
+        return "not tested: the cases differ too little to determine the exponent"
     excluded = excludes(free, count, power)
     return verdict(rest - rest.mean(axis=1, keepdims=True), count, 1, where, excluded=excluded)
 

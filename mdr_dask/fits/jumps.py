@@ -102,6 +102,9 @@ def _constant(before: FloatArray, jump: FloatArray, count: int) -> dict[str, flo
     stated = left(logs, np.full((len(logs), 1), np.log(LAW)))
     constant = np.exp(found.constants[:, 0])
     low, high = bootstrap.interval(constant, count, positive=True)
+    holds = verdict(stated, count, 0, where, excluded=excludes(found.constants[:, 0], count, np.log(LAW)))
+    if np.isnan(constant[0]):
+        holds = f"not tested: mu_1 / rms_slope is at most {before[0].max():.2g}, where the constant plays no part"
     return row | {
         "constant": float(constant[0]),
         "constant_low": float(low),
@@ -109,7 +112,7 @@ def _constant(before: FloatArray, jump: FloatArray, count: int) -> dict[str, flo
         "deviation": found.rms,
         "deviation_of_thesis": float(np.sqrt(np.mean(stated[0] ** 2))),
         "fitted_law_holds": found.holds(where),
-        "law_holds": verdict(stated, count, 0, where, excluded=excludes(found.constants[:, 0], count, np.log(LAW))),
+        "law_holds": holds,
     }
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import FITTED_LAW_HOLDS, LAW_HOLDS, Fit, excludes, fitted, law_holds, require, short, verdict
+from mdr_dask.fits.base import FITTED_LAW_HOLDS, LAW_HOLDS, Fit, excludes, fitted, require, short, verdict
 from mdr_dask.fits.jumps import LAW, jump_law
 from mdr_dask.fits.kinetic_cases import LEAST, LEVELS, Cases, jump_numbers, law_rate
 from mdr_dask.fits.relaxation import RATE_FIELDS, Relaxation, relaxation_of, window
@@ -156,7 +156,7 @@ def _relaxation(series: Series) -> xr.Dataset:
     expected = law_rate(cases.passing, cases.column("hurst"))
     windows = [window(cases.times, rate) if each else np.nan for rate, each in zip(expected, found, strict=True)]
     whole, of_rate, stated = _closed_laws(cases)
-    one = [law_holds(each.departures, each.chance, 2) if each else "not tested: nothing relaxes" for each in found]
+    one = [each.holds if each else "not tested: nothing relaxes" for each in found]
     return xr.Dataset(
         {
             "passing_number": cases.found(cases.passing, "1", "v_1 tau q_max"),

@@ -8,7 +8,7 @@ import numpy as np
 
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
-from mdr_dask.fits.base import DOUBTFUL
+from mdr_dask.fits.base import DOUBTFUL, law_holds
 
 WINDOW = 8.0  # length of the fitted part, in units of 1 / (rate of the law)
 FLOOR = 0.01  # error of every moment due to the grid, relative to the largest relaxing part (docs/kinetics.md)
@@ -28,17 +28,14 @@ class Relaxation(NamedTuple):
     rate, amplitude, integral_rate : array, shape (rows,)
         Stacks. If scatter and errors do not explain the departures of the trace from one exponential, the last rows
         of the rate contain the fits to the trace moved by these departures, and the integral rate.
-    departures : array, shape (times,)
-        Trace minus exponential over the largest relaxing part.
-    chance : float
-        Probability that scatter and errors alone cause as large departures.
+    holds : str
+        Whether one exponential fits; departures are relative to the largest relaxing part.
     """
 
     rate: FloatArray
     amplitude: FloatArray
     integral_rate: FloatArray
-    departures: FloatArray
-    chance: float
+    holds: str
 
 
 def widths(time: FloatArray) -> FloatArray:
@@ -127,7 +124,9 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
         rate, amplitude = np.concatenate([rate, rates, integral[:1], rate[:1]]), np.concatenate([amplitude, amplitudes])
     if outside[0] or outside.mean() > bootstrap.TAILS[0]:  # the end of the tried rates is no property of the data
         rate = np.full_like(rate, np.nan)
-    return Relaxation(rate, amplitude, integral, residuals[0] / np.abs(y[0]).max(), chance)
+    relative = residuals / np.abs(y[0]).max()
+    holds = law_holds(relative[0], chance, 2, scatter=bootstrap.scatter(relative, count))
+    return Relaxation(rate, amplitude, integral, holds)
 
 
 def window(time: FloatArray, expected: float) -> float:

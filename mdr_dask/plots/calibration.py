@@ -54,9 +54,7 @@ def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
         panels.append(_density(found, name, product.values, unit, False, data))
     points = f"{found.measured.source}, {found.measured.values.size} points{f', series {series}' if series else ''}"
     subject = f"calibration: {fit.sentence(found)}"
-    return Figure(
-        panels, subject, points, f"{found.law_holds}; bars, bands and shades: 95 % (dark: 68 %)", columns=3, ratio=0.8
-    )
+    return Figure(panels, subject, points, f"{found.law_holds}; bars, bands and shades: 95 % (dark: 68 %)", ratio=0.8)
 
 
 def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.Dataset]:

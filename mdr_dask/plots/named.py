@@ -39,9 +39,13 @@ def described(name: str, model: str, summary: str, *views: View, otherwise: View
 SLIDING, JUMP, MIXED, EHL, WEAR = (
     *("sliding_friction", "velocity_jump", "mixed_lubrication", "ehl_line", "fretting_wear"),
 )
-#: Limits of the film ratio between the regimes of lubrication.
-FILM_RATIOS = {1.0: "film ratio 1: boundary below, mixed above", 3.0: "film ratio 3: full film above"}
-STRIBECK = ("friction_coefficient", "asperity_load_share", "contact_length", "breakthrough_probability", "film_ratio")
+#: Limits of the film ratio: of the criterion of breakthrough, and between the regimes of lubrication.
+FILM_RATIOS = {
+    0.5: "film ratio 0.5: below it breakthrough is an artefact",
+    1.0: "film ratio 1: boundary below, mixed above",
+    3.0: "film ratio 3: full film above",
+}
+STRIBECK = ("friction_coefficient", "asperity_load_share", "contact_length", "breakthrough_probability")
 
 PLOTS: tuple[Plot, ...] = (
     described(
@@ -58,7 +62,8 @@ PLOTS: tuple[Plot, ...] = (
     ),
     described(
         *("stribeck", MIXED, "friction, load share, contact, breakthrough and film ratio against speed"),
-        View(STRIBECK, "rotation_speed", guides={"film_ratio": FILM_RATIOS}),
+        View(STRIBECK, "rotation_speed", log="x"),
+        View("film_ratio", "rotation_speed", guides={"film_ratio": FILM_RATIOS}),
     ),
     described(
         *("temperature", MIXED, "breakthrough probability against temperature, by load and speed"),

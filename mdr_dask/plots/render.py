@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import io
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -120,7 +121,10 @@ def render(description: Figure) -> Drawn:
     _share_labels(places, panels)
     _bars(figure, places, panels)
     _title(figure, description)
+    traces = [trace for panel in panels for trace in panel.traces]
+    markers = {trace.marker for trace in traces if not trace.line or trace.column("y").size < MANY_POINTS}
     keys = list(dict.fromkeys(key for panel in panels for key in panel.entries()))
+    keys = [key if key.marker in markers else replace(key, marker="") for key in keys]
     legend = _legend(figure, keys) if keys else 0.0
     if asked.height is None:
         figure.set_size_inches(width, height + legend + _height_of_title(figure))

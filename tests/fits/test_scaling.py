@@ -143,6 +143,23 @@ def test_straight_curves_have_no_shifts_that_are_told_apart():
     assert all(np.all(np.isnan(moved[name])) for name in ("horizontal", "horizontal_low", "vertical", "vertical_high"))
 
 
+def test_laws_that_say_the_same_of_all_cases_are_not_tested():
+    """Complete contact everywhere, and loads that are nearly equal: a fitted factor leaves nothing to contradict."""
+    whole = {
+        "contact_slope": lambda force, v: SLOPE + 0 * force * v,
+        "contact_fraction": lambda force, v: 1 + 0 * force,
+    }
+    found = FIT["contact_slope"].compute({"": planted(CURVES, 10, 1, **whole)})
+    assert np.all(found["law_holds"].str.startswith("not tested: by eq. 3.21"))
+    near = {"normal_force": np.linspace(1e-2, 1.02e-2, 4)}
+    found = FIT["contact_growth"].compute(
+        {"": planted(near, 10, 1, contact_fraction=lambda force, _: 0.3 * force**0.6)}
+    )
+    assert np.isnan(found["exponent"]).all()
+    assert np.all(found["law_holds"].str.startswith("not tested: the cases differ too little"))
+    assert np.all(found["fitted_law_holds"].str.startswith("not tested: these cases do not determine"))
+
+
 def test_a_bend_of_one_curve_alone_determines_no_shift():
     """Loads of 250 to 10 000: only the lowest reaches the bend, and beside straight curves it may lie anywhere."""
     axes = {"normal_force": np.geomspace(25, 1000, 4), "velocity": np.geomspace(1e-3, 0.5, 12)}
