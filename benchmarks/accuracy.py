@@ -61,6 +61,7 @@ def cells(row: Row) -> tuple[str, ...]:
 def draw(rows: Sequence[Row]) -> None:
     """Write the figure: a panel for every solver with its first family, a curve for every method."""
     from matplotlib.figure import Figure
+    from matplotlib.ticker import NullFormatter
 
     measured = [name for name in SOLVERS if any(row.solver == name for row in rows)]
     columns, count = 4, len(measured)
@@ -75,6 +76,9 @@ def draw(rows: Sequence[Row]) -> None:
             points = list(group)
             axes.loglog([row.seconds for row in points], [row.error for row in points], "o-", ms=4, label=method)
         axes.set_title(f"{name}: {first[0].case}", fontsize="small")
+        for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+            axis.set_view_interval(low / 2, max(2 * high, 30 * low))  # so that labels of decades are enough
+            axis.set_minor_formatter(NullFormatter())
         axes.grid(alpha=0.3)
         axes.legend(fontsize="xx-small")
         axes.set_xlabel("processor time (s)", fontsize="small")

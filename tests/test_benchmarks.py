@@ -73,6 +73,7 @@ def test_a_campaign_meets_its_accuracy(name):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")  # of the peers
 @pytest.mark.parametrize("subject", peers.SUBJECTS)
 def test_solvers_are_compared_with_the_peers_that_are_installed(subject):
     rows = list(importlib.import_module(f"benchmarks.peers.{subject}").compared())

@@ -130,8 +130,8 @@ SOLVERS = (
         "Error of the friction of a Kelvin solid on generated lines of 128 Nyquist points. v tau times the rms slope "
         f"is 0.03 to 3 rms heights. {REFERENCE}",
         {
-            "full contact": partial(on_plane, 5, 10),
             "transition": partial(on_plane, -0.5, 2),
+            "full contact": partial(on_plane, 5, 10),
             "few peaks": partial(on_plane, -2.2, -1),
         },
         {
