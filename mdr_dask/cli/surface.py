@@ -39,7 +39,7 @@ KINDS = ("map", "scan", "spectrum")
     "--plot",
     "figure",
     type=click.Path(path_type=Path),
-    help="Draw the spectra to FILE.png, .pdf or .svg, with their table beside it.",
+    help="Draw the spectra to FILE.png, .pdf or .svg, and their table to FILE.csv.",
 )
 @json_option
 @csv_option

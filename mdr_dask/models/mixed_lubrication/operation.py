@@ -98,7 +98,7 @@ class Operation:
 
 
 def operation_of(case: MixedLubrication, accuracy: float | None = None) -> Operation:
-    """Return the smooth contact of a case and its film, case by case: the value must not know its neighbours.
+    """Return the smooth contact of a case and its film; they do not depend on the other cases of a block.
 
     Raises
     ------

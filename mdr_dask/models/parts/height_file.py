@@ -210,9 +210,9 @@ def _metre(file: DataFile, unit: str, option: str) -> float:
 
 
 def _channel(file: DataFile) -> Any:
-    """Return the main channel of a file as SurfaceTopography finds it, or None if the file is text for our own reader.
+    """Return the main channel of a file as SurfaceTopography finds it, or None if it is text for our own reader.
 
-    Plain text belongs to our own readers unless it says sizes or units in a way that SurfaceTopography knows.
+    Plain text is left to our own readers unless SurfaceTopography finds a unit in it.
     """
     file.read_bytes()  # refuses a file that has changed
     is_text = file.name.lower().endswith(TEXT)
@@ -400,7 +400,7 @@ def _surfer(file: DataFile, lines: list[str]) -> _Grid:
         nx, ny = (int(n) for n in numbers[:2])
         rows = numbers[8:].reshape(ny, nx)
     except ValueError:
-        raise DataError(f"{file.name}: expected a grid of Surfer with as many heights as its head says") from None
+        raise DataError(f"{file.name}: expected a grid of Surfer with as many heights as its heading states") from None
     steps = (numbers[3] - numbers[2]) / (nx - 1), (numbers[5] - numbers[4]) / (ny - 1)
     return _Grid(rows, (float(steps[0]), float(steps[1])))
 

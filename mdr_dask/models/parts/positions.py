@@ -16,7 +16,7 @@ OFF_GRID = 0.5
 OUTER = 3
 """Rows or columns on each side that may hold positions or numbers."""
 BREAK = 3.0
-"""Times the largest change of slope between lines of heights by which positions differ from the line beside them."""
+"""Change of slope between a line of positions and its neighbours, over the largest between lines of heights."""
 FAR_ALONE = 10.0
 """Ranges of all other heights by which a number that occurs once must be away from them to be no height."""
 

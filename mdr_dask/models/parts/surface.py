@@ -69,8 +69,8 @@ class Surface(Parameters):
         """Return range, rms height and rms gradient of the spectra."""
         if self.profile is not None:
             return ()
-        told = zip(self.measured.files, self.measured.found(), spectra_of(self), strict=False)
-        return tuple(note for file, found, spectrum in told for note in _notes(self, file, found, spectrum))
+        spectra = zip(self.measured.files, self.measured.found(), spectra_of(self), strict=False)
+        return tuple(note for file, found, spectrum in spectra for note in _notes(self, file, found, spectrum))
 
     @property
     def measured(self) -> Files:
@@ -105,7 +105,7 @@ def _notes(surface: Surface, file: DataFile, found: Found, spectrum: Spectrum) -
 
 
 def without_exponent(value: Any, surface: str) -> Any:
-    """Return the data of a parameter set; where a measured surface is named, no Hurst exponent stands beside it."""
+    """Return the data of a parameter set; a measured surface has no Hurst exponent."""
     measured = isinstance(value, dict) and value.get(surface) is not None
     return {"hurst": None, **value} if measured else value
 
@@ -143,9 +143,9 @@ def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
 
 
 def _beyond(name: str, wavelength: float, which: str, end: float) -> str:
-    told, limit = distinguishable(wavelength, end, digits=4)
+    given, limit = distinguishable(wavelength, end, digits=4)
     return (
-        f"expected {name} of at {which} {limit} m, where the spectrum ends, got {told} m: "
+        f"expected {name} of at {which} {limit} m, where the spectrum ends, got {given} m: "
         "`extrapolate: true` goes on by a power law"
     )
 

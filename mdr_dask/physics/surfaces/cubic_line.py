@@ -101,7 +101,7 @@ class Cells(NamedTuple):
     mean, stretch : array, shape (n + 1,)
         Integrals of the height and of the slope squared over each cell.
     start : float
-        Where in cell 0 (and cell n) a turn of a periodic line begins and ends: its highest point.
+        Place in cell 0 (and cell n) where a period of the line begins and ends: its highest point.
     top : float
         The height of that point in the line.
     periodic : bool
@@ -171,7 +171,7 @@ def _highest(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[
 def cut(line: CubicLine) -> Cells:
     """Split a line into its cells; a periodic line starts at its highest point."""
     best, place, top = _highest(line.height, line.enter, line.leave)
-    if line.smooth and place == 1:  # a turn begins with a whole cell, wherever the line begins
+    if line.smooth and place == 1:  # a period begins with a whole cell, wherever the line begins
         best, place = (best + 1) % line.enter.size, 0.0
     columns = _turned(line, top, best if line.periodic else 0)
     if line.smooth and _is_resolved(columns[1][:-1], columns[5][:-1]):

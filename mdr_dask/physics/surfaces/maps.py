@@ -259,11 +259,7 @@ def spectrum_of_map(surface: SurfaceMap, hann: bool = True) -> MapSpectrum:
     power[:, 1 : (points[1] + 1) // 2] *= 2  # the other half of the plane
     del waves, height
     q_x, q_y = wavenumbers(points, size)
-    return _rings(power, q_x, q_y, points, size, HANN_MODES * _disc_share(size) if hann else 1.0)
-
-
-def _disc_share(size: tuple[float, float]) -> float:
-    return min(size) / max(size)
+    return _rings(power, q_x, q_y, points, size, HANN_MODES * (min(size) / max(size)) if hann else 1.0)
 
 
 def _rings(

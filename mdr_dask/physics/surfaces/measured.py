@@ -60,9 +60,8 @@ def measured_line(
     detrend : {"none", "mean", "line", "parabola"}
         Polynomial subtracted, fitted by least squares.
     taper : float
-        Part of the line, at both ends together, over which the heights are brought to their mean by a cosine, so
-        that the
-        line closes without a step; 0 to 1.
+        Part of the line, at both ends together, over which the heights are brought to their mean by a cosine, so that
+        the line closes without a step; 0 to 1.
     shortest, longest : float
         Wavelengths, m, outside of which the spectrum is cut off; 0 keeps that end.
 
@@ -141,15 +140,3 @@ def rms_height(height: FloatArray) -> float:
 def rms_slope(height: FloatArray, length: float) -> float:
     """Return the spectral rms slope of the periodic line through samples, including the wave of two points."""
     return waves_of(height).rms_slope() / length
-
-
-def power_spectrum(height: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-    """Return wavenumbers q, rad/m, and the one-dimensional spectral density C(q), m^3, of a periodic line.
-
-    C(q) = L |h_q|^2 for q > 0 with h_q the complex Fourier amplitude, so that rms^2 = sum over positive and negative
-    q of
-    C / L. The mean is left out.
-    """
-    waves = np.fft.rfft(height) / height.size
-    q = np.asarray(2 * np.pi * np.arange(1, waves.size) / length, dtype=np.float64)
-    return q, np.asarray(length * np.abs(waves[1:]) ** 2, dtype=np.float64)

@@ -1,13 +1,14 @@
-"""How near a contact at constant depth has come to the shape that ends all wear: a bound in closed form.
+"""Bound on the distance of a worn contact at constant depth from its limiting shape, in closed form.
 
-With s the slip over its amplitude, ds/dN = p s / eta. Wear elsewhere moves load onto a radius: of two bodies with
-s_1 <= s_2 and s_1 = s_2 at one radius, the second has no less pressure there (the maximum principle of the half-space).
-So what starts below the virgin slip and grows no faster by its own pressure stays below the true slip. Such is the
-half-integral of y = m min(y0 / y0(x_1), 1) for any x_1 > c, with dm/dN = m (1 - m) / (pi w) from m = y0(x_1) on:
+With s the slip over its amplitude, ds/dN = p s / eta. Wear at other radii adds pressure to a radius: of two bodies
+with s_1 <= s_2 everywhere and s_1 = s_2 at one radius, the second has at least the pressure of the first there (maximum
+principle of the half-space). So a function that starts below the virgin slip, and grows no faster than by its own
+pressure, stays below the true slip. One such function is the half-integral of y = m min(y0 / y0(x_1), 1) for any
+x_1 > c, with dm/dN = m (1 - m) / (pi w) from m = y0(x_1) on:
 
-* it grows by at most (1 - m) / (pi w) of itself, w^2 = a^2 - c^2;
-* its image rises up to the radius a of the last scar, and there from m to 1. That rise alone presses with
-  (1 - m) / (pi sqrt(a^2 - r^2)), which is no less.
+* its relative growth is at most (1 - m) / (pi w), with w^2 = a^2 - c^2;
+* its image jumps from m to 1 at the radius a of the final scar. The pressure of this jump alone is
+  (1 - m) / (pi sqrt(a^2 - r^2)), which is at least that growth.
 
 The true slip lies between it and that of the limit, (2 / pi) arccos(c / r). The force falls while the body wears.
 """

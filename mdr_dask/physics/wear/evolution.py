@@ -216,7 +216,7 @@ def march(
     start : Moment, optional
         Where to start from, in place of the virgin contact.
     stops : callable, Moment -> bool
-        Tells after which moment to stop before that time.
+        Whether to stop after a moment, before that time.
 
     Returns
     -------

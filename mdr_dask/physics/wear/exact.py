@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 
@@ -40,7 +39,6 @@ COARSER, COARSER_UNTIL = 1.6, 5e-3
 SLID_WIDER = (1e-3, 1.0), (3e-3, 3.0), (1e-2, 1.0)
 #: In gross slip: radius at which the exponent of a body is read, and largest factor on the halvings for sharp bodies.
 NEAR_AXIS, SHARPEST = 1e-5, 8.0
-Found = TypeVar("Found")
 Solver = Callable[[Profile, float, Sequence[float], Resolution], dict[float, Worn]]
 
 
@@ -134,13 +132,17 @@ def limit_under_force(profile: Profile, stick_radius: float, accuracy: float = 1
     check_stick_radius(stick_radius)
     if not border_moves(stick_radius, accuracy):
         return limit(profile, stick_radius)
-    resolution = forced_resolution(accuracy)
-    found, *rougher = _solutions(lambda one: forced_end(profile, stick_radius, one), resolution, errors)
-    least = least_edge_error(stick_radius, accuracy)
-    return replace(found, rougher=tuple(rougher), slowness=resolution.slowness, least_edge_error=least)
+    return _evolved(
+        lambda resolution: {np.inf: forced_end(profile, stick_radius, resolution)},
+        forced_resolution(accuracy),
+        least_edge_error(stick_radius, accuracy),
+        errors=errors,
+    )[np.inf]
 
 
-def _solutions(solve: Callable[[Resolution], Found], resolution: Resolution, errors: bool) -> list[Found]:
+def _solutions(
+    solve: Callable[[Resolution], dict[float, Worn]], resolution: Resolution, errors: bool
+) -> list[dict[float, Worn]]:
     """Solve at a resolution, and twice rougher; one rougher solution is enough where the other cannot be found."""
     found = [_first_of(solve, (resolution, resolution.finer(2.0), resolution.finer(4.0)))]
     reasons = []
@@ -155,7 +157,7 @@ def _solutions(solve: Callable[[Resolution], Found], resolution: Resolution, err
     return found
 
 
-def _first_of(solve: Callable[[Resolution], Found], resolutions: Sequence[Resolution]) -> Found:
+def _first_of(solve: Callable[[Resolution], dict[float, Worn]], resolutions: Sequence[Resolution]) -> dict[float, Worn]:
     """Solve at the first resolution at which the evolution can be advanced."""
     for resolution in resolutions[:-1]:
         try:

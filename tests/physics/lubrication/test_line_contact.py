@@ -104,15 +104,16 @@ def test_heavy_load_gives_the_pressure_of_hertz() -> None:
 
 @pytest.mark.slow
 def test_flow_is_the_same_everywhere() -> None:
-    """The flow rho H^3/eta P' - K rho H, by differences of the result, is constant where the film is full."""
-    case = LineContact(8.0, 4.0)
-    found = solve_film(case, accuracy=1e-5)
-    x = found.finest.nodes[(found.finest.nodes > -3) & (found.finest.nodes < found.finest.rupture - 0.02)]
-    middle = (x[1:] + x[:-1]) / 2
-    reduced = -np.exp(-case.liquid.alpha * found.finest.pressure_between(x)) / case.liquid.alpha
-    H = found.finest.film_between(middle)
-    flow = H - H**3 / case.film_number * np.diff(reduced) / np.diff(x)
-    assert np.max(np.abs(flow / np.median(flow) - 1)) < 0.005  # midpoint differences between some hundred nodes
+    """The flow rho H^3/eta P' - K rho H, by midpoint differences, tends to a constant where the film is full."""
+    case, changes = LineContact(8.0, 4.0), []
+    for grid in solve_film(case, accuracy=1e-5).grids[-2:]:
+        x = grid.nodes[(grid.nodes > -3) & (grid.nodes < grid.rupture - 0.02)]
+        reduced = -np.exp(-case.liquid.alpha * grid.pressure_between(x)) / case.liquid.alpha
+        H = grid.film_between((x[1:] + x[:-1]) / 2)
+        flow = H - H**3 / case.film_number * np.diff(reduced) / np.diff(x)
+        changes.append(np.max(np.abs(flow / np.median(flow) - 1)))
+    assert changes[1] < 0.3 * changes[0]  # second order
+    assert changes[1] < 0.01
 
 
 def _heavy() -> list[tuple[LineContact, float, float]]:
