@@ -250,6 +250,14 @@ def test_a_store_of_another_version_of_its_model_says_how_to_extend_it(toy, url,
     assert store.verify(url).findings == []
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="needs two cores")
+def test_a_long_study_in_plain_python_goes_on_in_processes(example):
+    Path("long.yaml").write_text(f"{CAMPAIGN}store: {{path: long.zarr, blocks: {{normal_force: 1, realisation: 1}}}}\n")
+    assert example("run", "long.yaml", "--quiet", line="    import time; time.sleep(0.05)").returncode == 0
+    assert len({record["process"] for record in store.records("long.zarr", "")}) > 1
+
+
 def test_models_in_plain_python_are_marked():
     assert per_case(lambda case, random: {}).is_plain_python
     assert not hasattr(models.load("ehl_line").compute, "is_plain_python")

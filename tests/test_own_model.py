@@ -220,6 +220,47 @@ def test_a_case_without_a_proper_result_has_failed_and_the_others_go_on(example,
     assert (again.kept, again.done, again.failed) == (160, 40, 0)
 
 
+def changed(values=None, **fields):
+    """Return what changes a Result, and the values in it."""
+    return lambda result: replace(result, values={**result.values, **(values or {})}, **fields)
+
+
+DONE = np.full((1, 1), Status.DONE)
+#: What the own function from a Block to a Result may return for a single case, and the reason why that has failed.
+RESULTS = {
+    "no Result": (lambda result: result.values, "TypeError: expected a Result, got dict"),
+    "unknown state": (changed(status=DONE * 7), "ValueError: status: expected DONE, NOT_CONVERGED or FAILED"),
+    "missing state": (changed(status=DONE * 0), "ValueError: status: expected DONE, NOT_CONVERGED or FAILED"),
+    "shape of states": (changed(status=DONE[0]), "ValueError: status: expected DONE, NOT_CONVERGED or FAILED"),
+    "output missing": (lambda result: replace(result, values={}), "ValueError: the output wear_volume is missing"),
+    "truth values": (changed(values={"wear_volume": DONE > 0}), f"ValueError: {NUMBER}"),
+    "shape": (changed(values={"wear_volume": np.ones(3)}), "ValueError: wear_volume: expected a number for each case"),
+    "place of a message": (changed(messages={(5, 5): "far"}), r"ValueError: messages: expected places in shape"),
+    "number of solves": (changed(solves=None), "TypeError"),
+}
+
+
+@pytest.mark.parametrize("kind", RESULTS)
+def test_a_result_that_is_not_as_declared_is_a_failed_case(example, monkeypatch, kind):
+    change, why = RESULTS[kind]
+    module = importlib.import_module("wear_rate")
+
+    def compute(block):
+        result = per_case(module.solve)(block)
+        return change(result) if block.cases == 1 and block.case(0).normal_force > 50 else result
+
+    def at_once(block):
+        if (block.column("normal_force") > 50).any() and block.cases > 1:
+            raise ValueError("one of them")
+        return compute(block)
+
+    monkeypatch.setattr(module, "MODEL", replace(module.MODEL, compute=at_once))
+    outcome = execute.run(mdr_dask.read("pin.yaml"), "pin.zarr", Resources(threads=1), lambda _: None)
+    assert (outcome.done, outcome.failed) == (160, 40)
+    (text,) = {each["message"] for each in messages("pin.zarr", "", xr.open_zarr("pin.zarr"))}
+    assert re.match(why, text), text
+
+
 @pytest.mark.parametrize(
     ("broken", "sentence"),
     [
