@@ -181,7 +181,6 @@ METADATA = (
     "status/zarr.json",
     "position/zarr.json",
     "status/layout.json",
-    "status/seal.json",
 )
 
 
@@ -328,8 +327,7 @@ def _metadata(case: Case, whole: Path) -> None:
     name = Path("s.zarr", case.base)
     tree = edited(json.loads(name.read_bytes()), case.content)
     if case.kind == "store":
-        for told in ("layout.json", "seal.json"):
-            Path("s.zarr/status", told).unlink()
+        Path("s.zarr/status/layout.json").unlink()
         if isinstance(tree, dict) and isinstance(tree.get("attributes"), dict):
             tree["attributes"]["mdr_dask_layout"] = 1
     try:
