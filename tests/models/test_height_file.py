@@ -203,6 +203,15 @@ def test_a_scan_is_read_as_it_stands_and_codes_are_no_heights(layout, code, tmp_
     assert ("taken as missing: 2 points" in " ".join(remarks)) == bool(code)
 
 
+def test_levels_of_a_grating_are_heights(tmp_path):
+    path = tmp_path / "grating.txt"
+    levels = np.tile([0.0] * 6 + [2.5] + [5.0] * 3, 20)
+    path.write_text(joined(np.c_[np.arange(levels.size) * 0.5, levels]))
+    scan = read_scan(DataFile.of(path), Units("um", "um"))
+    assert scan.remarks == ()
+    np.testing.assert_allclose(scan.height, 1e-6 * levels)
+
+
 @pytest.mark.parametrize(
     ("layout", "units", "message"),
     [

@@ -19,6 +19,8 @@ BREAK = 3.0
 """Change of slope between a line of positions and its neighbours, over the largest between lines of heights."""
 FAR_ALONE = 10.0
 """Ranges of all other heights by which a number that occurs once must be away from them to be no height."""
+FEW_LEVELS = 10
+"""Different heights of a profile that was designed, not measured."""
 
 
 class Outer(NamedTuple):
@@ -135,14 +137,15 @@ def without_codes(height: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     """Replace numbers that cannot be heights, m, by NaN, such as a code 9999 for missing points.
 
     Such a number is the highest or the lowest, and is farther from all other heights than these are from each other;
-    `FAR_ALONE` times as far if it occurs once, because a single deep groove is possible.
+    `FAR_ALONE` times as far if it occurs once, because a single deep groove is possible. Where the other heights are
+    `FEW_LEVELS` numbers or fewer, as of a grating, there is no code.
     """
     height = np.where(np.isfinite(height), height, np.nan)
     found: list[str] = []
     while True:
         low, high = (float(end) for end in (np.nanmin(height), np.nanmax(height)))
         rest = height[(height > low) & (height < high)]
-        if not rest.size:
+        if np.unique(rest[:: 1 + rest.size // 1000]).size <= FEW_LEVELS:
             return height, tuple(found)
         codes = []
         for code, distance in ((low, rest.min() - low), (high, high - rest.max())):
