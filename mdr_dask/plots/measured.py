@@ -86,7 +86,8 @@ def _add(panel: Panel, measured: Measured, data: xr.Dataset) -> int:
             left &= ~here
             found += int(here.sum())
     if found:
-        panel.keys = [*panel.entries(), Key(f"{NAME}, 95 %", "#000000", "", "D")]
+        label = NAME if measured.errors is None else f"{NAME}, 95 %"
+        panel.keys = [*panel.entries(), Key(label, "#000000", "", "D")]
     return found
 
 

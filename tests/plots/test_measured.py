@@ -40,6 +40,13 @@ def test_points_have_the_colour_of_their_curve_and_their_error_bars(groups, tmp_
     assert "measured, 95 %" in [key.label for key in panel.keys]
 
 
+def test_points_without_the_parameter_of_the_curves_are_black(groups, tmp_path):
+    figure = drawn(groups, tmp_path, "velocity [m/s],friction_coefficient\n0.01,2e-3\n0.02,5e-3\n")
+    (points,) = (trace for trace in figure.panels[0].traces if trace.what == "measured")
+    assert (points.colour, points.label, points.data["y"].size) == ("#000000", "measured", 2)
+    assert "measured" in [key.label for key in figure.panels[0].keys]
+
+
 def test_points_at_other_conditions_are_counted(groups, tmp_path):
     table = "velocity [m/s],normal_force [N],friction_coefficient\n0.01,0.1,2e-3\n0.01,7,5e-3\n"
     figure = drawn(groups, tmp_path, table)
