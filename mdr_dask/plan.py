@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mdr_dask import models
 from mdr_dask.campaign import Axis, Campaign, Series, measured
-from mdr_dask.errors import CampaignError, distinguishable
+from mdr_dask.errors import CampaignError, ModelError, distinguishable
 from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, with_value
 from mdr_dask.models.numbers import numbers_of
 
@@ -265,7 +265,14 @@ def templates(
             problems.append(_too_many(campaign, series, sizes))
             continue
         outputs = _outputs(campaign, series, model)
-        empty = Template(campaign, series, sizes, {}, outputs, model.coordinates(series.parameters))
+        extra = model.coordinates(series.parameters)
+        lacking = [dim for output in outputs for dim in output.dims if dim not in extra]
+        if lacking:
+            raise ModelError(
+                f"{campaign.model}: outputs have the dimension {lacking[0]!r}, whose values are not known: "
+                f"give the model coordinates=lambda parameters: {{{lacking[0]!r}: Coordinate(values, unit, meaning)}}"
+            )
+        empty = Template(campaign, series, sizes, {}, outputs, extra)
         chunks = known.get(series.name) or _choose_chunks(empty, model)
         template = Template(campaign, series, sizes, chunks, outputs, empty.extra)
         problems += _memory_problems(template, model)

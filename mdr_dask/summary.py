@@ -118,8 +118,10 @@ def cost_lines(costs: Estimate) -> Iterator[str]:
     more = costs.rounds
     cases, results = _counted("case", costs.cases, costs.growth), _counted("result", costs.results, more)
     yield f"{cases} x {_counted('realisation', costs.realisations, costs.at_most / costs.realisations)} = {results}"
-    solves, remain = _counted("solve", costs.solves, more), "remain" if costs.solves * more > 1 else "remains"
+    solves, remain = _counted("solve", costs.solves, more), "remains" if costs.solves * more == 1 else "remain"
     yield f"{solves} {remain} after sharing, in {_counted('block', costs.blocks, more)}"
+    if costs.solves == 0:
+        yield "no case can be solved: all will fail, and mdr-dask status --failures will say why"
     yield f"about {_counted('file', costs.files, more)} in the store"
     sizes = " to ".join(dict.fromkeys(human_bytes(count * costs.bytes) for count in (1, more)))
     times = " to ".join(dict.fromkeys(seconds(START + count * costs.seconds) for count in (1, more)))

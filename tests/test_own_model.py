@@ -276,6 +276,20 @@ def test_a_fault_in_another_function_of_the_model_is_one_sentence(example, capsy
     assert re.search(sentence, capsys.readouterr().err)
 
 
+def test_a_dimension_without_values_is_one_sentence(example, capsys):
+    Path("wear_rate.py").write_text(MODULE.replace("has_error=True", 'dims=("instant",)'))
+    assert main(["check", "pin.yaml"]) == 2
+    assert "the dimension 'instant', whose values are not known: give the model coordinates" in capsys.readouterr().err
+
+
+def test_errors_that_are_zero_everywhere_are_not_printed(example, capsys):
+    Path("pin.yaml").write_text(CAMPAIGN.replace("10 %", "0"))
+    Path("wear_rate.py").write_text(MODULE.replace("1e-12 * volume", "0.0"))
+    assert main(["run", "pin.yaml", "--quiet"]) == 0
+    assert main(["show", "results/pin.zarr"]) == 0
+    assert "+-" not in capsys.readouterr().out
+
+
 def test_ctrl_c_during_a_case_of_the_main_thread_is_no_failed_case():
     with pytest.raises(KeyboardInterrupt):
         per_case(raises(KeyboardInterrupt()))(Block(None, {}, 1, (0,), 1, ("y",)))

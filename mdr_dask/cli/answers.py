@@ -105,9 +105,10 @@ def _print_frame(frame: pd.DataFrame, answer: Table, join: bool) -> None:
 def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
     """Join each mean with its errors, ``0.1234 +- 0.0005 +- 0.0001``, or its interval, ``0.1234 (0.1220, 0.1240)``.
 
-    An error that is not known in any row is left out; the text returned says which errors are printed.
+    An error that is unknown or zero in all rows is left out; the text returned says which errors are printed.
     """
     known = {name for name, values in columns.items() if any(map(_is_known, values))}
+    telling = {name for name in known if any(_is_known(value) and value != 0 for value in columns[name])}
     joined: dict[str, list[Any]] = {}
     left_out: set[str] = set()
     kinds: dict[str, tuple[str, ...]] = {}
@@ -117,8 +118,8 @@ def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
             errors = [f"{output}_{part}" for part in ("standard_error", "grid_error") if f"{output}_{part}" in columns]
             ends = [f"{output}_{part}" for part in ("low", "high") if f"{output}_{part}" in columns]
             left_out |= {*errors, *ends}
-            parts = [each for each in errors or ends if each in known]
-            join = with_error if errors else with_interval
+            parts = [each for each in errors if each in telling] or [each for each in ends if each in known]
+            join = with_interval if ends else with_error
             joined[output] = [join(*each) for each in zip(values, *(columns[part] for part in parts), strict=True)]
             if errors and parts:
                 kinds[output] = tuple(f" +- {part.removeprefix(f'{output}_').replace('_', ' ')}" for part in parts)
