@@ -9,8 +9,9 @@ from __future__ import annotations
 import io
 import math
 import re
+import unicodedata
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -22,9 +23,12 @@ from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.units import example_unit, is_unit, to_si
 
 COMMENT = "#%"
-SEPARATORS = ("\t", ";", ",", r"\s+")
-#: Letters and signs of units beyond ASCII in tables that are not UTF-8.
-WESTERN = "°µ²³·±äöüÄÖÜßéèàç"
+BLANKS = r"\s+"
+SEPARATORS = ("\t", ";", ",", BLANKS)
+#: Letters beyond ASCII that do not follow each other in Western text.
+MANY_LETTERS = re.compile(r"[^\x00-\x7f]{4}")
+#: The line above each sheet of a workbook, before its name.
+SHEET = "# sheet of a workbook: "
 #: Tables with more columns are no measurements.
 MOST_COLUMNS = 1000
 #: Problems that are shown of one table.
@@ -38,24 +42,74 @@ NO_ROWS = "expected a line of names and at least one line of values"
 
 #: Names of quantities as instruments and people write them, `plain`; columns add their own.
 SYNONYMS = {
-    "temperature": ("T", "temp", "sample temperature", "temperature sample", "ts", "tr"),
-    "frequency": ("f", "freq", "omega", "w", "ω", "angular frequency", "ang frequency", "frequency angular"),
-    "time": ("t", "step time", "test time"),
-    "velocity": ("v", "speed", "sliding velocity", "sliding speed", "load point velocity"),
-    "storage modulus": ("e'", "g'", "storage", "e storage", "g storage", "e stor", "g stor", "e1", "g1"),
-    "loss modulus": ("e''", "g''", "loss", "e loss", "g loss", "e2", "g2"),
+    "temperature": ("T", "temp", "sample temperature", "temperature sample", "ts", "tr", "temperatur"),
+    "frequency": (
+        "f",
+        "freq",
+        "omega",
+        "w",
+        "ω",
+        "angular frequency",
+        "frequency angular",
+        "frequenz",
+        "kreisfrequenz",
+    ),
+    "time": ("t", "step time", "test time", "zeit"),
+    "velocity": (
+        "v",
+        "speed",
+        "sliding velocity",
+        "sliding speed",
+        "load point velocity",
+        "geschwindigkeit",
+        "gleitgeschwindigkeit",
+    ),
+    "storage modulus": (
+        "e'",
+        "g'",
+        "storage",
+        "e storage",
+        "g storage",
+        "e stor",
+        "g stor",
+        "e1",
+        "g1",
+        "speichermodul",
+    ),
+    "loss modulus": ("e''", "g''", "loss", "e loss", "g loss", "e2", "g2", "verlustmodul"),
     "modulus": ("relaxation modulus", "e relax", "g relax", "e(t)", "g(t)", "e", "g"),
     "compliance": ("creep compliance", "j", "j(t)"),
-    "tan delta": ("tan(delta)", "tan d", "tan δ", "tandelta", "tan(δ)", "loss factor", "damping factor"),
-    "friction coefficient": ("coefficient of friction", "coefficient", "friction", "mu", "μ", "cof"),
-    "normal force": ("force", "load", "normal load", "f n", "fn", "F"),
-    "kinematic viscosity": ("nu", "ν", "kin viscosity", "viscosity"),
-    "dynamic viscosity": ("eta", "η", "mu", "dyn viscosity", "viscosity"),
+    "tan delta": (
+        "tan(delta)",
+        "tan d",
+        "tan δ",
+        "tandelta",
+        "tan(δ)",
+        "loss factor",
+        "damping factor",
+        "verlustfaktor",
+    ),
+    "friction coefficient": (
+        "coefficient of friction",
+        "coefficient",
+        "friction",
+        "mu",
+        "μ",
+        "cof",
+        "reibwert",
+        "reibungskoeffizient",
+        "reibungszahl",
+    ),
+    "normal force": ("force", "load", "normal load", "f n", "fn", "F", "kraft", "normalkraft"),
+    "kinematic viscosity": ("nu", "ν", "viscosity", "kinematische viskosität", "viskosität"),
+    "dynamic viscosity": ("eta", "η", "mu", "viscosity", "dynamische viskosität", "viskosität"),
     "wavenumber": ("q", "k", "wave number", "wavevector", "wave vector"),
     "wavelength": ("lambda", "λ"),
     "C2D": ("C", "c iso", "areal spectrum", "psd 2d", "psd", "c(q)"),
     "C1D": ("C", "line spectrum", "psd 1d", "psd", "c(q)"),
-    "height": ("z", "h"),
+    "x": ("X", "position", "distance", "length", "weg"),
+    "height": ("z", "Z", "h", "höhe"),
+    "wear volume": ("worn volume", "verschleißvolumen"),
 }
 _ALIKE = str.maketrans({"’": "'", "′": "'", "″": "''", '"': "''", "µ": "μ", "δ": "δ"})
 #: Units that people join to a name, as they write them there.
@@ -73,12 +127,20 @@ JOINED = {
 _DEGREES = {"c": "degC", "°c": "degC", "ºc": "degC", "deg c": "degC", "f": "degF", "°f": "degF", "deg f": "degF"}
 #: A heading for the common logarithms of a quantity: ``log10 q``, ``lg(q)``.
 _LOGARITHM = re.compile(r"(?:log10|log|lg)(?:[\s_]+|\s*(?=\())(.+)", re.IGNORECASE)
+#: The end of a word that is abbreviated, as in ``Ang. frequency``.
+_ABBREVIATED = re.compile(r"(?<=\w{3})\.")
 _BRACKETED = re.compile(r"(.*?)[\s,/]*(?:\[([^\]]*)\]|\(([^()]*)\)|\{([^}]*)\}|<([^>]*)>)\s*\Z")
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?\Z")
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}([.,' ]\d{3})+([.,]\d+)?\Z")
+#: A number before a unit, as in ``10^3 um^3``, ``1e-6 mm^3`` or ``x 1000 N``.
+_FACTOR = re.compile(
+    r"[x×*]?\s*(?:10\s*(?:\^|\*\*)\s*\{?([+-]?\d+)\}?|(\d+(?:\.\d+)?(?:e[+-]?\d+)?|e[+-]?\d+))[\s×x*]*(?=[^\W\d]|°)",
+    re.I,
+)
 _STATED = re.compile(
     r"(?:^|[^a-z])t(?:emp[a-z]*)?\.?\s*[=:]?\s*([+-]?\d+(?:[.,]\d+)?)\s*(°\s?[CF]|deg[CF]|K)\b", re.IGNORECASE
 )
-_MISSING = frozenset({"", "-", "--", "nan", "na", "n/a", "no data"})
+_MISSING = frozenset({"", "nan", "na", "nodata", "null", "none"})
 
 
 class Problem(NamedTuple):
@@ -144,11 +206,20 @@ class Column:
 
 
 def is_called(heading: str, *names: str) -> bool:
-    """Return whether a heading is one of some names or of their synonyms."""
+    """Return whether a heading is one of some names or of their synonyms, or one with its symbol or abbreviated.
+
+    ``Storage modulus G'`` and ``Stor. mod.`` are names of the storage modulus.
+    """
     known = [each for name in names for each in (name, *SYNONYMS.get(plain(name), ()), *SYNONYMS.get(name, ()))]
     if len(heading.strip()) == 1:
         return heading.strip().translate(_ALIKE) in known
-    return plain(heading) in {plain(name) for name in known}
+    if plain(heading) in {plain(name) for name in known}:
+        return True
+    words, _, symbol = heading.strip().rpartition(" ")
+    if words and len(symbol.rstrip("'\"’′″")) == 1:
+        return is_called(words, *names) and is_called(symbol, *names)
+    parts = [re.escape(plain(part)) for part in _ABBREVIATED.split(heading)]
+    return len(parts) > 1 and any(re.fullmatch(r"\w* ?".join(parts), plain(name)) for name in known)
 
 
 def plain(name: str) -> str:
@@ -163,10 +234,21 @@ class Cell:
     text: str
     line: int
     column: int
+    sheet: str = ""
 
     def problem(self, what: str) -> Problem:
-        """Return what is wrong with it."""
+        """Return what is wrong with it; places in a workbook are the names of a sheet and its row."""
+        if self.sheet:
+            return Problem(0, 0, f"sheet {self.sheet!r}, row {self.line}: {what}")
         return Problem(self.line, self.column, what)
+
+    def is_missing(self) -> bool:
+        """Return whether it is empty or says that there is no number: ``-``, ``n.a.``, ``NaN``, ``****``."""
+        return re.sub(r"[\s.,/*#_<>–—-]", "", self.text.casefold()) in _MISSING
+
+    def is_entry(self) -> bool:
+        """Return whether it holds a number, or says that one is missing."""
+        return bool(_NUMBER.match(self.text)) or self.is_missing()
 
 
 @dataclass(frozen=True)
@@ -183,23 +265,39 @@ class Sheet:
         Unit of each column as written, empty where it has none.
     rows : tuple of tuple of Cell
         All equally long.
+    notes : tuple of Cell
+        First entries of the lines of words below the numbers.
     """
 
     source: str
     names: tuple[Cell, ...]
     units: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
-
-
-class Read(dict[str, FloatArray]):
-    """Columns that were read, by `Column.name`; `unused` holds the headings of the others."""
-
-    unused: tuple[str, ...] = ()
+    notes: tuple[Cell, ...] = ()
 
     @property
     def remark(self) -> str:
-        """A sentence that names the columns not used, empty if there are none."""
-        return f"not used: {', '.join(self.unused)}" if self.unused else ""
+        """A sentence that names the lines left out, empty if there are none."""
+        shown = dict.fromkeys(repr(cell.text[:60]) for cell in self.notes)
+        return f"lines below the numbers, left out: {', '.join(shown)}" if shown else ""
+
+
+class Read(dict[str, FloatArray]):
+    """Columns that were read, by `Column.name`.
+
+    `lines` holds the number of each row in the table, `unused` the headings of the other columns, and `left_out` a
+    sentence about lines that were left out.
+    """
+
+    lines: tuple[int, ...] = ()
+    unused: tuple[str, ...] = ()
+    left_out: str = ""
+
+    @property
+    def remark(self) -> str:
+        """A sentence that names the columns not used and the lines left out, empty if there are none."""
+        unused = f"not used: {', '.join(self.unused)}" if self.unused else ""
+        return "; ".join(filter(None, (unused, self.left_out)))
 
 
 def is_table(path: str | Path) -> bool:
@@ -223,7 +321,7 @@ def decoded(content: bytes, source: str) -> str:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         text = content.decode("cp1252", errors="replace")
-        if not re.fullmatch(r"[\t\r\n -~" + WESTERN + "]*", text):
+        if MANY_LETTERS.search(text) or not all(letter.isprintable() or letter in "\t\r\n\xa0" for letter in text):
             found = f"got byte {content[error.start]:#x} at {error.start}"
             raise DataError(f"{source}: expected text in UTF-8, {found} (save it as 'CSV UTF-8')") from None
         return text
@@ -241,8 +339,11 @@ def _workbook(content: bytes, source: str) -> str:
         ) from None
     except Exception as error:  # openpyxl and zipfile raise what the damage happens to cause
         raise DataError(f"{source}: expected a table or an Excel workbook, got neither ({error})") from None
-    frames = [sheet.fillna("").replace(r"[\t\r\n]+", " ", regex=True) for sheet in sheets.values()]
-    return "\n".join("\n".join("\t".join(row) for row in frame.to_numpy()) for frame in frames)
+    lines = []
+    for name, sheet in sheets.items():
+        frame = sheet.fillna("").replace(r"[\t\r\n]+", " ", regex=True)
+        lines += [SHEET + str(name), *("\t".join(row) for row in frame.to_numpy())]
+    return "\n".join(lines)
 
 
 def read_table(text: str, source: str, columns: Sequence[Column], allow_missing: bool = False) -> Read:
@@ -302,8 +403,9 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
         got = f", got {', '.join(cell.text for cell in unknown)[:200]}" if unknown else ""
         problems.append(first[0].problem(f"expected a column {' and a column '.join(lacking)}{got}"))
     if problems:
-        raise TableError(source, sorted(problems))
-    read.unused = tuple(cell.text for cell in unknown)
+        raise TableError(source, sorted(problems, key=lambda problem: problem[:2]))
+    read.lines, read.left_out = tuple(row[0].line for row in sheet.rows), sheet.remark
+    read.unused = tuple(cell.text for cell in unknown if cell.text)
     return read
 
 
@@ -333,8 +435,6 @@ def _match_of(heading: Cell, unit: str, columns: Sequence[Column]) -> _Match:
         return _Match(column, written)
     inner = found[1].strip()
     inner = inner[1:-1] if inner[0] == "(" and inner[-1] == ")" else inner
-    if not re.search(r"[\[(]", inner):
-        inner = re.sub(r"\s*/\s*(.+)", r" [\1]", inner)
     (name,), (own,) = _headings((replace(heading, text=inner),), (), 1)
     return _Match(*match(name.text, unit or own, columns), is_logarithm=True)
 
@@ -368,46 +468,97 @@ def _fits(unit: str, column: Column) -> bool:
     return bool(unit)
 
 
-def read_sheet(text: str, source: str, numeric: bool = True) -> Sheet:
+def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = None) -> Sheet:
     """Split a table into headings, units and rows of cells.
 
-    Text before the headings is skipped. Where the headings are repeated, another block of the same table begins. Pairs
-    of columns with a number above each (as digitised from a figure) become three columns.
+    Text before the headings is skipped. Where the headings are repeated, another block of the same table begins. Lines
+    of words below the last numbers are left out. Pairs of columns with a number above each (as digitised from a figure)
+    become three columns.
 
     Parameters
     ----------
     text, source : str
         The table and the name of its file.
-    numeric : bool
-        Whether the entries are numbers, so that lines without any are headings.
+    is_name : callable, optional
+        For tables whose entries may be words: whether a heading is one of the names that mark the line of headings.
 
     Raises
     ------
     TableError
-        If there are no rows, or rows of different length.
+        If there are no rows, rows of different length, or decimal commas and points.
     """
-    raw = [(number, line) for number, line in enumerate(text.lstrip("\ufeff").splitlines(), 1) if line.strip(" ,;\t")]
-    lines = [(number, line) for number, line in raw if line.lstrip()[0] not in COMMENT]
+    raw = _numbered(text)
+    lines = [line for line in raw if line.text.lstrip()[0] not in COMMENT]
     if not lines:
         raise TableError(source, [Problem(1, 1, NO_ROWS)])
-    rows = _cells(lines, _separator([line for _, line in lines], numeric))
-    if not numeric:
-        return _plain_sheet(source, rows)
-    data = [_is_data(row) for row in rows]
-    widths = Counter(len(row) for row, is_data in zip(rows, data, strict=True) if is_data)
+    separator = _separator([line.text for line in lines], is_name is None)
+    rows = _cells(lines, separator)
+    if is_name:
+        return _plain_sheet(source, rows, separator, is_name)
+    widths = Counter(len(row) for row in rows if _is_data(row))
     if not widths:
-        raise TableError(source, [Problem(rows[-1][0].line, 1, NO_ROWS)])
+        raise TableError(source, [rows[-1][0].problem(NO_ROWS)])
     width = max(widths, key=lambda each: (widths[each], each))
     if width > MOST_COLUMNS:
         raise TableError(source, [Problem(1, 1, f"expected at most {MOST_COLUMNS} columns, got {width}")])
-    return _blocks(source, rows, data, width, raw)
+    return _blocks(source, rows, width, raw, separator)
 
 
-def _blocks(
-    source: str, rows: list[tuple[Cell, ...]], data: list[bool], width: int, raw: list[tuple[int, str]]
-) -> Sheet:
+class _Line(NamedTuple):
+    """A line of text, its number, counted from 1, and the sheet of a workbook that it belongs to."""
+
+    number: int
+    text: str
+    sheet: str = ""
+
+
+def _numbered(text: str) -> list[_Line]:
+    """Return the lines of a text that are not empty; those of a workbook count from the first of their sheet."""
+    found, sheet, before = [], "", 0
+    for number, line in enumerate(text.lstrip("\ufeff").splitlines(), 1):
+        if line.startswith(SHEET):
+            sheet, before = line.removeprefix(SHEET), number
+        elif line.strip(" ,;\t"):
+            found.append(_Line(number - before, line, sheet))
+    return found
+
+
+def _numeric_columns(rows: Sequence[tuple[Cell, ...]], width: int) -> list[bool]:
+    """Return which columns hold numbers in more than half of the lines of numbers."""
+    counts = Counter(place for row in rows for place, cell in enumerate(row) if _NUMBER.match(cell.text))
+    return [2 * counts[place] > len(rows) for place in range(width)]
+
+
+def _is_labelled(row: tuple[Cell, ...], numeric: Sequence[bool]) -> bool:
+    """Return whether a line of numbers is none of the table, because it begins with words in place of a number.
+
+    Such lines hold means, or settings above a block.
+    """
+    first = next(place for place, cell in enumerate(row) if cell.text)
+    filled = sum(bool(cell.text) for cell in row)
+    is_short = 2 * filled < len(numeric)
+    return not row[first].is_entry() and (is_short or (first < len(numeric) and numeric[first]))
+
+
+def _are_missing(row: tuple[Cell, ...], numeric: Sequence[bool]) -> bool:
+    """Return whether a line says that all its numbers are missing, by more than empty entries."""
+    cells = [cell for cell, holds in zip(row, numeric, strict=False) if holds]
+    return any(cell.text for cell in cells) and all(cell.is_missing() for cell in cells)
+
+
+def _blocks(source: str, rows: list[tuple[Cell, ...]], width: int, raw: list[_Line], separator: str) -> Sheet:
     """Return the headings, and the rows of all blocks that have these headings."""
-    begin = next(i for i, row in enumerate(rows) if data[i] and len(row) == width)
+    data = [_is_data(row) for row in rows]
+    numeric = _numeric_columns([row for row, holds in zip(rows, data, strict=True) if holds], width)
+    labelled = [holds and _is_labelled(row, numeric) for row, holds in zip(rows, data, strict=True)]
+    data = [holds and not label for holds, label in zip(data, labelled, strict=True)]
+    begin = next((i for i, row in enumerate(rows) if data[i] and len(row) == width), None)
+    if begin is None:
+        raise TableError(source, [rows[-1][0].problem(NO_ROWS)])
+    data = [
+        *data[:begin],
+        *[holds or _are_missing(row, numeric) for row, holds in zip(rows, data, strict=True)][begin:],
+    ]
     words = [i for i in range(begin) if not data[i]]
     if not words and begin + 2 < len(rows) and not data[begin + 1]:  # numbers above the names of pairs of columns
         words, begin = [begin, begin + 1], begin + 2
@@ -425,22 +576,20 @@ def _blocks(
         if not is_data:
             between.append(row)
             continue
-        if between and again.isdisjoint(tuple(cell.text for cell in each) for each in between):
-            problems += [each[0].problem(f"expected a line of numbers, got {each[0].text[:60]!r}") for each in between]
-        stated = _stated(between) if between else stated
-        between = []
+        if row and between and again.isdisjoint(tuple(cell.text for cell in each) for each in between):
+            problems += [_no_numbers(each, numeric) for each in between]
         if row:
+            stated = _stated(between) if between else stated
+            between = []
             kept.append(row)
             states.append(stated)
+    means = [row for row, label in zip(rows[begin:], labelled[begin:], strict=True) if label and len(row) == width]
+    notes = [next(cell for cell in row if cell.text) for row in [*means, *between]]
     width = len(names) or width
     line = (names or kept[0])[0].line
-    for number, row in enumerate(kept):
-        if len(row) < width or any(cell.text for cell in row[width:]):
-            hint = SEMICOLONS if len(row) > width else ""
-            problems.append(row[0].problem(f"expected {width} values as in line {line}, got {len(row)}{hint}"))
-        kept[number] = row[:width]
     if problems:
         raise TableError(source, problems)
+    kept = _with_points(source, _even(source, kept, width, line, separator))
     headings, written = _headings(names, units, width)
     if _are_pairs(headings) and above:
         return _from_pairs(source, headings, written, rows[above[-1]], kept)
@@ -449,19 +598,60 @@ def _blocks(
         headings = (*headings, replace(headings[0], text="temperature"))
         written = (*written, known[0][1])
         kept = [(*row, replace(row[0], text=state[0])) for row, state in zip(kept, known, strict=True)]
-    return Sheet(source, headings, written, tuple(kept))
+    return Sheet(source, headings, written, tuple(kept), tuple(notes))
 
 
-def _plain_sheet(source: str, rows: list[tuple[Cell, ...]]) -> Sheet:
-    """Return a table with words, whose first line holds the names and perhaps the second one known units."""
-    uneven = [row for row in rows if len(row) != len(rows[0])]
-    if uneven:
-        what = f"expected {len(rows[0])} values as in line {rows[0][0].line}, got "
-        problems = [
-            row[0].problem(f"{what}{len(row)}{SEMICOLONS if len(row) > len(rows[0]) else ''}") for row in uneven
-        ]
+def _even(source: str, rows: list[tuple[Cell, ...]], width: int, line: int, separator: str) -> list[tuple[Cell, ...]]:
+    """Return rows of one length: empty entries at the end need not be written where a mark separates entries."""
+    filled = [row if separator == BLANKS else (*row, *[replace(row[-1], text="")] * (width - len(row))) for row in rows]
+    problems = [
+        row[0].problem(
+            f"expected {width} values as in line {line}, got {len(row)}{SEMICOLONS if len(row) > width else ''}"
+        )
+        for row in filled
+        if len(row) < width or any(cell.text for cell in row[width:])
+    ]
+    if problems:
         raise TableError(source, problems)
-    names, rows = rows[0], rows[1:]
+    return [row[:width] for row in filled]
+
+
+def _no_numbers(row: tuple[Cell, ...], numeric: Sequence[bool]) -> Problem:
+    """Return what is wrong with a line between lines of numbers: words in a column of numbers, or words alone."""
+    words = [cell for cell in row if cell.text and not cell.is_entry()]
+    wrong = [cell for cell, holds in zip(row, numeric, strict=False) if holds and cell in words]
+    cell = (wrong or words or row)[0]
+    return cell.problem(f"expected a line of numbers, got {cell.text[:60]!r}")
+
+
+def _with_points(source: str, rows: list[tuple[Cell, ...]]) -> list[tuple[Cell, ...]]:
+    """Return rows with points for decimal commas; refuse rows with both, in which one separates thousands."""
+    commas, points = (
+        [cell for row in rows for cell in row if mark in cell.text and _NUMBER.match(cell.text)] for mark in ",."
+    )
+    if commas and points:
+        comma, point = commas[0], points[0]
+        what = (
+            f"expected decimal commas or decimal points, got both ({point.text!r}, and {comma.text!r} in line "
+            f"{comma.line}): remove the separators of thousands, and write one kind of decimals"
+        )
+        raise TableError(source, [point.problem(what)])
+    if not commas:
+        return rows
+    return [
+        tuple(
+            replace(cell, text=cell.text.replace(",", ".")) if "," in cell.text and _NUMBER.match(cell.text) else cell
+            for cell in row
+        )
+        for row in rows
+    ]
+
+
+def _plain_sheet(source: str, rows: list[tuple[Cell, ...]], separator: str, is_name: Callable[[str], bool]) -> Sheet:
+    """Return a table with words: the first line with a known name holds the names, perhaps the next one units."""
+    begin = next((i for i, row in enumerate(rows) if any(map(is_name, _stripped(row)))), 0)
+    names, rows = rows[begin], rows[begin + 1 :]
+    rows = _even(source, rows, len(names), names[0].line, separator)
     units: tuple[Cell, ...] = ()
     if any(_NUMBER.match(cell.text) for cell in names):
         raise TableError(source, [names[0].problem("expected a line of names")])
@@ -470,17 +660,22 @@ def _plain_sheet(source: str, rows: list[tuple[Cell, ...]]) -> Sheet:
     if not rows:
         raise TableError(source, [Problem(1, 1, NO_ROWS)])
     headings, written = _headings(names, units, len(names))
-    return Sheet(source, headings, written, tuple(rows))
+    return Sheet(source, headings, written, tuple(_with_points(source, rows)))
 
 
-def _names_in_remark(raw: list[tuple[int, str]], first: tuple[Cell, ...]) -> tuple[Cell, ...]:
+def _stripped(row: tuple[Cell, ...]) -> list[str]:
+    """Return the entries of a line without units in brackets."""
+    return [cell.text for cell in _headings(row, (), len(row))[0]]
+
+
+def _names_in_remark(raw: list[_Line], first: tuple[Cell, ...]) -> tuple[Cell, ...]:
     """Return the names in the last remark above the numbers, if it holds as many."""
-    above = [(number, line) for number, line in raw if number < first[0].line and line.lstrip()[0] in COMMENT]
-    for number, line in above[-1:]:
-        words = line.lstrip(COMMENT + " ")
+    above = [line for line in raw if line.number < first[0].line and line.text.lstrip()[0] in COMMENT]
+    for line in above[-1:]:
+        words = line._replace(text=line.text.lstrip(COMMENT + " "))
         for separator in SEPARATORS:
-            cells = _cells([(number, words)], separator)[0]
-            if len(cells) == len(first) and not any(map(_is_entry, cells)):
+            cells = _cells([words], separator)[0]
+            if len(cells) == len(first) and not any(cell.is_entry() for cell in cells):
                 return cells
     return ()
 
@@ -537,7 +732,7 @@ def numbers(sheet: Sheet) -> FloatArray:
     for cells in zip(*sheet.rows, strict=True):
         are = [bool(_NUMBER.match(cell.text)) for cell in cells]
         if any(are):
-            wrong = [cell for cell in cells if not _is_entry(cell)]
+            wrong = [cell for cell in cells if not cell.is_entry()]
             problems += [cell.problem(f"expected a number, got {cell.text[:60]!r}") for cell in wrong]
         columns.append([float(cell.text) if number else math.nan for cell, number in zip(cells, are, strict=True)])
     if problems:
@@ -572,22 +767,18 @@ def described(text: str, source: str) -> str:
     return f"{len(sheet.rows)} rows; {', '.join(ranges)}"
 
 
-def _is_entry(cell: Cell) -> bool:
-    """Return whether a cell holds a number, or says that one is missing."""
-    return bool(_NUMBER.match(cell.text)) or cell.text.casefold() in _MISSING
-
-
 def _is_data(row: tuple[Cell, ...]) -> bool:
     """Return whether a line holds numbers in half of its filled cells or more."""
-    filled = [cell for cell in row if cell.text]
+    filled = [cell for cell in row if not cell.is_missing()]
     return 2 * sum(bool(_NUMBER.match(cell.text)) for cell in filled) >= max(len(filled), 1)
 
 
 def _are_units(row: tuple[Cell, ...], surely: bool) -> bool:
     """Return whether a line holds units: known ones, or any words below the only line of names if not `surely`."""
     units = [_unit_of(cell.text.strip("[](){}<> ")) for cell in row]
-    words = [unit for unit in units if unit.casefold() not in _MISSING and unit != "1"]
-    return bool(words) and (not surely or all(is_unit(unit) for unit in words))
+    words = [unit for unit in units if unit not in ("", "-", "--", "1")]
+    bracketed = all(re.fullmatch(r"\[.*\]", cell.text) for cell in row if cell.text)
+    return bool(words) and (not surely or bracketed or all(_is_unit(unit) for unit in words))
 
 
 def _headings(names: tuple[Cell, ...], units: tuple[Cell, ...], width: int) -> tuple[tuple[Cell, ...], tuple[str, ...]]:
@@ -600,7 +791,9 @@ def _headings(names: tuple[Cell, ...], units: tuple[Cell, ...], width: int) -> t
         if match and match[1]:
             square = match[2] if match[2] is not None else ""
             other = next((group for group in match.groups()[2:] if group), "").strip()
-            unit = square.strip() or (other if is_unit(_unit_of(other)) or _looks_like_a_unit(other) else "")
+            unit = square.strip() or (other if _is_unit(_unit_of(other)) or _looks_like_a_unit(other) else "")
+        if not match and (slash := re.fullmatch(r"(.+?)\s*/\s*(.+)", cell.text)) and _is_unit(_unit_of(slash[2])):
+            match, unit = slash, slash[2]
         below = units[number].text.strip("[](){}<> ") if units else ""
         kept.append(replace(cell, text=match[1].strip(" ,") if match and (unit or match[2] is not None) else cell.text))
         written.append(_unit_of(below or unit))
@@ -613,20 +806,27 @@ def _looks_like_a_unit(text: str) -> bool:
 
 def _unit_of(text: str) -> str:
     """Return a unit as `units` spells it: degrees, exponents without a sign, and words."""
-    text = text.strip()
+    text = re.sub(r"[⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻]+", lambda power: "^" + unicodedata.normalize("NFKC", power[0]), text.strip())
+    text = unicodedata.normalize("NFKC", text.replace("º", "°")).replace("−", "-")
+    factor = text[: len(text) - len(_factor(text)[1])]
+    text = text.removeprefix(factor)
     text = _DEGREES.get(text.casefold(), text)
     text = re.sub(r"(?<=[A-Za-z])\^?\{?(-?\d)\}?", r"^\1", text) if not is_unit(text) else text
-    return text.replace("·", " ").replace("microns", "um")
+    return factor + text.replace("·", " ").replace("microns", "um")
 
 
 def _separator(lines: Sequence[str], numeric: bool) -> str:
     """Return what separates the cells: the mark that leaves most lines of two or more numbers."""
-    if not numeric:
-        return next((mark for mark in SEPARATORS[:3] if mark in lines[0]), ",")
     counts = [sum(_numbers_between(line, mark) > 1 for line in lines) for mark in SEPARATORS]
-    if not any(counts):
-        return next((mark for mark in SEPARATORS[:3] if mark in lines[0]), ",")
-    return SEPARATORS[int(np.argmax(counts))]
+    if not numeric or not any(counts):
+        counts = [sum(mark in line for line in lines) for mark in SEPARATORS[:3]]
+        return SEPARATORS[int(np.argmax(counts))] if any(counts) else ","
+    best = SEPARATORS[int(np.argmax(counts))]
+    if best == ",":
+        first = next(i for i, line in enumerate(lines) if _numbers_between(line, ",") > 1)
+        if first and "," not in lines[first - 1] and all(_NUMBER.match(line.strip()) for line in lines[first:]):
+            return ";"  # one column with decimal commas
+    return best
 
 
 def _numbers_between(line: str, separator: str) -> int:
@@ -637,12 +837,14 @@ def _numbers_between(line: str, separator: str) -> int:
     return count if 2 * count >= len(filled) else 0
 
 
-def _cells(lines: Sequence[tuple[int, str]], separator: str) -> list[tuple[Cell, ...]]:
-    """Return the cells of all lines; decimal commas become points where commas do not separate."""
+def _cells(lines: Sequence[_Line], separator: str) -> list[tuple[Cell, ...]]:
+    """Return the cells of all lines."""
     import pandas as pd  # slow to import, and most commands read no table
 
-    blank = separator == r"\s+"
-    texts = [re.sub(r"\s+(?=[\[(])", "", line.strip()) if blank else line for _, line in lines]  # a unit and its name
+    blank = separator == BLANKS
+    texts = [
+        re.sub(r"\s+(?=[\[(])", "", line.text.strip()) if blank else line.text for line in lines
+    ]  # a unit and its name
     counts = [len(re.split(separator, text)) for text in texts]
     frame = pd.read_csv(
         io.StringIO("\n".join(text.replace("\x00", " ") for text in texts)),
@@ -655,13 +857,12 @@ def _cells(lines: Sequence[tuple[int, str]], separator: str) -> list[tuple[Cell,
         quoting=3 if blank else 0,
     ).fillna("")
     found = []
-    for (number, line), count, row in zip(lines, counts, frame.to_numpy(), strict=False):
+    for (number, line, sheet), count, row in zip(lines, counts, frame.to_numpy(), strict=False):
         cells, place = [], len(line) - len(line.lstrip()) if blank else 0
         for text in row[:count]:
             text = str(text).strip()
             place = max(line.find(text, place), place) if text else place
-            point = text.replace(",", ".") if separator != "," and _NUMBER.match(text) else text
-            cells.append(Cell(point, number, place + 1))
+            cells.append(Cell(text, number, place + 1, sheet))
             place += len(text) + (0 if blank else 1)
         found.append(tuple(cells))
     return found
@@ -694,10 +895,11 @@ def _values(cells: Sequence[Cell], column: Column, unit: str, allow_missing: boo
 
 
 def _number(cell: Cell, column: Column, unit: str, allow_missing: bool) -> float:
-    if allow_missing and cell.text.casefold() in _MISSING:
+    if allow_missing and cell.is_missing():
         return math.nan
     if not _NUMBER.match(cell.text) or len(cell.text) > LONGEST_NUMBER:
-        raise ValueError(f"expected a number, got {cell.text[:60]!r}")
+        thousands = " (remove the separators of thousands)" if _THOUSANDS.match(cell.text) else ""
+        raise ValueError(f"expected a number, got {cell.text[:60]!r}{thousands}")
     value = _in_si(cell.text, unit, column.unit)
     shown = repr(f"{cell.text} {unit}".strip())
     if not math.isfinite(value):
@@ -711,12 +913,27 @@ def _number(cell: Cell, column: Column, unit: str, allow_missing: bool) -> float
 
 def _in_si(number: str, unit: str, wanted: str) -> float:
     """Convert as a campaign file does; angular frequencies take Hz and 1/s, wave numbers 1/m."""
-    number = number.replace(",", ".")
     if not unit:
         return float(number)
+    factor, unit = _factor(unit)
     try:
-        return to_si(f"{number} {unit}", wanted)
+        return factor * to_si(f"{number} {unit}", wanted)
     except ValueError:
         if not wanted.startswith("rad/"):
             raise
-        return (2 * math.pi if "hz" in unit.lower() else 1.0) * to_si(f"{number} {unit}", wanted.replace("rad", "1"))
+        factor *= 2 * math.pi if "hz" in unit.lower() else 1.0
+        return factor * to_si(f"{number} {unit}", wanted.replace("rad", "1"))
+
+
+def _factor(unit: str) -> tuple[float, str]:
+    """Return the number before a unit, 1 if there is none, and the unit behind it."""
+    found = _FACTOR.match(unit)
+    if not found:
+        return 1.0, unit
+    return float(
+        f"1e{found[1]}" if found[1] else found[2].lower().replace("e", "1e") if found[2][0] in "eE" else found[2]
+    ), unit[found.end() :]
+
+
+def _is_unit(text: str) -> bool:
+    return is_unit(_factor(text)[1])

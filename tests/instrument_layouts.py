@@ -52,8 +52,51 @@ rad/s;Pa;Pa
 1;5e5;5e4
 """
 
+RHEOMETER = """\
+Project:\tTread L37
+Operator:\tK. Müller
+
+Result:\tFrequency sweep 1
+Interval and data points:\t1\t2
+Interval data:\tPoint No.\tAngular frequency\tStorage modulus\tLoss modulus\tLoss factor\tTemperature\tStatus
+
+\t\t[rad/s]\t[Pa]\t[Pa]\t[1]\t[°C]\t
+\t1\t0,1\t2,906e+07\t1,5785e+07\t0,5432\t-40,09\tTruStrain™
+\t2\t1\t5,9123e+07\t3,174e+07\t0,5368\t-40,11\t
+
+Result:\tFrequency sweep 2
+Interval and data points:\t1\t2
+Interval data:\tPoint No.\tAngular frequency\tStorage modulus\tLoss modulus\tLoss factor\tTemperature\tStatus
+
+\t\t[rad/s]\t[Pa]\t[Pa]\t[1]\t[°C]\t
+\t1\t0,1\t3,0708e+06\t1,3821e+06\t0,4501\t-25,18\tTruStrain™
+"""
+
 #: Name: text, columns, and the first value of some of them in SI.
 READ = {
+    "rheometer with settings between blocks": (RHEOMETER, DMA, {"storage modulus": 2.906e7, "temperature": 233.06}),
+    "German names": (
+        "Kreisfrequenz [rad/s];Speichermodul [MPa];Temperatur [°C]\n0,1;2,5;20\n1;3,5;20\n",
+        DMA,
+        {"frequency": 0.1, "storage modulus": 2.5e6, "temperature": 293.15},
+    ),
+    "names with symbols, abbreviations": (
+        "Ang. freq. ω [rad/s],Stor. mod. G' [MPa],Temp. [K]\n2,3,300\n3,4,300\n",
+        DMA,
+        {"frequency": 2.0, "storage modulus": 3e6, "temperature": 300.0},
+    ),
+    "units behind a slash": (
+        "f/Hz;E' / MPa;T/°C\n1;2;20\n2;3;20\n",
+        DMA,
+        {"frequency": 6.2832, "storage modulus": 2e6, "temperature": 293.15},
+    ),
+    "units of one sign": ("f,E',T\nHz,㎪,℃\n1,2,20\n2,3,20\n", DMA, {"storage modulus": 2e3, "temperature": 293.15}),
+    "notes below": (
+        "f [Hz];E' [MPa];T [°C]\n1;2;20\n2;3;20\n\n* limit\nMean;2,5;20\nend of measurement\n",
+        DMA,
+        {"storage modulus": 2e6},
+    ),
+    "no separator, decimal commas": ("velocity [m/s]\n0,5\n0,25\n", (Column("velocity", "m/s"),), {"velocity": 0.5}),
     "trios": (TRIOS, DMA, {"frequency": 1.0, "storage modulus": 1e7, "temperature": 253.15}),
     "steps with a stated temperature": (STEPS_STATED, DMA, {"storage modulus": 1e6, "temperature": 293.15}),
     "pandas": (
@@ -161,6 +204,21 @@ READ = {
 }
 #: Layouts that are refused, each with a part of the sentence that says what to change.
 REFUSED = {
+    "thousands": (
+        "velocity [mm/s];mu\n100;0,322\n1.000;0,48\n",
+        FRICTION,
+        "thousands:3:1: expected decimal commas or decimal points, got both ('1.000', and '0,322' in line 2): remove the separators of thousands",
+    ),
+    "thousands with commas": (
+        'velocity [mm/s],mu\n100,0.322\n"1,000",0.48\n',
+        FRICTION,
+        "remove the separators of thousands",
+    ),
+    "word between numbers": (
+        "sample;f [Hz];E' [MPa]\nA;1;2\nB;bad;worse\nC;2;3\n",
+        DMA,
+        "3:3: expected a line of numbers, got 'bad'",
+    ),
     "no unit": ("f [Hz],E'\n1,5\n", DMA, "expected its unit, such as 'storage modulus [MPa]'"),
     "misspelt": ("f [Hz],storage modulos [Pa]\n1,5\n", DMA, "did you mean 'storage modulus'?"),
     "missing": ("f [Hz],torque [N]\n1,5\n", DMA, "expected a column storage modulus, got torque"),

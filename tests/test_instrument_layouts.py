@@ -8,7 +8,7 @@ import pytest
 from instrument_layouts import DMA, READ, REFUSED, TRIOS
 
 from mdr_dask.errors import DataError
-from mdr_dask.tables import decoded, read_table
+from mdr_dask.tables import Column, decoded, read_table
 
 
 @pytest.mark.parametrize("layout", [name for name, (*_, expected) in READ.items() if expected])
@@ -33,6 +33,29 @@ def test_all_blocks_of_an_export_are_one_table_and_what_is_not_used_is_named():
     np.testing.assert_allclose(read["temperature"], [253.15, 253.15, 293.15])
     np.testing.assert_allclose(read["storage modulus"], [1e7, 2e7, 2e6])
     assert read.remark == "not used: Torque"
+
+
+@pytest.mark.parametrize("written", ["10³ µm³", "10^3 um^3", "1000 µm³", "1e-6 mm³", "x 1e3 um3", "e-6 mm^3"])
+def test_units_may_have_a_factor(written):
+    column = Column("wear volume", "m^3")
+    joined = read_table(f"cycles;wear volume [{written}]\n1000;0,5\n2000;0,7\n", "v.csv", [column])
+    below = read_table(f"cycles;wear volume\n[-];[{written}]\n1000;0,5\n2000;0,7\n", "v.csv", [column])
+    np.testing.assert_allclose(joined["wear volume"], [5e-16, 7e-16], rtol=1e-12)
+    np.testing.assert_array_equal(joined["wear volume"], below["wear volume"])
+
+
+@pytest.mark.parametrize("missing", ["n.a.", "n/a", "NaN", "-", "****", "#N/A"])
+def test_missing_numbers_are_found_in_any_spelling(missing):
+    text = f"sample;f [Hz];E' [MPa];remark\nA;1;2;\nB;{missing};{missing};filter\nC;2;3\n"
+    read = read_table(text, "v.csv", DMA, allow_missing=True)
+    assert np.isnan(read["storage modulus"]).tolist() == [False, True, False]
+
+
+def test_lines_below_the_numbers_are_named():
+    text, columns, _ = READ["notes below"]
+    read = read_table(text, "v.csv", columns)
+    assert read["storage modulus"].tolist() == [2e6, 3e6]
+    assert read.remark == "lines below the numbers, left out: 'Mean', '* limit', 'end of measurement'"
 
 
 def test_pairs_of_columns_become_a_table_with_a_temperature():
@@ -64,5 +87,9 @@ def test_workbooks_are_read_sheet_by_sheet():
     read = read_table(decoded(content.getvalue(), "dma.xlsx"), "dma.xlsx", DMA)
     np.testing.assert_allclose(read["temperature"], [293.15, 293.15, 313.15, 313.15])
     np.testing.assert_allclose(read["storage modulus"], [5.5e6, 6.5e6, 5.5e6, 6.5e6])
+    with pytest.raises(
+        DataError, match=r"(?m)^dma.xlsx: sheet '40 C', row 4: column storage modulus: expected .*'5.5'"
+    ):
+        read_table(decoded(content.getvalue(), "dma.xlsx"), "dma.xlsx", [Column("storage modulus", "Pa", above=5.6e6)])
     with pytest.raises(DataError, match="expected a table or an Excel workbook"):
         decoded(b"PK\x03\x04 nothing of the kind", "dma.xlsx")

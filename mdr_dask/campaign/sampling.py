@@ -104,7 +104,7 @@ def tabled(
         problems.add(origin.place, origin.name, what)
         return None
     try:
-        sheet = read_sheet(text, name, numeric=False)
+        sheet = read_sheet(text, name, lambda heading: heading.split(".")[0] in parameters.model_fields)
     except TableError as error:
         for line, column, what in error.problems:
             problems.add(Place(name, line, column), "", what)

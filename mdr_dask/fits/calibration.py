@@ -22,6 +22,7 @@ from mdr_dask.fits.base import DOUBTFUL, Fit
 from mdr_dask.fits.misfit import Residuals, law_holds
 from mdr_dask.fits.posterior import DEVIATIONS, Likelihood, Noise, Posterior, distance, posterior
 from mdr_dask.fits.prediction import Prediction, prediction
+from mdr_dask.tables import decoded
 
 #: Least error of measurement that is considered, as a share of the residuals of the best prediction.
 LEAST = 0.2
@@ -238,9 +239,7 @@ def read_file(path: str | Path) -> dict[str, str]:
     """Return the table of a file in the form in which a study contains it."""
     path = Path(path)
     try:
-        return {"name": path.name, "text": path.read_text(encoding="utf-8-sig")}
-    except UnicodeDecodeError as error:
-        raise DataError(f"{path}: expected text in UTF-8: {error.reason} at {error.start}") from None
+        return {"name": path.name, "text": decoded(path.read_bytes(), str(path))}
     except OSError as error:
         raise DataError(f"{path}: {error.strerror}") from None
 

@@ -424,9 +424,9 @@ def _esri(file: DataFile, lines: list[str]) -> _Grid:
 
 #: Columns of a table of points.
 COORDINATES = (
-    Column("x", "m", ("X", "position")),
+    Column("x", "m"),
     Column("y", "m", ("Y",)),
-    Column("z", "m", ("Z", "height")),
+    Column("z", "m", ("height",)),
 )
 
 
@@ -477,8 +477,8 @@ def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]
     sheet = read_sheet(text, file.name)
     if sheet.names:
         columns = (
-            Column("x", "m", ("position", "distance", "length", "X"), given_unit=units.position),
-            Column("z", "m", ("height", "h", "y", "profile"), given_unit=units.height),
+            Column("x", "m", given_unit=units.position),
+            Column("z", "m", ("height", "y", "Y", "profile"), given_unit=units.height),
         )
         table = read_table(text, file.name, columns, allow_missing=True)
         return table["x"], table["z"]
