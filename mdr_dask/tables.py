@@ -491,17 +491,16 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
     lines = [line for line in raw if line.text.lstrip()[0] not in COMMENT]
     if not lines:
         raise TableError(source, [Problem(1, 1, NO_ROWS)])
-    separator = _separator([line.text for line in lines], is_name is None)
-    rows = _cells(lines, separator)
+    rows = _cells(lines, _separator([line.text for line in lines], is_name is None))
     if is_name:
-        return _plain_sheet(source, rows, separator, is_name)
+        return _plain_sheet(source, rows, is_name)
     widths = Counter(len(row) for row in rows if _is_data(row))
     if not widths:
         raise TableError(source, [rows[-1][0].problem(NO_ROWS)])
     width = max(widths, key=lambda each: (widths[each], each))
     if width > MOST_COLUMNS:
         raise TableError(source, [Problem(1, 1, f"expected at most {MOST_COLUMNS} columns, got {width}")])
-    return _blocks(source, rows, width, raw, separator)
+    return _blocks(source, rows, width, raw)
 
 
 class _Line(NamedTuple):
@@ -529,15 +528,17 @@ def _numeric_columns(rows: Sequence[tuple[Cell, ...]], width: int) -> list[bool]
     return [2 * counts[place] > len(rows) for place in range(width)]
 
 
-def _is_labelled(row: tuple[Cell, ...], numeric: Sequence[bool]) -> bool:
-    """Return whether a line of numbers is none of the table, because it begins with words in place of a number.
+def _label_of(row: tuple[Cell, ...], numeric: Sequence[bool]) -> str:
+    """Return what a line of numbers is that begins with words: ``settings`` above a block, or a ``mean`` below it.
 
-    Such lines hold means, or settings above a block.
+    Settings fill less than half of the columns, and a mean has words in a column of numbers. Other lines have none.
     """
     first = next(place for place, cell in enumerate(row) if cell.text)
-    filled = sum(bool(cell.text) for cell in row)
-    is_short = 2 * filled < len(numeric)
-    return not row[first].is_entry() and (is_short or (first < len(numeric) and numeric[first]))
+    if not re.match(r"(?!inf)[^\W\d]{2}", row[first].text, re.IGNORECASE) or row[first].is_missing():
+        return ""
+    if 2 * sum(bool(cell.text) for cell in row) < len(numeric):
+        return "settings"
+    return "mean" if first < len(numeric) and numeric[first] else ""
 
 
 def _are_missing(row: tuple[Cell, ...], numeric: Sequence[bool]) -> bool:
@@ -546,19 +547,17 @@ def _are_missing(row: tuple[Cell, ...], numeric: Sequence[bool]) -> bool:
     return any(cell.text for cell in cells) and all(cell.is_missing() for cell in cells)
 
 
-def _blocks(source: str, rows: list[tuple[Cell, ...]], width: int, raw: list[_Line], separator: str) -> Sheet:
+def _blocks(source: str, rows: list[tuple[Cell, ...]], width: int, raw: list[_Line]) -> Sheet:
     """Return the headings, and the rows of all blocks that have these headings."""
-    data = [_is_data(row) for row in rows]
-    numeric = _numeric_columns([row for row, holds in zip(rows, data, strict=True) if holds], width)
-    labelled = [holds and _is_labelled(row, numeric) for row, holds in zip(rows, data, strict=True)]
-    data = [holds and not label for holds, label in zip(data, labelled, strict=True)]
+    holds = [_is_data(row) for row in rows]
+    numeric = _numeric_columns([row for row, has in zip(rows, holds, strict=True) if has], width)
+    labels = [_label_of(row, numeric) if has else "" for row, has in zip(rows, holds, strict=True)]
+    data = [has and label != "settings" for has, label in zip(holds, labels, strict=True)]
     begin = next((i for i, row in enumerate(rows) if data[i] and len(row) == width), None)
     if begin is None:
         raise TableError(source, [rows[-1][0].problem(NO_ROWS)])
-    data = [
-        *data[:begin],
-        *[holds or _are_missing(row, numeric) for row, holds in zip(rows, data, strict=True)][begin:],
-    ]
+    for i in range(begin + 1, len(rows)):
+        data[i] = (data[i] and labels[i] != "mean") or _are_missing(rows[i], numeric)
     words = [i for i in range(begin) if not data[i]]
     if not words and begin + 2 < len(rows) and not data[begin + 1]:  # numbers above the names of pairs of columns
         words, begin = [begin, begin + 1], begin + 2
@@ -570,26 +569,27 @@ def _blocks(source: str, rows: list[tuple[Cell, ...]], width: int, raw: list[_Li
     if len(wide) > 1 and _are_units(rows[wide[-1]], surely=len(words) > 2 or _are_pairs(names)):
         units, names, above = names, rows[wide[-2]], wide[:-2]
     again = {tuple(cell.text for cell in names)}
-    kept, states, problems, between = [], [], [], []
+    kept, states, problems, between, notes = [], [], [], [], []
     stated = _stated(rows[:begin])
-    for row, is_data in zip([*rows[begin:], ()], [*data[begin:], True], strict=True):
-        if not is_data:
-            between.append(row)
+    for place, row in enumerate([*rows[begin:], ()], begin):
+        if row and not data[place]:
+            between.append(place)
             continue
-        if row and between and again.isdisjoint(tuple(cell.text for cell in each) for each in between):
-            problems += [_no_numbers(each, numeric) for each in between]
+        is_block = not again.isdisjoint(tuple(cell.text for cell in rows[each]) for each in between)
+        if row and not is_block:
+            kept += [rows[each] for each in between if holds[each]]
+            problems += [_no_numbers(rows[each], numeric) for each in between if not holds[each]]
+        else:
+            notes += [rows[each] for each in between if not row or labels[each] == "mean"]
+        stated = _stated([rows[each] for each in between]) if between else stated
+        between = []
         if row:
-            stated = _stated(between) if between else stated
-            between = []
             kept.append(row)
-            states.append(stated)
-    means = [row for row, label in zip(rows[begin:], labelled[begin:], strict=True) if label and len(row) == width]
-    notes = [next(cell for cell in row if cell.text) for row in [*means, *between]]
+        states += [stated] * (len(kept) - len(states))
     width = len(names) or width
-    line = (names or kept[0])[0].line
     if problems:
         raise TableError(source, problems)
-    kept = _with_points(source, _even(source, kept, width, line, separator))
+    kept = _with_points(source, _even(source, kept, names or kept[0][:width]))
     headings, written = _headings(names, units, width)
     if _are_pairs(headings) and above:
         return _from_pairs(source, headings, written, rows[above[-1]], kept)
@@ -598,22 +598,25 @@ def _blocks(source: str, rows: list[tuple[Cell, ...]], width: int, raw: list[_Li
         headings = (*headings, replace(headings[0], text="temperature"))
         written = (*written, known[0][1])
         kept = [(*row, replace(row[0], text=state[0])) for row, state in zip(kept, known, strict=True)]
-    return Sheet(source, headings, written, tuple(kept), tuple(notes))
+    return Sheet(
+        source, headings, written, tuple(kept), tuple(next(cell for cell in row if cell.text) for row in notes)
+    )
 
 
-def _even(source: str, rows: list[tuple[Cell, ...]], width: int, line: int, separator: str) -> list[tuple[Cell, ...]]:
-    """Return rows of one length: empty entries at the end need not be written where a mark separates entries."""
-    filled = [row if separator == BLANKS else (*row, *[replace(row[-1], text="")] * (width - len(row))) for row in rows]
-    problems = [
-        row[0].problem(
-            f"expected {width} values as in line {line}, got {len(row)}{SEMICOLONS if len(row) > width else ''}"
-        )
-        for row in filled
-        if len(row) < width or any(cell.text for cell in row[width:])
-    ]
+def _even(source: str, rows: list[tuple[Cell, ...]], names: tuple[Cell, ...]) -> list[tuple[Cell, ...]]:
+    """Return rows as long as the names: empty entries at the end of columns of words need not be written."""
+    width, even, problems = len(names), [], []
+    numeric = _numeric_columns(rows, width)
+    for row in rows:
+        filled = (*row, *[replace(row[-1], text="")] * (width - len(row)))
+        even.append(filled[:width])
+        if any(numeric[len(row) :]) or any(cell.text for cell in filled[width:]):
+            hint = SEMICOLONS if len(row) > width else ""
+            what = f"expected {width} values as in line {names[0].line}, got {len(row)}{hint}"
+            problems.append(row[0].problem(what))
     if problems:
         raise TableError(source, problems)
-    return [row[:width] for row in filled]
+    return even
 
 
 def _no_numbers(row: tuple[Cell, ...], numeric: Sequence[bool]) -> Problem:
@@ -647,11 +650,11 @@ def _with_points(source: str, rows: list[tuple[Cell, ...]]) -> list[tuple[Cell, 
     ]
 
 
-def _plain_sheet(source: str, rows: list[tuple[Cell, ...]], separator: str, is_name: Callable[[str], bool]) -> Sheet:
+def _plain_sheet(source: str, rows: list[tuple[Cell, ...]], is_name: Callable[[str], bool]) -> Sheet:
     """Return a table with words: the first line with a known name holds the names, perhaps the next one units."""
     begin = next((i for i, row in enumerate(rows) if any(map(is_name, _stripped(row)))), 0)
     names, rows = rows[begin], rows[begin + 1 :]
-    rows = _even(source, rows, len(names), names[0].line, separator)
+    rows = _even(source, rows, names)
     units: tuple[Cell, ...] = ()
     if any(_NUMBER.match(cell.text) for cell in names):
         raise TableError(source, [names[0].problem("expected a line of names")])

@@ -55,7 +55,7 @@ def test_lines_below_the_numbers_are_named():
     text, columns, _ = READ["notes below"]
     read = read_table(text, "v.csv", columns)
     assert read["storage modulus"].tolist() == [2e6, 3e6]
-    assert read.remark == "lines below the numbers, left out: 'Mean', '* limit', 'end of measurement'"
+    assert read.remark == "lines below the numbers, left out: '* limit', 'Mean', 'end of measurement'"
 
 
 def test_pairs_of_columns_become_a_table_with_a_temperature():
@@ -88,7 +88,7 @@ def test_workbooks_are_read_sheet_by_sheet():
     np.testing.assert_allclose(read["temperature"], [293.15, 293.15, 313.15, 313.15])
     np.testing.assert_allclose(read["storage modulus"], [5.5e6, 6.5e6, 5.5e6, 6.5e6])
     with pytest.raises(
-        DataError, match=r"(?m)^dma.xlsx: sheet '40 C', row 4: column storage modulus: expected .*'5.5'"
+        DataError, match=r"(?m)^dma.xlsx: sheet '40 C', row 4: column storage modulus: expected .*'5.5 MPa'"
     ):
         read_table(decoded(content.getvalue(), "dma.xlsx"), "dma.xlsx", [Column("storage modulus", "Pa", above=5.6e6)])
     with pytest.raises(DataError, match="expected a table or an Excel workbook"):

@@ -91,7 +91,7 @@ WRONG = {
     ),
     "missing column": ("f [Hz]\n1\n", "1:1: expected a column storage modulus"),
     "twice": ("f [Hz],omega [Hz],E' [Pa]\n1,2,3\n", "1:8: column frequency is given twice, and 'f' disagrees"),
-    "ragged": ("f [Hz],E' [Pa]\n1,2\n3\n", "3:1: $expected a number, got ''"),
+    "ragged": ("f [Hz],E' [Pa]\n1,2\n3\n", "3:1: expected 2 values as in line 1, got 1"),
     "word": ("f [Hz],E' [Pa]\n1,2\n3,high\n", "3:3: $expected a number, got 'high'"),
     "empty": ("f [Hz],E' [Pa]\n1,2\n3,\n", "3:3: $expected a number, got ''"),
     "nan": ("f [Hz],E' [Pa]\n1,nan\n3,4\n", "2:3: $expected a number, got 'nan'"),
