@@ -523,9 +523,9 @@ def _numbered(text: str) -> list[_Line]:
 
 
 def _numeric_columns(rows: Sequence[tuple[Cell, ...]], width: int) -> list[bool]:
-    """Return which columns hold numbers in more than half of the lines of numbers."""
+    """Return which columns hold numbers in half of the lines of numbers or more."""
     counts = Counter(place for row in rows for place, cell in enumerate(row) if _NUMBER.match(cell.text))
-    return [2 * counts[place] > len(rows) for place in range(width)]
+    return [2 * counts[place] >= len(rows) for place in range(width)]
 
 
 def _label_of(row: tuple[Cell, ...], numeric: Sequence[bool]) -> str:
@@ -541,10 +541,11 @@ def _label_of(row: tuple[Cell, ...], numeric: Sequence[bool]) -> str:
     return "mean" if first < len(numeric) and numeric[first] else ""
 
 
-def _are_missing(row: tuple[Cell, ...], numeric: Sequence[bool]) -> bool:
-    """Return whether a line says that all its numbers are missing, by more than empty entries."""
+def _fits_columns(row: tuple[Cell, ...], numeric: Sequence[bool]) -> bool:
+    """Return whether a line has numbers, or words for missing ones, in the columns of numbers, and is no short one."""
     cells = [cell for cell, holds in zip(row, numeric, strict=False) if holds]
-    return any(cell.text for cell in cells) and all(cell.is_missing() for cell in cells)
+    is_long = 2 * sum(bool(cell.text) for cell in row) >= len(numeric)
+    return is_long and any(cell.text for cell in cells) and all(cell.is_entry() for cell in cells)
 
 
 def _blocks(source: str, rows: list[tuple[Cell, ...]], width: int, raw: list[_Line]) -> Sheet:
@@ -557,7 +558,7 @@ def _blocks(source: str, rows: list[tuple[Cell, ...]], width: int, raw: list[_Li
     if begin is None:
         raise TableError(source, [rows[-1][0].problem(NO_ROWS)])
     for i in range(begin + 1, len(rows)):
-        data[i] = (data[i] and labels[i] != "mean") or _are_missing(rows[i], numeric)
+        data[i] = (data[i] and labels[i] != "mean") or _fits_columns(rows[i], numeric)
     words = [i for i in range(begin) if not data[i]]
     if not words and begin + 2 < len(rows) and not data[begin + 1]:  # numbers above the names of pairs of columns
         words, begin = [begin, begin + 1], begin + 2
@@ -569,7 +570,8 @@ def _blocks(source: str, rows: list[tuple[Cell, ...]], width: int, raw: list[_Li
     if len(wide) > 1 and _are_units(rows[wide[-1]], surely=len(words) > 2 or _are_pairs(names)):
         units, names, above = names, rows[wide[-2]], wide[:-2]
     again = {tuple(cell.text for cell in names)}
-    kept, states, problems, between, notes = [], [], [], [], []
+    kept, problems, between, notes = [], [], [], []
+    states: list[tuple[str, str] | None] = []
     stated = _stated(rows[:begin])
     for place, row in enumerate([*rows[begin:], ()], begin):
         if row and not data[place]:

@@ -62,6 +62,7 @@ def expand(
         if series is not None:
             found.append(series)
             units = model.units(series.parameters)
+            asked |= dict.fromkeys(expansion.remarks)
             asked |= dict.fromkeys(map(str, remarks(document, model.parameters, expansion.data, paths, units)))
     return tuple(found), tuple(asked)
 
@@ -75,6 +76,7 @@ class _Expansion:
     problems: Problems
     paths: Mapping[str, Path]
     data: dict[str, Any] = field(init=False)
+    remarks: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         data = {name: value_at(self.document.data, path) for name, path in self.paths.items()}
@@ -124,7 +126,7 @@ class _Expansion:
             for one in found:
                 self._complain(one.origin, f"expected one value, because {design.table} has the parameters that vary")
             return found or sampling.tabled(
-                design.table, self.directory, origin, self.parameters, self.data, self.problems
+                design.table, self.directory, origin, self.parameters, self.data, self.problems, self.remarks
             )
         if drawn and not found:
             self._complain(origin, "expected at least one range among the parameters, got none")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from pydantic import BaseModel
 
 from mdr_dask import models
@@ -12,11 +14,15 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.campaign.definition import Campaign, Series
 from mdr_dask.errors import DataError, did_you_mean, distinguishable
 from mdr_dask.models.numbers import numbers_of
-from mdr_dask.tables import Column, read_sheet, read_table
+from mdr_dask.tables import Column, Sheet, match, plain, read_sheet, read_table
 from mdr_dask.units import shown
 
 ERROR = "standard_error"
-_ERRORS = ("error", "standard deviation", "uncertainty")
+#: Names of errors, before or behind the name of an output or beside it.
+_ERROR = re.compile(
+    r"(?<!\w)(?:(?:std|standard)? ?(?:dev|deviation|err|error|abw|abweichung|fehler)|uncertainty|std|sd|se)(?!\w)"
+    r"|[σ±]|\+ ?/?"
+)
 #: Largest table that a study carries along, in bytes.
 LARGEST = 10**6
 #: Conditions that agree to this part are the same.
@@ -75,7 +81,8 @@ def read_measured(
     DataError
         If the table has no column, or several, of outputs, fewer than two points, or is no such table.
     """
-    names = [cell.text for cell in read_sheet(text, source).names]
+    sheet = read_sheet(text, source)
+    names = [cell.text for cell in sheet.names]
     of_outputs = {name: Column(name, unit) for name, unit in outputs.items()}
     found = [name for name, column in of_outputs.items() if any(column.holds(heading) for heading in names)]
     if len(found) != 1:
@@ -87,13 +94,39 @@ def read_measured(
     output = found[0]
     short = _short_names([*conditions, *outputs], structures)
     columns = [Column(name, unit, tuple(short.get(name, ())), needed=False) for name, unit in conditions.items()]
-    error = Column(ERROR, outputs[output], (*_ERRORS, f"{output}_error"), needed=False, above=0.0)
-    read = read_table(text, source, [*columns, of_outputs[output], error])
-    values, errors = read.pop(output), read.pop(ERROR, None)
+    columns.append(of_outputs[output])
+    headings, unit = _error_of(sheet, columns)
+    error = Column(ERROR, outputs[output], headings, needed=False, above=0.0, given_unit=unit)
+    read = read_table(text, source, [*columns, error], allow_missing=True)
+    known = np.isfinite(np.array([*read.values()])).all(axis=0)
+    missing = f"rows without a number, left out: {np.count_nonzero(~known)}" if not known.all() else ""
+    remark = "; ".join(filter(None, (read.remark, missing)))
+    rows = {name: column[known] for name, column in read.items()}
+    values, errors = rows.pop(output), rows.pop(ERROR, None)
     if values.size < 2:
         raise DataError(f"{source}: expected at least two measured points, got {values.size}")
-    lines = tuple(row[0].line for row in read_sheet(text, source).rows)
-    return Measured(source, output, values, errors, read, lines, read.remark)
+    lines = tuple(line for line, is_known in zip(read.lines, known, strict=True) if is_known)
+    return Measured(source, output, values, errors, rows, lines, remark)
+
+
+def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...], str]:
+    """Return the headings of errors of the last of some columns, and their unit if the table gives them none.
+
+    A heading without the name of a quantity, such as ``std``, belongs to the nearest column before it.
+    """
+    output, headings, given, before = columns[-1], [], "", None
+    for cell, unit in zip(sheet.names, sheet.units, strict=True):
+        column, _ = match(cell.text, unit, columns)
+        before = column or before
+        if column is output:
+            given = unit
+        found = _ERROR.search(plain(cell.text))
+        if column or not found:
+            continue
+        of = plain(cell.text).replace(found[0], "", 1).strip(" ()").removeprefix("of ")
+        if output.holds(of) or (not of and before in (output, None)):
+            headings.append((cell.text, unit))
+    return tuple(name for name, _ in headings), "" if any(unit for _, unit in headings) else given
 
 
 def _short_names(names: Sequence[str], structures: Iterable[str]) -> dict[str, list[str]]:

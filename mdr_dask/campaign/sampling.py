@@ -78,6 +78,7 @@ def tabled(
     parameters: type[Parameters],
     data: Mapping[str, Any],
     problems: Problems,
+    remarks: list[str],
 ) -> tuple[Variation, ...] | None:
     """Return the parameters that a CSV file varies line by line, or None if there is a problem.
 
@@ -92,7 +93,9 @@ def tabled(
     data : mapping
         Plain data of the other parameters.
     problems : Problems
-        Receives unknown columns, units and missing cells.
+        Receives misspelt columns, units and missing cells.
+    remarks : list of str
+        Receives a sentence about the columns that are no parameters.
     """
     path = Path(directory, name)
     try:
@@ -109,15 +112,30 @@ def tabled(
         for line, column, what in error.problems:
             problems.add(Place(name, line, column), "", what)
         return None
-    malformed = [cell for cell in sheet.names if not _PATH.match(cell.text)]
+    unused = [
+        cell
+        for cell, *entries in zip(sheet.names, *sheet.rows, strict=True)
+        if _is_unused(cell.text, [entry.text for entry in entries], parameters)
+    ]
+    malformed = [cell for cell in sheet.names if cell not in unused and not _PATH.match(cell.text)]
     for cell in malformed:
         problems.add(_place(name, cell), "", _NOT_A_HEADING)
-    if not sheet.names:
+    if len(unused) == len(sheet.names):
         problems.add(Place(name, 1, 1), "", _NOT_A_HEADING)
-    if malformed or not sheet.names:
+    if malformed or len(unused) == len(sheet.names):
         return None
-    columns = [_column(name, sheet, index) for index in range(len(sheet.names))]
+    if unused:
+        remarks.append(f"table {name}: not used: {', '.join(cell.text for cell in unused if cell.text)}")
+    columns = [_column(name, sheet, index) for index in range(len(sheet.names)) if sheet.names[index] not in unused]
     return tuple(columns) if _are_sound(columns, parameters, data, problems) else None
+
+
+def _is_unused(heading: str, entries: Sequence[str], parameters: type[Parameters]) -> bool:
+    """Return whether a column is no parameter; one with numbers and a similar name is a misspelt parameter."""
+    if heading.split(".")[0] in parameters.model_fields:
+        return False
+    has_numbers = any(isinstance(_value(entry, ""), int | float) for entry in entries)
+    return not (has_numbers and "mean" in did_you_mean(heading, list(parameters.model_fields)))
 
 
 def _column(name: str, sheet: Sheet, index: int) -> Variation:

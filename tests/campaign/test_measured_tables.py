@@ -1,0 +1,54 @@
+"""Tables of measured points as people write them: errors by their names, missing rows, encodings."""
+
+import numpy as np
+import pytest
+
+from mdr_dask.campaign.measured import read_measured
+from mdr_dask.tables import decoded
+
+CONDITIONS = {"velocity": "m/s", "normal_force": "N"}
+OUTPUTS = {"friction_coefficient": "1", "wear_volume": "m^3"}
+
+
+def read(text):
+    return read_measured(text, "rig.csv", CONDITIONS, OUTPUTS)
+
+
+@pytest.mark.parametrize(
+    "heading",
+    ["std", "Std.abw.", "std dev", "sd", "\u00b1", "+-", "error of mu", "mu std", "friction_coefficient_error"],
+)
+def test_columns_named_as_errors_are_errors_of_the_output_before_them(heading):
+    found = read(f"velocity [m/s];mu;n;{heading}\n1;0,3;5;0,01\n2;0,4;5;0,02\n")
+    assert found.errors is not None
+    assert found.errors.tolist() == [0.01, 0.02]
+    assert found.remark == "not used: n"
+
+
+def test_errors_of_other_columns_are_named_as_not_used():
+    found = read("velocity [m/s];std;mu\n1;0,1;0,3\n2;0,1;0,4\n")
+    assert found.errors is None
+    assert found.remark == "not used: std"
+
+
+def test_errors_without_a_unit_have_that_of_the_output():
+    found = read("velocity [m/s];wear volume [10\u00b3 \u00b5m\u00b3];std\n1;5;1\n2;6;2\n")
+    np.testing.assert_allclose(found.errors, [1e-15, 2e-15], rtol=1e-12)
+
+
+def test_rows_without_a_number_are_left_out_and_counted():
+    found = read("run;velocity [m/s];mu;remark\nA;1;0,3;\nB;2;n.a.;filter\nC;3;0,4;\nend of test\n")
+    assert found.values.tolist() == [0.3, 0.4]
+    assert found.lines == (2, 4)
+    assert "rows without a number, left out: 1" in found.remark
+    assert "'end of test'" in found.remark
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "cp1252"])
+def test_reports_of_a_rig_are_read_as_they_stand(encoding):
+    text = "Rig \u2013 \u00b5 on A37\nT: 20 \u00b0C; 80 N\n"
+    text += "Gleitgeschw. [mm/s];Reibwert \u00b5 [-];Std.abw.;Bemerkung\n"
+    text += "1;0,112;0,008;\n10;0,181;0,012;stick-slip\n"
+    found = read(decoded(text.encode(encoding), "rig.csv"))
+    np.testing.assert_allclose(found.conditions["velocity"], [1e-3, 1e-2])
+    assert found.errors is not None
