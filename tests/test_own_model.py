@@ -34,6 +34,7 @@ def example(tmp_path, monkeypatch):
     (tmp_path / "pin.yaml").write_text(CAMPAIGN)
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # a module that changes within a second would stay as it was
     yield tmp_path
     sys.modules.pop("wear_rate", None)
 
