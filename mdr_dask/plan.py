@@ -98,8 +98,8 @@ class Template:
         """What parts and model say of the parameters, each sentence once, every axis by itself."""
         base = self.series.parameters
         sets = [base, *(with_value(base, axis.path, value) for axis in self.series.axes for value in axis.some)]
-        told = [note for parameters in sets for note in notes_of(parameters)]
-        return tuple(dict.fromkeys((*told, *models.load(self.campaign.model).notes(sets))))
+        of_parts = [note for parameters in sets for note in notes_of(parameters)]
+        return tuple(dict.fromkeys((*of_parts, *models.load(self.campaign.model).notes(sets))))
 
     @property
     def bytes(self) -> int:
@@ -109,7 +109,7 @@ class Template:
 
     @property
     def files(self) -> int:
-        """Number of files of the group when it is done: chunks, coordinates, metadata, and what is told of them."""
+        """Number of files of the group when it is done: chunks, coordinates, metadata and records."""
         blocks, arrays = math.prod(self.grid), len(self.outputs) + 1
         axes = {axis.name for axis in self.series.axes}
         coordinates = axes | set(self.extra) | (numbers_of(self.series.parameters).keys() - self.sizes.keys())
@@ -329,14 +329,14 @@ def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
         while chunks[dim] > 1 and (math.prod(chunks.values()) > limit or _is_cut(template, chunks, dim, 4 * goal)):
             chunks[dim] = math.ceil(chunks[dim] / 2)
 
-    def room() -> int:
+    def capacity() -> int:
         return int(min(goal / max(template.mean_seconds(chunks), 1e-9), limit / math.prod(chunks.values())))
 
     for dim in ("realisation", *reversed([dim for dim in template.dims[:-1] if dim not in whole])):
-        chunks[dim] = _part(template, dim, max(1, min(template.sizes[dim], room())))
+        chunks[dim] = _part(template, dim, max(1, min(template.sizes[dim], capacity())))
     replication = template.campaign.replication
     if replication.goes_on and chunks == template.sizes:
-        chunks["realisation"] = max(1, min(replication.at_most, room() * template.sizes["realisation"]))
+        chunks["realisation"] = max(1, min(replication.at_most, capacity() * template.sizes["realisation"]))
     return {
         **chunks,
         **{dim: min(n, template.sizes[dim]) for dim, n in template.campaign.blocks.items() if dim in template.sizes},

@@ -66,15 +66,15 @@ def draft(name: str, model: Model[Any], file: str) -> str:
 def _entries(parameters: type[Parameters]) -> Iterator[str]:
     """Yield the lines of all parameters; optional ones are comments."""
     needed = _needed(parameters)
-    told: dict[str, None] = {}
-    for ways in parameters.alternatives:
-        yield from textwrap.wrap(f"{describe(ways)}:", 110, initial_indent="  # ", subsequent_indent="  # ")
-        names = {name.partition(".")[0]: None for way in ways for name in way}
-        for name in [name for name in names if name not in told]:
+    written: dict[str, None] = {}
+    for group in parameters.alternatives:
+        yield from textwrap.wrap(f"{describe(group)}:", 110, initial_indent="  # ", subsequent_indent="  # ")
+        names = {name.partition(".")[0]: None for way in group for name in way}
+        for name in [name for name in names if name not in written]:
             yield from _entry(parameters, name, needed)
-        told |= names
+        written |= names
         yield ""
-    rest = [name for name in parameters.model_fields if name not in told]
+    rest = [name for name in parameters.model_fields if name not in written]
     for name in sorted(rest, key=lambda name: name not in needed):
         yield from _entry(parameters, name, needed)
 

@@ -154,7 +154,7 @@ def require_readable(text: str, source: str, model: str, outputs: Sequence[str],
 def notes(campaign: Campaign) -> tuple[str, ...]:
     """Return how the table of a campaign meets each series: the output, conditions, unknowns, and rows outside."""
     table = campaign.measured
-    told = []
+    notes_found = []
     for series in campaign.series if table else ():
         assert table is not None
         conditions, outputs, structures = _of_series(campaign.model, campaign.outputs, series)
@@ -162,10 +162,10 @@ def notes(campaign: Campaign) -> tuple[str, ...]:
         try:
             found = read_measured(table.read_text(), table.name, conditions, outputs, structures)
         except DataError:
-            told.append(f"{before}: no table of this series")
+            notes_found.append(f"{before}: no table of this series")
             continue
-        told += [f"{before}: {sentence}" for sentence in _sentences(found, campaign.model, series, conditions)]
-    return tuple(told)
+        notes_found += [f"{before}: {sentence}" for sentence in _sentences(found, campaign.model, series, conditions)]
+    return tuple(notes_found)
 
 
 def _sentences(found: Measured, model: str, series: Series, units: Mapping[str, str]) -> Iterator[str]:

@@ -46,16 +46,16 @@ def remarks(
     units : mapping of str to str
         Units that differ from the declared ones, as in a dimensionless campaign.
     """
-    told: set[Path] = set()
+    reported: set[Path] = set()
     for name, value in data.items():
         for bare in _bare_numbers((name,), value, paths[name]):
             found = fields.owner(parameters, bare.field, data)
-            if found is None or bare.field in told:
+            if found is None or bare.field in reported:
                 continue
             unit = units.get(dotted(bare.field), fields.unit_at(parameters, bare.field, data) or "1")
             usual = fields.usual(found[0].model_fields[found[1]])
             if usual and unit != "1" and is_far(bare.value, unit, usual):
-                told.add(bare.field)
+                reported.add(bare.field)
                 yield Problem(document.place(bare.at), dotted(bare.at), _question(bare.value, unit, usual))
 
 

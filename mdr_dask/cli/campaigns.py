@@ -29,11 +29,11 @@ def models(name: str | None, form: str | None) -> None:
     mdr-dask models
     mdr-dask models sliding_friction
     """
-    from mdr_dask import models as room
+    from mdr_dask import models
     from mdr_dask.campaign.reference import alternatives_of, number_rows, output_rows, parameter_rows
 
     if name is None:
-        rows = [{"model": known, "summary": room.load(known).summary} for known in room.names()]
+        rows = [{"model": known, "summary": models.load(known).summary} for known in models.names()]
         _print_left(rows, form)
         return
     model = _model(name)
@@ -55,13 +55,13 @@ def models(name: str | None, form: str | None) -> None:
 
 def _model(name: str) -> Model[Any]:
     """Return a model; raise UsageError for an unknown name."""
-    from mdr_dask import models as room
+    from mdr_dask import models
     from mdr_dask.errors import ModelError, did_you_mean
 
     try:
-        return room.load(name)
+        return models.load(name)
     except ModelError as error:
-        hint = did_you_mean(name, room.names()) if str(error).startswith("unknown") else ""
+        hint = did_you_mean(name, models.names()) if str(error).startswith("unknown") else ""
         raise click.UsageError(f"{error}{hint}") from None
 
 

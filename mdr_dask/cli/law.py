@@ -27,15 +27,15 @@ def law(store: str, output: str, series: str | None, selections: tuple[str, ...]
     \b
     mdr-dask law results/quickstart.zarr friction_coefficient -o mu.nc
     """
-    from mdr_dask import store as room
+    from mdr_dask import store as stores
     from mdr_dask.fits.interpolant import law as table_of
     from mdr_dask.questions import selection
 
     require_suffix(path, (".nc", ".zarr"))
-    dataset = selection.select(selection.group(room.datasets(store), series), selections, tell)
+    dataset = selection.select(selection.group(stores.datasets(store), series), selections, tell)
     table = table_of(selection.outputs(dataset, (output,)).assign(status=dataset["status"]), output)
     with writing(path):
-        room.save(table, path)
+        stores.save(table, path)
     values, error = table[output], table[f"{output}_error"]
     for dim in values.dims:
         if values[dim].dtype.kind in "fiu":

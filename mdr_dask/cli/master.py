@@ -28,7 +28,7 @@ PARTS = ("factors", "curve", "points")
 
 LAWS = ("power", "arrhenius", "wlf")
 FAR, LEAST = 5.0, 0.002
-"""Distance of a point from the merged curve, in standard deviations of the scatter and in decades, that is told."""
+"""Distance of a point from the merged curve, in standard deviations of the scatter and in decades, that is reported."""
 
 KEPT = (".json", ".csv")
 

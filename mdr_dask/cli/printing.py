@@ -177,10 +177,10 @@ def _is_text(column: Sequence[str]) -> bool:
 
 def hanging(before: str, text: str) -> str:
     """Join two texts; the second is wrapped below its own beginning if the line is too long."""
-    room = max(terminal_width() - len(before), NARROWEST // 2)
-    if len(before) + len(text) <= terminal_width() or room <= NARROWEST // 2:
+    width = max(terminal_width() - len(before), NARROWEST // 2)
+    if len(before) + len(text) <= terminal_width() or width <= NARROWEST // 2:
         return (before + text).rstrip()
-    lines = textwrap.wrap(text, room, break_on_hyphens=False)
+    lines = textwrap.wrap(text, width, break_on_hyphens=False)
     return ("\n" + " " * len(before)).join([before + lines[0], *lines[1:]]).rstrip()
 
 

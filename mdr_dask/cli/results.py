@@ -51,7 +51,7 @@ def status(store: str, failures: bool, messages: bool, watch: bool, form: str | 
     mdr-dask status results/quickstart.zarr --watch
     mdr-dask status results/quickstart.zarr --failures
     """
-    from mdr_dask import store as room
+    from mdr_dask import store as stores
     from mdr_dask.questions import progress
 
     if watch:
@@ -60,12 +60,12 @@ def status(store: str, failures: bool, messages: bool, watch: bool, form: str | 
         watching.watch(store, lambda: progress.counts(store))
         return
     if not (failures or messages):
-        of_store = room.attributes(store)
+        of_store = stores.attributes(store)
         study = {"study": of_store["title"], "model": of_store["model"], "model_version": of_store["model_version"]}
         _print_counts(study, progress.counts(store), watching.at_work(store), form)
-        room.require_sound(store, room.series_names(store))
+        stores.require_sound(store, stores.series_names(store))
         return
-    studies = room.datasets(store)
+    studies = stores.datasets(store)
     found = [message for name, data in studies.items() for message in progress.messages(store, name, data)]
     if not messages:
         found = [message for message in found if message["status"] != "done"]
@@ -147,7 +147,7 @@ def _answer(
     **parts: Any,
 ) -> None:
     """Print or write the answer to a question."""
-    from mdr_dask import store as room
+    from mdr_dask import store as stores
     from mdr_dask.questions import selection
     from mdr_dask.questions.labelled import labelled
     from mdr_dask.questions.table import Question, table
@@ -157,14 +157,14 @@ def _answer(
             raise click.UsageError(f"expected one of --{form} and --output, got both")
         check_target(output)
     question = Question(outputs, statistics=statistics, written=output is None and not form, **parts)
-    dataset = selection.group(room.datasets(store), series)
+    dataset = selection.group(stores.datasets(store), series)
     if output is None:
         print_answer(table(dataset, question, 0 if form else limit, tell), form or "table", limit, join)
         return
     if output.suffix in (".nc", ".zarr"):
         found = labelled(dataset, question, tell)
         with writing(output):
-            room.save(found, output)
+            stores.save(found, output)
         click.echo(f"{output}: {len(found.data_vars)} variables over {dict(found.sizes)}")
         return
     answer = table(dataset, question, 0, tell)

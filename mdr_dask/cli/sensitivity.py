@@ -46,12 +46,12 @@ def sensitivity(
     mdr-dask sensitivity results/rolling.zarr breakthrough_probability
     mdr-dask sensitivity results/rolling.zarr film_ratio -o sensitivity.png
     """
-    from mdr_dask import store as room
+    from mdr_dask import store as stores
     from mdr_dask.fits.sensitivity import sobol_indices
     from mdr_dask.questions import selection
 
     require_suffix(figure, FIGURES)
-    dataset = selection.select(selection.group(room.datasets(store), series), selections, tell)
+    dataset = selection.select(selection.group(stores.datasets(store), series), selections, tell)
     found = sobol_indices(selection.outputs(dataset, (output,)), output)
     rows, units = table(found)
     if form == "json":

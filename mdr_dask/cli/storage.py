@@ -28,14 +28,14 @@ def verify(store: str, repair: bool, limit: int, form: str | None) -> int:
     mdr-dask verify results/quickstart.zarr --repair
     mdr-dask verify study.zip
     """
-    from mdr_dask import store as room
+    from mdr_dask import store as stores
 
     if _is_packed(store):
         if repair:
             raise click.UsageError("--repair is for a store, not for a published zip; unpack it first")
-        found, left = room.verify_packed(Path(store)), None
+        found, left = stores.verify_packed(Path(store)), None
     else:
-        found, left = room.repair(store) if repair else (room.verify(store), None)
+        found, left = stores.repair(store) if repair else (stores.verify(store), None)
     if form == "json":
         print_json(_document(found) | ({"left": _document(left)["findings"]} if left else {}))
     else:

@@ -18,9 +18,9 @@ PAUSE, SHARE = 1.0, 5.0
 
 def at_work(store: str) -> list[str]:
     """Return who is at work on a store: an exclusive run, or how many parts and which."""
-    from mdr_dask import store as room
+    from mdr_dask import store as stores
 
-    runner, parts = room.at_work(store)
+    runner, parts = stores.at_work(store)
     found = [runner] if runner else []
     for count, alike in itertools.groupby(parts, key=lambda part: part.count):
         numbers = [part.number for part in alike]

@@ -1,4 +1,4 @@
-"""Run a campaign: rounds, resume, failures, progress. The only room that uses Dask."""
+"""Run a campaign: rounds, resume, failures, progress. The only package that uses Dask."""
 
 from mdr_dask.execute.events import Event, Tell
 from mdr_dask.execute.progress import Progress

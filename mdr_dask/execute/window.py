@@ -90,8 +90,8 @@ class TaskWindow:
         suspects: set[str] = set()
 
         def fill() -> None:
-            room = 2 * max(self._threads, self._most) + 2 - len(self._running)
-            for _, work in zip(range(room), remaining, strict=False):
+            free = 2 * max(self._threads, self._most) + 2 - len(self._running)
+            for _, work in zip(range(free), remaining, strict=False):
                 self._submit(_run_apart if self._case_timeout else _run, work)
 
         try:

@@ -38,8 +38,8 @@ def readable(url: str) -> Iterator[None]:
 def is_damage(error: Exception) -> bool:
     """Return whether an error comes from Zarr or its codecs: a chunk cannot be read."""
     *_, (innermost, _) = traceback.walk_tb(error.__traceback__)
-    room = str(innermost.f_globals.get("__name__", "")).partition(".")[0]
-    return not isinstance(error, OSError) and room in ("zarr", "numcodecs")
+    package = str(innermost.f_globals.get("__name__", "")).partition(".")[0]
+    return not isinstance(error, OSError) and package in ("zarr", "numcodecs")
 
 
 def datasets(url: str) -> dict[str, xr.Dataset]:

@@ -61,10 +61,10 @@ def _is_one(found: Mapping[str, Any]) -> bool:
     return whole and texts and type(found["messages"]) is list and all(map(_is_message, found["messages"]))
 
 
-def _is_message(told: Mapping[str, Any]) -> bool:
-    texts = type(told["message"]) is str and told["status"] in ("done", "not_converged", "failed", "not_needed")
-    plain = all(isinstance(value, str | int | float | None) for value in told["case"].values())
-    return texts and plain and all(type(i) is int and i >= 0 for i in told.get("place", ()))
+def _is_message(message: Mapping[str, Any]) -> bool:
+    texts = type(message["message"]) is str and message["status"] in ("done", "not_converged", "failed", "not_needed")
+    plain = all(isinstance(value, str | int | float | None) for value in message["case"].values())
+    return texts and plain and all(type(i) is int and i >= 0 for i in message.get("place", ()))
 
 
 def record(url: str, series: str, index: BlockIndex, attempt: int) -> dict[str, Any] | None:
