@@ -53,7 +53,7 @@ def test_every_optional_entry_passes_when_its_mark_is_taken_off(name, tmp_path):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_way_to_give_a_thing_passes(name, tmp_path):
-    line = "x [m],z [m]\n" + "\n".join(f"{k * 0.1},{k % 3 * 1e-6}" for k in range(100))
+    line = "x [m],z [m]\n" + "\n".join(f"{k * 0.1},{7 * k % 100 * 1e-8}" for k in range(100))
     spectrum = "q [1/mm],C2D [m^4]\n1,1e-18\n100,1e-24\n"
     model = models.load(name)
     text = draft(name, model, "first.yaml")
