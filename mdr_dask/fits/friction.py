@@ -355,16 +355,18 @@ def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: st
     """Say whether friction has a maximum or a level, or still changes at an end of the velocities."""
     at, rise = float(found.place[0]), float(found.rise[0])
     change = f"d ln mu / d ln v = {rise:.2g}"
-    if np.isfinite(ends[0]):
+    known = bool(np.isfinite(ends[0]))
+    if known:
         change += f" ({ends[0]:.2g}, {ends[1]:.2g})"
+    end = "still rises at the largest velocity" if max(ends, key=abs) > 0 else "already falls at the lowest velocity"
+    if abs(rise) > top.FLAT and not (known and ends[0] <= 0 <= ends[1]):
+        end = "still rises at the largest velocity" if rise > 0 else "already falls at the lowest velocity"
+        return f"no: the plateau is not reached, friction {end}, {change}"
+    if abs(rise) > top.FLAT or (known and max(map(abs, ends)) > top.FLAT):
+        return f"not tested: because of the scatter it is open whether friction {end}, {change}"
     if x[0] < at < x[-1] and abs(rise) < 1e-9:
         return f"yes: friction is largest at {place.format(np.exp(at))}"
-    if abs(rise) <= top.FLAT:
-        return f"yes: friction is level at the end of the velocities, {change}"
-    end = "still rises at the largest velocity" if rise > 0 else "already falls at the lowest velocity"
-    if np.isfinite(ends[0]) and ends[0] <= 0 <= ends[1]:
-        return f"not tested: because of the scatter it is open whether friction {end}, {change}"
-    return f"no: the plateau is not reached, friction {end}, {change}"
+    return f"yes: friction is level at the end of the velocities, {change}"
 
 
 def least_squares(

@@ -219,6 +219,20 @@ def test_the_plateau_is_judged_with_both_slopes():
     assert str(without["law_holds"].values.flat[0]).startswith("not tested: the study has no output contact_slope")
 
 
+@pytest.mark.parametrize("lines", [2, 5, 40])
+def test_scatter_makes_no_plateau_of_a_curve_that_rises(lines):
+    axes, rng = {"normal_force": [0.1], "velocity": np.geomspace(1e-3, 1, 9)}, np.random.default_rng(5)
+    data = planted(axes, lines, 1, friction_coefficient=lambda force, v: v**0.1 + 0 * force).isel(study=0)
+    shape = data.friction_coefficient.shape
+    said = []
+    for scatter in (0.1, 0.3):
+        for _ in range(4):
+            noisy = data.friction_coefficient * (1 + scatter * rng.standard_normal(shape))
+            found = available("sliding_friction")["plateau"].compute({"": data.assign(friction_coefficient=noisy)})
+            said.append(str(found["reached"].values.flat[0]))
+    assert sum(each.startswith("yes") for each in said) <= 1, said
+
+
 def test_few_points_of_a_curve_are_no_test():
     """More constants than points always fit; and where one part of a study has a curve less, it says so by NaN."""
     axes = {"hurst": [0.3, 0.7], "normal_force": np.geomspace(1e-2, 10, 4), "velocity": np.geomspace(1e-6, 1, 5)}
