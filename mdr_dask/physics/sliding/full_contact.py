@@ -69,7 +69,11 @@ def steady_full_contact(
         moves = np.isfinite(deborah) & (deborah >= 0 if terms else deborah > 0)
         full = moves & np.isfinite(loads) & (loads > DEEP * np.sqrt(elastic + deborah * (lost + drag)))
     speeds, which = np.unique(deborah[full], return_inverse=True)
-    highest = np.array([np.max(np.abs(pressure + speed * slope)) for speed in speeds])
+    highest, total = np.empty(speeds.size), np.empty(height.size)
+    for k, speed in enumerate(speeds):
+        np.multiply(slope, speed, out=total)
+        total += pressure
+        highest[k] = max(total.max(), -total.min())
     full[full] = highest[which] < loads[full] * np.cos(np.pi * waves.coefficients.size / height.size)
     if not np.any(full):
         return None
