@@ -142,7 +142,10 @@ def _warnings(urls: Sequence[str]) -> list[str]:
         studies = stores.datasets(url)
         messages = [message for name, data in studies.items() for message in progress.messages(url, name, data)]
         done = [message for message in messages if message["status"] == "done"]
-        found += [f"{group.results} results of the store: {group.reason}" for group in progress.grouped(done, studies)]
+        found += [
+            f"{group.results} result{'s' * (group.results > 1)} of the store: {group.reason}"
+            for group in progress.grouped(done, studies)
+        ]
     return found
 
 

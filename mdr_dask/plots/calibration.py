@@ -135,7 +135,8 @@ def _data(found: fit.Calibration, main: str, curves: list[_Curve], data: xr.Data
             Trace("law", columns(of, x=x, y=how.of(best[at])), study, study, line="-", **look),
             Trace("curve", columns(of, x=x, y=measured), "data", curve.label, marker="o", **look),
         ]
-        panel.keys.append(Key(curve.label, curve.colour, "-", "o"))
+        panel.keys.append(Key(curve.label, curve.colour, "", "o"))
+    panel.keys.append(Key("median of the calibrated study", "#808080", "-"))
     return panel
 
 
@@ -150,7 +151,7 @@ def _residuals(found: fit.Calibration, main: str, curves: list[_Curve], data: xr
         of, x = _conditions(found, curve.points), _along(found, main, curve.points, data)
         residuals = columns(of, x=x, y=found.residuals.scaled[curve.points])
         panel.traces.append(Trace("curve", residuals, "data", curve.label, curve.colour, "", "o"))
-    panel.keys = [Key(curve.label, curve.colour, "-", "o") for curve in curves]
+    panel.keys = [Key(curve.label, curve.colour, "", "o") for curve in curves]
     return panel
 
 

@@ -72,12 +72,13 @@ def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
 def _add(panel: Panel, measured: Measured, data: xr.Dataset) -> int:
     """Add the points at the conditions of a panel, in the colours of its curves; return their number.
 
-    If the table does not have a parameter in which the curves differ, a point belongs to none of them and is black.
+    Points are black beside a single curve, and if the table lacks a parameter in which the curves differ.
     """
-    found = 0
+    found, keys = 0, panel.entries()
     left = np.ones(measured.values.size, dtype=bool)
     curves = [trace for trace in panel.traces if trace.kind == "curve" and trace.what == "data"]
-    of_curves = _differing([trace.data for trace in curves]) <= {*measured.conditions, panel.x.quantity}
+    differing = _differing([trace.data for trace in curves])
+    of_curves = len(curves) > 1 and differing <= {*measured.conditions, panel.x.quantity}
     for trace in curves:
         here = left & _at(trace.data, measured, panel.x.quantity)
         if here.any():
@@ -87,7 +88,9 @@ def _add(panel: Panel, measured: Measured, data: xr.Dataset) -> int:
             found += int(here.sum())
     if found:
         label = NAME if measured.errors is None else f"{NAME}, 95 %"
-        panel.keys = [*panel.entries(), Key(label, "#000000", "", "D")]
+        if len(curves) == 1 and not curves[0].label:
+            keys = [Key("study", curves[0].colour, curves[0].line, curves[0].marker), *keys]
+        panel.keys = [*keys, Key(label, "#000000", "", "D")]
     return found
 
 

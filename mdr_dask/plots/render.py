@@ -39,6 +39,8 @@ LEGEND_SHARE = 0.35
 GAP = 3
 #: Most lines of a title.
 MOST_LINES = 7
+#: Most decades of a logarithmic axis; a share of 1e-90 would hide everything else.
+DECADES = 15
 #: Points of a curve from which on they have no markers.
 MANY_POINTS = 60
 #: Height in a panel of marks for cases without a value.
@@ -182,6 +184,9 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
 def _finish_axis(axes: Axes, name: str, axis: Axis) -> None:
     if axis.low is not None or axis.high is not None:
         getattr(axes, f"set_{name}lim")(axis.low, axis.high)
+    elif axis.log:
+        low, high = getattr(axes, f"get_{name}lim")()
+        getattr(axes, f"set_{name}lim")(max(low, high / 10.0**DECADES), high)
     if axis.reverse:
         getattr(axes, f"invert_{name}axis")()
     if axis.ticks:
