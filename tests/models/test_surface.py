@@ -112,7 +112,7 @@ parameters:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("  points: 400\n", "  hurst: 0.8\n  rms_roughness: 1 um\n", "surface takes the place of hurst, rms_roughness"),
+        ("  points: 400\n", "  hurst: 0.8\n  rms_roughness: 1 um\n", "surface replaces hurst, rms_roughness"),
         ("  length: 20 mm\n", "", "expected length, of the line that stands for the surface"),
         ("  surface: {spectrum: road.csv}\n", "", "expected length with rms_roughness, or length with surface"),
         ("surface: {spectrum: road.csv}", "profile: road.csv", "write surface: {profile: ...}"),

@@ -220,7 +220,7 @@ class FrettingWear(Parameters):
             raise ValueError(f"a history has wear_rule exact only, got {self.wear_rule!r}")
         for other, name in self.inactive.items():
             if getattr(self, other) != type(self).model_fields[other].default:
-                raise ValueError(f"{name} takes the place of {other}: leave out one or the other")
+                raise ValueError(f"{name} replaces {other}: leave out one or the other")
         return self
 
     @model_validator(mode="after")
