@@ -65,7 +65,7 @@ def test_zone_one(lines, scatter):
     found = FIT["zone_one"].compute({"": planted(zone, ZONE, lines, scatter)})
     assert coverage(found, "alpha", 0.35) >= LEAST
     assert coverage(found, "beta", 1.5) >= LEAST
-    assert judged(found, "yes") >= LEAST
+    assert judged(found, "yes") + judged(found, "approximately") >= LEAST
 
 
 TOP = {"normal_force": 15.0 * G * RMS * LENGTH, "velocity": np.geomspace(1e-2, 1e4, 19) / 100}
@@ -138,7 +138,7 @@ def test_interpolation(lines, scatter):
     found = FIT["interpolation"].compute({"": planted(interpolated, PLANE, lines, scatter)})
     assert coverage(found, "alpha", 0.35) >= LEAST
     assert coverage(found, "beta", 1.5) >= LEAST
-    assert judged(found, "yes") >= LEAST
+    assert judged(found, "yes") + judged(found, "approximately") >= LEAST
 
 
 def rough_cone(lines, scatter, law, grid=0.0):
@@ -160,7 +160,7 @@ def test_indenter(lines, scatter):
     found = xr.concat([FIT["indenter"].compute({"": data.isel(study=k)}) for k in range(STUDIES)], "study")
     assert np.all(found["cases"] >= 8)
     assert coverage(found, "exponent", 1.3) >= LEAST
-    assert judged(found, "yes") >= LEAST
+    assert judged(found, "yes") + judged(found, "approximately") >= LEAST
 
 
 @pytest.mark.parametrize(("lines", "grid"), [(5, 0.2), (30, 0.02)])
@@ -246,11 +246,11 @@ def test_an_indenter_of_another_law_and_one_without_a_case_are_named(lines):
     assert np.isnan(found["exponent"])
 
 
-def test_one_line_alone_has_no_interval_and_no_verdict_but_by_its_departure():
+def test_one_line_alone_has_no_interval_and_no_verdict():
     data = planted(bent, ZONE, 1, (0.0, 0.0), studies=1)
     found = FIT["zone_one"].compute({"": data}).squeeze()
     assert found["fitted_law_holds"].item().startswith("not tested: too few realisations for the scatter")
     assert np.isfinite(found["alpha"])
     assert np.isnan(found["alpha_low"])
     found = FIT["zone_one"].compute({"": planted(zone, ZONE, 1, (0.0, 0.0), studies=1)}).squeeze()
-    assert found["fitted_law_holds"].item().startswith("yes: departs by")
+    assert found["fitted_law_holds"].item().startswith("not tested: too few realisations for the scatter")
