@@ -20,6 +20,7 @@ from mdr_dask.models.parts.sliding_problem import (
     STATUS,
     Setting,
     SlidingProblems,
+    combinations,
     each,
     refuse_immense,
     sliding_problems,
@@ -204,9 +205,9 @@ class _Marched(_Group):
         """
         before = self.problems.deborah[self.members]
         change = np.asarray(self.block.column("velocity_change"), dtype=np.float64)[self.members]
-        numbers = np.stack([before, before * (1 + change), self.problems.loads[self.members]])
-        (*deborah, loads), which = np.unique(numbers, axis=1, return_inverse=True)
-        return loads, np.column_stack(deborah), which
+        after, loads = before * (1 + change), self.problems.loads[self.members]
+        first, which = combinations(before, after, loads)
+        return loads[first], np.column_stack([before, after])[first], which
 
     @staticmethod
     def _of(jumps: Jumps, loads: FloatArray, which: IntArray) -> _Found:
