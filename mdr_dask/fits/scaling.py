@@ -123,8 +123,8 @@ def _contact_slope(data: xr.Dataset) -> Variables:
     )
     fraction = fractions.mean()[used]
     holding = found.holds(lambda k: f"L_cont / L = {fraction[k]:.2g}")
-    if np.ptp(law[0]) < WITHIN:  # a factor is fitted, so there is nothing left that the data could contradict
-        holding = f"not tested: by eq. 3.21 the slopes of these cases differ by less than {WITHIN:.0%}"
+    if np.ptp(np.log(fraction)) < WITHIN:  # a factor is fitted, so there is nothing left to contradict
+        holding = f"not tested: the lengths in contact of these cases differ by less than {WITHIN:.0%}"
     return {
         **constant("factor", np.exp(found.constants[:, 0]), count, "slope in contact over eq. 3.21", positive=True),
         **measure("range", float(np.exp(np.ptp(law[0]))), "largest over smallest slope by eq. 3.21"),
