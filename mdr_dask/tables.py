@@ -11,9 +11,10 @@ import math
 import re
 import unicodedata
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -285,10 +286,11 @@ class Sheet:
 class Read(dict[str, FloatArray]):
     """Columns that were read, by `Column.name`.
 
-    `lines` holds the number of each row in the table, `unused` the headings of the other columns, and `left_out` a
-    sentence about lines that were left out.
+    `lines` holds the number of each row in the table, `headings` the names of the columns as written, `unused` those of
+    the other columns, and `left_out` a sentence about lines that were left out.
     """
 
+    headings: Mapping[str, str] = MappingProxyType({})
     lines: tuple[int, ...] = ()
     unused: tuple[str, ...] = ()
     left_out: str = ""
@@ -405,6 +407,7 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
     if problems:
         raise TableError(source, sorted(problems, key=lambda problem: problem[:2]))
     read.lines, read.left_out = tuple(row[0].line for row in sheet.rows), sheet.remark
+    read.headings = {name: first[place].text if sheet.names else "" for name, place in taken.items()}
     read.unused = tuple(cell.text for cell in unknown if cell.text)
     return read
 
@@ -769,7 +772,8 @@ def described(text: str, source: str) -> str:
         ranges.append(
             " ".join(filter(None, [name, " to ".join(dict.fromkeys(ends)), unit if unit not in ("-", "1") else ""]))
         )
-    return f"{len(sheet.rows)} rows; {', '.join(ranges)}"
+    left_out = f"; {sheet.remark}" if sheet.remark else ""
+    return f"{len(sheet.rows)} rows; {', '.join(ranges)}{left_out}"
 
 
 def _is_data(row: tuple[Cell, ...]) -> bool:

@@ -22,7 +22,7 @@ KINDS = ("map", "scan", "spectrum")
 @click.command()
 @click.argument("files", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False))
 @click.option("--as", "kind", type=click.Choice(KINDS), help="What the files are.  [from their content]")
-@click.option("--spacing", help="Distance between points of a map in text or npy, such as 2um.")
+@click.option("--spacing", help="Distance between points, if the file has heights alone, such as 2um.")
 @click.option("--spacing-y", help="Distance between rows, if different from --spacing.")
 @click.option("--unit", help="Unit of the heights, if the file does not say.")
 @click.option("--x-unit", help="Unit of positions in the file, if the file does not say.")
@@ -132,11 +132,12 @@ def _kind(file: str, options: dict[str, Any]) -> str:
     """Return what a file is: a map or a scan by its content, or a table of a spectrum by the names of its columns."""
     from mdr_dask.models.data_file import DataFile
     from mdr_dask.models.parts.height_file import TEXT, dimensions
+    from mdr_dask.tables import decoded
 
-    if "spacing" in options or "direction" in options:
+    if "spacing_y" in options or "direction" in options:
         return "map"
     if file.lower().endswith(TEXT):
-        head = Path(file).read_text(errors="replace")[:2000].lower()
+        head = decoded(Path(file).read_bytes(), file)[:2000].lower()
         if re.search(r"c_?(2d|1d|cut|iso)|psd|c\(q\)|wave ?(number|vector)|\b(log|log10|lg)[ _(]+[qk]\b", head):
             return "spectrum"
     return "map" if dimensions(DataFile.of(Path(file))) == 2 else "scan"

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from mdr_dask.physics.surfaces.maps import SurfaceMap
 
-#: Ends of the names of plain text.
-TEXT = (".csv", ".txt", ".dat", ".xyz", ".asc", ".tsv", ".grd", ".prn")
+#: Ends of the names of tables.
+TEXT = (".csv", ".txt", ".dat", ".xyz", ".asc", ".tsv", ".grd", ".prn", ".xlsx")
 SAME = 0.01
 """Relative difference up to which two lengths count as equal: files round them, and positions are recorded ones."""
 MOST_COLUMNS = 6
@@ -121,10 +121,16 @@ def read_scan(file: DataFile, units: Units) -> Scan:
         line, unit = _topography(file, channel, units)
         metre = _metre(file, unit, "unit")
         x, z = (np.ma.filled(np.ma.asarray(a, dtype=np.float64), np.nan) * metre for a in line.positions_and_heights())
-    z, remarks = positions.without_codes(z)
+    placed = np.isfinite(x)
+    gaps = (f"rows without a position, left out: {np.count_nonzero(~placed)}",) if not placed.all() else ()
+    x, (z, codes) = x[placed], positions.without_codes(z[placed])
+    remarks = (*gaps, *codes)
     missing = ~np.isfinite(z)
     if missing.any():
-        require_few_missing(missing)
+        try:
+            require_few_missing(missing)
+        except DataError as problem:
+            raise DataError(f"{file.name}: {problem}") from None
         order = np.argsort(x)
         z[missing] = np.interp(x[missing], x[order][~missing[order]], z[order][~missing[order]])
         remarks = (*remarks, f"missing points interpolated: {np.count_nonzero(missing)}")
@@ -367,13 +373,22 @@ def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
 
     first = next((k for k, line in enumerate(kept) if is_row(line)), len(kept))
     last = next((k for k in range(len(kept) - 1, first - 1, -1) if is_row(kept[k])), first - 1)
-    width = [len(line.rstrip(separator).split(separator)) for line in kept[first : last + 1]]
-    common = max(set(width), key=width.count, default=0)
+    stripped = [len(line.rstrip(separator).split(separator)) for line in kept[first : last + 1]]
+    common = max(set(stripped), key=stripped.count, default=0)
+
+    def cells_of(line: str) -> list[str]:
+        """Return the entries of a row; an empty one at its end is a missing point unless it is one too many."""
+        cells = line.split(separator)
+        while len(cells) > common and not cells[-1].strip():
+            cells.pop()
+        return cells
+
+    width = [len(cells_of(line)) for line in kept[first : last + 1]]
     while width and width[0] != common:  # numbers in a preamble
         first, width = first + 1, width[1:]
     try:
         table = pd.read_csv(
-            io.StringIO("\n".join(line.rstrip(separator) for line in kept[first : last + 1])),
+            io.StringIO("\n".join((separator or " ").join(cells_of(line)) for line in kept[first : last + 1])),
             sep=separator or r"\s+",
             decimal=decimal,
             header=None,
@@ -471,18 +486,34 @@ def _scattered(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame
     return _Grid(rows, steps, stated._replace(position=units[0] or stated.position, height=units[2] or stated.height))
 
 
+def _spaced(file: DataFile, height: FloatArray, units: Units) -> FloatArray:
+    """Return the positions of heights at the distance that the user states, m."""
+    import numpy as np
+
+    if units.spacing is None:
+        raise DataError(f"{file.name}: expected a column x: name it, or give `spacing`, the distance of the heights")
+    return units.spacing * np.arange(height.size)
+
+
 def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]:
     """Return positions and heights, m, of a table: by the names of its columns, or else by their numbers."""
     text = file.read_text()
     sheet = read_sheet(text, file.name)
     if sheet.names:
         columns = (
-            Column("x", "m", given_unit=units.position),
+            Column("x", "m", needed=False, given_unit=units.position),
             Column("z", "m", ("height", "y", "Y", "profile"), given_unit=units.height),
         )
         table = read_table(text, file.name, columns, allow_missing=True)
-        return table["x"], table["z"]
+        if "x" in table and units.spacing is not None:
+            raise DataError(f"{file.name}: has positions: leave out `spacing`")
+        return table["x"] if "x" in table else _spaced(file, table["z"], units), table["z"]
     table_of = numbers(sheet)
+    if table_of.shape[1] == 1:
+        if not units.height:
+            raise DataError(f"{file.name}: does not say the unit of its heights: give `unit`, such as um")
+        height = table_of[:, 0] * _metre(file, units.height, "unit")
+        return _spaced(file, height, units), height
     rises = [k for k, one in enumerate(positions.rising(table_of.T)) if one]
     counted = [k for k in rises if positions.is_numbered(table_of[:, k])]
     along = [k for k in rises if k not in counted] or rises or [0]

@@ -10,8 +10,9 @@ from pydantic import Field, ValidationInfo, model_validator
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import quantity
 from mdr_dask.models.data_file import NamedFile
-from mdr_dask.models.parts.height_file import Units, read_scan
+from mdr_dask.models.parts.height_file import Scan, Units, read_scan
 from mdr_dask.models.parts.named_by_file import NamedByFile
+from mdr_dask.models.parts.surface_files import doubts_of_line
 from mdr_dask.units import shown
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ class ProfileFile(NamedByFile):
     )
     unit: str = Field(default="", description="unit of the heights, if the file has none")
     x_unit: str = Field(default="", description="unit of the positions, if the file has none")
+    spacing: float | None = quantity("m", "distance of points, of a file of heights alone", default=None, gt=0)
     detrend: Literal["none", "mean", "line", "parabola"] = Field(default="mean", description="polynomial subtracted")
     taper: float = quantity("1", "part of the line faded to its mean so that the ends meet", default=0.0, ge=0, le=1)
     shortest_wavelength: float | None = quantity(
@@ -45,8 +47,13 @@ class ProfileFile(NamedByFile):
 
     def notes(self) -> tuple[str, ...]:
         """Return points, length, rms height and rms slope of the line."""
-        remarks = read_scan(self.file, Units(self.unit, self.x_unit)).remarks
+        remarks = (*_scan(self).remarks, *doubts_of_line(line_of(self), self.detrend))
         return (_statistics(self), *(f"profile {self.file.name}: {remark}" for remark in remarks))
+
+
+@lru_cache(maxsize=16)
+def _scan(profile: ProfileFile) -> Scan:
+    return read_scan(profile.file, Units(profile.unit, profile.x_unit, profile.spacing))
 
 
 @lru_cache(maxsize=16)
@@ -72,6 +79,6 @@ def line_of(profile: ProfileFile) -> MeasuredLine:
     """
     from mdr_dask.physics.surfaces.measured import measured_line
 
-    scan = read_scan(profile.file, Units(profile.unit, profile.x_unit))
+    scan = _scan(profile)
     band = profile.shortest_wavelength or 0.0, profile.longest_wavelength or 0.0
     return measured_line(scan.position, scan.height, profile.detrend, profile.taper, *band)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -14,9 +15,11 @@ from mdr_dask.models.base import quantity
 from mdr_dask.models.data_file import NamedFile
 from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.models.parts.temperature import Law
-from mdr_dask.tables import Column, Read, TableError, is_called, read_sheet, read_table
+from mdr_dask.tables import Column, Read, TableError, is_called, plain, read_sheet, read_table
 from mdr_dask.units import shown
 
+#: Names of moduli in tension, `plain`.
+_IN_TENSION = re.compile(r"(?<!\w)e(?:'|1|[ _]?stor|$)|young|tensile|tension")
 SAME_TEMPERATURE = 1.0  # K: scatter of an instrument about its set point
 #: Gap between the moduli of neighbouring curves above which they cannot overlap, decades: scatter of instruments.
 APART = 0.02
@@ -229,6 +232,12 @@ def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray,
     """Return angular frequency, storage modulus, loss modulus and temperature (or None) of a file, in SI."""
     name, table = chosen.file.name, _table(chosen)
     omega, storage, loss = table["frequency"], table["storage modulus"], table.get("loss modulus")
+    heading = table.headings["storage modulus"]
+    if chosen.poisson_ratio is None and _IN_TENSION.search(plain(heading)):
+        raise DataError(
+            f"{name}: column {heading!r} is a modulus in tension: give poisson_ratio (0.5 for rubber), or name the "
+            "column G' if it is a modulus of shear"
+        )
     if loss is None and "tan delta" in table:
         loss = storage * table["tan delta"]
     if loss is None:
@@ -245,8 +254,14 @@ def _columns(chosen: ModulusTable) -> tuple[Column, ...]:
     """Return the columns of a dynamic mechanical analysis."""
     return (
         Column("frequency", "rad/s", above=0, given_unit=chosen.frequency_unit),
-        Column("storage modulus", "Pa", above=0, given_unit=chosen.modulus_unit),
-        Column("loss modulus", "Pa", needed=False, above=0, given_unit=chosen.modulus_unit),
+        Column(
+            "storage modulus",
+            "Pa",
+            ("tensile storage modulus", "Young's modulus"),
+            above=0,
+            given_unit=chosen.modulus_unit,
+        ),
+        Column("loss modulus", "Pa", ("tensile loss modulus",), needed=False, above=0, given_unit=chosen.modulus_unit),
         Column("temperature", "K", needed=False, above=0),
         Column("tan delta", "1", needed=False, above=0),
     )

@@ -15,6 +15,7 @@ from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.tables import Column, read_table
 
 if TYPE_CHECKING:
+    from mdr_dask.arrays import FloatArray
     from mdr_dask.physics.surfaces.maps import MapSpectrum
     from mdr_dask.physics.surfaces.measured import MeasuredLine
     from mdr_dask.physics.surfaces.scans import Cut
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 CUT_ERROR = 0.05  # relative, of every point of a tabulated cut
 MOST_ANISOTROPY = 0.25  # the slopes in two directions then differ by more than a fifth
 STRIPES = 10.0  # times the power of an isotropic surface, in waves along an axis
+FORM = 0.9  # share of the mean square that a parabola explains; roughness as long as the file has less
 MOST_OUTLIERS = 0.05  # share of the points; more are part of the surface
 
 Window = Literal["hann", "none"]
@@ -69,6 +71,7 @@ class SpectrumTables(Files):
 class ScanFiles(Files):
     """Scans of an isotropic surface, as a stylus records them: straight cuts."""
 
+    spacing: float | None = quantity("m", "distance of points, of a file of heights alone", default=None, gt=0)
     unit: str = Field(default="", description="unit of the heights, where the file does not say")
     x_unit: str = Field(default="", description="unit of the positions, where the file does not say")
     detrend: Literal["none", "mean", "line", "parabola"] = Field(default="line", description="polynomial subtracted")
@@ -141,7 +144,7 @@ def _tabulated(file: DataFile) -> Found:
 
 @lru_cache(maxsize=64)
 def _scan(scans: ScanFiles, file: DataFile) -> Scan:
-    return read_scan(file, Units(scans.unit, scans.x_unit))
+    return read_scan(file, Units(scans.unit, scans.x_unit, scans.spacing))
 
 
 @lru_cache(maxsize=64)
@@ -156,6 +159,36 @@ def line_of_scan(scans: ScanFiles, file: DataFile) -> MeasuredLine:
         raise DataError(f"{file.name}: {problem}") from None
 
 
+def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
+    """Return sentences about a line that may have the form of a part, or heights in a wrong unit."""
+    import numpy as np
+
+    place = np.linspace(-1, 1, line.height.size)
+    level, curved = (line.height - np.polyval(np.polyfit(place, line.height, order), place) for order in (1, 2))
+    form = _form(level, curved) if detrend != "parabola" else ()
+    return (*form, *_steepness(float(np.sqrt(np.mean(np.diff(line.height) ** 2)) / line.spacing)))
+
+
+def _form(level: FloatArray, curved: FloatArray) -> tuple[str, ...]:
+    """Return a sentence if a parabola explains most of the levelled heights, which is the form of a part."""
+    import numpy as np
+
+    square, rest = (float(np.nanmean((height - np.nanmean(height)) ** 2)) for height in (level, curved))
+    if not rest < (1 - FORM) * square:
+        return ()
+    return (
+        f"a parabola explains {100 * (1 - rest / square):.3g} % of the mean square: form of the part, not "
+        "roughness? (`detrend: parabola` removes it)",
+    )
+
+
+def _steepness(slope: float) -> tuple[str, ...]:
+    """Return a question about the units of a surface that is steeper than 45 degrees."""
+    if not slope > 1:
+        return ()
+    return (f"rms slope {slope:.3g}, steeper than 45 degrees: are the units of heights and positions right?",)
+
+
 @lru_cache(maxsize=64)
 def scanned(scans: ScanFiles, file: DataFile) -> Found:
     """Return the spectrum of the surface that a scan cuts."""
@@ -163,7 +196,8 @@ def scanned(scans: ScanFiles, file: DataFile) -> Found:
 
     line = line_of_scan(scans, file)  # names the file itself
     try:
-        return of_surface_cut(cut_of_lines([line], scans.window == "hann"))._replace(remarks=_scan(scans, file).remarks)
+        found = of_surface_cut(cut_of_lines([line], scans.window == "hann"))
+        return found._replace(remarks=(*_scan(scans, file).remarks, *doubts_of_line(line, scans.detrend)))
     except DataError as problem:
         raise DataError(f"{file.name}: {problem}") from None
 
@@ -264,6 +298,9 @@ def levelled_map(maps: MapFiles, file: DataFile) -> LevelledMap:
         spectrum = spectrum_of_map(filled(surface), maps.window == "hann")
     except DataError as problem:
         raise DataError(f"{file.name}: {problem}") from None
+    if maps.detrend != "parabola":
+        remarks = (*remarks, *_form(without_trend(surface, "plane").height, without_trend(surface, "parabola").height))
+    remarks = (*remarks, *_steepness(float(np.sqrt(sum(spectrum.slopes[:2])))))
     stripes = [name for name, power in zip("xy", spectrum.axes, strict=True) if power > STRIPES]
     if stripes:
         along = " and ".join(stripes)
