@@ -33,7 +33,7 @@ LAW = {"c1": 10.0, "c2": 100.0, "reference": 20.0}
 
 
 def rubber(temperatures):
-    lines = ["f [Hz];E' [MPa];E'' [MPa];T [C]"]
+    lines = ["f [Hz];G' [MPa];G'' [MPa];T [C]"]
     for temperature in temperatures:
         difference = temperature - LAW["reference"]
         factor = 10 ** (-LAW["c1"] * difference / (LAW["c2"] + difference))
@@ -60,13 +60,13 @@ def test_check_tells_axes_tables_lines_and_how_they_meet(capsys):
         "tyre.yaml: sliding_friction",
         "  material_temperature  0 degC, 20 degC, 50 degC",
         "  velocity              1 um/s to 1 m/s, 7 values, geometric",
-        "  table rubber.csv: 15 rows; f 0.01 to 100 Hz, E' 1.079 to 35.62 MPa, E'' 0.0402 to 17.64 MPa, T 0 to 50 degC",
+        "  table rubber.csv: 15 rows; f 0.01 to 100 Hz, G' 1.079 to 35.62 MPa, G'' 0.0402 to 17.64 MPa, T 0 to 50 degC",
         "  profile road.csv: 100 points, 1 mm long, rms height 707.1 nm, rms slope 0.00889",
         "  21 cases x 2 realisations = 42 results",
     ):
         assert line in said
     text = "\n".join(said)
-    assert "table rubber.csv: superposed at 20 degC by the shift factors given; " in text
+    assert "table rubber.csv: superposed at 20 degC by the shift factors given, moduli not shifted (b_T = 1); " in text
     for temperature in (0, 20, 50):
         assert f"q v of 0.0063 to 3.1e+05 rad/s at {temperature} degC, data from" in text
     assert " uncompressed, about " in text

@@ -34,16 +34,16 @@ def table(names, scales=(1, 1, 1, 0), order=(0, 1, 2, 3), comma=".", separator="
     return ends.join(lines) + ends
 
 
-NAMES = "f [Hz],E' [MPa],E'' [MPa],T [degC]"
+NAMES = "f [Hz],G' [MPa],G'' [MPa],T [degC]"
 DIALECTS = {
     "plain": table(NAMES),
-    "kilopascals and kilohertz": table("f [kHz],E' [kPa],E'' [kPa],T [degC]", (1e-3, 1e3, 1e3, 0)),
-    "bars": table("f [Hz],E' [bar],E'' [bar],T [degC]", (1, 10, 10, 0)),
-    "kelvins": table("f [Hz],E' [MPa],E'' [MPa],T [K]", (1, 1, 1, 273.15)),
-    "another order": table("T [C],E'' [MPa],f [Hz],E' [MPa]", order=(3, 2, 0, 1)),
+    "kilopascals and kilohertz": table("f [kHz],G' [kPa],G'' [kPa],T [degC]", (1e-3, 1e3, 1e3, 0)),
+    "bars": table("f [Hz],G' [bar],G'' [bar],T [degC]", (1, 10, 10, 0)),
+    "kelvins": table("f [Hz],G' [MPa],G'' [MPa],T [K]", (1, 1, 1, 273.15)),
+    "another order": table("T [C],G'' [MPa],f [Hz],G' [MPa]", order=(3, 2, 0, 1)),
     "semicolons and decimal commas": table(NAMES.replace(",", ";"), comma=",", separator=";"),
     "tabs": table(NAMES.replace(",", "\t"), separator="\t"),
-    "blanks": table(["f E_stor E_loss T", "Hz MPa MPa C"], separator=" "),
+    "blanks": table(["f G_stor G_loss T", "Hz MPa MPa C"], separator=" "),
     "a row of units": table(["Frequency, Storage Modulus, Loss modulus, Temperature", "Hz,MPa,MPa,°C"]),
     "remarks and a byte-order mark": "\ufeff# machine 3\n\n" + table(NAMES).replace("\n0.1,", "\n% cold\n0.1,"),
     "line ends of another system": table(NAMES, ends="\r\n"),
@@ -73,9 +73,9 @@ SOUND = table(NAMES)
 CELLS = ("", "x", "nan", "inf", "1e400", "1.2.3", "--", "#REF!", "1 MPa", "0x10", "-5000")
 #: Names, and what becomes of them one at a time.
 HEADINGS = {
-    "f [Hz]": ("f", "f [MPa]", "f [hz]", "frequenzy [Hz]", "E' [MPa]", ""),
-    "E' [MPa]": ("E'", "E' [Hz]", "E' [mpa]", "storage modulos [MPa]", "f [Hz]", "E* [MPa]"),
-    "E'' [MPa]": ("E''", "E'' [degC]", "E'' [Mpa]", "loss modul [MPa]", "E' [MPa]", "compliance [1/MPa]"),
+    "f [Hz]": ("f", "f [MPa]", "f [hz]", "frequenzy [Hz]", "G' [MPa]", ""),
+    "G' [MPa]": ("G'", "G' [Hz]", "G' [mpa]", "storage modulos [MPa]", "f [Hz]", "E* [MPa]"),
+    "G'' [MPa]": ("G''", "G'' [degC]", "G'' [Mpa]", "loss modul [MPa]", "G' [MPa]", "compliance [1/MPa]"),
     "T [degC]": ("T", "T [Hz]", "Temprature [degC]", "f [Hz]"),
 }
 

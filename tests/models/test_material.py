@@ -128,7 +128,7 @@ def test_columns_of_a_table_go_by_their_names(tmp_path):
     """The order of the columns does not matter; tan delta stands for the loss modulus; Hz and rad/s are told apart."""
     plain = "frequency [rad/s],storage modulus [Pa],loss modulus [Pa]\n"
     solid = moduli(tmp_path, plain + "\n".join(f"{f!r},{s!r},{loss!r}" for f, s, loss in ROWS))
-    turned = "loss modulus [Pa],frequency [rad/s],E' [Pa]\n"
+    turned = "loss modulus [Pa],frequency [rad/s],G' [Pa]\n"
     again = moduli(tmp_path, turned + "\n".join(f"{loss!r},{f!r},{s!r}" for f, s, loss in ROWS))
     np.testing.assert_array_equal(again.moduli, solid.moduli)
     tangent = "frequency [rad/s],G' [MPa],tan delta [-]\n"
@@ -139,11 +139,11 @@ def test_columns_of_a_table_go_by_their_names(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("f [Hz],E' [MPa],tan delta [MPa]\n1,2,0.1\n", "column tan delta: expected a number"),
-        ("f [Hz],E' [MPa]\n1,2\n", "expected a column loss modulus or tan delta"),
+        ("f [Hz],G' [MPa],tan delta [MPa]\n1,2,0.1\n", "column tan delta: expected a number"),
+        ("f [Hz],G' [MPa]\n1,2\n", "expected a column loss modulus or tan delta"),
         ("1,2,3\n4,5,6\n", "column frequency: expected its unit"),
-        ("f [Hz],E' [MPa],E'' [MPa],T [K]\n1,2,3,-10\n", "column temperature: expected a value above 0, got '-10 K'"),
-        ("T [C],f [Hz],E' [MPa],E'' [MPa]\n20,1,2,\n", r"dma.csv:2:8: column loss modulus: expected a number"),
+        ("f [Hz],G' [MPa],G'' [MPa],T [K]\n1,2,3,-10\n", "column temperature: expected a value above 0, got '-10 K'"),
+        ("T [C],f [Hz],G' [MPa],G'' [MPa]\n20,1,2,\n", r"dma.csv:2:8: column loss modulus: expected a number"),
     ],
 )
 def test_a_table_that_is_no_dma_is_refused(tmp_path, text, message):
@@ -249,6 +249,6 @@ def test_a_temperature_beyond_those_measured_is_told(tmp_path):
 def test_columns_of_moduli_that_are_not_used_are_named(tmp_path):
     file = tmp_path / "dma.csv"
     rows = "".join(f"{f},{3 + f**0.3:.4g},{0.4 * f**0.3:.4g},2\n" for f in (0.01, 0.1, 1, 10, 100))
-    file.write_text(f"f [Hz],E' [MPa],E'' [MPa],Torque\n{rows}")
+    file.write_text(f"f [Hz],G' [MPa],G'' [MPa],Torque\n{rows}")
     notes = notes_of(material(dma_table={"file": str(file)}))
     assert f"table {file}: not used: Torque" in notes

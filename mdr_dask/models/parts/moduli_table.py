@@ -142,7 +142,7 @@ def _by_law(
         )
     omega, storage, loss = rows
     reference = law.reference
-    text = f"superposed at {shown(reference, 'K')} by the shift factors given"
+    text = f"superposed at {shown(reference, 'K')} by the shift factors given, moduli not shifted (b_T = 1)"
     return Moduli(omega * law.factor(levels)[member], storage, loss, reference, ends, text)
 
 
@@ -229,15 +229,12 @@ def _table(chosen: ModulusTable) -> Read:
 
 
 def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
-    """Return angular frequency, storage modulus, loss modulus and temperature (or None) of a file, in SI."""
+    """Return angular frequency, storage modulus, loss modulus and temperature (or None) of a file, in SI.
+
+    Moduli in tension without a Poisson ratio are refused.
+    """
     name, table = chosen.file.name, _table(chosen)
     omega, storage, loss = table["frequency"], table["storage modulus"], table.get("loss modulus")
-    heading = table.headings["storage modulus"]
-    if chosen.poisson_ratio is None and _IN_TENSION.search(plain(heading)):
-        raise DataError(
-            f"{name}: column {heading!r} is a modulus in tension: give poisson_ratio (0.5 for rubber), or name the "
-            "column G' if it is a modulus of shear"
-        )
     if loss is None and "tan delta" in table:
         loss = storage * table["tan delta"]
     if loss is None:
@@ -247,6 +244,12 @@ def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray,
         _, levels = _levels(temperature)
         known = ", ".join(shown(level, "K") for level in levels[:12])
         raise DataError(f"{name}: got no rows at {shown(wanted, 'K')}; it was measured at {known}")
+    heading = table.headings["storage modulus"]
+    if chosen.poisson_ratio is None and _IN_TENSION.search(plain(heading)):
+        raise DataError(
+            f"{name}: column {heading!r} is a modulus in tension: give poisson_ratio (0.5 for rubber), or name the "
+            "column G' if it is a modulus of shear"
+        )
     return omega, storage, loss, temperature
 
 
