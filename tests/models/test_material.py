@@ -89,7 +89,7 @@ def test_table_of_many_temperatures_is_superposed():
 
 def test_table_needs_a_temperature_or_a_reference():
     with pytest.raises(DataError, match="has several temperatures: name one by table_temperature, a reference"):
-        solid_of(material(dma_table={"file": TABLE}))
+        solid_of(material(dma_table={"file": TABLE, "poisson_ratio": 0.5}))
     assert material(dma_table=TABLE) == material(dma_table={"file": TABLE})
     with pytest.raises(DataError, match=r"got no rows at 226.9 degC; it was measured at -4"):
         solid_of(material(dma_table={"file": TABLE, "table_temperature": 500.0}))

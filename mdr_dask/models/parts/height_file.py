@@ -492,7 +492,7 @@ def _spaced(file: DataFile, height: FloatArray, units: Units) -> FloatArray:
 
     if units.spacing is None:
         raise DataError(f"{file.name}: expected a column x: name it, or give `spacing`, the distance of the heights")
-    return units.spacing * np.arange(height.size)
+    return np.asarray(units.spacing * np.arange(height.size), dtype=np.float64)
 
 
 def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]:
