@@ -1,7 +1,8 @@
 """Fretting and sliding wear of a contact of revolution.
 
-Read `worn` first: a worn contact and its error. `rules` has the limit and the fast rule,
-`approach` how near a contact has come to the limit. The exact evolution: `exact` is its front end for every condition,
-`evolution` the time steps, `slip` the equations at constant depth and in gross slip, `forced_slip` those under constant
-force, which `forced` solves. `history` has blocks of load on a uniform grid.
+Read `worn` first: it holds a worn contact and the estimate of its error. `rules` computes the limiting profile and the
+fast rule; `approach` bounds the distance of a contact from its limiting profile. The exact evolution is spread over
+four modules: `exact` is the front end for all conditions, `evolution` makes the time steps, `slip` holds the equations
+at constant depth and in gross slip, and `forced_slip` holds the equations under constant force, which `forced` solves.
+`history` computes wear under blocks of load, on a uniform grid.
 """

@@ -1,16 +1,17 @@
-"""Bound on the distance of a worn contact at constant depth from its limiting shape, in closed form.
+"""Bound on the distance of a worn contact at constant depth from its limiting profile, in closed form.
 
-With s the slip over its amplitude, ds/dN = p s / eta. Wear at other radii adds pressure to a radius: of two bodies
-with s_1 <= s_2 everywhere and s_1 = s_2 at one radius, the second has at least the pressure of the first there (maximum
-principle of the half-space). So a function that starts below the virgin slip, and grows no faster than by its own
-pressure, stays below the true slip. One such function is the half-integral of y = m min(y0 / y0(x_1), 1) for any
-x_1 > c, with dm/dN = m (1 - m) / (pi w) from m = y0(x_1) on:
+Let s be the slip over its amplitude: ds/dN = p s / eta. Wear at other radii increases the pressure at a given radius.
+Therefore, if s_1 <= s_2 everywhere and s_1 = s_2 at one radius, the pressure at this radius is at least as high in the
+second body as in the first (maximum principle of the half-space). So a function stays below the true slip if it starts
+below the virgin slip and grows no faster than its own pressure allows. One such function is the half-integral of
+y = m min(y0 / y0(x_1), 1) for any x_1 > c, where dm/dN = m (1 - m) / (pi w), starting at m = y0(x_1):
 
 * its relative growth is at most (1 - m) / (pi w), with w^2 = a^2 - c^2;
 * its image jumps from m to 1 at the radius a of the final scar. The pressure of this jump alone is
-  (1 - m) / (pi sqrt(a^2 - r^2)), which is at least that growth.
+  (1 - m) / (pi sqrt(a^2 - r^2)), which is at least this growth.
 
-The true slip lies between it and that of the limit, (2 / pi) arccos(c / r). The force falls while the body wears.
+The true slip lies between this function and the slip in the limit, (2 / pi) arccos(c / r). The force falls as the body
+wears.
 """
 
 from __future__ import annotations
@@ -25,12 +26,12 @@ from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.wear.rules import limit
 from mdr_dask.physics.wear.worn import Worn
 
-#: How fast x_1 - c decays over N / (pi w), about the best where y0 rises linearly; what N / (pi w) counts at most.
+#: Decay rate of x_1 - c per N / (pi w), close to the best choice if y0 rises linearly; upper limit of N / (pi w).
 LAYER, MOST = 2.0 / 3.0, 600.0
 
 
 def nearly_limit(profile: Profile, stick_radius: float, cycles: Sequence[float], accuracy: float) -> dict[float, Worn]:
-    """Return the shape that ends all wear for those N after which it is right to an accuracy, at constant depth.
+    """Return the limiting profile for every N at which it already has the wanted accuracy, at constant depth.
 
     Parameters
     ----------
@@ -41,7 +42,8 @@ def nearly_limit(profile: Profile, stick_radius: float, cycles: Sequence[float],
     cycles : sequence of float
         N >= 0.
     accuracy : float
-        Largest relative error of volume and force; that of f, over what can wear, is less.
+            Largest relative error of volume and force; the error of f, relative to the largest possible wear, is
+            smaller.
     """
     c = stick_radius
     soonest = -math.pi * math.sqrt((1.0 - c) * (1.0 + c)) * math.log(accuracy) / (1.0 - LAYER)
@@ -49,13 +51,13 @@ def nearly_limit(profile: Profile, stick_radius: float, cycles: Sequence[float],
     if not late:
         return {}
     end = limit(profile, c)
-    end = replace(end, energy_volume=end.wear_volume)  # all of the energy has gone into wear
+    end = replace(end, energy_volume=end.wear_volume)  # all dissipated energy has caused wear
     found = {number: replace(end, relative_error=_bound(profile, end, number)) for number in late}
     return {number: one for number, one in found.items() if one.relative_error <= accuracy}
 
 
 def _bound(profile: Profile, end: Worn, cycles: float) -> float:
-    """Return the largest relative error that the end has as volume and force after some cycles."""
+    """Return the largest relative error of volume and force if the limiting profile is used after N cycles."""
     c, a = end.stick_border, end.contact_radius
     eta, area = float(profile.rise(np.array(1.0 - c), c)), (a - c) * (a + c)
     decay = min(cycles / (math.pi * math.sqrt(area)), MOST)

@@ -1,8 +1,8 @@
-"""How a worn contact evolves: steps of backward differentiation along fixed radii, for any kind of slip.
+"""Time integration of a worn contact: backward differentiation along fixed radii, for any kind of slip.
 
-Every radius keeps what it has accumulated (see `Problem`). The contact is mapped onto graded panels in r^2, which
-follow the moving edge; each step is a stiff backward differentiation formula of order 1 to 3, solved for the image and
-the edge together by a Newton iteration that keeps its Jacobian as long as it converges.
+Every radius accumulates a quantity, for example its worn depth (see `Problem`). The contact is mapped onto graded
+panels in r^2, which follow the moving edge. Each step is a stiff backward differentiation formula (BDF) of order 1 to
+3, solved for the image and the edge together by Newton iterations that keep their Jacobian as long as they converge.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from mdr_dask.physics.linear import Factors, factorise
 from mdr_dask.physics.mdr.half_integrals import Panels, graded_panels
 from mdr_dask.physics.outcome import Outcome
 
-#: Local error of a BDF step of order 1, 2, 3 over its distance from the extrapolated past.
+#: Local error of a BDF step of order 1, 2, 3, as a fraction of its distance from the extrapolation of past steps.
 _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
 
 
@@ -29,20 +29,22 @@ class Settings(NamedTuple):
     Parameters
     ----------
     most_steps, most_iterations : int
-        Where a march, and a step, give up.
+            Number of steps after which a march fails, and of Newton iterations after which a step fails.
     growth : float
-        Largest ratio of one step to the last.
+            Largest ratio of a step to the previous one.
     slow : float
-        Rate of convergence beyond which the Jacobian is renewed.
+            Ratio of successive Newton corrections above which the Jacobian is renewed.
     theta_ratio : float
-        How much longer or shorter a step may be than that of the Jacobian.
+            Largest ratio of the present theta to the theta of the Jacobian, or of the inverse, for which it is reused.
     difference : float
-        Step of the differences by the edge and what follows it.
+            Step of the finite differences for the edge and the unknowns after it.
     first : float
-        Longest first step, over the time in which a contact changes: little wear is right to 2 %.
+            Longest first step, relative to the time scale of the contact; with it, small amounts of wear are right to 2
+            %.
     shortest, beginning : float
-        Step at which a march gives up, over the longest so far, or the first one if that is shorter; and over the first
-        one while none has been taken. Marches that reach their end take no later step below 0.13, some begin with 1e-5.
+            The march fails if a step becomes shorter than `shortest` times the longest step so far (or times the first
+            step, if that is shorter), and shorter than `beginning` times the first step. In marches that succeeded, no
+            later step was below 0.13 of its reference, but some first steps had to be reduced to 1e-5.
     """
 
     most_steps: int = 20000
@@ -60,28 +62,28 @@ SETTINGS = Settings()
 
 
 class Resolution(NamedTuple):
-    """How finely an evolution is solved: panels and steps for an accuracy of f in eta d0.
+    """Resolution of an evolution: panels and steps for an accuracy of f, relative to eta d0.
 
     Parameters
     ----------
     accuracy : float
-        The accuracy that the panels are chosen for.
+            The accuracy for which the panels are chosen.
     wider : float
-        How much wider the steps' accuracy is.
+            Factor on the error that is allowed in a step.
     fewer : int
-        Nodes that each panel, and halvings that each end, has less.
+            Number by which the nodes of each panel, and the halvings at each end, are reduced.
     thinned : int
-        Most nodes that a panel may have less.
+            Largest reduction of the nodes of a panel.
     order : int, optional
-        Nodes of a panel; by default four, or six for the finest accuracies.
+            Nodes of a panel; by default four, or six for accuracies of 3e-5 and below.
     rough : tuple of float
-        How much larger the tolerance of the two rougher solutions is from which the error is estimated.
+            Factors on the step tolerance of the two rougher solutions from which the error is estimated.
     slowness : float
-        How much more slowly than usual the error falls from them.
+            Factor on the distances from the rougher solutions, if the error falls more slowly than usual.
     second : float
-        Share of the distance from the second of them, which counts where the first is close by chance.
+            Weight of the distance from the second rougher solution, which matters where the first agrees by chance.
     newton : float
-        Under constant force, error of the solution of a step's equations over that of the step.
+            Under constant force: tolerance of Newton's method as a fraction of the step tolerance.
     """
 
     accuracy: float
@@ -101,31 +103,34 @@ class Resolution(NamedTuple):
 
     @property
     def first(self) -> float:
-        """The length of the first step, over the time in which a contact changes."""
+        """The length of the first step, relative to the time scale of the contact."""
         return min(0.1 * self.accuracy, SETTINGS.first) * self.wider
 
     def panels(self, near: int, fewest_digits: float = 2.0, sharpness: float = 1.0, coarser: float = 1.0) -> Panels:
-        """Return panels, halved `near` times more at the inner border than at the edge, `sharpness` times as often."""
+        """Return panels with `near` more halvings at the inner border than at the edge, times a factor `sharpness`."""
         digits = max(-np.log10(coarser * self.accuracy), fewest_digits)
-        levels = round(2.7 * digits - 3.3)  # fewer at the moving edge, and short steps follow the panels' noise
+        # with fewer halvings, the error of the panels at the moving edge would make the steps very short
+        levels = round(2.7 * digits - 3.3)
         order = self.order or (4 if self.accuracy > 3e-5 else 6)
         left, right = (max(halvings - self.fewer, 0) for halvings in (levels + near, levels))
         return graded_panels(round(sharpness * left), right, order - min(self.fewer, self.thinned))
 
     def panels_of_a_punch(self, sharpness: float) -> Panels:
-        """Return panels for a pressure that tends to a jump at the edge, and a body that is a power at its axis."""
+        """Return panels for a pressure that tends to a jump at the edge, and a body whose profile is a power law at its
+        axis.
+        """
         digits = max(-np.log10(self.accuracy), 2.0)
         halvings = round(2.0 * digits) - self.fewer
-        # the tip is off by its height in the innermost panel, which a halving lowers by a root of two under a cone
+        # the error at the tip is the height in the innermost panel; under a cone, a halving divides it by sqrt(2)
         tip = max(halvings + 1, 3.3 * digits - 2.2 - self.fewer)
         return graded_panels(round(sharpness * tip), halvings + 4, 4 - min(self.fewer, self.thinned))
 
     def finer(self, factor: float) -> Resolution:
-        """Return the resolution for a finer accuracy where a march failed: equations are solved more closely, too."""
+        """Return a finer resolution, for use after a march has failed; Newton's method is made more accurate, too."""
         return self._replace(accuracy=self.accuracy / factor, newton=0.01 * self.newton)
 
     def halfway_to(self, finer: Resolution) -> Resolution:
-        """Return a resolution with steps between those of two."""
+        """Return this resolution with the step tolerance at the geometric mean of its own and that of `finer`."""
         return self._replace(wider=float(np.sqrt(self.wider * finer.wider)))
 
     def rougher(self) -> tuple[Resolution, Resolution]:
@@ -135,7 +140,7 @@ class Resolution(NamedTuple):
 
 
 class NotConvergedError(ArithmeticError):
-    """A time step that no smaller step could rescue."""
+    """A time step fails even if it is very short."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,10 +152,11 @@ class Moment:
     time : float
         Cycles N in partial slip, sliding path s in gross slip.
     unknowns : array, shape (n,)
-        The unknowns of the problem: values of the image at all nodes but the last, the squared width of the panels over
-        that of the virgin contact, in some problems more. All are of the order of one.
+            The unknowns of the problem: values of the image at all nodes but the last, the squared width of the panels
+            over the squared width of the virgin contact, and in some problems further ones. All are of the order of
+            one.
     accumulated : array, shape (n,)
-        What the radii of the nodes have accumulated; zero at the edge.
+            The quantity accumulated at the radii of the nodes; zero at the edge.
     """
 
     time: float
@@ -159,36 +165,36 @@ class Moment:
 
 
 class Problem(Protocol):
-    """One kind of slip, as the equations of one step."""
+    """One kind of slip, given by the equations of one time step."""
 
     @property
     def newton(self) -> float:
-        """Return the error of the solution of a step's equations over that of the step."""
+        """Return the tolerance of Newton's method as a fraction of the step tolerance."""
 
     @property
     def panels(self) -> Panels:
         """Return the panels between the inner border and the edge."""
 
     def holds(self, unknowns: FloatArray) -> bool:
-        """Return whether unknowns describe a contact."""
+        """Return whether the unknowns describe a possible contact."""
 
     def start(self) -> Moment:
         """Return the virgin contact."""
 
     def memory(self, past: Sequence[Any], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """Return, as a function of the unknowns, what past moments in these shares had accumulated at the nodes."""
+        """Return a function of the unknowns: the weighted sum of past accumulated values at the nodes."""
 
     def moment(self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Any]) -> Moment:
-        """Return the moment that a solved step ends in."""
+        """Return the moment at the end of a solved step."""
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
         """Return accumulated - known - theta * rate at every node, and the conditions at the edge."""
 
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
-        """Return its derivatives by the nodal unknowns."""
+        """Return the derivatives of the residual with respect to the nodal unknowns."""
 
     def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return the quantity, over what can wear, whose step error is controlled."""
+        """Return the quantity whose step error is controlled, relative to the largest possible wear."""
 
 
 def march(
@@ -199,9 +205,9 @@ def march(
     start: Moment | None = None,
     stops: Callable[[Any], bool] = lambda moment: False,
 ) -> list[Any]:
-    """Advance a contact until the first step that ends at or beyond a time.
+    """Advance a contact in time until a step ends at or beyond `end`.
 
-    The steps do not depend on that time, so that a longer march repeats the shorter one exactly.
+    The steps do not depend on `end`, so a longer march repeats a shorter one exactly.
 
     Parameters
     ----------
@@ -214,9 +220,9 @@ def march(
     first : float
         Length of the first step.
     start : Moment, optional
-        Where to start from, in place of the virgin contact.
+            The first moment; by default the virgin contact.
     stops : callable, Moment -> bool
-        Whether to stop after a moment, before that time.
+            Returns True for a moment after which the march stops before `end`.
 
     Returns
     -------
@@ -226,7 +232,7 @@ def march(
     Raises
     ------
     NotConvergedError
-        If a step fails however short it is.
+            If a step fails even if it is very short.
     """
     newton = _Newton(problem, tolerance)
     history = [settled(problem) if start is None else start]
@@ -251,7 +257,7 @@ def march(
 
 
 def settled(problem: Problem) -> Any:
-    """Return the virgin contact as the panels see it, so that the first step starts without a jump."""
+    """Return the virgin contact as it solves the discrete equations, so that the first step starts without a jump."""
     virgin = problem.start()
     known = problem.memory([virgin], np.zeros(1))
     unknowns = _Newton(problem, 1e-9).solve(virgin.unknowns, 0.0, known)
@@ -259,23 +265,23 @@ def settled(problem: Problem) -> Any:
 
 
 class Dense:
-    """A march as a function of time: each time by the polynomial of the step that passed it."""
+    """A march as a function of time, interpolated with the polynomial of the step that contains the time."""
 
     def __init__(self, history: Sequence[Any]) -> None:
         self.history = history
         self.times = np.array([moment.time for moment in history])
 
     def steps(self, time: float) -> int:
-        """Return the number of steps up to the one that passed a time."""
+        """Return the number of steps up to and including the step that contains a time."""
         return int(np.searchsorted(self.times, time))
 
     def around(self, time: float) -> tuple[Any, Any]:
-        """Return the moments that the step which passed a time led from and to."""
+        """Return the moments at the beginning and end of the step that contains a time."""
         last = self.steps(time)
         return self.history[max(last - 1, 0)], self.history[last]
 
     def near(self, time: float) -> tuple[Sequence[Any], FloatArray]:
-        """Return the moment at or after a time with up to three before it, and their weights."""
+        """Return the moment at or after a time and up to three before it, with their interpolation weights."""
         last = self.steps(time)
         near = slice(max(last - 3, 0), last + 1)
         return self.history[near], _lagrange(self.times[near], time)
@@ -286,19 +292,19 @@ class Dense:
         return np.asarray(weights @ np.array([moment.unknowns for moment in moments]))
 
     def accumulated(self, time: float) -> FloatArray:
-        """Return what the nodes have accumulated at a time."""
+        """Return the values accumulated at the nodes at a time."""
         moments, weights = self.near(time)
         return np.asarray(weights @ np.array([moment.accumulated for moment in moments]))
 
     def number(self, time: float, numbers: FloatArray) -> float:
-        """Return a number known at all moments at a time."""
+        """Interpolate a number, given at all moments, to a time."""
         last = self.steps(time)
         near = slice(max(last - 3, 0), last + 1)
         return float(_lagrange(self.times[near], time) @ numbers[near])
 
 
 def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatArray:
-    """Integrate a rate over the steps with the formulas of the steps themselves, shape (steps + 1,)."""
+    """Return the integral of a rate at every moment, by the BDF formulas of the steps; shape (steps + 1,)."""
     total = np.zeros(len(history))
     for number in range(1, len(history)):
         order = min(number, 3)
@@ -309,7 +315,7 @@ def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatAr
 
 
 def _try_step(problem: Problem, newton: _Newton, history: Sequence[Moment], time: float) -> tuple[Moment | None, float]:
-    """Make one step of the highest order that the past allows; return None if Newton's method fails."""
+    """Make one step of the highest order for which there are past moments; return None if Newton's method fails."""
     past = list(history[-1:-4:-1])
     order = len(past)
     shares = _backward_shares(np.array([time, *(m.time for m in past)]))
@@ -329,7 +335,7 @@ def _try_step(problem: Problem, newton: _Newton, history: Sequence[Moment], time
 
 
 class _Newton:
-    """Newton's method with a Jacobian that is kept from step to step while it converges."""
+    """Newton's method with a Jacobian that is reused from step to step while the iteration converges."""
 
     def __init__(self, problem: Problem, tolerance: float) -> None:
         self.problem, self.enough = problem, problem.newton * tolerance
@@ -337,7 +343,7 @@ class _Newton:
         self.theta = np.nan
 
     def solve(self, guess: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray]) -> FloatArray | None:
-        """Solve one step from a guess; None if that fails."""
+        """Return the unknowns of one step, or None if the iteration fails."""
         ratio = theta / self.theta if self.theta else np.nan
         if self.factors is not None and 1.0 / SETTINGS.theta_ratio < ratio < SETTINGS.theta_ratio:
             found = self._iterate(guess, theta, known, fresh=False)
@@ -348,7 +354,7 @@ class _Newton:
     def _iterate(
         self, guess: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray], *, fresh: bool
     ) -> FloatArray | None:
-        """Iterate; with a fresh Jacobian it is renewed whenever convergence is slow, else slow is failure."""
+        """Iterate. If `fresh`, renew the Jacobian whenever convergence is slow; otherwise return None in this case."""
         unknowns, last, renew = guess.copy(), np.inf, fresh
         for _ in range(SETTINGS.most_iterations):
             residual = self.problem.residual(unknowns, theta, known(unknowns))
@@ -376,7 +382,7 @@ class _Newton:
     def _renew(
         self, unknowns: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray], residual: FloatArray
     ) -> None:
-        """Factorise the Jacobian; columns of the edge and what follows it are differences."""
+        """Factorise the Jacobian; the columns of the edge and of the unknowns after it are finite differences."""
         matrix = self.problem.jacobian(unknowns, theta)
         for column in range(self.problem.panels.nodes.size - 1, unknowns.size):
             moved = unknowns.copy()
@@ -388,7 +394,7 @@ class _Newton:
 
 @jit
 def _backward_shares(times: FloatArray) -> FloatArray:
-    """Return the weights of the derivative at times[0] of the polynomial through all the times."""
+    """Return the weights that give the derivative at times[0] of the polynomial through all times."""
     weights = np.zeros(times.size)
     for j in range(1, times.size):
         weights[j] = 1.0 / (times[j] - times[0])
@@ -401,7 +407,7 @@ def _backward_shares(times: FloatArray) -> FloatArray:
 
 @jit
 def _lagrange(times: FloatArray, time: float) -> FloatArray:
-    """Return the weights of the polynomial through the times at another time."""
+    """Return the weights that give the value at `time` of the polynomial through all times."""
     weights = np.ones(times.size)
     for j in range(times.size):
         for m in range(times.size):

@@ -1,7 +1,7 @@
 """Worn contacts by the exact evolution, with their errors: fretting at constant depth or force, and sliding.
 
-One front end for the three conditions. Each is solved three times, on ever coarser panels in ever longer steps, and the
-error is estimated from their distances.
+This is the front end for all three conditions. Each contact is solved three times, with coarser panels and longer steps
+each time, and the error is estimated from the differences.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from mdr_dask.physics.wear.rules import limit, limit_radius
 from mdr_dask.physics.wear.slip import FixedBorder, GrossSlip, PartialSlip, partial_slip
 from mdr_dask.physics.wear.worn import Scar, Worn, check_stick_radius, contact_pressure, virgin_load, worn_image
 
-#: Accuracy above which solutions are no coarser.
+#: Accuracies above this value are computed with this value.
 COARSEST = 1e-2
-#: At constant depth: how much wider steps are for accuracies, over which 1 - c, and the share of the second rougher
-#: solution; ``python -m benchmarks accuracy wear``.
+#: At constant depth: (accuracy, factor on the step tolerance); the width 1 - c of the slip annulus below which this
+#: factor tends to 1; and the weight of the second rougher solution. See ``python -m benchmarks accuracy wear``.
 WIDER, THIN, SECOND = ((1e-4, 1.0), (3e-4, 1.5), (1e-3, 4.0), (3e-3, 5.0), (1e-2, 3.0)), 0.1, 0.25
-#: At constant depth: panels are chosen for so many times the accuracy, where that is less than the second number.
+#: At constant depth, panels are chosen for 1.6 times the accuracy, but not for more than 5e-3 or the accuracy itself.
 COARSER, COARSER_UNTIL = 1.6, 5e-3
-#: In gross slip at constant depth: as `WIDER`; all of the error is that of the edge where panels are fine enough.
+#: As `WIDER`, for gross slip at constant depth; with fine enough panels only the error of the edge remains.
 SLID_WIDER = (1e-3, 1.0), (3e-3, 3.0), (1e-2, 1.0)
-#: In gross slip: radius at which the exponent of a body is read, and largest factor on the halvings for sharp bodies.
+#: In gross slip: radius at which the exponent of a body is evaluated; largest factor on the halvings for sharp bodies.
 NEAR_AXIS, SHARPEST = 1e-5, 8.0
 Solver = Callable[[Profile, float, Sequence[float], Resolution], dict[float, Worn]]
 
@@ -58,15 +58,16 @@ def exact(
     profile : Profile
         The virgin body, pressed to the depth 1.
     stick_radius : float
-        c of the virgin contact, between 0 and 1; 0 is gross slip in one direction, df/ds = p in all of the contact.
+            c of the virgin contact, between 0 and 1; 0 is gross slip in one direction, df/ds = p in the whole contact.
     amounts : sequence of float
         Cycles N >= 0 in units of N0, or sliding paths s = k E* l / (sigma0 a0); any order.
     accuracy : float
-        Error of f wanted, in eta d0, the scale of what can wear; below 1e-5 round-off accumulated over the steps grows.
+            Wanted error of f, relative to eta d0, the scale of the wear; below 1e-5, round-off accumulates over the
+            steps.
     constant_force : bool
         Keep the force of the virgin contact instead of its depth.
     errors : bool
-        Whether to estimate the errors, at about the same cost again.
+            Whether to estimate the errors; this takes about as long again.
 
     Returns
     -------
@@ -76,7 +77,7 @@ def exact(
     Raises
     ------
     ValueError
-        If the scar would leave the table of the profile.
+            If the scar would reach beyond the table of the profile.
     NotConvergedError
         If the evolution cannot be advanced.
 
@@ -109,7 +110,7 @@ def exact(
 def _evolved(
     solve: Callable[[Resolution], dict[float, Worn]], resolution: Resolution, least: float, *, errors: bool
 ) -> dict[float, Worn]:
-    """Return contacts with the rougher solutions from which their errors are estimated."""
+    """Return contacts together with the rougher solutions from which their errors are estimated."""
     found, *rougher = _solutions(solve, resolution, errors)
     return {
         amount: replace(
@@ -124,10 +125,11 @@ def _evolved(
 
 
 def limit_under_force(profile: Profile, stick_radius: float, accuracy: float = 1e-3, *, errors: bool = True) -> Worn:
-    """Return the shape that ends all wear under constant force.
+    """Return the limiting profile under constant force.
 
-    Once the image jumps at the border, the border no longer moves and the shape inside it is frozen, so that the end is
-    known. The evolution is needed up to the jump only. Parameters and errors are those of `exact`.
+    Once the image jumps at the stick border, the border no longer moves and the shape inside it stays as it is. The
+    limit then follows in closed form, so the evolution is computed only up to the jump. Parameters and errors as in
+    `exact`.
     """
     check_stick_radius(stick_radius)
     if not border_moves(stick_radius, accuracy):
@@ -143,7 +145,7 @@ def limit_under_force(profile: Profile, stick_radius: float, accuracy: float = 1
 def _solutions(
     solve: Callable[[Resolution], dict[float, Worn]], resolution: Resolution, errors: bool
 ) -> list[dict[float, Worn]]:
-    """Solve at a resolution, and twice rougher; one rougher solution is enough where the other cannot be found."""
+    """Return the solutions at a resolution and at two rougher ones; one rougher solution may fail."""
     found = [_first_of(solve, (resolution, resolution.finer(2.0), resolution.finer(4.0)))]
     reasons = []
     for rough in resolution.rougher() if errors else ():
@@ -158,7 +160,7 @@ def _solutions(
 
 
 def _first_of(solve: Callable[[Resolution], dict[float, Worn]], resolutions: Sequence[Resolution]) -> dict[float, Worn]:
-    """Solve at the first resolution at which the evolution can be advanced."""
+    """Return the solution at the first resolution for which the evolution does not fail."""
     for resolution in resolutions[:-1]:
         try:
             return solve(resolution)
@@ -168,7 +170,7 @@ def _first_of(solve: Callable[[Resolution], dict[float, Worn]], resolutions: Seq
 
 
 def _resolution(solve: Solver, stick_radius: float, accuracy: float) -> Resolution:
-    """Return the resolution that a solver needs for an accuracy."""
+    """Return the resolution with which a solver reaches an accuracy."""
     at_most = min(accuracy, COARSEST)
     if solve is forced_contacts:
         return forced_resolution(at_most)
@@ -178,14 +180,15 @@ def _resolution(solve: Solver, stick_radius: float, accuracy: float) -> Resoluti
 
 
 def _wider(accuracy: float, table: tuple[tuple[float, float], ...], power: float = 1.0) -> float:
-    """Return how much wider steps are at an accuracy, by a table in logarithms."""
+    """Return the factor on the step tolerance at an accuracy, interpolated in a table in logarithms."""
     return float(np.exp(power * np.interp(np.log(accuracy), *np.log(table).T)))
 
 
 def fretted_resolution(stick_radius: float, accuracy: float) -> Resolution:
-    """Return the resolution for an accuracy at constant depth: the error falls as the root of that of the steps.
+    """Return the resolution for an accuracy at constant depth: the error of f is the square root of the step error.
 
-    Steep bodies need more nodes a panel. A thin annulus of slip is worn off in few steps.
+    Steep bodies need more nodes per panel. A thin slip annulus is worn off in few steps, so they are not lengthened as
+    much.
     """
     order = 4 if accuracy > 2e-3 else 5 if accuracy > 5e-4 else 6
     wider = _wider(accuracy, WIDER, min((1.0 - stick_radius) / THIN, 1.0))
@@ -193,7 +196,7 @@ def fretted_resolution(stick_radius: float, accuracy: float) -> Resolution:
 
 
 def _fretted(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
-    """Solve fretting at constant depth once and describe every wanted time."""
+    """Return the contacts at all wanted times, from one solution of fretting at constant depth."""
     reach = limit_radius(profile, c)
     coarser = min(max(COARSER_UNTIL / resolution.accuracy, 1.0), COARSER)
     panels = resolution.panels(round(-2.0 * np.log2(c)), coarser=coarser)
@@ -206,9 +209,10 @@ def _fretted(profile: Profile, c: float, wanted: Sequence[float], resolution: Re
 def _fretted_contact(problem: PartialSlip, dense: Dense, time: float, energy: float) -> Worn:
     """Turn the nodal values at one time into a worn contact.
 
-    The worn depth is eta s0 (exp(accumulated) - 1), which is free of cancellation, or eta (s - s0) where it is large,
-    because late long steps accumulate a larger error than the slip has. Over the root of r^2 - c^2 it is smooth next to
-    c, before and after the image has jumped there.
+    The worn depth is eta s0 (exp(accumulated) - 1), a formula without cancellation. Where `accumulated` exceeds 1,
+    eta (s - s0) is used instead, because the long late steps accumulate a larger error than the slip has. The worn
+    depth over sqrt(r^2 - c^2) is interpolated: it is smooth next to c, both before and after the image has jumped
+    there.
     """
     profile, panels, c, eta = problem.profile, problem.panels, problem.inner_radius, problem.eta
     unknowns = dense.unknowns(time) if time > 0.0 else problem.start().unknowns
@@ -258,19 +262,19 @@ def _fretted_contact(problem: PartialSlip, dense: Dense, time: float, energy: fl
 
 
 def _edge_step(problem: FixedBorder, dense: Dense, time: float) -> float:
-    """Return how far the edge moved in the step that passed a time."""
+    """Return the distance by which the edge moved in the step that contains a time."""
     before, after = (problem.radii(moment.unknowns)[-1] for moment in dense.around(time))
     return float(abs(after - before))
 
 
 def _slid(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
-    """Solve gross slip at constant depth."""
+    """Return the contacts after all wanted sliding paths, at constant depth."""
     panels = resolution.panels(3, sharpness=_sharpness(profile))
     return _slid_contacts(GrossSlip(profile, panels), wanted, resolution.step, resolution.first)
 
 
 def _slid_under_force(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
-    """Solve gross slip at constant force: the pressure tends to a jump at the edge, with short panels there."""
+    """Return the contacts after all wanted paths at constant force; the pressure tends to a jump at the edge."""
     panels = resolution.panels_of_a_punch(_sharpness(profile))
     virgin = GrossSlip(profile, panels)
     problem = GrossSlip(profile, panels, virgin.normal_force(virgin.start().unknowns))
@@ -278,20 +282,20 @@ def _slid_under_force(profile: Profile, c: float, wanted: Sequence[float], resol
 
 
 def _sharpness(profile: Profile) -> float:
-    """Return how many times as many halvings the axis needs as under a parabola: f is a power n/2 of r^2 there."""
+    """Return the factor on the halvings at the axis, relative to a parabola: f is a power n/2 of r^2 at the axis."""
     near, far = profile.image(np.array([NEAR_AXIS, 2.0 * NEAR_AXIS]))
     return float(np.clip(2.0 / np.log2(far / near), 1.0, SHARPEST)) if near > 0.0 else 1.0
 
 
 def _slid_contacts(problem: GrossSlip, wanted: Sequence[float], step: float, first: float) -> dict[float, Worn]:
-    """March once and describe every wanted path."""
+    """Return the contacts after all wanted paths, from one march."""
     dense = Dense(march(problem, max(wanted), step, first))
     energy = integral_along(dense.history, [problem.wear_rate(moment.unknowns) for moment in dense.history])
     return {path: _slid_contact(problem, dense, path, dense.number(path, energy)) for path in wanted}
 
 
 def _slid_contact(problem: GrossSlip, dense: Dense, path: float, energy: float) -> Worn:
-    """Turn the nodal values after one path into a worn contact; its image is not known beyond the contact."""
+    """Turn the nodal values after one path into a worn contact; its image is NaN beyond the contact."""
     profile, panels = problem.profile, problem.panels
     unknowns, worn = problem.start().unknowns, np.zeros(panels.nodes.size)
     if path > 0.0:
@@ -312,7 +316,7 @@ def _slid_contact(problem: GrossSlip, dense: Dense, path: float, energy: float) 
         stick_border=0.0,
         depth=depth,
         normal_force=problem.normal_force(unknowns),
-        wear_volume=energy,  # int F ds exactly
+        wear_volume=energy,  # in gross slip V = int F ds exactly
         worn_depth=float(max(np.max(worn), depths(np.zeros(1))[0])),
         height=lambda r: np.asarray(profile.height(r) + depths(r)),
         image=lambda x: np.asarray(profile.image(np.abs(x)) + changes(np.abs(x))),

@@ -1,6 +1,6 @@
-"""The exact evolution under constant force: while the border moves, after it has stopped, and the end.
+"""The exact evolution under constant force: while the stick border moves, after it has stopped, and the limit.
 
-See `mdr_dask.physics.wear.forced_slip` for the equations; the force kept is that of the virgin contact.
+See `mdr_dask.physics.wear.forced_slip` for the equations. The constant force is the force of the virgin contact.
 """
 
 from __future__ import annotations
@@ -26,26 +26,29 @@ class Settings(NamedTuple):
     Parameters
     ----------
     jump : float
-        The border stops when y rises by this much in the panel next to it, or by a tenth of it if it would return.
+            The border stops when y exceeds this value in the panel next to it, or a tenth of it if the border moves
+            back.
     nearest : float
-        Stick radius below which the panels become no finer: the border soon leaves it.
+            Stick radius below which the panels are not refined further, because the border soon moves away.
     finer : int
-        How many more halvings the border needs than at constant depth.
+            Number of halvings at the border in addition to those at constant depth.
     latest_jump : float
-        N by which the image jumps at the border, with much to spare.
+            A number of cycles N much larger than the N at which the image jumps at the border.
     lowest : float
-        A step with y below minus this is rejected, and the border stops at the moment before.
+            A step with y below minus this value is rejected, and the border stops at the moment before.
     coarsest : float
-        Accuracy beyond which steps do not follow the border: more of them fail, so that less accuracy takes longer.
+            Larger accuracies are computed with this value: longer steps do not follow the border, fail, and take more
+            time.
     rougher : tuple of float
-        How much wider the accuracy of the two rougher solutions is.
+            Factors on the step tolerance of the two rougher solutions.
     thinned : int
-        Most nodes that their panels have less: the border of the worst must follow the accuracy too.
+            Largest reduction of the nodes of their panels: the border must be resolved even in the roughest solution.
     slowness : float
-        How much more slowly than usual the error falls from them.
+            Factor on the distances from the rougher solutions, because the error falls more slowly than usual.
     least_edge_error : float
-        Least error of the radii over accuracy and width of the virgin slip zone: next to full stick the border stops
-        at one place in all solutions.
+            Least error of the radii, relative to the accuracy times the width 1 - c of the virgin slip zone. Near full
+            stick the border stops at the same place in all three solutions, so their difference does not show the
+            error.
     """
 
     jump: float = 0.1
@@ -66,12 +69,12 @@ SETTINGS = Settings()
 def forced_contacts(
     profile: Profile, stick_radius: float, wanted: Sequence[float], resolution: Resolution
 ) -> dict[float, Worn]:
-    """Solve once and describe every wanted time."""
+    """Return the contacts at all wanted times, from one solution."""
     tabulated = bool(np.isfinite(profile.largest_radius))
     until = SETTINGS.latest_jump if tabulated else max(wanted)
     moving, first = _until_jump(profile, stick_radius, resolution, until)
     if tabulated:
-        _end(moving, first[-1])  # the table must hold it, however few cycles are wanted
+        _end(moving, first[-1])  # raises if the limit exceeds the table, even if only few cycles are wanted
     stopped, start = moving.stop(first[-1])
     second = march(stopped, max(wanted), resolution.step, _first(moving, resolution), start)
     early, late = Dense(first), Dense(second)
@@ -88,38 +91,38 @@ def forced_contacts(
 
 
 def forced_end(profile: Profile, stick_radius: float, resolution: Resolution) -> Worn:
-    """Return what a contact ends in under constant force.
+    """Return the limiting profile under constant force.
 
-    What sticks is frozen and carries the force alone: g = d beyond the border b, with d = (F/2 + int_0^b g dx) / b, and
-    the scar's radius from int_0^a (g - g0) / sqrt(a^2 - x^2) dx = 0.
+    The shape of the stick zone no longer changes, and this zone carries the whole force: g = d beyond the border b,
+    with d = (F/2 + int_0^b g dx) / b. The radius of the scar follows from int_0^a (g - g0) / sqrt(a^2 - x^2) dx = 0.
     """
     problem, moments = _until_jump(profile, stick_radius, resolution, SETTINGS.latest_jump)
     return _end(problem, moments[-1])
 
 
 def forced_resolution(accuracy: float) -> Resolution:
-    """Return the resolution for an accuracy under constant force: the border needs more panels than the edge."""
+    """Return the resolution for an accuracy under constant force."""
     finest = min(accuracy, SETTINGS.coarsest)
     order = 4 if finest > 2e-4 else 5 if finest > 3e-5 else 6
     return Resolution(finest, thinned=SETTINGS.thinned, order=order, rough=SETTINGS.rougher, slowness=SETTINGS.slowness)
 
 
 def border_moves(stick_radius: float, accuracy: float) -> bool:
-    """Return whether constant force differs from constant depth: next to full stick the border hardly moves.
+    """Return whether constant force differs from constant depth; near full stick the border hardly moves.
 
-    The depth grows by up to (1 - c) eta / 2, the square of the border by the same share of 1 - c^2, and f next to it by
-    the root of that share.
+    The depth grows by up to (1 - c) eta / 2, the squared border by the same fraction (1 - c) / 2 of 1 - c^2, and f next
+    to the border by the square root of this fraction.
     """
     return 0.5 * (1.0 - stick_radius) > accuracy**2
 
 
 def least_edge_error(stick_radius: float, accuracy: float) -> float:
-    """Return the least error of the radii under constant force."""
+    """Return the least error to be stated for the radii under constant force."""
     return SETTINGS.least_edge_error * min(accuracy, SETTINGS.coarsest) * (1.0 - stick_radius)
 
 
 def farthest_contact(profile: Profile, stick_radius: float) -> float:
-    """Return a radius that no contact under constant force exceeds: that of the end, had the border not moved."""
+    """Return an upper bound of the contact radius: the contact at the final depth if the border did not move."""
     if np.isfinite(profile.largest_radius):
         return profile.largest_radius
     abscissa, weight = gauss(64)
@@ -139,7 +142,7 @@ def _first(problem: ForcedSlip, resolution: Resolution) -> float:
 def _until_jump(
     profile: Profile, stick_radius: float, resolution: Resolution, end: float
 ) -> tuple[ForcedSlip, list[Pressed]]:
-    """March while the border moves, or to an end; return problem and moments."""
+    """March until the border stops or the time `end` is reached; return the problem and the moments."""
     near = round(-2.0 * np.log2(max(stick_radius, SETTINGS.nearest)))
     panels = resolution.panels(near + SETTINGS.finer, fewest_digits=3.0)
     problem = forced_slip(profile, stick_radius, panels, farthest_contact(profile, stick_radius), resolution.newton)
@@ -160,13 +163,13 @@ def _until_jump(
 
 
 class _Frozen(NamedTuple):
-    """The image that the border left behind, as pairs of radius and depth over d0."""
+    """The image in the annulus that the border has passed, as pairs of radius and depth over d0."""
 
     reached: FloatArray
     depths: FloatArray
 
     def slope(self, x: FloatArray) -> FloatArray:
-        """Return its slope."""
+        """Return the slope of this image."""
         if self.reached.size == 1:
             return np.zeros_like(x)
         slopes = np.diff(self.depths) / np.diff(self.reached)
@@ -180,10 +183,10 @@ def _frozen(problem: ForcedSlip, path: FloatArray) -> _Frozen:
 
 
 def _end(problem: ForcedSlip, moment: Pressed) -> Worn:
-    """Return the end of a contact whose border no longer moves after a moment."""
+    """Return the limiting profile if the border stops at a moment."""
     profile, c, eta = problem.profile, problem.virgin.inner_radius, problem.eta
     border, frozen = problem.radius(moment.border), _frozen(problem, moment.path)
-    # the load of the virgin slip zone is carried by what sticks: b d = ... - int_c^b (d' - eta) db'
+    # the stick zone takes over the load of the virgin slip zone: b d = ... - int_c^b (d' - eta) db'
     annulus = float(np.trapezoid((frozen.depths - 1.0) / eta - 1.0, frozen.reached))
     depth = 1.0 + eta * (problem.virgin_load + annulus) / border
 
@@ -276,7 +279,7 @@ def _edge(problem: ForcedSlip, moment: Pressed) -> float:
 
 
 def _breaks(c: float, border: float) -> tuple[float, ...]:
-    """Return places that crowd towards the border, where the frozen image becomes steep."""
+    """Return integration limits that are dense below the border, where the frozen image becomes steep."""
     if not border > c * (1.0 + 1e-12):
         return ()
     return (*(border - (border - c) * 0.25**k for k in range(1, 8)), border)

@@ -2,11 +2,12 @@
 
 The depth d grows, and the stick border b moves outwards until the image jumps there; then it no longer moves. Inside
 the border the image is frozen: g(b) = d - eta at the time when the border passed. The slip is s = (f - f_star) / eta.
-The plateau f_star behind the border changes as df_star = (2/pi) arccos(b / r) dd only, so that only the path (b, d)
-has to be kept of the annulus between the first border c and the present one.
+In the annulus between the first border c and the present one, the plateau f_star changes only by
+df_star = (2/pi) arccos(b / r) dd. So only the path (b, d) has to be stored for this annulus.
 
-Every radius accumulates its worn depth over eta. Squared radii are counted from c^2 in units of the virgin 1 - c^2, and
-the depth from 1 in units of eta: all unknowns are of the order of one, next to full stick too.
+The accumulated quantity is the worn depth over eta. Squared radii are counted from c^2 in units of 1 - c^2, the width
+of the virgin slip zone, and the depth is counted from 1 in units of eta. So all unknowns are of the order of one, even
+near full stick.
 """
 
 from __future__ import annotations
@@ -27,15 +28,15 @@ from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear.evolution import Moment, settled
 from mdr_dask.physics.wear.slip import LogTable, PartialSlip, log_slip, partial_slip
 
-#: How much more closely steps follow the border than the depth: f rises beyond it as a root.
+#: Weight of the border relative to the depth in the step error: f rises like a square root beyond the border.
 BORDER_WEIGHT = 30.0
-#: How far beyond the edge, over the width, the rise of the plateau is kept.
+#: How far the rise of the plateau is stored, over the width of the slip zone; 1 is the edge.
 BEYOND = 1.25
 
 
-#: Floor of (r^2 - c^2) / (1 - c^2).
+#: Lower limit of (r^2 - c^2) / (1 - c^2), to take its logarithm.
 SMALLEST = 1e-30
-#: Half the spread of the roots along a piece, over their mean, below which its middle represents it.
+#: If half the difference of the roots at both ends of a piece, over their mean, is less, a series is used.
 SHORT = 0.02
 _ABSCISSA, _WEIGHT = gauss(3)
 
@@ -49,7 +50,7 @@ class VirginBody(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Border b and width of the slip zone in squared radii, and depth over eta, from 1."""
+    """Border b and width of the slip zone in squared radii, and the depth minus 1 over eta."""
 
     border: float
     width: float
@@ -57,18 +58,19 @@ class Place(NamedTuple):
 
 
 class Past(NamedTuple):
-    """What past moments had worn, in the shares of one step.
+    """Past moments, with their weights in the formula of one step.
 
     Parameters
     ----------
     shares, borders, widths : array, shape (m,)
-        One for each moment.
+            One entry for each moment: its weight, border and width.
     worn : array, shape (m, n)
-        The worn depth over eta at the nodes; less `frozen` and over the root of z if the border no longer moves.
+            Worn depth over eta at the nodes; if the border no longer moves, minus `frozen` and divided by the root of
+            z.
     frozen : float
         The worn depth at the border if it no longer moves, else NaN.
     moved : array, shape (n + order,)
-        `plateau_rise` along the path at the places of the last moment, and beyond.
+            `plateau_rise` along the path, at the nodes of the last moment and in one panel beyond the edge.
     path : array, shape (2, k)
         Border and depth up to where the border moved last.
     carried : float
@@ -92,11 +94,12 @@ class Pressed(Moment):
     Parameters
     ----------
     path : array, shape (2, k)
-        All pairs of border and depth up to this moment, joined by straight lines; the last is that of the moment.
+            All pairs of border and depth up to and including this moment, joined by straight lines.
     moved : array, shape (n + order,)
-        `plateau_rise` of the part of the path on which the border moved, at the nodes and in one panel beyond the edge.
+            `plateau_rise` along the part of the path on which the border moved, at the nodes and in one panel beyond
+            the edge.
     carried : float
-        int (1 - d) db along the path, d over eta from 1.
+            int (1 - d) db along the path, with d counted from 1 and in units of eta.
     """
 
     path: FloatArray
@@ -113,10 +116,10 @@ class Pressed(Moment):
 class ForcedSlip:
     """Slip outside the stick border under constant force.
 
-    Unknowns: y = 1 - (d - g) / eta at the nodes but the last, the width of the panels, the depth, and the border unless
-    `border` is given, because it no longer moves; `since` is then the number of the pair of the path since which, and
-    `frozen` the worn depth at it; `newton` is the error of a step's equations over that of the step. Loads are half
-    forces over eta; `virgin_load` is that of the virgin slip zone.
+    The unknowns are y = 1 - (d - g) / eta at all nodes but the last, the width of the panels, the depth, and the border
+    if it moves. If it no longer moves, it is given as `border`; `since` is then the index of the pair in the path at
+    which it stopped, and `frozen` the worn depth there. `newton` is the tolerance of Newton's method as a fraction of
+    the step tolerance. Loads are half forces over eta; `virgin_load` is the load of the virgin slip zone.
     """
 
     virgin: PartialSlip
@@ -138,7 +141,7 @@ class ForcedSlip:
 
     @property
     def eta(self) -> float:
-        """The share of the first depth that the amplitude makes slip."""
+        """The quantity G* U0 / (mu E* d0), with the amplitude U0 and the first depth d0."""
         return self.virgin.eta
 
     @cached_property
@@ -153,7 +156,7 @@ class ForcedSlip:
 
     @cached_property
     def mesh(self) -> Mesh:
-        """The panels, and one beyond the edge."""
+        """The panels, and one more beyond the edge."""
         return self.panels.mesh.extended(BEYOND)
 
     def image(self, unknowns: FloatArray) -> FloatArray:
@@ -168,12 +171,12 @@ class ForcedSlip:
         return Place(border, float(unknowns[self.size - 1]), float(unknowns[self.size]))
 
     def holds(self, unknowns: FloatArray) -> bool:
-        """Return whether unknowns describe a contact."""
+        """Return whether the unknowns describe a possible contact."""
         place = self.place(unknowns)
         return place.width > 0.0 and self.body.width * place.border > -0.5 * self.body.square
 
     def radius(self, place: float) -> float:
-        """Return the radius at a squared radius counted from c^2."""
+        """Return the radius for a squared radius that is counted from c^2."""
         return float(np.sqrt(self.body.square + self.body.width * place))
 
     def start(self) -> Pressed:
@@ -182,19 +185,19 @@ class ForcedSlip:
         return Pressed(0.0, np.append(first.unknowns, 0.0), first.accumulated, np.zeros((2, 1)), np.zeros(nodes), 0.0)
 
     def move(self, moment: Pressed) -> tuple[ForcedSlip, Pressed]:
-        """Return the problem, and its first moment, in which the border moves."""
+        """Return the problem in which the border moves, and its first moment."""
         return replace(self, border=None, frozen=np.nan), replace(
             moment, unknowns=np.append(moment.unknowns, moment.border)
         )
 
     def stop(self, moment: Pressed) -> tuple[ForcedSlip, Pressed]:
-        """Return the problem, and its first moment, in which the border stays where it is."""
+        """Return the problem in which the border no longer moves, and its first moment."""
         frozen = float(self.frozen_depth(moment.path, np.array([moment.border]))[0])
         still = replace(self, border=moment.border, since=moment.path.shape[1] - 1, frozen=frozen)
         return still, replace(moment, unknowns=moment.unknowns[:-1])
 
     def memory(self, past: Sequence[Pressed], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """Return, as a function of the unknowns, what is known of s, of the worn depth, and of the load that sticks."""
+        """Return a function of the unknowns: past contributions to s and to the worn depth, and sticking load."""
         places = [self.place(moment.unknowns) for moment in past]
         worn = np.array([moment.accumulated for moment in past])
         earlier = Past(
@@ -216,23 +219,23 @@ class ForcedSlip:
         return known
 
     def plateau_rise(self, path: FloatArray, place: FloatArray) -> FloatArray:
-        """Return (2/pi) int arccos(b / r) dd along a path, at places beyond it."""
+        """Return (2/pi) int arccos(b / r) dd along a path, at positions beyond the path."""
         result = np.empty_like(place)
         plateau_rise(self.body, np.ascontiguousarray(path), place, result)
         return result
 
     def frozen_depth(self, path: FloatArray, place: FloatArray) -> FloatArray:
-        """Return the worn depth over eta that the border left at places it passed."""
+        """Return the worn depth over eta at positions that the border has passed."""
         result = np.empty_like(place)
         frozen_depth(self.body, np.stack(rising(path)), place, result)
         return result
 
     def _last_move(self, path: FloatArray) -> int:
-        """Return the number of the last pair of the path on which the border moved."""
+        """Return the index of the last pair of the path for which the border moved."""
         return path.shape[1] - 1 if self.border is None else self.since
 
     def worn_depth(self, moment: Pressed, q: FloatArray) -> FloatArray:
-        """Return the worn depth of a moment over eta, between its border and its edge, 0 beyond."""
+        """Return the worn depth over eta between border and edge at a moment, 0 beyond the edge."""
         place = self.place(moment.unknowns)
         z = (q - place.border) / place.width
         if self.border is None:
@@ -246,7 +249,7 @@ class ForcedSlip:
         return np.asarray(self.panels.inner @ (self.image(unknowns) * self._factor(self.place(unknowns))))
 
     def rate(self, unknowns: FloatArray) -> FloatArray:
-        """Return p / eta at the nodes; none is worn at the edge."""
+        """Return p / eta at the nodes; zero at the edge, where nothing wears."""
         result = self.panels.outer @ self.image(unknowns) / np.sqrt(self.body.width * self.place(unknowns).width)
         result[-1] = 0.0
         return np.asarray(result)
@@ -258,7 +261,7 @@ class ForcedSlip:
 
     @cached_property
     def at_border(self) -> FloatArray:
-        """The weights that continue the first panel to the border."""
+        """The weights that extrapolate from the nodes of the first panel to the border."""
         mesh = self.panels.mesh
         weights = mesh.barycentric[0, -mesh.order :] / mesh.nodes[: mesh.order]
         shares = np.zeros(mesh.nodes.size)
@@ -266,7 +269,9 @@ class ForcedSlip:
         return shares
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return s - known - theta (p / eta) s at the nodes; then continuity at the edge, force, and y = 0 at b."""
+        """Return s - known - theta (p / eta) s at the nodes (continuity at the edge); then force, and y = 0 at b if it
+        moves.
+        """
         size, y, place = self.size, self.image(unknowns), self.place(unknowns)
         root, factor = math.sqrt(self.body.width * place.width), self._factor(place)
         slip, rate = self.panels.inner @ (y * factor), self.panels.outer @ y
@@ -279,7 +284,7 @@ class ForcedSlip:
         return rows
 
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
-        """Return the derivatives by y."""
+        """Return the derivatives of the residual with respect to y."""
         place = self.place(unknowns)
         size, root, factor = self.size, np.sqrt(self.body.width * place.width), self._factor(place)
         slip, rate = self.slip(unknowns), self.rate(unknowns)
@@ -293,18 +298,18 @@ class ForcedSlip:
         return result
 
     def sticking_load(self, before: Pressed, place: Place) -> float:
-        """Return int_0^b (d - g) dx - int_0^c (1 - g) dx over eta, on what sticks, from a moment on."""
+        """Return int_0^b (d - g) dx - int_0^c (1 - g) dx over eta, for a border and depth reached after `before`."""
         border, depth = before.path[:, -1]
         return float(sticking_load(self.body, border, depth, before.carried, place))
 
     def slipping_load(self, unknowns: FloatArray) -> float:
-        """Return int_b^a (d - g) dx over eta, on the slip zone."""
+        """Return int_b^a (d - g) dx over eta, the load of the slip zone."""
         place = self.place(unknowns)
         share = (1.0 - self.image(unknowns)) * self._factor(place)
         return float(0.5 * np.sqrt(self.body.width * place.width) * self.panels.weights @ share)
 
     def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return s at the nodes, the depth, and the border: what the error of a step is judged by."""
+        """Return the quantities with a controlled step error: s at the nodes, depth, and border if it moves."""
         weight = BORDER_WEIGHT * (1.0 - self.virgin.inner_radius) / self.eta
         tail = unknowns[self.size :] * ([1.0, weight] if self.border is None else 1.0)
         return np.append(self.slip(unknowns), tail)
@@ -312,7 +317,7 @@ class ForcedSlip:
     def moment(
         self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Pressed]
     ) -> Pressed:
-        """Return the moment that a solved step ends in; its worn depth is what came before and what the step wore."""
+        """Return the moment at the end of a solved step; its worn depth is the past one plus the wear in the step."""
         size, place, before = self.size, self.place(unknowns), past[0]
         worn = known[size : 2 * size] + theta * self.rate(unknowns) * self.slip(unknowns)
         path = onward(before.path, place)
@@ -322,7 +327,7 @@ class ForcedSlip:
         return Pressed(time, unknowns, worn, path, moved, carried)
 
     def wear_rate(self, unknowns: FloatArray) -> float:
-        """Return dV/dN = 2 int_b^a (d - g) y dx, the dissipation of a cycle over mu."""
+        """Return dV/dN = 2 int_b^a (d - g) y dx, the energy dissipated per cycle over mu."""
         y, place = self.image(unknowns), self.place(unknowns)
         root = np.sqrt(self.body.width * place.width)
         return float(self.eta * root * self.panels.weights @ (y * (1.0 - y) * self._factor(place)))
@@ -331,7 +336,7 @@ class ForcedSlip:
 def forced_slip(
     profile: Profile, stick_radius: float, panels: Panels, reach: float, newton: float = 1e-5
 ) -> ForcedSlip:
-    """Prepare partial slip under the force of the virgin contact."""
+    """Prepare partial slip under the constant force of the virgin contact."""
     virgin = partial_slip(profile, stick_radius, panels, reach)
     y, factor = virgin.image(settled(virgin).unknowns)
     load = 0.5 * np.sqrt(virgin.virgin_width) * panels.weights @ ((1.0 - y) * factor)
@@ -339,26 +344,26 @@ def forced_slip(
 
 
 def rising(path: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the places that the border passed, and the depths at which it left them."""
+    """Return the positions that the border reached for the first time, and the depths at these moments."""
     furthest = np.maximum.accumulate(path[0])
     new = np.append(True, np.diff(furthest) > 0.0)
     return furthest[new], path[1, new]
 
 
 def onward(path: FloatArray, place: Place) -> FloatArray:
-    """Return a path with one more pair."""
+    """Return the path with one more pair."""
     return np.append(path, [[place.border], [place.depth]], axis=1)
 
 
 @jit
 def fill_known(mesh: Mesh, body: VirginBody, past: Past, place: Place, result: FloatArray) -> None:
-    """Put what is known of s and of the worn depth at the nodes, and the load that sticks."""
+    """Write the past contributions to s and to the worn depth at the nodes, and the sticking load, to `result`."""
     nodes, path, stopped = result.size // 2, past.path, past.frozen == past.frozen
     last = path.shape[1] - 1
     for i in range(nodes):
         q = place.border + place.width * mesh.nodes[i]
         worn = 0.0
-        for k in range(past.shares.size if i < nodes - 1 else 0):  # nothing is worn at the edge
+        for k in range(past.shares.size if i < nodes - 1 else 0):  # the worn depth at the edge is zero
             z = (q - past.borders[k]) / past.widths[k]
             if z < 1.0:
                 value = value_at(mesh, past.worn[k], z)
@@ -375,7 +380,7 @@ def fill_known(mesh: Mesh, body: VirginBody, past: Past, place: Place, result: F
 
 @jit_inline
 def sticking_load(body: VirginBody, border: float, depth: float, carried: float, place: Place) -> float:
-    """Return int_0^b (d - g) dx - int_0^c (1 - g) dx over eta, on what sticks."""
+    """Return int_0^b (d - g) dx - int_0^c (1 - g) dx over eta, the additional load of the stick zone."""
     radius = math.sqrt(body.square + body.width * border)
     further = body.width * (place.border - border) / (radius + math.sqrt(body.square + body.width * place.border))
     return radius * place.depth + carried + further * (0.5 * (place.depth - depth) + 1.0)
@@ -383,14 +388,14 @@ def sticking_load(body: VirginBody, border: float, depth: float, carried: float,
 
 @jit
 def plateau_rise(body: VirginBody, path: FloatArray, place: FloatArray, result: FloatArray) -> None:
-    """Put (2/pi) int arccos(b / r) dd along a path of straight pieces, at places beyond it."""
+    """Write (2/pi) int arccos(b / r) dd along a path of straight pieces, at positions beyond the path, to `result`."""
     for i in range(place.size):
         result[i] = _rise(body, path, path.shape[1] - 1, place[i])
 
 
 @jit
 def frozen_depth(body: VirginBody, path: FloatArray, place: FloatArray, result: FloatArray) -> None:
-    """Put the worn depth over eta that the border left at places it passed, on a path on which it never returned."""
+    """Write the worn depth over eta at positions that the border has passed, on a path without moves back."""
     for i in range(place.size):
         q = place[i]
         if q <= 0.0:
@@ -407,7 +412,7 @@ def frozen_depth(body: VirginBody, path: FloatArray, place: FloatArray, result: 
 
 @jit
 def _rise(body: VirginBody, path: FloatArray, last: int, q: float) -> float:
-    """Return the rise of the plateau along the first pieces of a path."""
+    """Return the rise of the plateau along the path up to the pair `last`."""
     square, total = body.square + body.width * q, 0.0
     first = _root(q, path[0, 0])
     for k in range(1, last + 1):
@@ -424,7 +429,7 @@ def _root(q: float, border: float) -> float:
 
 @jit_inline
 def _mean_angle(square: float, width: float, first: float, last: float) -> float:
-    """Return the mean of arccos(b / r) along a straight piece, in the root of r^2 - b^2, in which it is smooth."""
+    """Return the mean of arccos(b / r) along a straight piece, integrated over the smooth variable sqrt(r^2 - b^2)."""
     scale = math.sqrt(width / square)
     whole = first + last
     spread = (first - last) / whole if whole > 0.0 else 0.0

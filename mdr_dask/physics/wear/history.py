@@ -1,8 +1,9 @@
-"""Wear under histories of amplitude, depth and force: every block is a new partial-slip or gross-slip problem.
+"""Wear under histories of amplitude, depth and force; every block is a new problem of partial or gross slip.
 
-The cycle is reduced exactly, df/dN = p(r) s(r) with the half-integral s of 1 - (d - g)/eta where that is positive, on
-a uniform grid that can hold the borders which earlier blocks left behind. At constant force the depth grows, and with
-it the stick radius; beyond the amplitude of gross slip s is positive everywhere; an infinite amplitude is sliding.
+The wear in one cycle is exactly df/dN = p(r) s(r), where s is the half-integral of the positive part of
+1 - (d - g) / eta. The grid is uniform, because earlier blocks leave stick borders at different radii. At constant force
+the depth grows, and the stick radius with it. For amplitudes of gross slip s is positive everywhere; an infinite
+amplitude means sliding.
 """
 
 from __future__ import annotations
@@ -20,16 +21,16 @@ from mdr_dask.physics.wear.worn import Worn
 
 
 class Settings(NamedTuple):
-    """Tuned numbers of histories; `tests/physics/wear/test_errors.py` judges those of the errors.
+    """Tuned numbers of histories; `tests/physics/wear/test_errors.py` checks the stated errors.
 
     Parameters
     ----------
     step_share : float
-        Share of the largest stable explicit step, 1.7 h.
+            Time step as a fraction of the largest stable explicit step, 1.7 h, with the grid spacing h.
     slowness : float
-        How much more slowly the error falls on grids of half as many cells than with the accuracy of the evolution.
+            Factor on the distances from the solutions on coarser grids, because the error falls more slowly than usual.
     least_edge_error : float
-        Least error of the radii, in cells: between nodes their place is hardly known, and grids agree by chance.
+            Least error of the radii, in cells: borders between nodes are uncertain, and grids may agree by chance.
     """
 
     step_share: float = 0.45
@@ -49,9 +50,10 @@ class LoadBlock:
     cycles : float
         N in units of N0 of this block's own amplitude: the sliding path 4 U0 n k E* / (sigma0 a0).
     slip_share : float
-        eta = G* U0 / (mu E* d0) > 0 with the first depth d0; above the depth it is gross slip, infinite is sliding.
+            eta = G* U0 / (mu E* d0) > 0 with the first depth d0; gross slip if it exceeds the depth, infinite for
+            sliding.
     depth, force : float, optional
-        What is kept, in d0 or E* d0 a0: exactly one of them.
+            The quantity that is constant during the block, in units of d0 or E* d0 a0; give exactly one of them.
     """
 
     cycles: float
@@ -80,18 +82,18 @@ def history(
     profile : Profile
         The virgin body; its first contact under depth 1 has radius 1.
     blocks : sequence of LoadBlock
-        One after the other.
+            The blocks in their order in time.
     cells : int
-        Cells of the grid; the error falls about linearly with their width, and as its root once the image has jumped.
+            Cells of the grid; the error is about proportional to their width, or to its root once the image has jumped.
     reach : float
         Radius that the grid covers.
     errors : bool
-        Whether to estimate the errors, on grids of a half and a quarter as many cells.
+            Whether to estimate the errors by further solutions on grids of half and a quarter as many cells.
 
     Returns
     -------
     list of Worn
-        One for the end of every block.
+            The contact at the end of every block.
 
     Raises
     ------
@@ -132,7 +134,7 @@ def _run(profile: Profile, blocks: Sequence[LoadBlock], grid: UniformGrid) -> li
 
 
 def _advance(grid: UniformGrid, image_0: FloatArray, worn: FloatArray, block: LoadBlock) -> tuple[FloatArray, float]:
-    """Step through a block by Heun's rule; return the worn depth and the energy over mu."""
+    """Step through a block with Heun's method; return the worn depth and the dissipated energy over mu."""
     done, energy = 0.0, 0.0
     while done < block.cycles:
         step = min(SETTINGS.step_share * 1.7 * grid.spacing, block.cycles - done)
@@ -161,7 +163,7 @@ def _state(grid: UniformGrid, image: FloatArray, block: LoadBlock) -> _State:
 def _record(
     grid: UniformGrid, profile: Profile, worn: FloatArray, state: _State, block: LoadBlock, energy: float
 ) -> Worn:
-    """Turn the state at the end of a block into a worn contact; image and pressure are not known beyond the grid."""
+    """Turn the state at the end of a block into a worn contact; beyond the grid, image is NaN and pressure zero."""
     stuck = np.flatnonzero(state.depth - state.image < block.slip_share)
     k = int(stuck[0]) if stuck.size else 0
     border = 0.0

@@ -1,8 +1,9 @@
-"""The fast rule of the thesis at constant depth and the limiting shape in which it ends, compiled, for any body.
+"""The fast rule of the thesis at constant depth, and the limiting profile in which it ends, compiled, for any body.
 
-The fast rule (thesis eq. 6.11) in closed form: inside the first contact y = (g - g_c) / eta follows a logistic law,
-outside it g - 1 decays, both with the exponent xi N / a(c). All it needs is how much is left, exp(-xi N / a(c));
-the limit (thesis eqs. 6.8-6.10) has nothing left. The profile is cut where it would fall below the virgin one.
+The fast rule (thesis eq. 6.11) has a closed form. Inside the first contact y = (g - g_c) / eta follows a logistic law;
+outside it g - 1 decays; the exponent of both is xi N / a(c). The rule needs only the remaining fraction
+exp(-xi N / a(c)), which is zero in the limit (thesis eqs. 6.8-6.10). Where the rule would give a profile below the
+virgin one, the virgin profile is used.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from mdr_dask.physics.wear.worn import (
     worn_image,
 )
 
-#: Factor of the fast rule: the thesis's fit by eye. The best one lies between 0.9 and 1 (see docs/wear.md).
+#: Factor of the fast rule, fitted by eye in the thesis. The best factor lies between 0.9 and 1 (see docs/wear.md).
 THESIS_XI = 0.8
 
 
@@ -38,13 +39,15 @@ class Settings(NamedTuple):
     nodes : int
         Gauss nodes in each of four pieces.
     layer_growth : float
-        Widths of the pieces next to the stick border, where the rule builds a layer as thin as what is left.
+            Ratio of the widths of successive pieces at the stick border; the first is as wide as the layer left by the
+            rule.
     least : float
-        Floor of what is left by the fast rule: the layer must not become thinner than numbers are.
+            Smallest remaining fraction, so that the layer at the stick border does not become thinner than round-off.
     scar, end : float
-        Error of the integral that is zero at the scar's radius, over eta, and in the end of all wear.
+            Tolerance of the integral that vanishes at the radius of the scar, over eta: in the fast rule, and in the
+            limit.
     error : float
-        Error of every output over its largest value: that of the rule's own equation, no more.
+            Numerical error of every output over its largest value; it excludes the approximation of the fast rule.
     """
 
     nodes: int = 16
@@ -60,7 +63,7 @@ _NO_TABLE = PowerProfile(1.0).pieces()
 
 
 class Rule(NamedTuple):
-    """One body under the rule: its image, c, g0(c), eta and what is left."""
+    """One body under the rule: its image, c, g0(c), eta, and the remaining fraction."""
 
     image: Image
     c: float
@@ -70,7 +73,7 @@ class Rule(NamedTuple):
 
 
 class Quadrature(NamedTuple):
-    """Gauss nodes on [0, 1], and the ends of the pieces that they are used in: c, three near it, and 1."""
+    """Gauss nodes on [0, 1], and the ends of the pieces of integration: c, three radii next to it, and 1."""
 
     abscissa: FloatArray
     weight: FloatArray
@@ -78,7 +81,7 @@ class Quadrature(NamedTuple):
 
 
 class Bracket(NamedTuple):
-    """Two ends between which a falling function has a root, its values there, and the newer end, -1 or 1."""
+    """Interval with a root of a falling function: ends, values, and the newer end (-1 low, 1 high)."""
 
     low: float
     low_value: float
@@ -93,7 +96,7 @@ def limit_radius(profile: Profile, stick_radius: float) -> float:
     Raises
     ------
     ValueError
-        Without partial slip, or if the scar would reach beyond the table of the profile.
+            If c is not between 0 and 1, or if the scar would reach beyond the table of the profile.
     """
     check_stick_radius(stick_radius)
     radius = float(_limit_radius(_rule(profile, stick_radius, 0.0), profile.largest_radius, _quadrature()))
@@ -106,7 +109,7 @@ def limit_radius(profile: Profile, stick_radius: float) -> float:
 
 
 def limit(profile: Profile, stick_radius: float) -> Worn:
-    """Return the shape that ends all wear at constant depth: g = g0 up to c, then 1.
+    """Return the limiting profile at constant depth: g = g0 up to c, and 1 beyond.
 
     Examples
     --------
@@ -139,7 +142,7 @@ def fast(profile: Profile, stick_radius: float, cycles: float, xi: float = THESI
 
 
 def limit_cases(exponent: ArrayLike, stick_radius: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return contact radius, volume and normal force of limiting shapes of power laws.
+    """Return contact radius, volume and normal force of the limiting profiles of power-law bodies.
 
     Parameters
     ----------
@@ -161,7 +164,7 @@ def limit_cases(exponent: ArrayLike, stick_radius: ArrayLike) -> tuple[FloatArra
 def fast_cases(
     exponent: ArrayLike, stick_radius: ArrayLike, cycles: ArrayLike, xi: ArrayLike, limit_radius: ArrayLike
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return scar radius, volume and normal force of power laws by the fast rule.
+    """Return scar radius, volume and normal force of power-law bodies by the fast rule.
 
     Parameters
     ----------
@@ -171,7 +174,7 @@ def fast_cases(
     Returns
     -------
     contact_radius, wear_volume, normal_force : array
-        As :func:`fast` has them.
+            The same as in the result of :func:`fast`.
     """
     parts = np.broadcast_arrays(exponent, stick_radius, cycles, xi, limit_radius)
     cases = np.array([np.array(part, dtype=float).ravel() for part in parts])
@@ -191,7 +194,7 @@ def _rule(profile: Profile, c: float, rest: float) -> Rule:
 
 
 def _worn(profile: Profile, rule: Rule, radius: float, edge: float) -> Worn:
-    """Turn the rule into a worn contact whose load ends at an edge."""
+    """Turn the rule into a worn contact that carries load up to the radius `edge`."""
     quadrature = _quadrature()
     radius, volume, force = _numbers(rule, radius, quadrature)
     c, eta, rest = rule.c, rule.eta, rule.rest
@@ -232,14 +235,14 @@ def _worn(profile: Profile, rule: Rule, radius: float, edge: float) -> Worn:
 
 @jit_inline
 def _between(bracket: Bracket) -> float:
-    """Return the root of the straight line through both ends."""
+    """Return the root of the straight line through both values."""
     low, low_value, high, high_value, _ = bracket
     return (low * high_value - high * low_value) / (high_value - low_value)
 
 
 @jit_inline
 def _narrowed(bracket: Bracket, x: float, value: float) -> Bracket:
-    """Return the bracket with one more value, by the rule of Anderson and Björck: the end that stays loses weight."""
+    """Return the bracket narrowed by one value, by the rule of Anderson and Björck."""
     low, low_value, high, high_value, newer = bracket
     before = low_value if value > 0.0 else high_value
     share = 1.0 - value / before
@@ -270,7 +273,7 @@ def _changes(rule: Rule, places: FloatArray, result: FloatArray) -> None:
 
 @jit
 def _put_cuts(rule: Rule, cuts: FloatArray) -> None:
-    """Put the ends of the pieces: a layer as thin as what is left, two wider ones, and the first contact."""
+    """Write the ends of the pieces to `cuts`: c, the width of the layer beyond it, two wider ones, and 1."""
     low, high, level = 0.0, 1.0 - rule.c, rule.eta * rule.rest / (1.0 + rule.rest)
     if rule.rest == 0.0:
         high = 0.0
@@ -291,7 +294,7 @@ def _put_cuts(rule: Rule, cuts: FloatArray) -> None:
 
 @jit
 def _scar_integral(rule: Rule, radius: float, moment: int, quadrature: Quadrature) -> float:
-    """Return int_c^R (g - g0) (R^2 - x^2)^(moment - 1/2) dx in pieces between the cuts."""
+    """Return int_c^R (g - g0) (R^2 - x^2)^(moment - 1/2) dx, piece by piece between the cuts."""
     abscissa, weight, cuts = quadrature
     total, end = 0.0, _angle(cuts[0], radius)
     for piece in range(cuts.size):
@@ -321,14 +324,14 @@ def _angle(x: float, radius: float) -> float:
 
 @jit
 def _heights(rule: Rule, radii: FloatArray, quadrature: Quadrature, result: FloatArray) -> None:
-    """Put f - f0 at radii beyond c."""
+    """Write f - f0 at radii beyond c to `result`."""
     for k in range(radii.size):
         result[k] = 2.0 / math.pi * _scar_integral(rule, radii[k], 0, quadrature)
 
 
 @jit
 def _scar_radius(rule: Rule, bracket: Bracket, quadrature: Quadrature) -> float:
-    """Return the root of the scar's integral in a bracket, or its higher end if there is none."""
+    """Return the root of the scar's integral in a bracket, or the upper end if there is no root."""
     if not bracket.high_value < 0.0 < bracket.low_value:
         return bracket.high
     error = SETTINGS.end if rule.rest == 0.0 else SETTINGS.scar
@@ -344,7 +347,7 @@ def _scar_radius(rule: Rule, bracket: Bracket, quadrature: Quadrature) -> float:
 
 @jit
 def _limit_radius(rule: Rule, largest: float, quadrature: Quadrature) -> float:
-    """Return a(c) of a rule with nothing left, NaN if it lies beyond the largest radius."""
+    """Return a(c), for a rule with the remaining fraction zero; NaN if it lies beyond the largest radius."""
     _put_cuts(rule, quadrature.cuts)
     low, high = 1.0, min(1.5, largest)
     low_value, high_value = _scar_integral(rule, low, 0, quadrature), _scar_integral(rule, high, 0, quadrature)
@@ -358,7 +361,7 @@ def _limit_radius(rule: Rule, largest: float, quadrature: Quadrature) -> float:
 
 @jit
 def _numbers(rule: Rule, limit: float, quadrature: Quadrature) -> tuple[float, float, float]:
-    """Return scar radius, volume and normal force; put the cuts."""
+    """Return scar radius, volume and normal force; write the cuts."""
     abscissa, weight, cuts = quadrature
     _put_cuts(rule, cuts)
     radius = limit
@@ -367,7 +370,7 @@ def _numbers(rule: Rule, limit: float, quadrature: Quadrature) -> tuple[float, f
         radius = _scar_radius(rule, Bracket(1.0, first, limit, last, 0), quadrature)
     volume = 4.0 * _scar_integral(rule, radius, 1, quadrature)
     load, worn = _sticking_load(rule, abscissa, weight), 0.0
-    for piece in range(4 if rule.rest > 0.0 else 0):  # in the end all of the slip zone is worn off
+    for piece in range(4 if rule.rest > 0.0 else 0):  # in the limit, the slip zone carries no load
         width = cuts[piece + 1] - cuts[piece]
         for k in range(abscissa.size):
             gap = cuts[piece] - rule.c + width * abscissa[k]
@@ -383,7 +386,7 @@ def _sticking_load(rule: Rule, abscissa: FloatArray, weight: FloatArray) -> floa
         return rule.c * (1.0 - rule.level / (rule.image.exponent + 1.0))
     load = 0.0
     for k in range(abscissa.size):
-        share = weight[k] * 4.0 * rule.c * abscissa[k] ** 3  # x = c t^4 smooths a power at the axis
+        share = weight[k] * 4.0 * rule.c * abscissa[k] ** 3  # x = c t^4 makes a power law smooth at the axis
         place = rule.c * abscissa[k] ** 4
         load += share * (rule.eta - image_rise(rule.image, rule.c, rule.level, place - rule.c))
     return load
@@ -391,7 +394,7 @@ def _sticking_load(rule: Rule, abscissa: FloatArray, weight: FloatArray) -> floa
 
 @jit
 def _limits(cases: FloatArray, no_table: Image, quadrature: Quadrature, result: FloatArray) -> None:
-    """Put radius, volume and force of cases (n, c)."""
+    """Write radius, volume and force of the cases (n, c) to `result`."""
     for k in range(cases.shape[1]):
         rule = _power_rule(no_table, cases[0, k], cases[1, k], 0.0)
         radius = _limit_radius(rule, np.inf, quadrature)
@@ -400,7 +403,7 @@ def _limits(cases: FloatArray, no_table: Image, quadrature: Quadrature, result: 
 
 @jit
 def _fasts(cases: FloatArray, no_table: Image, quadrature: Quadrature, result: FloatArray) -> None:
-    """Put radius, volume and force of cases (n, c, N, xi, a(c))."""
+    """Write radius, volume and force of the cases (n, c, N, xi, a(c)) to `result`."""
     for k in range(cases.shape[1]):
         n, c, cycles, xi, limit = cases[0, k], cases[1, k], cases[2, k], cases[3, k], cases[4, k]
         rule = _power_rule(no_table, n, c, max(math.exp(-xi * cycles / limit), SETTINGS.least))

@@ -1,7 +1,7 @@
 """Partial slip at constant depth, and gross slip, as the equations of one step for `evolution.march`.
 
-Nodes lie at r^2 = c^2 + width z, with the panels' z from 0 to 1 and the width a^2 - c^2. The unknown of the edge is
-that width over the virgin one, so that contacts next to full stick are as well determined as any.
+Nodes lie at r^2 = c^2 + z (a^2 - c^2), where z is the position on the panels, from 0 to 1. The unknown for the edge is
+the width a^2 - c^2 over the width of the virgin contact, so that contacts near full stick are also well conditioned.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from mdr_dask.physics.wear.evolution import Moment
 
 
 class FixedBorder(ABC):
-    """Base of the problems with a fixed inner border, in which accumulated values are functions on the panels."""
+    """Base of the problems with a fixed inner border; accumulated values are interpolated on the panels."""
 
     panels: Panels
     inner_radius: float
     newton = 1e-2
 
     def holds(self, unknowns: FloatArray) -> bool:
-        """Return whether unknowns describe a contact."""
+        """Return whether the unknowns describe a possible contact."""
         return bool(unknowns[self.panels.nodes.size - 1] > 0.0)
 
     @property
@@ -49,10 +49,10 @@ class FixedBorder(ABC):
 
     @abstractmethod
     def rate(self, unknowns: FloatArray) -> FloatArray:
-        """Return the rate at which the radii accumulate."""
+        """Return the rate of the accumulated quantity at the nodes."""
 
     def memory(self, past: Sequence[Moment], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """Return, as a function of the unknowns, what past moments in these shares had accumulated at the nodes."""
+        """Return a function of the unknowns: the weighted sum of past accumulated values at the nodes."""
         last = self.panels.nodes.size - 1
         memories = np.array([moment.accumulated for moment in past])
         widths = np.array([moment.unknowns[last] for moment in past])
@@ -65,7 +65,7 @@ class FixedBorder(ABC):
     def moment(
         self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Moment]
     ) -> Moment:
-        """Return the moment that a solved step ends in, from what was known and what the step added."""
+        """Return the moment at the end of a solved step: `known` is the contribution of past moments."""
         accumulated = known + theta * self.rate(unknowns)
         accumulated[-1] = 0.0
         return Moment(time, unknowns, accumulated)
@@ -74,8 +74,8 @@ class FixedBorder(ABC):
 class LogTable(NamedTuple):
     """The slip of the virgin body, ln s0 as a function of ln(r^2 - c^2).
 
-    s0(r) = (2/pi) int_c^r (g0 - g_c) / (eta sqrt(r^2 - x^2)) dx. The coefficients are those of a cubic spline from
-    `first` on, `step` apart.
+    s0(r) = (2/pi) int_c^r (g0 - g_c) / (eta sqrt(r^2 - x^2)) dx. The coefficients belong to a cubic spline whose knots
+    begin at `first` and have the distance `step`.
     """
 
     first: float
@@ -105,7 +105,9 @@ def _look_up(table: LogTable, squares: FloatArray, result: FloatArray) -> None:
 
 
 class _Step(NamedTuple):
-    """One step of `PartialSlip`: its length over the root of the width, the places in squared radii, what was known."""
+    """One step of `PartialSlip`: theta over the root of the width, r^2 - c^2 of the nodes, contribution of past
+    moments.
+    """
 
     share: float
     squares: FloatArray
@@ -114,7 +116,7 @@ class _Step(NamedTuple):
 
 @jit
 def _slip_rows(table: LogTable, step: _Step, stress: FloatArray, slip: FloatArray) -> None:
-    """Turn the slip into the residual of `PartialSlip`, in place; in the last row s is continuous at the edge."""
+    """Replace the slip by the residual of `PartialSlip`; the last row demands that s is continuous at the edge."""
     last = slip.size - 1
     for i in range(slip.size):
         slip[i] = math.log(max(slip[i], 1e-300)) - log_slip(table, step.squares[i])
@@ -124,10 +126,11 @@ def _slip_rows(table: LogTable, step: _Step, stress: FloatArray, slip: FloatArra
 
 @dataclass(frozen=True, eq=False)
 class PartialSlip(FixedBorder):
-    """Slip outside the stick radius c at constant depth; unknowns y = (g - g_c) / eta at the nodes, and the edge.
+    """Slip outside the stick radius c at constant depth; the unknowns are y = (g - g_c) / eta at the nodes, and the
+    edge.
 
-    The slip is s = (f - f_star) / eta, f_star the profile of the plateau g = g_c beyond c. A radius accumulates
-    ln(s / s0) = int p dN / eta, s0 the slip of the virgin body.
+    The slip is s = (f - f_star) / eta, where f_star is the profile whose image is the plateau g = g_c beyond c. The
+    accumulated quantity is ln(s / s0) = int p dN / eta, where s0 is the slip of the virgin body.
     """
 
     profile: Profile
@@ -144,7 +147,7 @@ class PartialSlip(FixedBorder):
         return Moment(0.0, y, np.zeros_like(y))
 
     def image(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return y at all nodes, and the factor sqrt(a^2 - c^2) / r that turns it into a half-integrand."""
+        """Return y at all nodes, and the factor sqrt(a^2 - c^2) / r by which the half-integral multiplies it."""
         y = unknowns.copy()
         y[-1] = 1.0
         return y, 1.0 / np.sqrt(self.inner_radius**2 / self.width(unknowns) + self.panels.nodes)
@@ -160,31 +163,31 @@ class PartialSlip(FixedBorder):
         return np.asarray(self.panels.outer @ y / np.sqrt(self.width(unknowns)))
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return ln s - ln s0 - known - theta p / eta; the last row is the continuity of s at the edge."""
+        """Return ln s - ln s0 - known - theta p / eta; the last row demands that s is continuous at the edge."""
         y, factor = self.image(unknowns)
         slip, stress, width = self.panels.inner @ (y * factor), self.panels.outer @ y, self.width(unknowns)
         _slip_rows(self.virgin_slip, _Step(theta / np.sqrt(width), width * self.panels.nodes, known), stress, slip)
         return np.asarray(slip)
 
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
-        """Return the derivatives by y."""
+        """Return the derivatives of the residual with respect to y."""
         _, factor = self.image(unknowns)
         result = self.panels.inner * (factor / self.slip(unknowns)[:, None])
         result[:-1] -= theta / np.sqrt(self.width(unknowns)) * self.panels.outer[:-1]
         return result
 
     def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return the slip: the part of f that changes, over eta."""
+        """Return the slip s, which is the part of f that wear changes, over eta."""
         return self.slip(unknowns)
 
     def wear_rate(self, unknowns: FloatArray) -> float:
-        """Return dV/dN = 2 int_c^a (1 - g)(g - g_c) / eta dx, the dissipation of a cycle over mu."""
+        """Return dV/dN = 2 int_c^a (1 - g)(g - g_c) / eta dx, the energy dissipated per cycle over mu."""
         y, factor = self.image(unknowns)
         return float(self.eta * np.sqrt(self.width(unknowns)) * self.panels.weights @ (y * (1.0 - y) * factor))
 
 
 def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: float) -> PartialSlip:
-    """Prepare partial slip: tabulate the virgin slip, free of cancellation next to c, up to the radius `reach`."""
+    """Prepare partial slip: tabulate the virgin slip up to the radius `reach`, without cancellation next to c."""
     c = stick_radius
     eta = float(profile.rise(np.array(1.0 - c), c))
     smallest = 0.5 * panels.nodes[0] * (1.0 - c) * (1.0 + c)
@@ -194,7 +197,7 @@ def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: f
     abscissa, weight = gauss(40)
     span = np.arctan2(np.exp(0.5 * table), c)
     angle = span[:, None] * abscissa
-    # x - c = r (cos angle - cos span), as a product
+    # x - c = r (cos(angle) - cos(span)), written as a product to avoid cancellation
     gap = 2.0 * r[:, None] * np.sin(0.5 * (span[:, None] + angle)) * np.sin(0.5 * (span[:, None] - angle))
     slip = 2.0 / np.pi * span * (profile.rise(gap, c) @ weight) / eta
     coefficients = np.ascontiguousarray(CubicSpline(table, np.log(slip)).c)
@@ -203,9 +206,9 @@ def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: f
 
 @dataclass(frozen=True, eq=False)
 class GrossSlip(FixedBorder):
-    """Slip everywhere; unknowns g at the nodes but the last, the edge, and the depth d if the force is given.
+    """Slip everywhere. The unknowns are g at all nodes but the last, the edge, and the depth d if the force is given.
 
-    A radius accumulates its worn depth, int p ds.
+    The accumulated quantity is the worn depth, int p ds.
     """
 
     profile: Profile
@@ -243,14 +246,16 @@ class GrossSlip(FixedBorder):
     wear_rate = normal_force
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return f - f0 - known - theta p; then continuity at the edge, and the force."""
+        """Return f - f0 - known - theta p with continuity at the edge in the last row; then the error of the force, if
+        given.
+        """
         accumulated = known + theta * self.rate(unknowns)
         accumulated[-1] = 0.0
         rows = self.worn(unknowns) - self.profile.height(self.radii(unknowns)) - accumulated
         return rows if self.force is None else np.append(rows, self.normal_force(unknowns) - self.force)
 
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
-        """Return the derivatives by g."""
+        """Return the derivatives of the residual with respect to g."""
         a, nodes = np.sqrt(self.width(unknowns)), self.panels.nodes.size
         result = np.zeros((unknowns.size, unknowns.size))
         result[:nodes, :nodes] = self.panels.full

@@ -1,7 +1,7 @@
-"""A worn contact, the result of every rule and every evolution: its error, and the transforms that give its shape.
+"""A worn contact, the result of every rule and evolution: its error, and the transforms that give its shape.
 
-Units: lengths a0, heights d0, pressure E* d0 / a0, volume a0^2 d0, cycles N0 = a0 sigma0 / (4 U0 k E*), with a0 and d0
-of the virgin contact. Wear raises f, which is measured upwards from the virgin apex.
+Units: lengths a0, heights d0, pressure E* d0 / a0, volume a0^2 d0, cycles N0 = a0 sigma0 / (4 U0 k E*), where a0 and d0
+belong to the virgin contact. Wear increases f, the profile height measured upwards from the virgin apex.
 """
 
 from __future__ import annotations
@@ -20,34 +20,34 @@ from mdr_dask.physics.mdr.transforms import gauss
 
 Function = Callable[[FloatArray], FloatArray]
 
-#: Outputs that are functions of a place, and how a worn contact calls them; all others are numbers.
+#: Outputs that are functions of position, and the attributes of `Worn` that compute them; other outputs are numbers.
 FUNCTIONS = {"worn_profile": "height", "worn_image": "image", "pressure": "pressure"}
 
 VOLUMES = ("wear_volume", "energy_volume")
-#: Numbers that solutions of wrong shape agree on by chance, at the depth of the virgin contact.
+#: Outputs on which solutions of different shape may agree by chance, if the depth is that of the virgin contact.
 SHAPED, KEPT_DEPTH = ("normal_force", "worn_depth"), 1.0
 NOWHERE = np.zeros(0)
-#: Distance from a border over its radius within which a change of the image is a jump.
+#: Distance from a border, over its radius, within which a change of the image is treated as a jump.
 JUMP_WIDTH = 1e-9
 
 
 class Settings(NamedTuple):
-    """Tuned numbers of the error estimate; `python -m benchmarks accuracy wear` measures what it covers.
+    """Tuned numbers of the error estimate; `python -m benchmarks accuracy wear` measures its coverage.
 
     Parameters
     ----------
     safety : float
-        Error over the distance from rougher solutions.
+            Ratio of the stated error to the distance from the rougher solutions.
     step : float
-        Least error of the contact radius over its change in a step.
+            Least error of the contact radius, as a fraction of its change in the last step.
     shape : float
-        Share of the profile's largest error that force and worn depth have at constant depth, at least.
+            Least error of force and worn depth at constant depth, as a fraction of the profile's largest error.
     volumes : float
-        Share of the distances of shape and energy that is added to their difference, for volumes.
+            For volumes: the fraction of the distances of wear volume and energy that is added to their difference.
     reach : int
-        Places to both sides, of those that crowd at borders, over which a distance spreads.
+            Number of neighbours on each side, among positions dense at the borders, whose largest distance is used.
     floor : float
-        Share of the largest distance that counts everywhere.
+            Least error of a function, as a fraction of its largest error.
     """
 
     safety: float = 1.5
@@ -63,7 +63,7 @@ SETTINGS = Settings()
 
 @dataclass(frozen=True, eq=False)
 class Worn:
-    """A worn contact, whatever rule or evolution it came from.
+    """A worn contact, computed by any rule or evolution.
 
     Parameters
     ----------
@@ -76,23 +76,23 @@ class Worn:
     wear_volume, worn_depth : float
         V, and the largest f - f0.
     height, image, pressure : callable, array -> array
-        f(r), g(x) and p(r), anywhere.
+            f(r), g(x) and p(r), for any position.
     energy_volume : float
-        The energy dissipated over mu, in units in which it equals the wear volume; NaN if it is not known.
+            The dissipated energy over mu, in units in which it equals the wear volume; NaN if it is unknown.
     steps : int
         Time steps taken.
     rougher : tuple of Worn
         Two rougher solutions of the same contact, from which its error is estimated.
     slowness : float
-        How much more slowly than usual the error falls from the rougher solutions to this one.
+            Factor on the distances from the rougher solutions, if the error falls more slowly than usual.
     second : float
-        Share of the distance from the second one, which counts where the first is close by chance.
+            Weight of the distance from the second rougher solution, which matters where the first agrees by chance.
     least_edge_error : float
-        Least error of the radii of scar and stick zone: rougher solutions may agree on them by chance.
+            Least error of the radii of scar and stick zone, because rougher solutions may agree on them by chance.
     edge_step : float
-        How far the contact radius moved in the last time step, to the first order of which it is known.
+            Distance by which the contact radius moved in the last time step; its error is of the same order.
     relative_error : float
-        Error of every output over its largest value, where there is no rougher solution.
+            Error of every output over its largest value, used if there is no rougher solution.
     """
 
     contact_radius: float
@@ -114,16 +114,17 @@ class Worn:
     relative_error: float = np.nan
 
     def value(self, output: str, places: FloatArray) -> float | FloatArray:
-        """Return an output by name, functions at the places."""
+        """Return an output by name; outputs that are functions are evaluated at the positions `places`."""
         if output in FUNCTIONS:
             return np.asarray(getattr(self, FUNCTIONS[output])(places))
         return float(getattr(self, output))
 
     def error(self, output: str, places: FloatArray) -> float | FloatArray:
-        """Return the error expected of an output, absolute, functions at the places.
+        """Return the expected absolute error of an output; for functions, at the positions `places`.
 
-        It is the distance from two rougher solutions, or a share of the largest value where there are none. That of a
-        function is the largest nearby, where places crowd at the borders of stick and contact.
+        The error is the distance from two rougher solutions, or, without them, a fraction of the largest value. For
+        functions, the largest distance at neighbouring positions is used; these are dense at the borders of stick and
+        contact.
         """
         if not self.rougher:
             value = np.asarray(self.value(output, places), dtype=float)
@@ -143,7 +144,7 @@ class Worn:
         return max(one.contact_radius for one in (self, *self.rougher))
 
     def _error_of_number(self, output: str) -> float:
-        """Return the error of a number; volumes in partial slip are known from the shape and from the energy."""
+        """Return the error of a number; volumes in partial slip follow both from the shape and from the energy."""
         if output in VOLUMES and self.stick_border > 0.0:
             apart = sum(float(self._distance(name)) for name in VOLUMES)
             return self.slowness * abs(self.wear_volume - self.energy_volume) + SETTINGS.volumes * apart
@@ -160,7 +161,7 @@ class Worn:
         return SETTINGS.safety * float(np.max(self._distance("worn_profile", self._crowd(0.0))))
 
     def _distance(self, output: str, places: FloatArray = NOWHERE) -> FloatArray:
-        """Return the distance from the rougher solutions, the larger where there are both."""
+        """Return the distance from the rougher solutions; if there are two, the larger one."""
         value = self.value(output, places)
         with np.errstate(invalid="ignore"):
             gaps = [np.abs(value - one.value(output, places)) for one in self.rougher]
@@ -168,14 +169,14 @@ class Worn:
         return np.asarray(self.slowness * np.max(weighted, axis=0))
 
     def _crowd(self, last: float) -> FloatArray:
-        """Return places that crowd at the borders of stick and contact."""
+        """Return positions that are dense at the borders of stick and contact."""
         cuts = sorted({0.0, self.stick_border, self.contact_radius, max(last, self._last_change)})
         steps = np.sin(0.5 * np.pi * np.arange(1, 40) / 40.0) ** 2
         return np.concatenate([low + (high - low) * steps**1.5 for low, high in pairwise(cuts)])
 
 
 def _spread(distance: FloatArray) -> FloatArray:
-    """Return the largest of the finite neighbours of each entry."""
+    """Return the largest finite value among the neighbours of each entry."""
     finite = np.where(np.isfinite(distance), distance, 0.0)
     padded = np.pad(finite, SETTINGS.reach, mode="edge")
     return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 2 * SETTINGS.reach + 1).max(axis=1))
@@ -187,13 +188,13 @@ class Scar(NamedTuple):
     Parameters
     ----------
     border : float
-        The first stick border c: inside it the body is virgin.
+            The first stick border c; inside it the body is unworn.
     radius : float
-        Where the scar ends.
+            The radius of the scar.
     change, slope : callable, array -> array
         g - g0 and its derivative.
     breaks : tuple of float
-        Places in between where the change is not smooth.
+            Positions between border and radius at which the change is not smooth.
     """
 
     border: float
@@ -204,7 +205,7 @@ class Scar(NamedTuple):
 
 
 def worn_height(scar: Scar, radius: FloatArray) -> FloatArray:
-    """Return f - f0 = (2/pi) int_c^r (g - g0) / sqrt(r^2 - x^2) dx, by x = r cos(phi), at r > c."""
+    """Return f - f0 = (2/pi) int_c^r (g - g0) / sqrt(r^2 - x^2) dx at r > c, by substituting x = r cos(phi)."""
     c = scar.border
     cuts = [c, *sorted(b for b in scar.breaks if b > c)]
     total = np.zeros_like(radius)
@@ -229,7 +230,7 @@ def worn_volume(scar: Scar) -> float:
 
 
 def worn_image(profile: Profile, scar: Scar) -> Function:
-    """Return the worn image g(x); beyond the scar it is the one that leaves f = f0 there."""
+    """Return the worn image g(x); beyond the scar it is continued such that f = f0 there."""
 
     def image(position: FloatArray) -> FloatArray:
         x = np.abs(position)
@@ -260,7 +261,7 @@ def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, bo
 
     def slope(x: FloatArray) -> FloatArray:
         inside = np.maximum(x, c)
-        changes = (x > c) & ~(np.abs(x - border) < JUMP_WIDTH * border)  # what changes there counts as a jump
+        changes = (x > c) & ~(np.abs(x - border) < JUMP_WIDTH * border)  # changes this close to the border are a jump
         return np.asarray(profile.image_slope(x) + np.where(changes, scar.slope(inside), 0.0))
 
     near = np.array([border * (1.0 - JUMP_WIDTH), border * (1.0 + JUMP_WIDTH), edge * (1.0 - 1e-13)])
@@ -280,7 +281,7 @@ def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, bo
         inside = radius < edge
         r = np.maximum(radius[inside], 1e-12 * edge)
         sums = np.zeros_like(r)
-        for low, high in pairwise(cuts):  # by x = r cosh(angle), piece by piece so that little memory is needed
+        for low, high in pairwise(cuts):  # x = r cosh(angle); one piece at a time to save memory
             begin, end = (np.arccosh(np.maximum(x / r, 1.0)) for x in (low, high))
             angle = begin[:, None] + (end - begin)[:, None] * abscissa
             sums += (end - begin) * (slope(np.minimum(r[:, None] * np.cosh(angle), edge)) @ weight)
@@ -296,7 +297,7 @@ def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, bo
 
 
 def worn_by(profile: Profile, scar: Scar, border: float, edge: float, depth: float, normal_force: float) -> Worn:
-    """Return the contact with a scar that sticks up to a border and carries its load up to an edge."""
+    """Return the worn contact for a scar that sticks up to `border` and carries load up to `edge`."""
     return Worn(
         contact_radius=scar.radius,
         stick_border=border,
@@ -319,8 +320,9 @@ def largest_wear(scar: Scar) -> float:
 def _change_beyond(scar: Scar, position: FloatArray) -> FloatArray:
     """Return g - g0 outside a scar of radius a, where f = f0.
 
-    The half-integral that vanishes beyond a continues the image uniquely:
-    (2x/pi) sqrt(x^2 - a^2) int_c^a (g - g0) / ((x^2 - t^2) sqrt(a^2 - t^2)) dt, by sin(phi) = (s/a) sinh(w).
+    The image is the unique continuation for which the half-integral vanishes beyond a:
+    (2x/pi) sqrt(x^2 - a^2) int_c^a (g - g0) / ((x^2 - t^2) sqrt(a^2 - t^2)) dt, by substituting sin(phi) = (s/a)
+    sinh(w).
     """
     c, a = scar.border, scar.radius
     s = np.sqrt((position - a) * (position + a))
@@ -339,7 +341,7 @@ def _change_beyond(scar: Scar, position: FloatArray) -> FloatArray:
 
 
 def check_stick_radius(stick_radius: float) -> None:
-    """Raise ValueError unless there is partial slip."""
+    """Raise ValueError unless the stick radius means partial slip."""
     if not 0.0 < stick_radius < 1.0:
         raise ValueError(
             f"the stick radius must lie between 0 and 1 for partial slip, got {stick_radius!r}; "
@@ -348,7 +350,7 @@ def check_stick_radius(stick_radius: float) -> None:
 
 
 def virgin_load(profile: Profile, radius: float) -> float:
-    """Return int_0^c (1 - g0) dx; x = c t^4 smooths a power at the axis."""
+    """Return int_0^c (1 - g0) dx; the substitution x = c t^4 makes a power law smooth at the axis."""
     abscissa, weight = gauss(64)
     return 4.0 * radius * float(((1.0 - profile.image(radius * abscissa**4)) * abscissa**3) @ weight)
 
