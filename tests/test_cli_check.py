@@ -193,7 +193,7 @@ def test_check_says_how_measured_points_meet_each_series(tmp_path, monkeypatch, 
     assert main(["check", "rig.yaml"]) == 0
     told = capsys.readouterr().out
     for line in (
-        "measured rig.csv: 4 rows of friction_coefficient, standard_error",
+        "measured rig.csv: 4 rows of friction_coefficient, 0.2 to 0.3, standard_error",
         "measured rig.csv: conditions velocity 1 mm/s to 10.01 mm/s, relaxation_times 0.01 to 100",
         "measured rig.csv: unknowns material_kelvin_relaxation_time",
         "measured rig.csv: outside the study, and refused by the fit: line 4, velocity 10.01 mm/s; "

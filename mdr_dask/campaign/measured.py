@@ -164,13 +164,17 @@ def notes(campaign: Campaign) -> tuple[str, ...]:
         except DataError:
             notes_found.append(f"{before}: no table of this series")
             continue
-        notes_found += [f"{before}: {sentence}" for sentence in _sentences(found, campaign.model, series, conditions)]
+        notes_found += [
+            f"{before}: {sentence}"
+            for sentence in _sentences(found, campaign.model, series, conditions, outputs[found.output])
+        ]
     return tuple(notes_found)
 
 
-def _sentences(found: Measured, model: str, series: Series, units: Mapping[str, str]) -> Iterator[str]:
+def _sentences(found: Measured, model: str, series: Series, units: Mapping[str, str], unit: str) -> Iterator[str]:
     errors = "standard_error" if found.errors is not None else "errors estimated by the fit"
-    yield f"{found.values.size} rows of {found.output}, {errors}"
+    reach = (shown(float(end), unit) for end in (found.values.min(), found.values.max()))
+    yield f"{found.values.size} rows of {found.output}, {' to '.join(dict.fromkeys(reach))}, {errors}"
     ranges = {
         name: f"{name} {' to '.join(dict.fromkeys(shown(float(end), units[name]) for end in (rows.min(), rows.max())))}"
         for name, rows in found.conditions.items()

@@ -14,6 +14,7 @@ from mdr_dask.fits.calibration import measured_of, with_table
 from mdr_dask.plots import labels
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Figure, Key, Mean, Panel, Trace, columns
+from mdr_dask.units import shown
 
 #: Relative difference up to which a condition is that of a curve or a panel.
 SAME = 1e-3
@@ -59,6 +60,7 @@ def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
         measured = measured_of(data)
     except FitError as error:
         raise DataError(str(error)) from None
+    figure.warnings += _apart(measured, data)
     panels = [p for p in figure.panels if p.y.quantity == measured.output and p.x.quantity in measured.conditions]
     if not panels:
         known = ", ".join(measured.conditions)
@@ -67,6 +69,22 @@ def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
     if drawn < measured.values.size:
         rest = measured.values.size - drawn
         figure.leave_out([f"{rest} of {measured.values.size} measured points, whose conditions are not drawn"])
+
+
+def _apart(measured: Measured, data: xr.Dataset) -> list[str]:
+    """Return a sentence if all measured points lie above or below all results of a study."""
+    study = data[measured.output].to_numpy()
+    low, high = (
+        find(study[np.isfinite(study)], initial=start) for find, start in ((np.min, np.inf), (np.max, -np.inf))
+    )
+    if measured.values.min() <= high and measured.values.max() >= low:
+        return []
+    unit = str(data[measured.output].attrs.get("units", "1"))
+    ends = [shown(float(end), unit) for end in (measured.values.min(), measured.values.max(), low, high)]
+    return [
+        f"measured {measured.output} is {ends[0]} to {ends[1]}, the study has {ends[2]} to {ends[3]}: is the unit of "
+        "the table right?"
+    ]
 
 
 def _add(panel: Panel, measured: Measured, data: xr.Dataset) -> int:

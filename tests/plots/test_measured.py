@@ -78,3 +78,11 @@ def test_calibration_shows_what_the_fit_found(tmp_path):
     assert density.x.label == "normal force $F_N$ [mN]"
     shades = [trace for trace in density.traces if trace.kind == "band"]
     assert bool(shades) != (density.title == "not determined")
+
+
+@pytest.mark.parametrize(("factor", "warnings"), [(1, 0), (1000, 1)])
+def test_points_far_from_all_results_are_questioned(groups, tmp_path, factor, warnings):
+    figure = drawn(
+        groups, tmp_path, f"velocity [m/s],friction_coefficient\n0.01,{2e-3 * factor}\n0.02,{5e-3 * factor}\n"
+    )
+    assert sum("is the unit of the table right?" in each for each in figure.warnings) == warnings
