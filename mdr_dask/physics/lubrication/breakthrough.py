@@ -1,10 +1,10 @@
 """Breakthrough of a boundary layer between two rough lines that roll on a film (thesis section 5.2.2).
 
-The two lines are held apart by the film ``h0``; where the sum of their heights ``z`` exceeds it, they overlap. What
-overlaps in one piece is a cluster, of length ``D`` and force ``F = E* int (z - h0) dx`` (eq. 5.5). It breaks the layer
-if ``pi tau0 D^3/(12 F) < h_c`` (eq. 5.6), that is if ``int (z - h0) dx > s D^3`` with the layer strength
-``s = pi tau0/(12 E* h_c)``, the only place where tau0, E* and h_c appear. Lines are closed (periodic) cubic splines, on
-which all this is exact; the contact is a window that begins at each node, one after the other.
+The film ``h0`` separates the two lines; where the sum of their heights ``z`` exceeds it, they overlap. A cluster is one
+connected interval of overlap, with the length ``D`` and the force ``F = E* int (z - h0) dx`` (eq. 5.5). It breaks the
+layer if ``pi tau0 D^3/(12 F) < h_c`` (eq. 5.6), that is, if ``int (z - h0) dx > s D^3`` with the layer strength
+``s = pi tau0/(12 E* h_c)``. tau0, E* and h_c enter only through s. Lines are closed (periodic) cubic splines, for which
+these integrals are exact. The contact is a window; one window begins at each node.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from mdr_dask.physics.jit import jit
 from mdr_dask.physics.lubrication.clusters import Clusters, crossings, total, whole_piece
 from mdr_dask.physics.surfaces.splines import integral, piece, shares, zeros
 
-#: What becomes of a cluster that the window's edge cuts: judged and counted by its part inside (``part``, what comes of
-#: testing every window by itself), judged whole and counted with its part inside (``clip``), judged and counted whole
-#: (``whole``), or left out (``inside``).
+#: Treatment of a cluster that is cut by an edge of the window. ``part``: the part inside is tested and counted, as if
+#: every window were tested by itself; ``clip``: the whole cluster is tested, the part inside is counted; ``whole``: the
+#: whole cluster is tested and counted; ``inside``: the cluster is ignored.
 EDGE_RULES: tuple[str, ...] = ("part", "clip", "whole", "inside")
 _PART, _CLIP, _WHOLE, _INSIDE = range(4)
-#: Parts of a spacing that lengths in contact are counted in.
+#: Lengths in contact are counted in units of the spacing over this number.
 PARTS = 64
 
 
@@ -45,13 +45,13 @@ def layer_strength(shear_strength: ArrayLike, E_star: ArrayLike, thickness: Arra
 
 @jit
 def _counted(length: float) -> int:
-    """Return a length in spacings as whole parts of a spacing, at least one."""
+    """Convert a length in spacings to a whole number of parts of a spacing, at least one."""
     return max(1, int(length * PARTS + 0.5))
 
 
 @jit
 def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> None:
-    """Add a number to `count` positions of the circle from `begin` on, as jumps."""
+    """Add `number` to `count` positions of the closed trace from `begin` on; `jumps` holds differences of the trace."""
     points = jumps.size - 1
     while begin < 0:
         begin += points
@@ -67,7 +67,7 @@ def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> Non
 
 @jit
 def _add(jumps: NDArray[np.int32], at: int, number: int) -> None:
-    """Add a number to one position of the circle, at most once around off, as jumps."""
+    """Add `number` to one position of the closed trace, as `_block` does; `at` may be outside by one length at most."""
     points = jumps.size - 1
     at = at + points if at < 0 else at - points if at >= points else at
     jumps[at] += number
@@ -76,17 +76,17 @@ def _add(jumps: NDArray[np.int32], at: int, number: int) -> None:
 
 @jit
 def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: float, jumps: NDArray[np.int32]) -> None:
-    """Add what the window's edges leave of a cluster: its head and its tail.
+    """Add the two parts of a cluster that edges of windows cut off: its head and its tail.
 
-    A part counts if it breaks by itself where parts are `judged`, else if the cluster does. One longer than `reach`
-    does not break, whatever its shape.
+    If `judged`, a part counts if it breaks the layer by itself; otherwise, if the whole cluster does. A part longer
+    than `reach` does not break the layer, whatever its shape.
     """
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
     start, end, total = clusters.start[c], clusters.end[c], clusters.total[c]
     always = total > limit * (end - start) ** 3
     longest = min(window, reach) if judged else window
     width = int(window)
-    beyond = window - width  # of the window's right edge over the node before it
+    beyond = window - width  # distance of the window's right edge from the node before it
     first, second, third, fourth = shares(beyond)
     node = int(start)
     until_node = -integral(piece(overlap, node), start - node)
@@ -106,7 +106,7 @@ def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: fl
 
 @jit
 def _add_middles(clusters: Clusters, c: int, window: float, judged: bool, jumps: NDArray[np.int32]) -> None:
-    """Add the windows that lie within a cluster, which they cut on both sides."""
+    """Add the windows within a cluster; both edges of such a window cut the cluster."""
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
     start, end = clusters.start[c], clusters.end[c]
     always = clusters.total[c] > limit * (end - start) ** 3
@@ -126,7 +126,7 @@ def _add_middles(clusters: Clusters, c: int, window: float, judged: bool, jumps:
 
 @jit
 def _collect(clusters: Clusters, window: float, rule: int, jumps: NDArray[np.int32]) -> None:
-    """Gather the jumps of the trace cluster by cluster, then sum them up in place."""
+    """Add the contributions of all clusters to `jumps`, then replace `jumps` by its cumulative sum, the trace."""
     points = jumps.size - 1
     reach = np.sqrt(clusters.overlap.max() / clusters.limit) if clusters.limit > 0 else np.inf
     for c in range(clusters.start.size):
@@ -152,12 +152,12 @@ def _collect(clusters: Clusters, window: float, rule: int, jumps: NDArray[np.int
 
 
 def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> NDArray[np.int32]:
-    """Return the length in intimate contact of the window that begins at every node, in O(points).
+    """Return the length in intimate contact for the window that begins at each node, in O(points).
 
     Parameters
     ----------
     clusters : Clusters
-        Found once for the whole line.
+            The clusters of the whole line.
     window : float
         Width of the window in spacings, at most that of the line.
     rule : str
@@ -166,8 +166,8 @@ def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> ND
     Returns
     -------
     int array, shape (points,)
-        In `PARTS` of a spacing, so that sums are exact and nothing but contact is above zero. The share of such entries
-        is the breakthrough probability.
+            In units of 1/`PARTS` of a spacing, so that sums are exact. Entries are above zero only with contact; their
+            fraction is the breakthrough probability.
     """
     trace = np.zeros(clusters.points + 1, dtype=np.int32)
     if clusters.start.size:
@@ -176,7 +176,7 @@ def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> ND
 
 
 class Pair(NamedTuple):
-    """Two rough lines at a distance.
+    """Two rough lines at the distance of a film.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ class Pair(NamedTuple):
     spacing : float
         Distance dx of the nodes in m.
     strength : float
-        From `layer_strength`, in 1/m.
+            Layer strength from `layer_strength`, in 1/m.
     """
 
     line_1: FloatArray
@@ -199,7 +199,7 @@ class Pair(NamedTuple):
 
 @jit
 def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
-    """Fill the spline of the overlap from nodes (p, q) on."""
+    """Fill `overlap` with spline coefficients of the overlap, from node p of line 1 and node q of line 2 on."""
     points = pair.line_1.size
     for k in range(overlap.size):
         overlap[k] = pair.line_1[(p + k - 1) % points] + pair.line_2[(q + k - 1) % points] - pair.level
@@ -207,9 +207,10 @@ def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
 
 @jit
 def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work: FloatArray) -> tuple[float, float]:
-    """Follow a cluster beyond the edge of a window, to the right from 0 on where `most` is positive, so far at most.
+    """Follow a cluster beyond the edge of a window, for at most the distance `most`; to the right if `most` is
+    positive.
 
-    Returns length and force there.
+    Return the additional length and force.
     """
     overlap, found = work[:4], work[4:]
     direction = 1 if most > 0 else -1
@@ -235,7 +236,7 @@ def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work
 
 @jit
 def _judge(pair: Pair, position: tuple[int, int], window: float, rule: int, work: FloatArray) -> int:
-    """Return the length in intimate contact of one window; `work` has room for its overlap and what crosses it."""
+    """Return the length in intimate contact of one window; `work` is workspace for its overlap and its crossings."""
     points, pieces = pair.line_1.size, int(np.ceil(window))
     overlap, found, beyond = work[: pieces + 3], work[pieces + 3 : 4 * pieces + 3], work[4 * pieces + 3 :]
     limit = pair.strength * pair.spacing**2
@@ -273,7 +274,7 @@ def _windows(
 
 
 def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray], rule: str = "part") -> IntArray:
-    """Judge windows one by one: the reference for pure rolling, and the method for rolling with creep.
+    """Return the contact of each given window; the reference for pure rolling, and the method for rolling with creep.
 
     Parameters
     ----------
@@ -281,14 +282,14 @@ def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray
     window : float
         Width of the window in spacings, at most that of the line.
     positions : tuple of two int arrays, shape (n,)
-        Node of each line at the window's left edge; see `creep_positions`.
+            Node of each line at the left edge of the window; see `creep_positions`.
     rule : str
         One of `EDGE_RULES`.
 
     Returns
     -------
     int array, shape (n,)
-        Length in intimate contact of each window in `PARTS` of a spacing.
+            Length in intimate contact of each window, in units of 1/`PARTS` of a spacing.
     """
     contact = np.zeros(positions[0].size, dtype=np.int64)
     if pair.line_1.max() + pair.line_2.max() > pair.level:
@@ -298,16 +299,17 @@ def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray
 
 
 def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> tuple[IntArray, IntArray]:
-    """Return the first node of the window on each line after some travel of the mean surface.
+    """Return the first node of the window on each line for given travels of the mean surface.
 
     Parameters
     ----------
     travel : array_like, shape (n,)
-        In points. For mean values, steps of an eighth of the window are small enough.
+            Travel in points. For mean values, steps of an eighth of the window are small enough.
     points : int
         Points of each line.
     slide_roll_ratio : float
-        ``S = (v1 - v2)/u`` with the mean velocity u: the lines move by ``1 + S/2`` and ``1 - S/2`` of the travel.
+            ``S = (v1 - v2)/u`` with the mean velocity u: the lines move by ``1 + S/2`` and ``1 - S/2`` times the
+            travel.
 
     Returns
     -------
@@ -321,7 +323,7 @@ def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> 
 
 @jit
 def _occupied(contact: NDArray[np.int32] | IntArray, windows: IntArray, lengths: IntArray, ends: IntArray) -> None:
-    """Count windows in contact, their lengths in contact, and where contact begins or ends, part by part."""
+    """Count, for each part, windows in contact, their lengths in contact, and how often contact begins or ends."""
     parts = windows.size
     before = contact[-1] > 0
     for part in range(parts):
@@ -341,9 +343,9 @@ class Occupied(NamedTuple):
     windows : int array
         Number of windows in contact.
     lengths : int array
-        Sum of their lengths in contact, as they were counted.
+            Sum of their lengths in contact, in the units of the input.
     ends : int array
-        How often contact begins or ends.
+            Number of times that contact begins or ends.
     """
 
     windows: IntArray
@@ -352,14 +354,14 @@ class Occupied(NamedTuple):
 
 
 def occupied(contact: NDArray[np.int32] | IntArray, parts: int = 1) -> Occupied:
-    """Count intimate contact in equal parts of a revolution.
+    """Count windows in intimate contact, in equal parts of a revolution.
 
     Parameters
     ----------
     contact : int array, shape (positions,)
-        Lengths in contact of the windows, in the order of time.
+            Lengths in contact of successive windows in time.
     parts : int
-        Part k begins at position ``k positions // parts``.
+            Number of parts; part k begins at position ``k positions // parts``.
     """
     found = Occupied(*np.zeros((3, parts), dtype=np.int64))
     _occupied(contact, *found)
@@ -367,12 +369,12 @@ def occupied(contact: NDArray[np.int32] | IntArray, parts: int = 1) -> Occupied:
 
 
 def contact_resistance(resistivity: ArrayLike, contact_length: ArrayLike) -> FloatArray:
-    """Return ``R_c = rho/L_cont`` in ohm (thesis eq. 5.1: spots of one material in parallel); infinite without contact.
+    """Return ``R_c = rho/L_cont`` in ohm (thesis eq. 5.1: parallel spots of equal material); infinite without contact.
 
     Parameters
     ----------
     resistivity : array_like
-        Of the contacting materials in ohm m.
+            Resistivity of the contacting materials in ohm m.
     contact_length : array_like
         Sum of the diameters of the spots in m.
     """

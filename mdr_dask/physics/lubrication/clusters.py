@@ -1,4 +1,4 @@
-"""Clusters: stretches of a closed line that reach beyond the film."""
+"""Clusters: connected intervals of a closed line in which the sum of heights exceeds the film."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from mdr_dask.physics.surfaces.splines import integral, piece, zeros
 
 
 class Clusters(NamedTuple):
-    """Clusters of a closed line that overlap the other one, in the order of their starts.
+    """Clusters of a closed line, in the order of their starts.
 
     Parameters
     ----------
     start, end : array, shape (n,)
-        Where they begin and end, in spacings; a cluster across the seam ends beyond the last node.
+            Beginning and end in spacings; the end of a cluster across the seam lies beyond the last node.
     total : array, shape (n,)
-        Integral of ``z - h0`` over each, in m times spacings.
+            Integral of ``z - h0`` over each cluster, in m times spacings.
     overlap : array, shape (points + 3,)
-        Spline of ``z - h0`` in m: the last of its coefficients, all of them, and the first two again.
+            Spline of ``z - h0`` in m: its last coefficient, all coefficients, and the first two again.
     limit : float
         ``s dx^2`` in m: the layer breaks where ``total > limit (end - start)^3``.
     closed : bool
-        Whether the whole line is one cluster without an end.
+            Whether one cluster covers the whole line, without an end.
     """
 
     start: FloatArray
@@ -43,12 +43,12 @@ class Clusters(NamedTuple):
 
     @property
     def length(self) -> FloatArray:
-        """Length of each in spacings."""
+        """Length of each cluster in spacings."""
         return self.end - self.start
 
     @property
     def broken(self) -> NDArray[np.bool_]:
-        """Whether each cluster, taken whole, breaks the layer (thesis eq. 5.6)."""
+        """Whether each whole cluster breaks the layer (thesis eq. 5.6)."""
         return self.total > self.limit * self.length**3
 
 
@@ -61,7 +61,7 @@ def whole_piece(overlap: FloatArray, k: int) -> float:
 
 @jit
 def total(overlap: FloatArray, start: float, end: float) -> float:
-    """Return the integral of a closed spline of ``overlap.size - 3`` nodes from `start`, on it, to `end` beyond."""
+    """Return the integral of a closed spline of ``overlap.size - 3`` nodes from `start`, which is on it, to `end`."""
     points = overlap.size - 3
     first, last = int(start), int(end)
     found: float = -integral(piece(overlap, first), start - first)
@@ -74,11 +74,11 @@ def total(overlap: FloatArray, start: float, end: float) -> float:
 
 @jit
 def crossings(overlap: FloatArray, found: FloatArray) -> int:
-    """Collect where a spline, of three nodes fewer than coefficients, enters and leaves contact; return how often."""
+    """Write the positions where the spline changes sign to `found`; return their number. It has size - 3 nodes."""
     count = 0
     above = 4 * (overlap[0] > 0) + 2 * (overlap[1] > 0) + (overlap[2] > 0)
     for k in range(overlap.size - 3):
-        above = (above << 1 | (overlap[k + 3] > 0)) & 15  # a bit for each of four coefficients
+        above = (above << 1 | (overlap[k + 3] > 0)) & 15  # signs of the four coefficients of this piece, as bits
         if above != 0 and above != 15:
             count = zeros(overlap, k, found, count)
     return count
@@ -102,7 +102,7 @@ def find_clusters(line: FloatArray, level: float, spacing: float, strength: floa
     spacing : float
         Distance dx of the nodes in m.
     strength : float
-        From `layer_strength`, in 1/m.
+            Layer strength from `layer_strength`, in 1/m.
     """
     points = line.size
     overlap = np.concatenate((line[-1:], line, line[:2])) - level

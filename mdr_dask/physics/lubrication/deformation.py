@@ -1,4 +1,4 @@
-"""Elastic deformation of a half-plane under a piecewise linear pressure, on any grid, exact for each element.
+"""Elastic deformation of a half-plane under a piecewise linear pressure on any grid, exact for each element.
 
 Hertz units: positions in half widths a, pressures in p0, films and deformations in ``a^2/R`` (thesis eq. B.13, B.19).
 """
@@ -22,7 +22,7 @@ def _second_integral(x: float) -> float:
 
 @jit
 def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
-    """Turn second integrals of ``ln|x|`` at the nodes into integrals over hat functions there; zero at both ends."""
+    """Replace second integrals of ``ln|x|`` at nodes by integrals over the hat functions; zero at both ends."""
     left, left_slope = row[0], 0.0
     for j in range(nodes.size - 1):
         right = row[j + 1]
@@ -43,7 +43,7 @@ def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
 
 @jit
 def influence_matrix(nodes: FloatArray) -> FloatArray:
-    """Return the matrix that turns nodal pressures into deformations at the nodes, relative to that of ``X = 0``.
+    """Return the matrix that turns nodal pressures into deformations at the nodes, relative to the one at ``X = 0``.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def influence_matrix(nodes: FloatArray) -> FloatArray:
     matrix, origin = np.empty((n, n)), np.empty(n)
     _influence_row(0.0, nodes, origin)
     for i in range(n):
-        for j in range(i + 1):  # a logarithm serves both
+        for j in range(i + 1):  # the matrix is symmetric: one logarithm for two entries
             matrix[i, j] = matrix[j, i] = _second_integral(nodes[i] - nodes[j])
     for i in range(n):
         row = matrix[i]
@@ -78,7 +78,7 @@ def film(points: FloatArray, nodes: FloatArray, pressure: FloatArray, central_fi
     points : array, shape (m,)
         Positions in half widths.
     nodes, pressure : array, shape (n,)
-        Ascending nodes and the pressure there in units of p0, zero at both ends.
+            Ascending nodes, and the pressures at them in units of p0, zero at both ends.
     central_film : float
         Film at ``X = 0`` in units of ``a^2/R``.
 
@@ -92,7 +92,7 @@ def film(points: FloatArray, nodes: FloatArray, pressure: FloatArray, central_fi
     result = np.empty(points.size)
     for i in range(points.size):
         _influence_row(points[i], nodes, row)
-        total = 0.0  # summed here, as a threaded BLAS has other last bits with another number of threads
+        total = 0.0  # no BLAS here: with another number of threads, its last bits would differ
         for j in range(nodes.size):
             total += (origin[j] - row[j]) * pressure[j]
         result[i] = central_film + 0.5 * points[i] ** 2 + total / pi

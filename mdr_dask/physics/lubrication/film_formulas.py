@@ -1,4 +1,4 @@
-"""Film thickness of a lubricated line contact by formula: Hertz contact, regressions, regimes and their limits.
+"""Film thickness of a lubricated line contact in closed form: Hertz contact, regressions, regimes and limiting films.
 
 Conventions (physics of thesis section 5.2.1 and appendix B): ``E* = E'/2`` with
 ``1/E* = (1-nu1^2)/E1 + (1-nu2^2)/E2``; the velocity is the mean ``u = (u1 + u2)/2``;
@@ -18,14 +18,14 @@ from mdr_dask.arrays import FloatArray
 
 
 class HertzLine(NamedTuple):
-    """Half width (m) and highest pressure (Pa) of a dry line contact."""
+    """Half width (m) and maximum pressure (Pa) of a dry line contact."""
 
     half_width: FloatArray
     pressure: FloatArray
 
 
 def hertz_line(line_load: ArrayLike, E_star: ArrayLike, radius: ArrayLike) -> HertzLine:
-    """Return half width and highest pressure of a Hertzian line contact (thesis eq. 5.2).
+    """Return half width and maximum pressure of a Hertzian line contact (thesis eq. 5.2).
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def hertz_line(line_load: ArrayLike, E_star: ArrayLike, radius: ArrayLike) -> He
 
 
 def hertz_gap(x: ArrayLike, half_width: float, radius: float) -> FloatArray:
-    """Return the gap in m between the bodies of a dry line contact at places x (m) from its middle, 0 inside."""
+    """Return the gap in m between the bodies of a dry line contact at distances x (m) from its centre; 0 in contact."""
     ratio = np.maximum(1.0, np.abs(np.asarray(x, dtype=np.float64)) / half_width)
     root = np.sqrt(ratio**2 - 1)
     return np.asarray(half_width**2 / (2 * radius) * (ratio * root - np.log(ratio + root)))
@@ -59,12 +59,12 @@ def fluid_friction(
     eyring_stress: float,
     film_share: float = 1.0,
 ) -> float:
-    """Return the shear of a uniform film under the Hertzian pressure, over the load.
+    """Return the friction force of a uniform film under the Hertzian pressure, divided by the load.
 
     Parameters
     ----------
     contact : HertzLine
-        Half width in m and highest pressure in Pa.
+            Half width in m and maximum pressure in Pa.
     film : float
         Film thickness in m.
     sliding_velocity : float
@@ -72,15 +72,15 @@ def fluid_friction(
     log_viscosity : callable
         Natural logarithm of the viscosity in Pa s at pressures in Pa.
     eyring_stress : float
-        Stress tau_E in Pa of ``tau = tau_E asinh(eta v/(h tau_E))``; a great one makes the liquid Newtonian.
+            Stress tau_E in Pa of ``tau = tau_E asinh(eta v/(h tau_E))``; for large values the liquid is Newtonian.
     film_share : float
-        Share of the load, and so of the pressure, that the film carries.
+            Fraction of the load, and so of the pressure, that the film carries.
 
     Returns
     -------
     float
-        Mean shear stress over the mean pressure of the whole load, by 64 Gauss points in the angle of
-        ``x = a sin(angle)``; rolling friction is left out.
+            Mean shear stress over mean pressure of the whole load, by 64 Gauss points in the angle of ``x = a
+            sin(angle)``, without rolling friction.
     """
     nodes, weights = np.polynomial.legendre.leggauss(64)
     cosine = np.cos(np.pi / 2 * nodes)
@@ -89,14 +89,14 @@ def fluid_friction(
     logarithm = log_viscosity(film_share * contact.pressure * cosine) + np.log(
         abs(sliding_velocity) / (film * eyring_stress)
     )
-    # asinh(e^l) is l + ln 2 long before e^l overflows
+    # for large l, asinh(e^l) = l + ln 2; this avoids an overflow of e^l
     stress = eyring_stress * np.where(
         logarithm > 30, logarithm + np.log(2), np.arcsinh(np.exp(np.minimum(logarithm, 30)))
     )
     return float(np.sum(weights * stress * cosine) / (contact.pressure * np.sum(weights * cosine**2)))
 
 
-#: Film thickness over the radius above which a parabola is no longer the shape of a roller within some per cent.
+#: Film thickness over the radius; above it, a parabola differs from the roller by more than a few per cent.
 THICKEST_FILM = 0.1
 
 
@@ -150,16 +150,16 @@ def dimensionless_groups(
 
 @dataclass(frozen=True)
 class FilmFormula:
-    """A regression ``h/R = factor W^load U^speed G^material`` and the box of points that it was fitted to.
+    """A regression ``h/R = factor W^load U^speed G^material`` and the ranges of the points to which it was fitted.
 
     Parameters
     ----------
     name : str
-        Authors and the film meant.
+            Authors, and whether it gives the central or the minimum film.
     factor, load, speed, material : float
-        Its constants.
+            Factor and exponents.
     load_range, speed_range, material_range : tuple of float
-        Lowest and highest W, U, G of the points behind it; outside it is an extrapolation.
+            Lowest and highest W, U, G of the fitted points; outside these ranges, the formula is an extrapolation.
     """
 
     name: str
@@ -172,7 +172,7 @@ class FilmFormula:
     material_range: tuple[float, float]
 
     def __call__(self, W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:
-        """Return h/R for arrays of W, U and G, which broadcast."""
+        """Return h/R; the arrays W, U and G broadcast."""
         return np.asarray(
             self.factor
             * np.asarray(W, float) ** self.load
@@ -181,7 +181,7 @@ class FilmFormula:
         )
 
     def outside(self, W: float, U: float, G: float) -> str:
-        """Return which of W, U, G lie outside the range of the formula, an empty string if none does."""
+        """Return a message about which of W, U, G lie outside the range of the formula, or an empty string."""
         ranges = (("W", W, self.load_range), ("U", U, self.speed_range), ("G", G, self.material_range))
         outside = [
             f"{symbol} lies outside {low:g} to {high:g}"
@@ -191,17 +191,17 @@ class FilmFormula:
         return f"film formula {self.name} is extrapolated: {', '.join(outside)}" if outside else ""
 
 
-# Ranges as remembered from the papers; no open copy was at hand (docs/evidence/mixed-lubrication.md).
+# Ranges from memory; no open copy of the papers was available (docs/evidence/mixed-lubrication.md).
 _PAN_HAMROCK_RANGE = ((2.045e-5, 5.0e-4), (1.0e-12, 5.0e-10), (2504.0, 10014.0))
 _DOWSON_HIGGINSON_RANGE = ((3.0e-5, 3.0e-4), (1.0e-13, 1.0e-11), (2500.0, 5000.0))
 
-#: Pan and Hamrock (1989); 2.922 belongs to the central film (thesis eq. 5.3 and appendix B print 2.992 and 2.929).
+#: Pan and Hamrock (1989). 2.922 is the factor of the central film; thesis eq. 5.3 and appendix B print 2.992 and 2.929.
 PAN_HAMROCK_CENTRAL = FilmFormula("Pan-Hamrock (central)", 2.922, -0.166, 0.692, 0.470, *_PAN_HAMROCK_RANGE)
 PAN_HAMROCK_MINIMUM = FilmFormula("Pan-Hamrock (minimum)", 1.714, -0.128, 0.694, 0.568, *_PAN_HAMROCK_RANGE)
 DOWSON_HIGGINSON_MINIMUM = FilmFormula("Dowson-Higginson (minimum)", 2.65, -0.13, 0.70, 0.54, *_DOWSON_HIGGINSON_RANGE)
 
 
-#: The formulas by the name that a campaign gives them.
+#: The formulas, by their names in a campaign.
 FORMULAS: dict[str, FilmFormula] = {
     "pan_hamrock": PAN_HAMROCK_CENTRAL,
     "pan_hamrock_minimum": PAN_HAMROCK_MINIMUM,
@@ -210,12 +210,12 @@ FORMULAS: dict[str, FilmFormula] = {
 
 
 def square_of_half_width(W: float) -> float:
-    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact, by which films in ``a^2/R`` become films over R."""
+    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact; it converts films in ``a^2/R`` to films over R."""
     return 8 * W / np.pi
 
 
 class Moes(NamedTuple):
-    """Moes' load and lubricant parameters; with them ``h/R (2 U)^(-1/2)`` depends on two numbers only."""
+    """Moes' load and lubricant parameters; ``h/R (2 U)^(-1/2)`` depends only on these two numbers."""
 
     M: FloatArray
     L: FloatArray
@@ -237,7 +237,7 @@ REGIMES: tuple[str, ...] = (
 
 #: ``(h_min/R) W/U`` of a rigid parabola and an isoviscous liquid with the Reynolds exit condition (Kapitza).
 RIGID_ISOVISCOUS = 4.894968
-#: ``(h_min/R) (G U)^(-2/3)`` where the greatest isoviscous pressure reaches ``1/alpha`` (Blok).
+#: ``(h_min/R) (G U)^(-2/3)`` at which the maximum isoviscous pressure reaches ``1/alpha`` (Blok).
 RIGID_PIEZOVISCOUS = 1.666297
 #: ``(h_min/R) M^(1/5) (2 U)^(-1/2)`` of soft bodies and an isoviscous liquid (Moes).
 ELASTIC_ISOVISCOUS = 2.05
@@ -269,7 +269,7 @@ def limiting_films(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:
 
 
 def expected_film(M: float, L: float) -> float:
-    """Return the film in ``a^2/R`` expected from the four limiting regimes; good for a first guess."""
+    """Return an estimate of the film in ``a^2/R`` from the four limiting regimes, as a first guess."""
     rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(M, 0.5, L) * np.pi / (8 * M)
     return float(max(min(rigid_piezo, elastic_piezo), max(rigid_iso, elastic_iso)))
 
@@ -277,9 +277,9 @@ def expected_film(M: float, L: float) -> float:
 def regime(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> NDArray[np.intp]:
     """Return the index in `REGIMES` of the regime of each point.
 
-    Elastic flattening raises an isoviscous film and lowers a piezoviscous one: the thicker of the two isoviscous limits
-    competes with the thinner of the two piezoviscous ones, and the thicker of these is the film (the limit of Moes'
-    interpolation for a sharp transition).
+    Elastic flattening makes an isoviscous film thicker and a piezoviscous film thinner. So take the thicker of the two
+    isoviscous limits and the thinner of the two piezoviscous limits; the thicker of these two is the film (the limit of
+    Moes' interpolation for a sharp transition).
     """
     rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(W, U, G)
     isoviscous = np.where(elastic_iso > rigid_iso, 2, 0)

@@ -1,4 +1,4 @@
-"""The film of a line contact on one grid, and what is read from it between the nodes."""
+"""The film of a line contact on one grid, and quantities interpolated between its nodes."""
 
 from __future__ import annotations
 
@@ -13,22 +13,23 @@ from mdr_dask.physics.jit import jit
 from mdr_dask.physics.lubrication.deformation import film as film_at
 from mdr_dask.physics.lubrication.grids import adapted_density
 
-#: A second pressure maximum counts as a spike if it stands out by this share of the greatest pressure.
+#: A second pressure maximum is a spike if it exceeds the minimum before it by this fraction of the maximum pressure.
 _SPIKE = 0.01
-#: Positions between two cells at which the lowest film is looked for.
+#: Number of positions, within two cells, at which the minimum film is searched.
 _SUBDIVISION = 41
-#: Nodes on either side of a position that a polynomial goes through; the lowest film of coarse grids needs more.
+#: Nodes on either side of a position through which a polynomial goes; the minimum film on coarse grids needs three.
 _CUBIC, _QUINTIC = 2, 3
-#: Share of a cell by which the pressures of a grid end too early, where the film ends at a node.
+#: Fraction of a cell by which the pressure of a grid ends too early, if the film ends at a node.
 _TOO_EARLY = 0.035
 
 
 @dataclass(frozen=True)
 class GridSolution:
-    """Pressure (in p0) and film (in ``a^2/R``) at the nodes of one grid, the film at ``X = 0``, the steps taken, and
-    the spacing of the nodes over that of the density which places them.
+    """Pressure (in p0) and film (in ``a^2/R``) at the nodes of one grid, the film at ``X = 0``, the number of steps,
+    and the ratio of the node spacing to the spacing given by the density that places the nodes.
 
-    Between two nodes the pressure is straight and the film sags; :meth:`film_between` goes through the nodes instead.
+    The method takes the pressure as linear between two nodes, so that its film sags there; :meth:`film_between` uses a
+    polynomial through the nodes instead.
     """
 
     nodes: FloatArray
@@ -39,22 +40,23 @@ class GridSolution:
     spacing: float = np.nan
 
     def film_between(self, positions: FloatArray) -> FloatArray:
-        """Return the film in ``a^2/R`` at any positions in half widths; NaN upstream of the oil."""
+        """Return the film in ``a^2/R`` at positions in half widths; NaN upstream of the oil."""
         film = _between(self.nodes, self.film, positions, _CUBIC)
         behind = positions > self.nodes[-1]
         film[behind] = film_at(positions[behind], self.nodes, self.pressure, self.central)
         return np.where(positions < self.nodes[0], np.nan, film)
 
     def pressure_between(self, positions: FloatArray) -> FloatArray:
-        """Return the pressure in p0 at any positions in half widths; zero where there is no film."""
+        """Return the pressure in p0 at positions in half widths; zero where there is no film."""
         inside = (positions > self.nodes[0]) & (positions < self.nodes[-1])
         return np.where(inside, np.maximum(_between(self.nodes, self.pressure, positions, _CUBIC), 0.0), 0.0)
 
     def pressure_carried(self, nodes: FloatArray, front: float) -> FloatArray:
-        """Return the pressure at the nodes of another grid, on which it falls behind its spike at `front` (or NaN).
+        """Return the pressure at the nodes of another grid, with the front behind the spike shifted to `front` (or
+        NaN).
 
-        The nodes on either side of the front get the pressures half a cell from the front of this grid, which are
-        nearly the same on finer grids.
+        The nodes on either side of the front get the pressures at half a cell from the front of this grid; these are
+        nearly equal on finer grids.
         """
         if np.isnan(front + self.front):
             return self.pressure_between(nodes)
@@ -66,19 +68,19 @@ class GridSolution:
 
     @cached_property
     def density(self) -> FloatArray:
-        """The density of nodes that the solution needs, at its nodes."""
+        """The density of nodes that suits the solution, at its nodes."""
         return adapted_density(self.nodes, self.pressure, self.film, self.central)
 
     @cached_property
     def central_film(self) -> float:
-        """Film at ``X = 0`` in ``a^2/R``, between the nodes around it."""
+        """Film at ``X = 0`` in ``a^2/R``, interpolated between nodes."""
         return float(_between(self.nodes, self.film, np.zeros(1), _CUBIC)[0])
 
     @cached_property
     def minimum(self) -> tuple[float, float]:
-        """Position and height of the lowest film, between the nodes around the lowest one.
+        """Position and height of the minimum film, interpolated between the nodes around the lowest one.
 
-        A cubic there is off by more than what is left of the grids' error.
+        The polynomial is quintic, because the error of a cubic exceeds the remaining error of the grids.
         """
         i = int(np.clip(np.argmin(self.film), 1, self.film.size - 2))
         positions = np.linspace(self.nodes[i - 1], self.nodes[i + 1], _SUBDIVISION)
@@ -93,22 +95,24 @@ class GridSolution:
 
     @cached_property
     def spike(self) -> tuple[float, float]:
-        """Position and height of a second pressure maximum behind the first; NaN twice if there is none."""
+        """Position and height of a second pressure maximum downstream of the first; NaN for both if there is none."""
         peak, _ = self._spike
         return (float(self.nodes[peak]), float(self.pressure[peak])) if peak else (float("nan"), float("nan"))
 
     @property
     def resolves_spike(self) -> bool:
-        """Whether the pressure behind the spike takes two cells at least to lose half of the spike's height."""
+        """Whether the pressure behind the spike needs at least two cells to fall by half of the spike's height."""
         peak, lowest = self._spike
         behind = self.pressure[peak:]
         return peak > 0 and int(np.argmax(behind <= 0.5 * (lowest + behind[0]))) > 1
 
     @cached_property
     def front(self) -> float:
-        """Where the pressure behind its spike is down to the lowest before it; NaN if there is no spike.
+        """Position behind the spike at which the pressure has fallen to the minimum before it; NaN if there is no
+        spike.
 
-        It falls within a cell or two there, however fine the grid; only the spike's height depends on the nodes.
+        On any grid, the pressure falls there within one or two cells; only the height of the spike depends on the
+        nodes.
         """
         peak, lowest = self._spike
         if not peak:
@@ -128,7 +132,7 @@ class GridSolution:
 
     @cached_property
     def rupture(self) -> float:
-        """Where the film ends, from the last four values of the pressure, which goes out like a square."""
+        """Position where the film ends, extrapolated from the last four pressures, which tend to zero quadratically."""
         last = int(np.flatnonzero(self.pressure)[-1])
         behind = self.nodes[min(last + 1, self.nodes.size - 1)]
         x, root = self.nodes[max(last - 3, 0) : last + 1], np.sqrt(self.pressure[max(last - 3, 0) : last + 1])
@@ -148,7 +152,7 @@ def _cell_around(nodes: FloatArray, position: float) -> FloatArray:
 def expected(
     before: Sequence[GridSolution], reading: Callable[[GridSolution], float | FloatArray], spacing: float
 ) -> FloatArray:
-    """Return a reading on a grid of another spacing, extrapolated at second order from two grids, or that of one."""
+    """Return a quantity on a grid of another spacing, extrapolated (second order) if there are two grids."""
     last = np.asarray(reading(before[-1]))
     if len(before) == 1:
         return last
@@ -158,10 +162,10 @@ def expected(
 
 @jit
 def _between(nodes: FloatArray, values: FloatArray, positions: FloatArray, sides: int) -> FloatArray:
-    """Return the polynomial through as many nodes before as behind each position, `sides` each."""
+    """Return the interpolating polynomial through `sides` nodes before and behind each position."""
     result = np.empty(positions.size)
     for k in range(positions.size):
-        low, high = sides, nodes.size - sides  # of the first node that is not before the position
+        low, high = sides, nodes.size - sides  # bounds for the first node that is not before the position
         while low < high:
             middle = (low + high) // 2
             if nodes[middle] < positions[k]:
@@ -180,7 +184,7 @@ def _between(nodes: FloatArray, values: FloatArray, positions: FloatArray, sides
 
 
 def _at_zero(x: list[float], values: list[float]) -> float:
-    """Return the polynomial through values at x, at zero."""
+    """Return, at zero, the polynomial through the values at x."""
     total = 0.0
     for i, value in enumerate(values):
         share = value

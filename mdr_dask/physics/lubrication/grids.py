@@ -1,7 +1,7 @@
-"""Graded grids for a lubricated line contact: a first one from the expected film, then one from a solution.
+"""Graded grids for a lubricated line contact: a first grid from the expected film, then grids from a solution.
 
-A grid is sampled from a density of nodes over position, so that grids of different size nest in the limit and their
-errors compare (Richardson). Positions in half widths, films in ``a^2/R``.
+A grid is sampled from a density of nodes along the contact. Grids of different size are therefore similar, and their
+errors can be compared (Richardson extrapolation). Positions are in half widths, films in ``a^2/R``.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 
-#: Fully flooded: the inlet lies this many times ``sqrt(2 Hc)`` upstream.
+#: A fully flooded film begins this many times ``sqrt(2 Hc)`` upstream.
 FLOODED = 300.0
 
 
@@ -25,14 +25,14 @@ def outlet_position(central_film: float) -> float:
 
 
 def sample(positions: FloatArray, density: FloatArray, count: int) -> FloatArray:
-    """Return `count` nodes whose spacing is inverse to a density that is linear between positions.
+    """Return `count` nodes with spacings inverse to a density, which is linear between the given positions.
 
     Parameters
     ----------
     positions, density : array, shape (m,)
-        Ascending positions and positive density there; only its shape matters.
+            Ascending positions and the positive density at them; only its shape matters.
     count : int
-        Number of nodes, both ends included.
+            Number of nodes, including both ends.
 
     Returns
     -------
@@ -51,7 +51,7 @@ def _cells(positions: FloatArray, density: FloatArray) -> FloatArray:
 
 
 def _placed(positions: FloatArray, density: FloatArray, number: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Return where the numbers of cells wanted are reached; behind the last position the density goes on."""
+    """Return the positions before which there are `wanted` cells; beyond the last position, the density is constant."""
     width = np.diff(positions)
     cell = np.clip(np.searchsorted(number, wanted, side="right") - 1, 0, width.size - 1)
     rest = wanted - number[cell]
@@ -65,27 +65,28 @@ def _placed(positions: FloatArray, density: FloatArray, number: FloatArray, want
 def aligned(
     positions: FloatArray, density: FloatArray, count: int, rupture: float, front: float = np.nan
 ) -> tuple[FloatArray, float]:
-    """Return nodes of a density, one of them where the film ends, and none within half a cell of the pressure's front.
+    """Return nodes of a density such that the film ends at a node, and no node is within half a cell of the front.
 
-    The error of a film depends on where in its cell it ends, by as much as a tenth and least at a node, so that grids
-    compare only if it ends alike on all of them. Where the pressure falls behind a sharp spike, it does so within a
-    cell or two, and the lowest film depends on which. So cells are a little wider or narrower behind that front.
+    The error of a film depends, by up to a tenth, on where in its cell the film ends, and is least at a node. So grids
+    can be compared only if this is equal on all of them. Behind a sharp spike, the pressure falls within one or two
+    cells, and the minimum film depends on where these begin. So the cells are made slightly wider or narrower, for the
+    front to lie in the middle of a cell.
 
     Parameters
     ----------
     positions, density : array, shape (m,)
-        Ascending positions and positive density there; only its shape matters.
+            Ascending positions and the positive density at them; only its shape matters.
     count : int
-        Number of nodes, but for one or two.
+            Number of nodes; the result may differ by one or two.
     rupture : float
-        Where the film ends, as a coarser grid found it.
+            Position of the end of the film, estimated from coarser grids.
     front : float
-        Where the pressure falls behind its spike, before the film ends; NaN if it does not.
+            Position where the pressure falls behind its spike, before the film ends; NaN if there is none.
 
     Returns
     -------
     tuple of array and float
-        Ascending nodes, the last one behind the last position or there, and the spacing: cells of the density a cell.
+            Ascending nodes, the last one at or behind the last position; and the spacing in cells of the density.
     """
     number = _cells(positions, density)
     reached = _cells_before(rupture, positions, density, number)
@@ -98,14 +99,14 @@ def aligned(
 
 
 def _halved_by(share: float, cells: int) -> int:
-    """Return the number of cells near `cells` one of which is halved best at this share of them all."""
-    far = int(0.5 / max(1 - share, 4 / cells))  # the place in its cell comes again with every 1 / (1 - share) cells
+    """Return the number near `cells` for which the fraction `share` of it lies closest to the middle of a cell."""
+    far = int(0.5 / max(1 - share, 4 / cells))  # the place in its cell repeats after 1 / (1 - share) cells
     near = cells + np.arange(-far, far + 1)
     return int(near[np.argmin(np.abs(near * share % 1 - 0.5))])
 
 
 def _cells_before(position: float, positions: FloatArray, density: FloatArray, number: FloatArray) -> float:
-    """Return the number of cells before any position, where those before the positions of the density are given."""
+    """Return the number of cells before any position, given the numbers before the positions of the density."""
     before = int(np.clip(np.searchsorted(positions, position) - 1, 0, positions.size - 2))
     rest = position - positions[before]
     slope = (density[before + 1] - density[before]) / (positions[before + 1] - positions[before])
@@ -113,14 +114,15 @@ def _cells_before(position: float, positions: FloatArray, density: FloatArray, n
 
 
 def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:
-    """Return a grid for an expected film: fine where a dry contact ends, or around the parabola of a rigid one.
+    """Return a grid for an expected film: fine where a dry contact ends, or, for a thick film, around the rigid
+    parabola.
 
     Parameters
     ----------
     central_film : float
         Expected film at ``X = 0`` in ``a^2/R``.
     inlet : float
-        Where the film begins, in half widths.
+            Position where the film begins, in half widths.
     count : int
         Number of nodes.
     """
@@ -140,25 +142,25 @@ def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:
 
 
 def first_pressure(nodes: FloatArray, central: float) -> FloatArray:
-    """Return half an ellipse: Hertz' pressure, or a wider and flatter one upstream for a thick film."""
+    """Return half an ellipse: Hertz' pressure, or, for a thick film, a wider and flatter one upstream."""
     reach = float(np.sqrt(2 * central))
     width, centre = (1.0, 0.0) if reach < 1 else (max(1.0, 0.8 * reach), -0.4 * reach)
     return np.sqrt(np.maximum(1 - ((nodes - centre) / width) ** 2, 0.0)) / width
 
 
 def second_derivative(nodes: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the second divided differences at the nodes, those at the ends repeated from inside."""
+    """Return the second divided differences at the nodes; at both ends, the value at the next node."""
     width = np.diff(nodes)
     inner = 2 * np.diff(np.diff(values) / width) / (width[1:] + width[:-1])
     return np.concatenate([inner[:1], inner, inner[-1:]])
 
 
 def adapted_density(nodes: FloatArray, pressure: FloatArray, film: FloatArray, central_film: float) -> FloatArray:
-    """Return the density of nodes that a solution needs, shape (n,).
+    """Return the density of nodes that suits a solution, shape (n,).
 
-    The curvature of the film relative to the film itself gives the error of the flow (square root: second order), that
-    of the pressure the error of the deformation (cube root: integrated over an element); a floor keeps the contact and
-    the inlet covered, and smoothing keeps neighbouring cells alike.
+    The flow error follows from the curvature of the film over the film (second order: square root), the deformation
+    error from the curvature of the pressure (integrated over an element: cube root). A least density keeps nodes in the
+    contact and in the inlet, and smoothing keeps neighbouring cells similar.
     """
     length = max(1.0, float(np.sqrt(2 * central_film)))
     of_film = np.sqrt(np.abs(second_derivative(nodes, film)) / film)

@@ -1,12 +1,12 @@
-"""The elastohydrodynamic film of a line contact, from rigid and isoviscous to elastic and piezoviscous.
+"""The elastohydrodynamic film of a line contact, in all regimes from rigid isoviscous to elastic piezoviscous.
 
 Hertz units: ``X = x/a``, ``P = p/p0``, ``H = h R/a^2`` (thesis eq. B.13), with ``a/R = sqrt(8 W/pi)`` and
 ``p0 = E' sqrt(W/(2 pi))``, where ``E' = 2 E*`` and velocities are means of the two surfaces. With Barus' law and an
 incompressible liquid the solution depends on two numbers only, Moes' M and L.
 
-The first solution on a coarse grid places the nodes of all others. A case is then solved on grids of 40, 80, 160, ...
-nodes of that density. The scheme is of second order, so that two grids together give a value of third order; how these
-values change from grid to grid gives the error (`mdr_dask.physics.refine`).
+The first solution on a coarse grid gives the density of nodes for all other grids. A case is then solved on grids of
+40, 80, 160, ... nodes with this density. The scheme is of second order, so two grids together give a value of third
+order; the changes of this value from grid to grid give the error (`mdr_dask.physics.refine`).
 """
 
 from __future__ import annotations
@@ -29,28 +29,28 @@ from mdr_dask.physics.refine import SAFETY, Solution, refine
 
 VISCOSITY_LAWS = ("barus", "roelands")
 
-#: Nodes of the grids; on the finest one, a Newton step solves 1281 dense equations and takes some 0.1 s.
+#: Nodes of the grids; on the finest one, a Newton step solves 1281 dense equations and takes about 0.1 s.
 NODES = (40, 80, 160, 320, 640, 1280)
-#: Order of the values that two grids give together, and the factor from their last change to the error.
+#: Order of the values extrapolated from two grids, and the ratio of the stated error to their last change.
 ORDER = 3.0
 FACTOR = SAFETY / (2.0**ORDER - 1)
-#: Nodes of the two grids that place the nodes of all others.
+#: Nodes of the two grids that are solved to obtain the density of nodes.
 ADAPTED_NODES = 161
 
 
 class Attempt(NamedTuple):
-    """Guess and steps for the first solution.
+    """Initial guess and step limits for the first solution.
 
     Parameters
     ----------
     factor : float
-        The guessed film over that of the limiting regimes.
+            Guess of the film over the film expected from the limiting regimes.
     starved : float
-        Largest guess over the square of the distance to the inlet.
+            Upper limit of the guess, over the square of the distance to the inlet.
     nodes : int
         Number of nodes.
     pace : Pace
-        Steps of Newton's method.
+            Step limits of Newton's method.
     """
 
     factor: float
@@ -59,13 +59,14 @@ class Attempt(NamedTuple):
     pace: Pace
 
 
-#: Tried in this order. Small steps from a thick film on a fine grid nearly always converge, but take long.
+#: Tried in this order. The second attempt, small steps from a thick film on a fine grid, is slow but hardly ever fails.
 ATTEMPTS = (Attempt(1.5, 0.2, 121, Pace(0.12, 80)), Attempt(2.5, 0.4, 361, Pace(0.05, 200)))
-#: From one grid to the next: from an extrapolated guess, and if that fails from the last solution.
+#: Step limits on further grids: first from an extrapolated guess; if this fails, from the previous solution.
 PACES = (Pace(0.12, 16), Pace(0.03, 250))
-#: A position is known to a tenth of a cell at best.
+#: Least error of a position, in cells.
 PLACED = 0.1
-#: Cells of the coarser grid over which the change of a profile counts: a steep front moves from grid to grid.
+#: Cells of the coarser grid over which the largest error of a profile is taken, since a steep front moves between
+#: grids.
 REACH = 2.0
 
 
@@ -84,18 +85,18 @@ Reading = Callable[[GridSolution], float | FloatArray]
 
 
 class LineContact(NamedTuple):
-    """A case in dimensionless numbers; equal tuples have the same solution.
+    """A case in dimensionless numbers; cases with equal numbers have the same solution.
 
     Parameters
     ----------
     M, L : float
         Moes' load and lubricant parameters.
     pole, exponent : float
-        Roelands' pressure over p0 and exponent z; zeros for Barus.
+            Roelands' pressure p_r over p0, and his exponent z; zeros for Barus.
     density_rise, density_saturation : float
         Constants of the density law times p0; zeros for an incompressible liquid.
     inlet : float or None
-        Where the oil begins, in half widths (negative); None for a fully flooded inlet.
+            Beginning of the oil in half widths (negative); None for a fully flooded inlet.
     """
 
     M: float
@@ -118,7 +119,7 @@ class LineContact(NamedTuple):
 
     @property
     def liquid(self) -> Liquid:
-        """Return the laws of the liquid; ``alpha p0 = L sqrt(M/(2 pi))``."""
+        """Return viscosity and density as functions of pressure; ``alpha p0 = L sqrt(M/(2 pi))``."""
         alpha = self.L * float(np.sqrt(self.M / (2 * np.pi)))
         return Liquid(alpha, self.pole, self.exponent, self.density_rise, self.density_saturation)
 
@@ -139,7 +140,7 @@ def line_contact(
     groups : tuple of float
         Load, speed and material parameters W, U and G with ``E' = 2 E*`` and the mean velocity.
     E_star : float
-        Contact modulus in Pa; it sets the pressures that the density law and Roelands' law see.
+            Contact modulus in Pa; it gives the pressures for the density law and Roelands' law.
     viscosity_law : str
         ``"barus"`` or ``"roelands"``.
     viscosity : float, optional
@@ -147,13 +148,13 @@ def line_contact(
     compressible : bool
         Whether the density follows the law of Dowson and Higginson.
     inlet : float, optional
-        Where the oil begins, in half widths, negative; None for a fully flooded inlet.
+            Beginning of the oil in half widths, negative; None for a fully flooded inlet.
 
     Raises
     ------
     ValueError
-        If a number is not positive, the law is unknown, Roelands' law has no viscosity above ``exp(-9.67)`` Pa s, or
-        the inlet is not upstream.
+            If a number is not positive (G may be zero), the law is unknown, Roelands' law has no viscosity above
+            ``exp(-9.67)`` Pa s, or the inlet is not upstream.
     """
     W, U, G = groups
     for name, value in (("W", W), ("U", U), ("G", G), ("E_star", E_star)):
@@ -182,7 +183,7 @@ class LineSolution:
     Parameters
     ----------
     case : LineContact
-        What was solved.
+            The solved case.
     outcome : Outcome
         CONVERGED, or why there is no film.
     reason : str
@@ -216,7 +217,7 @@ class LineSolution:
         return abs(float(np.trapezoid(self.finest.pressure, self.finest.nodes)) / (np.pi / 2) - 1)
 
     def estimate(self, reading: Reading) -> Estimate:
-        """Return the value of a number that is read from each grid, such as a traction, and its error."""
+        """Return a quantity that is evaluated on each grid, such as a traction, with its error."""
         values = [_extrapolated(reading, *pair) for pair in _pairs(self.grids)]
         return Estimate(np.asarray(values[-1]), np.asarray(_error(values)))
 
@@ -226,14 +227,14 @@ class LineSolution:
         Parameters
         ----------
         read : callable, (grid, positions) -> array
-            The profile on one grid at any positions.
+                Evaluates the profile of one grid at given positions.
         positions : array, shape (m,)
             Ascending positions in half widths.
 
         Notes
         -----
-        The error at a position is the largest one within `REACH` cells of it, because a spike or a front moves from
-        grid to grid and two grids cross each other.
+        The error at a position is the largest one within `REACH` cells of it: a spike or a front moves from grid to
+        grid, so the difference of two grids vanishes where their profiles intersect.
         """
         pairs = list(_pairs(self.grids))
         coarse = pairs[-1][0].nodes
@@ -247,7 +248,7 @@ class LineSolution:
         return Estimate(value, np.where(np.isnan(value), np.nan, largest))
 
     def position(self, reading: Reading) -> Estimate:
-        """Return a position in half widths, which is known to a tenth of a cell at best."""
+        """Return a position in half widths; its error is at least a tenth of a cell."""
         found, nodes = self.estimate(reading), self.finest.nodes
         after = np.clip(np.searchsorted(nodes, found.value), 1, nodes.size - 1)
         return found._replace(error=np.maximum(found.error, PLACED * (nodes[after] - nodes[after - 1])))
@@ -255,8 +256,8 @@ class LineSolution:
     def spike(self) -> tuple[Estimate, Estimate]:
         """Return position (half widths) and pressure (p0) of the pressure spike; NaN if there is none.
 
-        Values are those of the finest grid. A spike whose pressure falls within one cell is as high as its nodes allow:
-        its height is not determined, and the error is infinite.
+        Values are from the finest grid. If the pressure behind the spike falls within one cell, the height of the spike
+        depends on the nodes; its error is then infinite.
         """
         position, height = (np.array([grid.spike[k] for grid in self.grids[-3:]]) for k in (0, 1))
         grid, changes = self.finest, [np.abs(np.diff(each)) for each in (position, height)]
@@ -274,18 +275,18 @@ class LineSolution:
 
 
 def _pairs(solved: Sequence[GridSolution]) -> Sequence[tuple[GridSolution, GridSolution]]:
-    """Return each grid with the next finer one, three pairs at most."""
+    """Return each grid with the next finer one, for the finest grids; at most three pairs."""
     return list(itertools.pairwise(solved))[-3:]
 
 
 def _extrapolated(reading: Reading, coarse: GridSolution, fine: GridSolution) -> FloatArray:
-    """Return a reading without its error of second order, from two grids."""
+    """Return a quantity extrapolated from two grids, without its error of second order."""
     value, ratio = np.asarray(reading(fine)), (coarse.spacing / fine.spacing) ** 2
     return np.asarray(value + (value - np.asarray(reading(coarse))) / (ratio - 1))
 
 
 def _error(values: Sequence[FloatArray]) -> FloatArray:
-    """Return the error of the last of some extrapolated values on ever finer grids, by the rule of `refine`."""
+    """Return the error of the last of several extrapolated values on finer and finer grids, by the rule of `refine`."""
     if len(values) < 2:
         return np.full_like(values[-1], np.inf)
     changes = np.abs(np.diff(values[-3:], axis=0))
@@ -305,14 +306,14 @@ def _solve_on(
     grid = Grid.of(nodes)
     guess = pressure.copy()
     guess[0] = guess[-1] = 0.0
-    # a guess with a film below zero has no Newton step
+    # with negative film in the guess there is no Newton step
     lift = max(0.0, 0.1 * central - float(film_on(grid, guess, central).min()))
     found = newton(grid, case.liquid, case.film_number, guess, central + lift, pace)
     return found.outcome, GridSolution(nodes, found.pressure, found.film, found.central, found.steps, spacing)
 
 
 def _first_solution(case: LineContact) -> tuple[Outcome, GridSolution]:
-    """Return a solution on a grid placed by the expected film."""
+    """Return a solution on a grid that suits the expected film."""
     for attempt in ATTEMPTS:
         guess = attempt.factor * expected_film(case.M, case.L)
         inlet = grids.inlet_position(guess) if case.inlet is None else case.inlet
@@ -327,7 +328,7 @@ def _first_solution(case: LineContact) -> tuple[Outcome, GridSolution]:
 def _refined(
     case: LineContact, before: Sequence[GridSolution], source: GridSolution, count: int
 ) -> tuple[Outcome, GridSolution]:
-    """Solve on some `count` nodes of the density of the `source`, from one or two solutions `before`."""
+    """Solve on about `count` nodes with the density of `source`, from the one or two last solutions in `before`."""
     last = before[-1]
     spacing = last.spacing * (last.nodes.size - 1) / (count - 1)
     end = float(expected(before, lambda grid: grid.rupture, spacing))
@@ -343,7 +344,7 @@ def _refined(
 
 
 def _source(case: LineContact) -> tuple[Outcome, GridSolution]:
-    """Return the solution that places the nodes of all grids."""
+    """Return the solution whose density of nodes is used for all grids."""
     outcome, state = _first_solution(case)
     for _ in range(2 if outcome == Outcome.CONVERGED else 0):
         adapted_outcome, adapted = _refined(case, [state], state, ADAPTED_NODES)
@@ -362,18 +363,18 @@ def solve_film(
     case : LineContact
         The case; see :func:`line_contact`.
     accuracy : float
-        Relative error allowed for the central film, the minimum film and the readings. Grids become finer until the
-        estimates meet it or the finest grid is reached.
+            Allowed relative error of the central film, the minimum film and the readings. Grids are refined until the
+            estimated errors meet it, or up to the finest grid.
     readings : sequence of callable, GridSolution -> float or array
-        Further numbers, or profiles at fixed positions, that have to meet the accuracy.
+            Further quantities, or profiles at fixed positions, that must meet the accuracy.
     floors : sequence of float
-        For each reading the size below which its error is not relative; all 0 if not given.
+            For each reading, the magnitude below which its error is absolute; 0 by default.
 
     Returns
     -------
     LineSolution
-        With an outcome other than CONVERGED and a reason if no film was found. Its `error` may exceed the accuracy on
-        the finest grid allowed, or on the finest one that converged.
+            If no film was found, the outcome is not CONVERGED and there is a reason. The `error` may exceed the
+            accuracy if the finest grid is reached, or the finest one that converges.
 
     Examples
     --------
@@ -386,7 +387,7 @@ def solve_film(
     if outcome != Outcome.CONVERGED:
         return _no_solution(case, outcome, source)
     solved: list[GridSolution] = []
-    # both films have the same relative error, that of the one that changes more: two grids may agree on one by chance
+    # both films get the larger of their two relative errors, since two grids may agree on one film by chance
     scales = np.array([source.central_film, source.minimum[1]])
     wanted: list[Reading] = [lambda grid: np.array([grid.central_film, grid.minimum[1]]) / scales, *readings]
 
@@ -400,7 +401,7 @@ def solve_film(
     def solve(count: int, _: IntArray) -> Solution:
         outcome = add(count)
         if outcome == Outcome.CONVERGED and len(solved) < 2:
-            outcome = Outcome.UNDER_WAY  # one grid alone gives no extrapolated value
+            outcome = Outcome.UNDER_WAY  # an extrapolated value needs two grids
         if outcome != Outcome.CONVERGED:
             none = [np.full_like(np.atleast_2d(reading(source)), np.nan, dtype=np.float64) for reading in wanted]
             return Solution(none, np.array([outcome], np.int8))
@@ -419,7 +420,7 @@ def solve_film(
 
 
 def _no_solution(case: LineContact, outcome: Outcome, failed: GridSolution) -> LineSolution:
-    """Return a solution without a film, and why there is none."""
+    """Return a solution without a film, with the reason."""
     none = Estimate(np.asarray(np.nan), np.asarray(np.nan))
     why = "too few grids have a solution" if outcome == Outcome.CONVERGED else outcome.sentence
     reason = f"no film found for M = {case.M:.4g}, L = {case.L:.4g}: {why} on {failed.nodes.size} nodes"

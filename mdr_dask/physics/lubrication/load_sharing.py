@@ -1,14 +1,14 @@
-"""The load of a rough contact, shared between its film and its asperities (Johnson, Greenwood and Poon 1972).
+"""Load of a rough contact, shared between film and asperities (Johnson, Greenwood and Poon 1972).
 
-The film carries the share gamma of the load, the asperities the rest. The pressure of both together bends the rollers,
-so the film is that of the load ``gamma w`` on bodies of the modulus ``gamma E'``: W stays, U becomes ``U/gamma`` and G
-becomes ``gamma G`` (Wear 19, 91).
+The film carries the fraction gamma of the load, the asperities the rest. The total pressure deforms the rollers, so the
+film equals that of the load ``gamma w`` on bodies of the modulus ``gamma E'``: W stays the same, U becomes ``U/gamma``
+and G becomes ``gamma G`` (Wear 19, 91).
 
-The asperities are the springs of the MDR: a line as long as its longest wave stands for a square of that edge, and
-its springs of stiffness ``E* dx`` carry ``E* dx`` times their overlap. Squares side by side are alike, so their mean
-pressure is ``E*/wavelength`` times the mean overlap of the two lines. The lines approach until the gap left between
-them is the film: ``<(d - z)+> = h`` with d the distance of their means; above two rms heights d and h are the same.
-Heights are Gaussian.
+The asperities are represented by the springs of the MDR. A line as long as its longest wave stands for a square with
+this edge; its springs of stiffness ``E* dx`` carry ``E* dx`` times their overlap. The contact consists of equal
+squares, so their mean pressure is ``E*/wavelength`` times the mean overlap of the two lines. The lines approach until
+the mean gap equals the film: ``<(d - z)+> = h`` with the distance d of their means; above two rms heights d and h are
+equal.
 """
 
 from __future__ import annotations
@@ -19,30 +19,30 @@ from typing import NamedTuple
 
 from scipy.optimize import brentq
 
-#: A share of the load so small that the film does not notice: it would thicken by a quarter of that.
+#: Asperity load share that is neglected; it would change the film by a quarter of this fraction.
 _NEGLIGIBLE = 1e-9
-#: Logarithm of the smallest share of the load on the film.
+#: Logarithm of the smallest load share of the film that is tried.
 _LEAST_LOGARITHM = -256.0
-#: Greatest lack of balance of the load, over the tolerance.
+#: Largest imbalance of the load, over the tolerance.
 _BALANCE = 100.0
-#: Distance of the means of two lines in rms heights at which there is no gap left in double precision.
+#: Distance of the means of two lines, in rms heights, at which the gap is zero in double precision.
 _CLOSED = -37.0
-#: Greatest number of Newton steps to a distance; five are usual.
+#: Largest number of Newton steps; five are usual.
 _MOST_STEPS = 100
-#: Distance beyond which lines do not overlap in double precision.
+#: Distance in rms heights beyond which lines do not overlap in double precision.
 _APART = 9.0
 
 
 def mean_overlap(distance: float) -> float:
-    """Return ``<(z - d)+>`` of heights z, in their rms, at a distance d of the means in rms heights."""
+    """Return ``<(z - d)+>`` for heights z and a distance d of the means, all in rms heights."""
     return max(exp(-(distance**2) / 2) / sqrt(2 * pi) - distance * erfc(distance / sqrt(2)) / 2, 0.0)
 
 
 def distance_of_means(gap: float) -> float:
-    """Return the distance d of the means, in rms heights, at which ``<(d - z)+>`` is the mean gap given."""
+    """Return the distance d of the means at which the mean gap ``<(d - z)+>`` is `gap`, both in rms heights."""
     if gap > _APART:
         return gap
-    # the gap at d is the overlap at -d; its logarithm is concave in d, so Newton comes from the left without fail
+    # the gap at d is the overlap at -d; its logarithm is concave in d, so Newton's method converges from the left
     if mean_overlap(-_CLOSED) >= gap:
         return _CLOSED
     middle = mean_overlap(0.0)
@@ -57,14 +57,14 @@ def distance_of_means(gap: float) -> float:
 
 
 class Asperities(NamedTuple):
-    """Two rough lines as springs.
+    """Two rough lines, represented by springs.
 
     Parameters
     ----------
     rms : float
-        Rms height of both lines together in m.
+            Rms height of both lines together, in m.
     wavelength : float
-        Their longest wavelength in m.
+            Longest wavelength of the lines in m.
     E_star : float
         Contact modulus in Pa.
     """
@@ -79,7 +79,7 @@ class Asperities(NamedTuple):
 
 
 class SharedLoad(NamedTuple):
-    """Film thickness in the unit of `film_at`, and the shares of the load on film and asperities."""
+    """Film thickness in the unit of `film_at`, and the load shares of film and asperities."""
 
     film: float
     film_share: float
@@ -89,22 +89,22 @@ class SharedLoad(NamedTuple):
 def share_load(
     film_at: Callable[[float], float], asperity_share: Callable[[float], float], tolerance: float = 1e-9
 ) -> SharedLoad:
-    """Return the film at which film and asperities together carry the load.
+    """Return the film for which the load shares of film and asperities add up to one.
 
     Parameters
     ----------
     film_at : callable, float -> float
-        Film thickness if the film carries a share of the load between 0 and 1; it falls with that share. It may be 0
-        where the film is too thin to be found.
+            Film thickness for a load share of the film between 0 and 1; it falls with this share. It may be 0 where the
+            film is too thin to be computed.
     asperity_share : callable, float -> float
-        Share of the load that the asperities carry at a film thickness; it falls with the film.
+            Load share of the asperities for a film thickness; it falls with the film.
     tolerance : float
-        Relative error of the film's share; the film's own is about a quarter of that.
+            Relative error of the film's load share; the relative error of the film is about a quarter of it.
 
     Returns
     -------
     SharedLoad
-        The one film at which the shares add to one; 0 if none is found.
+            The film and the shares; if no film is found, film and film share are 0.
     """
 
     def excess(logarithm: float) -> float:
@@ -123,5 +123,5 @@ def share_load(
     film = film_at(share)
     carried = asperity_share(film)
     if abs(carried + share - 1.0) > _BALANCE * tolerance:
-        return SharedLoad(0.0, 0.0, 1.0)  # between a film that is found and one that is not
+        return SharedLoad(0.0, 0.0, 1.0)  # no balance: the root lies where `film_at` jumps to 0
     return SharedLoad(film, share, min(carried, 1.0))

@@ -1,12 +1,12 @@
-"""Semismooth Newton for the pressure and central film of a lubricated line contact on a given grid.
+"""Semismooth Newton method for pressure and central film of a lubricated line contact on a given grid.
 
 Hertz units as in :mod:`mdr_dask.physics.lubrication.deformation`. The film obeys (thesis eq. B.15)
 
     d/dX( rho H^3/eta dP/dX ) = K d(rho H)/dX,   K = (3 pi^2/4) U/W^2,
 
-in finite volumes around the nodes; cavitation is the complementarity ``P >= 0``, ``R <= 0``, ``P R = 0`` of pressure
-and balance R; the load ``int P dX = pi/2`` is the last equation. Unknowns are the nodal pressures and the film at
-``X = 0``.
+in finite volumes around the nodes. Cavitation is the complementarity ``P >= 0``, ``R <= 0``, ``P R = 0`` of the
+pressure P and the flow balance R of each volume. The load ``int P dX = pi/2`` is the last equation. The unknowns are
+the nodal pressures and the film at ``X = 0``.
 """
 
 from __future__ import annotations
@@ -23,20 +23,21 @@ from mdr_dask.physics.linear import factorise
 from mdr_dask.physics.lubrication.deformation import influence_matrix
 from mdr_dask.physics.outcome import Outcome
 
-#: Share of the quadratic (QUICK) face value in the second-order upwind Couette flux; the rest is linear from upstream.
+#: Weight of the quadratic (QUICK) face value in the second-order upwind Couette flux; the rest is linear from upstream.
 _QUADRATIC = 1.0 / 3.0
-#: A step may close at most this share of the film at any node.
+#: Largest fraction of the film at any node that one step may close.
 _FILM_SHARE = 0.8
-#: Least share of a step that is worth taking.
+#: Smallest fraction of a step that is taken.
 _LEAST_SHARE = 1e-9
-#: Factors are used again if the last step was at most this share of the one before it, or the first one this large.
+#: The factorised Jacobian is reused if the last step was smaller than this fraction of the previous one (first step:
+#: 1).
 _SHRINKS = 0.1
 
 
 class Grid(NamedTuple):
-    """Nodes in half widths, their trapezoidal weights, and the influence of their pressures on the film there.
+    """Nodes in half widths, their trapezoidal weights, and the influence of nodal pressures on the film at the nodes.
 
-    The influence is that of :func:`mdr_dask.physics.lubrication.deformation.influence_matrix`, shape (n, n).
+    The influence is the matrix :func:`mdr_dask.physics.lubrication.deformation.influence_matrix`, shape (n, n).
     """
 
     nodes: FloatArray
@@ -53,17 +54,17 @@ class Grid(NamedTuple):
 
 
 class Pace(NamedTuple):
-    """How an iteration goes.
+    """Limits of an iteration.
 
     Parameters
     ----------
     clip : float
-        Greatest change of a pressure in one step, in units of the greatest pressure.
+            Largest change of a pressure in one step, over the largest pressure.
     most : int
-        Greatest number of steps.
+            Largest number of steps.
     tolerance : float
-        Relative size of the last step: what is left is of the size of its square. A step by the factors of the one
-        before it leaves more, and has to be a hundredth of that.
+            Relative size of the last step; the remaining error is about its square. A step with a reused Jacobian
+            leaves a larger error, so that it has to be a hundred times smaller.
     """
 
     clip: float
@@ -72,7 +73,7 @@ class Pace(NamedTuple):
 
 
 class Iterate(NamedTuple):
-    """Where an iteration ended: outcome, steps, pressure and film at the nodes, film at ``X = 0``."""
+    """Result of an iteration: outcome, steps, pressure and film at the nodes, film at ``X = 0``."""
 
     outcome: Outcome
     steps: int
@@ -82,7 +83,7 @@ class Iterate(NamedTuple):
 
 
 class Liquid(NamedTuple):
-    """Viscosity and density over pressure in Hertz units.
+    """Viscosity and density as functions of pressure, in Hertz units.
 
     Parameters
     ----------
@@ -139,7 +140,7 @@ def _mobility(left: float, right: float) -> tuple[float, float, float]:
 
 @jit
 def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
-    """Return the weights of nodes f-1, f, f+1 for the value at the face between f and f+1, flow to the right."""
+    """Return the weights of nodes f-1, f, f+1 in the value at the face between f and f+1, for flow to the right."""
     if f == 0:
         return 0.0, 0.5, 0.5
     dx = nodes[f + 1] - nodes[f]
@@ -153,9 +154,9 @@ def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
 
 
 class Imbalance(NamedTuple):
-    """What flows into every volume less what flows out, shape (n,), and its derivatives, shape (n, 4).
+    """Inflow minus outflow of every volume, shape (n,), and its derivatives, shape (n, 4).
 
-    Those are by pressure and film of the nodes i - 2 to i + 1.
+    The derivatives are with respect to pressure and film at the nodes i - 2 to i + 1.
     """
 
     value: FloatArray
@@ -167,7 +168,7 @@ class Imbalance(NamedTuple):
 def balance(
     nodes: FloatArray, liquid: Liquid, K: float, P: FloatArray, H: FloatArray, state: FloatArray, found: Imbalance
 ) -> None:
-    """Fill the imbalance of every volume; `state` is workspace, shape (4, n)."""
+    """Write the imbalance of every volume to `found`; `state` is workspace, shape (4, n)."""
     R, by_pressure, by_film = found
     rho, rho_slope, viscosity, viscosity_slope = state
     for i in range(P.size):
@@ -212,7 +213,7 @@ def balance(
 def _fill_jacobian_row(
     i: int, influence: FloatArray, by_pressure: FloatArray, by_film: FloatArray, row: FloatArray
 ) -> None:
-    """Fill the derivative of the balance of volume i by every pressure, through the film too."""
+    """Write the derivatives of the balance of volume i by all pressures to `row`, including the effect of the film."""
     c0, c1, c2, c3 = by_film[i]
     far, near, own, next_ = influence[max(i - 2, 0)], influence[i - 1], influence[i], influence[i + 1]
     for j in range(row.size):
@@ -224,7 +225,9 @@ def _fill_jacobian_row(
 
 @jit
 def _fill_active(influence: FloatArray, P: FloatArray, found: Imbalance, active: NDArray[np.int64]) -> int:
-    """List the inner nodes that carry pressure, ``P + R/d > 0`` with d the size of their own derivative; count them."""
+    """List the inner nodes with pressure, ``P + R/d > 0``, where d is the size of dR/dP at the node; return their
+    number.
+    """
     R, by_pressure, by_film = found
     count = 0
     for i in range(1, P.size - 1):
@@ -241,7 +244,7 @@ def _fill_active(influence: FloatArray, P: FloatArray, found: Imbalance, active:
 def _fill_equations(
     grid: Grid, P: FloatArray, found: Imbalance, active: NDArray[np.int64], A: FloatArray, b: FloatArray
 ) -> None:
-    """Fill the Newton equations of the active pressures and the central film; the other pressures go to zero."""
+    """Write the Newton equations of the active pressures and the central film; all other pressures become zero."""
     R, by_pressure, by_film = found
     count = active.size
     released, row = P.copy(), np.empty(P.size)
@@ -266,7 +269,7 @@ def _fill_equations(
 
 @jit
 def _fill_imbalance(grid: Grid, P: FloatArray, R: FloatArray, active: NDArray[np.int64], b: FloatArray) -> None:
-    """Fill the right side of those equations where the other pressures are zero already."""
+    """Write the right side of these equations for the case that all other pressures are already zero."""
     for k in range(active.size):
         b[k] = -R[active[k]]
     b[active.size] = 0.5 * np.pi
@@ -276,7 +279,7 @@ def _fill_imbalance(grid: Grid, P: FloatArray, R: FloatArray, active: NDArray[np
 
 @jit
 def _add_deformation(influence: FloatArray, P: FloatArray, H: FloatArray) -> None:
-    """Add to H what the pressures P deform; four rows at once, as their sums do not wait for one another."""
+    """Add the deformation by the pressures P to H; four rows at once, so that their sums are computed in parallel."""
     n = P.size
     for i in range(0, n - 3, 4):
         h0, h1, h2, h3 = H[i], H[i + 1], H[i + 2], H[i + 3]
@@ -294,7 +297,7 @@ def _add_deformation(influence: FloatArray, P: FloatArray, H: FloatArray) -> Non
 
 @jit
 def _fill_film(grid: Grid, P: FloatArray, central: float, H: FloatArray) -> None:
-    """Fill the film H at the nodes, given the pressure there and the film at ``X = 0``."""
+    """Write the film at the nodes to H, given the nodal pressures and the film at ``X = 0``."""
     for i in range(P.size):
         H[i] = central + 0.5 * grid.nodes[i] ** 2
     _add_deformation(grid.influence, P, H)
@@ -302,7 +305,7 @@ def _fill_film(grid: Grid, P: FloatArray, central: float, H: FloatArray) -> None
 
 @jit
 def _step_length(grid: Grid, P: FloatArray, H: FloatArray, step: FloatArray, change: float, clip: float) -> float:
-    """Return the share of a step that neither moves a pressure by more than `clip` nor closes the film."""
+    """Return the largest fraction of a step that changes no pressure by more than `clip` and does not close the film."""
     largest = np.max(np.abs(step))
     share = min(1.0, clip * np.max(P) / largest) if largest > 0.0 else 1.0
     film_step = np.full_like(H, change)
@@ -317,9 +320,10 @@ def _step_length(grid: Grid, P: FloatArray, H: FloatArray, step: FloatArray, cha
 def _take_step(
     grid: Grid, clip: float, P: FloatArray, central: float, H: FloatArray, step: FloatArray, change: float
 ) -> tuple[float, float]:
-    """Change P, H and the film at ``X = 0`` by as much of a Newton step as the film allows.
+    """Change P, H and the film at ``X = 0`` by the allowed fraction of a Newton step.
 
-    Return that film, and the relative size of the step: infinite if it was shortened, NaN if no film is left.
+    Return the film at ``X = 0`` and the relative size of the step: infinite if it was shortened, NaN if the film
+    closes.
     """
     share = _step_length(grid, P, H, step, change, clip)
     if not share > _LEAST_SHARE:
@@ -333,7 +337,7 @@ def _take_step(
 
 
 def film_on(grid: Grid, P: FloatArray, central: float) -> FloatArray:
-    """Return the film at the nodes, given the pressure there and the film at ``X = 0``."""
+    """Return the film at the nodes, given the nodal pressures and the film at ``X = 0``."""
     H = np.empty_like(P)
     _fill_film(grid, P, central, H)
     return H
@@ -345,17 +349,17 @@ def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: flo
     Parameters
     ----------
     grid : Grid
-        Nodes and their influence on each other.
+            Nodes, with the influence of their pressures on the film.
     liquid : Liquid
-        Its laws.
+            Viscosity and density of the liquid.
     K : float
         ``(3 pi^2/4) U/W^2``.
     guess : array, shape (n,)
         Guess of the pressure; zero at both ends, never negative.
     central : float
-        Guess of the film at ``X = 0``, positive with the pressure everywhere.
+            Guess of the film at ``X = 0``, large enough for a positive film at all nodes.
     pace : Pace
-        How far a step may go, and how many there may be.
+            Limits of the step and of the number of steps.
 
     Returns
     -------
@@ -372,7 +376,7 @@ def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: flo
         balance(grid.nodes, liquid, K, P, H, state, found)
         active = listed[: _fill_active(grid.influence, P, found, listed)]
         same = np.array_equal(active, solved)
-        # a first step may be small by chance; from then on steps shrink like squares
+        # the first step may be small by chance; later steps shrink quadratically
         if steps > 1 and size < last and same:
             return Iterate(Outcome.CONVERGED, steps, P, central, H)
         if steps == pace.most:

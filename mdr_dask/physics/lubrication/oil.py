@@ -1,4 +1,4 @@
-"""Lubricating oils: viscosity over temperature and pressure, density, pressure-viscosity correlations.
+"""Lubricating oils: viscosity versus temperature and pressure, density, pressure-viscosity correlations.
 
 Temperatures in K, pressures in Pa, dynamic viscosities in Pa s, kinematic viscosities in m^2/s.
 """
@@ -14,14 +14,14 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import distinguishable
 
 _MM2 = 1e-6
-#: Density of water at 15.6 C in kg/m^3, to which a specific gravity refers.
+#: Density of water at 15.6 C in kg/m^3, the reference of a specific gravity.
 WATER_DENSITY = 999.016
 #: Reference temperature of a specific gravity, 60 F.
 SPECIFIC_GRAVITY_TEMPERATURE = 288.705555
-#: ASTM D1250 / API 54D, lubricating oils: thermal expansion at 60 F is this over the density there, 1/K.
+#: ASTM D1250 / API 54D, lubricating oils: thermal expansion at 60 F in 1/K is this number over the density at 60 F.
 _LUBRICANT_EXPANSION = 0.6278
 
-#: Gold's correlation ``alpha = s nu^t 1e-9`` with nu in mm^2/s: (s, t) of each kind of oil (Gold et al. 2001,
+#: Gold's correlation ``alpha = s nu^t 1e-9`` with nu in mm^2/s: (s, t) for each kind of oil (Gold et al. 2001,
 #: from memory; see docs/evidence/mixed-lubrication.md).
 GOLD: dict[str, tuple[float, float]] = {
     "gold_mineral": (9.904, 0.1390),
@@ -29,7 +29,7 @@ GOLD: dict[str, tuple[float, float]] = {
     "gold_ester": (6.605, 0.1360),
     "gold_polyglycol": (5.489, 0.1485),
 }
-#: Names for :func:`pressure_viscosity`.
+#: Names of the correlations in :func:`pressure_viscosity`.
 CORRELATIONS: tuple[str, ...] = (*GOLD, "wooster")
 
 
@@ -39,14 +39,15 @@ def walther_fit(temperature: FloatArray, viscosity: FloatArray) -> tuple[float, 
     Parameters
     ----------
     temperature : array, shape (n,)
-        In K; at least two differ.
+            Temperatures in K; at least two are different.
     viscosity : array, shape (n,)
-        Kinematic viscosities there in m^2/s.
+            Kinematic viscosities at these temperatures in m^2/s.
 
     Raises
     ------
     ValueError
-        If there are not two temperatures, a viscosity is below 2 mm^2/s, or they do not fall with temperature.
+            If there are fewer than two temperatures, a viscosity is below 2 mm^2/s, or they do not fall with
+            temperature.
 
     Examples
     --------
@@ -79,7 +80,7 @@ def walther_constants(T1: float, nu1: float, T2: float, nu2: float) -> tuple[flo
     T1, T2 : float
         Two different temperatures in K.
     nu1, nu2 : float
-        Kinematic viscosities there in m^2/s, lower at the higher temperature.
+            Kinematic viscosities at T1 and T2 in m^2/s, lower at the higher temperature.
 
     Returns
     -------
@@ -119,16 +120,17 @@ def density_at(temperature: ArrayLike, density: float, reference_temperature: fl
     Parameters
     ----------
     temperature : array_like
-        In K.
+            Temperature in K.
     density : float
-        Known density in kg/m^3.
+            Density in kg/m^3 at the reference temperature.
     reference_temperature : float
-        Temperature in K at which it is known.
+            Reference temperature in K.
 
     Returns
     -------
     array
-        ``rho_ref exp(-b dT (1 + 0.8 b dT))``, ``b = 0.6278/rho_ref`` (ASTM D1250, table 54D, whose reference is 60 F).
+            ``rho_ref exp(-b dT (1 + 0.8 b dT))``, ``b = 0.6278/rho_ref`` (ASTM D1250, table 54D, with 60 F as
+            reference).
     """
     expansion = _LUBRICANT_EXPANSION / density * (np.asarray(temperature, dtype=np.float64) - reference_temperature)
     return np.asarray(density * np.exp(-expansion * (1 + 0.8 * expansion)))
@@ -140,15 +142,15 @@ def pressure_viscosity(correlation: str, kinematic: ArrayLike, dynamic: ArrayLik
     Parameters
     ----------
     correlation : str
-        One of `CORRELATIONS`: Gold's power laws of the kinematic viscosity by kind of oil, or Wooster's
-        ``alpha = (0.6 + 0.965 log10(eta0)) 1e-8`` with eta0 in mPa s (mineral oils).
+            One of `CORRELATIONS`: Gold's power laws of the kinematic viscosity for each kind of oil, or Wooster's
+            ``alpha = (0.6 + 0.965 log10(eta0)) 1e-8`` with eta0 in mPa s (mineral oils).
     kinematic, dynamic : array_like
         Viscosities at ambient pressure in m^2/s and Pa s.
 
     Raises
     ------
     ValueError
-        If there is no such correlation.
+            If the correlation is unknown.
     """
     if correlation == "wooster":
         return np.asarray((0.6 + 0.965 * np.log10(np.asarray(dynamic, dtype=np.float64) * 1e3)) * 1e-8)
@@ -160,18 +162,18 @@ def pressure_viscosity(correlation: str, kinematic: ArrayLike, dynamic: ArrayLik
 
 @dataclass(frozen=True)
 class Oil:
-    """An oil by the numbers of its data sheet.
+    """An oil, described by the numbers of its data sheet.
 
     Parameters
     ----------
     T1, nu1, T2, nu2 : float
-        Two temperatures in K and the kinematic viscosities there in m^2/s.
+            Two temperatures in K and the kinematic viscosities at them in m^2/s.
     density, density_temperature : float
         Density in kg/m^3 and its temperature in K.
     correlation : str
         Pressure-viscosity correlation, one of `CORRELATIONS`.
     lowest, highest : float
-        Temperatures in K between which the data hold.
+            Range of temperatures in K in which the data are valid.
     source : str
         Source of the numbers.
 
@@ -202,18 +204,18 @@ class Oil:
         return self.kinematic(temperature) * density_at(temperature, self.density, self.density_temperature)
 
     def alpha(self, temperature: ArrayLike) -> FloatArray:
-        """Return the pressure-viscosity coefficient in 1/Pa at temperatures in K, by the oil's correlation."""
+        """Return the pressure-viscosity coefficient in 1/Pa at temperatures in K, by the correlation of the oil."""
         return pressure_viscosity(self.correlation, self.kinematic(temperature), self.dynamic(temperature))
 
     def outside(self, temperature: float) -> str:
-        """Return a message if a temperature lies outside the oil's data, else an empty string."""
+        """Return a message if a temperature is outside the range of the data, or an empty string."""
         if self.lowest <= temperature <= self.highest:
             return ""
         got, lowest, highest = distinguishable(temperature, self.lowest, self.highest, digits=6)
         return f"expected a temperature within the oil's data, {lowest} to {highest} K, got {got} K"
 
 
-#: Oils by name.
+#: Available oils, by name.
 OILS: dict[str, Oil] = {
     "mobilgear_shc_xmp_320": Oil(
         T1=313.15,
@@ -231,13 +233,13 @@ OILS: dict[str, Oil] = {
 }
 
 
-#: Roelands' constants: pressure in Pa and logarithm of the viscosity (Pa s) at the common pole, with opposite sign.
+#: Roelands' constants: reference pressure in Pa, and minus the logarithm of the viscosity (Pa s) at the common pole.
 ROELANDS_PRESSURE = 1.9609e8
 ROELANDS_LOGARITHM = 9.67
 
 
 def log_viscosity(law: str, pressure: ArrayLike, viscosity: ArrayLike, alpha: ArrayLike) -> FloatArray:
-    """Return the natural logarithm of the viscosity (Pa s) under pressure, which does not overflow.
+    """Return the natural logarithm of the viscosity (Pa s) under pressure; unlike the viscosity, it cannot overflow.
 
     Parameters
     ----------
@@ -245,14 +247,14 @@ def log_viscosity(law: str, pressure: ArrayLike, viscosity: ArrayLike, alpha: Ar
         ``barus``: ``ln eta0 + alpha p`` (thesis eq. B.4); ``roelands``: ``ln eta0 + s ((1 + p/p_r)^z - 1)`` with
         ``s = ln eta0 + 9.67``, ``z = alpha p_r/s`` and p_r = 196.09 MPa, which has the slope alpha at ambient pressure.
     pressure : array_like
-        In Pa.
+            Pressure in Pa.
     viscosity, alpha : array_like
         Viscosity in Pa s and pressure-viscosity coefficient in 1/Pa at ambient pressure.
 
     Raises
     ------
     ValueError
-        If there is no such law.
+            If the law is unknown.
     """
     p, logarithm = np.asarray(pressure, dtype=np.float64), np.log(np.asarray(viscosity, dtype=np.float64))
     if law == "barus":

@@ -1,7 +1,7 @@
 """Friction of a lubricated line contact from the shear of its film.
 
-The film itself is that of a Newtonian, isothermal liquid in rolling; the shear is laid over it. That is right for small
-sliding; heat and shear thinning, which lower the film and the traction, are left out.
+The film is computed for rolling of a Newtonian, isothermal liquid, and the shear stress follows from this film. This is
+right for small sliding; heat and shear thinning, which reduce film and traction, are left out.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from mdr_dask.physics.lubrication.grid_solution import GridSolution
 from mdr_dask.physics.lubrication.line_contact import LineContact
 from mdr_dask.physics.lubrication.newton import log_viscosities
 
-#: Largest exponent of a viscosity ratio that is evaluated; a Newtonian liquid that thick has no meaning any more.
+#: Largest exponent of the viscosity ratio that is evaluated; above it, a Newtonian liquid has no physical meaning.
 _LARGEST_EXPONENT = 600.0
 
 
@@ -25,9 +25,9 @@ def shear_stress(
     Parameters
     ----------
     case : LineContact
-        Its dimensionless numbers.
+            The dimensionless numbers of the case.
     grid : GridSolution
-        Its pressure and film.
+            Pressure and film of the case.
     W : float
         Load parameter; ``a/R = sqrt(8 W/pi)`` sets the slope of the surfaces.
     slide_roll_ratio : float
@@ -38,7 +38,8 @@ def shear_stress(
     Returns
     -------
     array, shape (n,)
-        In p0 at the nodes: ``eta (u1 - u2)/h``, or ``tau_E asinh`` of that over tau_E; zero where the film is torn.
+            Stress in p0 at the nodes: ``eta (u1 - u2)/h``, or ``tau_E asinh`` of it over tau_E; zero where the film has
+            ended.
     """
     slope = case.film_number * np.sqrt(2 * W / np.pi) / 6 * slide_roll_ratio
     exponent = np.minimum(log_viscosities(grid.pressure, case.liquid), _LARGEST_EXPONENT)
@@ -55,6 +56,6 @@ def sliding_coefficient(
 
 
 def rolling_coefficient(grid: GridSolution, W: float) -> float:
-    """Return the integral of ``(h/2) dp/dx`` over the load: what rolling costs each surface."""
+    """Return the integral of ``(h/2) dp/dx`` over the load: the rolling friction of each surface."""
     film = (grid.film[1:] + grid.film[:-1]) / 2
     return float(2 / np.pi * np.sqrt(8 * W / np.pi) * np.sum(film / 2 * np.diff(grid.pressure)))
