@@ -305,7 +305,7 @@ def _fill_film(grid: Grid, P: FloatArray, central: float, H: FloatArray) -> None
 
 @jit
 def _step_length(grid: Grid, P: FloatArray, H: FloatArray, step: FloatArray, change: float, clip: float) -> float:
-    """Return the largest fraction of a step that changes no pressure by more than `clip` and does not close the film."""
+    """Return the largest fraction of a step that changes no pressure by more than `clip` and keeps the film open."""
     largest = np.max(np.abs(step))
     share = min(1.0, clip * np.max(P) / largest) if largest > 0.0 else 1.0
     film_step = np.full_like(H, change)
