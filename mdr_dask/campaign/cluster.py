@@ -18,7 +18,7 @@ _EXPECTED = {
 
 
 def load_cluster(path: FilePath) -> dict[str, Any]:
-    """Read a cluster file: the keys ``class``, and ``arguments``, ``scale`` and ``adapt`` if there are any.
+    """Read a cluster file: the key ``class``, and the optional keys ``arguments``, ``scale`` and ``adapt``.
 
     Raises
     ------

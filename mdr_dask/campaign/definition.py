@@ -13,9 +13,9 @@ from mdr_dask.models.base import Parameters
 from mdr_dask.models.data_file import DataFile
 
 _DIGITS = 14
-#: Digits to which two values of an axis differ at least; closer ones are one value, computed once.
+#: Significant digits to which values of an axis are compared; values that agree to them are computed once.
 SAME_DIGITS = 12
-#: Values of an axis that are examined where all of them would take too long.
+#: Largest number of values of an axis that are examined, because examining all of them would take too long.
 SOME = 64
 
 
@@ -48,7 +48,7 @@ class Spread:
 
 
 def tidy(value: float, whole: bool, exact: bool = False) -> float:
-    """Return a number of a range: rounded to a whole number, exactly as given, or to 14 digits."""
+    """Return a number of a range: rounded to a whole number if `whole`, unchanged if `exact`, else to 14 digits."""
     if whole:
         return round(value)
     return float(value) if exact else float(f"{value:.{_DIGITS}g}")
@@ -65,7 +65,7 @@ class Axis:
     name : str
         Name of its coordinate in the store: the path with ``_`` for ``.``.
     dim : str
-        Its dimension in the store: its own name in a grid, ``case`` where parameters vary together.
+        Its dimension in the store: `name` in a grid, ``case`` where parameters vary together.
     values : tuple
         Checked values in SI, in the order of the file: numbers, names, or whole parameter sets.
     labels : tuple of str or None
@@ -89,7 +89,7 @@ class Axis:
 
     @property
     def some(self) -> list[Any]:
-        """At most `SOME` of its values, evenly spread, with the first and the last."""
+        """At most `SOME` values of the axis, evenly spread, including the first and the last."""
         places = np.linspace(0, len(self.values) - 1, min(len(self.values), SOME)).round().astype(int)
         return [self.values[place] for place in places]
 
@@ -105,7 +105,7 @@ class Series:
     parameters : Parameters
         The parameters with every axis at its first value.
     axes : tuple of Axis
-        In the order of the file.
+        The axes, in the order of the file.
     """
 
     name: str
@@ -120,9 +120,9 @@ class Series:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Largest error that is accepted: a part of the value, or an absolute one; either is enough.
+    """The largest accepted error, relative to the value or absolute; it is enough to meet one of the two.
 
-    `place` is its position in the campaign file.
+    `place` is the position of the tolerance in the campaign file.
     """
 
     relative: float = 0.0
@@ -139,7 +139,7 @@ class Refinement:
     spread : Spread
         The interval, on the scale on which outputs are interpolated.
     until : mapping of str to Tolerance
-        Largest error of interpolation, by output; its relative part refers to the largest value along the axis.
+        Largest interpolation error of each output; a relative error refers to the largest value along the axis.
     at_most : int
         Largest number of values.
     """
@@ -158,9 +158,9 @@ class Replication:
     at_least, at_most : int
         Number of realisations of the first round, and the largest number.
     until : mapping of str to Tolerance
-        Largest standard errors of means, by output.
+        Largest standard error of the mean of each output.
     answers : mapping of str to Tolerance
-        Largest half widths of the 95 % intervals of fitted constants, by ``fit.constant``.
+        Largest half width of the 95 % interval of each fitted constant, by its name ``fit.constant``.
     """
 
     at_least: int
@@ -181,13 +181,13 @@ class Campaign:
     Parameters
     ----------
     name, model : str
-        Its name and the name of its model.
+        Names of the campaign and of its model.
     seed : int
         Seed of every random number.
     replication : Replication
         Number of realisations of each case.
     series : tuple of Series
-        At least one.
+        At least one series.
     outputs : tuple of str
         The arrays to compute and store, in the order of the model.
     accuracy : float or None
@@ -195,9 +195,9 @@ class Campaign:
     store : str
         Path (relative to the working directory) or URL of the store.
     blocks : mapping of str to int
-        Chunk lengths set in the file, by dimension; the others are chosen.
+        Chunk lengths set in the file, by dimension; all other lengths are chosen automatically.
     text, source : str
-        The file as written, and where it was read.
+        Text of the campaign file, and its path.
     remarks : tuple of str
         Questions about bare numbers far from the usual values, each with its place.
     measured : DataFile or None

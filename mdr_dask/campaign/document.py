@@ -33,7 +33,7 @@ class Document:
     Parameters
     ----------
     source, text : str
-        Where the file was read, and the file as written.
+        Path of the file, and its text.
     data : object
         Mappings, lists, texts, numbers, truth values and None.
     """
@@ -51,7 +51,7 @@ class Document:
         return self._at(self._nodes[path]) if path in self._nodes else Place(self.source, 1, 1)
 
     def key_place(self, path: Path) -> Place:
-        """Return the position of the key at a path; for an entry of a list that of its value."""
+        """Return the position of the key at a path; for an entry of a list, the position of its value."""
         return self._at(self._keys[path]) if path in self._keys else self.place(path)
 
     def flow(self, path: Path) -> str:
@@ -68,7 +68,7 @@ def read_text(path: str | FilePath) -> str:
     Raises
     ------
     CampaignError
-        If it cannot be read, or is not UTF-8.
+        If the file cannot be read, or is not UTF-8.
     """
     try:
         return FilePath(path).read_bytes().decode("utf-8-sig")
@@ -86,7 +86,7 @@ def parse(text: str, source: str, problems: Problems) -> Document:
     text, source : str
         The text, and its name in messages.
     problems : Problems
-        Receives syntax errors, duplicate keys, keys that are not texts and unknown tags.
+        Receives syntax errors, duplicate keys, keys that are not strings, and unknown tags.
     """
     document = Document(source, text)
     if len(text) > _LONGEST:
@@ -137,7 +137,7 @@ def _hint(text: str, index: int) -> str:
 
 
 def _is_indented_otherwise(lines: list[str]) -> bool:
-    """Return whether the last two lines begin in different columns, and the first of them is not a key alone."""
+    """Return whether the last two lines begin in different columns although the first does not end with a colon."""
     written = [line for line in lines if line.strip() and not line.lstrip().startswith("#")][-2:]
     if len(written) < 2 or written[0].rstrip().endswith(":"):
         return False
@@ -146,7 +146,7 @@ def _is_indented_otherwise(lines: list[str]) -> bool:
 
 
 class _EndlessError(Exception):
-    """Stops the reading of a document that refers to itself; the problem has been reported."""
+    """Raised to end the reading of a document that is too large or refers to itself, after this was reported."""
 
 
 class _Reader:

@@ -47,11 +47,11 @@ def draft(name: str, model: Model[Any], file: str) -> str:
     Parameters
     ----------
     name : str
-        As a campaign names the model.
+        Name of the model in a campaign.
     model : Model
         The model.
     file : str
-        What the campaign file will be called, for its comments.
+        Name of the campaign file, for its comments.
     """
     short = name.partition(":")[2].lower() if ":" in name else name
     summary = f"{model.summary[:1].upper()}{model.summary[1:].rstrip('.')}."
@@ -80,7 +80,7 @@ def _entries(parameters: type[Parameters]) -> Iterator[str]:
 
 
 def _needed(parameters: type[BaseModel]) -> set[str]:
-    """Return the required parameters, with dotted names for those of structures."""
+    """Return the required parameters and the first of each group of alternatives; nested names are dotted."""
     ways = getattr(parameters, "alternatives", ())
     required = {name for name, info in parameters.model_fields.items() if info.is_required()}
     return required | {name for each in ways for name in each[0]}
@@ -102,13 +102,13 @@ def _comment(info: FieldInfo, value: str) -> str:
 
 
 def _choices(info: FieldInfo) -> list[str]:
-    """Return the words that a field may have."""
+    """Return the words that a field accepts."""
     kinds = [kind for kind in fields.members(info.annotation) if get_origin(kind) is Literal]
     return [str(choice) for kind in kinds for choice in get_args(kind)]
 
 
 def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str]:
-    """Return the possible texts of a value: one, or one for each structure."""
+    """Return examples of a value as text: one, or one for each structure."""
     info = parameters.model_fields[name]
     kinds = [kind for kind in fields.structures(info) if kind is not DataFile]
     if inner:
@@ -133,7 +133,7 @@ def _structures(kind: type[BaseModel], inner: set[str]) -> list[str]:
 
 
 def _scalar(parameters: type[BaseModel], name: str) -> str:
-    """Return a value of a field: a common one, the default, or one within its bounds."""
+    """Return a value of a field as text: the default, a common value, or a value within the bounds."""
     info = parameters.model_fields[name]
     kinds = fields.members(info.annotation)
     unit = unit_of(parameters, name)
@@ -157,7 +157,7 @@ def _scalar(parameters: type[BaseModel], name: str) -> str:
 
 
 def _inside(info: FieldInfo) -> float:
-    """Return a number within the bounds of a field, 1 if they allow it."""
+    """Return a number within the bounds of a field: 1 if the bounds allow it."""
     bounds = {key: getattr(part, key) for part in info.metadata for key in _BOUNDS if hasattr(part, key)}
     low = bounds.get("ge", bounds.get("gt", -math.inf))
     high = bounds.get("le", bounds.get("lt", math.inf))

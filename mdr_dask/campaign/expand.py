@@ -39,17 +39,17 @@ def expand(
     Parameters
     ----------
     document : Document
-        The file.
+        The campaign file.
     model : Model
-        Its model.
+        The model of the campaign.
     spec : CampaignSpec
-        Its keys, checked.
+        The checked keys of the campaign file.
     directory : str
-        Folder of the files that it names.
+        Folder to which the names of files in the campaign are relative.
     outputs : sequence of str
-        The outputs that it asks for.
+        Names of the requested outputs.
     problems : Problems
-        Receives everything wrong with parameters, ranges and tables; series that cannot be built are left out.
+        Receives every problem of parameters, ranges and tables; a series with a problem is left out.
     """
     found = []
     asked: dict[str, None] = {}
@@ -83,7 +83,7 @@ class _Expansion:
         object.__setattr__(self, "data", data)
 
     def series(self, name: str, model: Model[Any], outputs: Sequence[str]) -> Series | None:
-        """Return the series of that name, or None if something is wrong with it."""
+        """Return one series, or None if it has a problem."""
         variations = self._variations()
         if variations is None:
             return None
@@ -155,16 +155,16 @@ class _Expansion:
     def _grid_values(
         self, base: Parameters | None, variations: Sequence[Variation], index: int, broken: set[Path]
     ) -> list[Any] | None:
-        """Return the checked values of one axis, the other parameters at their first value; None if one is wrong."""
+        """Return the values of one axis, each checked with the first value of all other axes; None if one is wrong."""
         one = variations[index]
         known = _checked(base, self._substituted(self.data, variations, 0), {one.path[0]})
-        elsewhere = broken | {other.path for other in variations if other is not one}  # reported by their own columns
+        elsewhere = broken | {other.path for other in variations if other is not one}  # reported with their own axes
         last = self._validate(known, [one], len(one.items) - 1, elsewhere)
         independent = fields.is_independent(self.parameters, one.path, self.data)
         values: list[Any] = []
         seen, sound = set(), None not in (base, last)
         for position, item in enumerate(one.items):
-            if item.inner and (not sound or independent):  # within the bounds if both ends are
+            if item.inner and (not sound or independent):  # valid if both ends of the range are valid
                 values.append(item.value)
                 continue
             checked = base if position == 0 else self._validate(known, [one], position, elsewhere)
@@ -266,7 +266,7 @@ class _Expansion:
     def _refined(
         self, axes: Sequence[Axis], variations: Sequence[Variation], model: Model[Any], outputs: Sequence[str]
     ) -> Iterator[Axis]:
-        """Yield the axes; adaptive ones get their refinement."""
+        """Yield the axes, each adaptive axis with its refinement."""
         for axis, one in zip(axes, variations, strict=True):
             if one.written and one.spread:
                 found = refinement(self.document, one.written, one.spread, model, outputs, self.problems)
@@ -279,7 +279,7 @@ class _Expansion:
 
 
 def _checked(base: Parameters | None, data: Mapping[str, Any], varied: set[str | int]) -> dict[str, Any]:
-    """Return the data in which fixed parameters are replaced by their checked values."""
+    """Return the data with the checked values of the fixed parameters."""
     if base is None:
         return dict(data)
     return {name: value if name in varied else getattr(base, name) for name, value in data.items()}

@@ -15,7 +15,7 @@ from mdr_dask.models.base import unit_of
 
 
 def members(annotation: Any) -> tuple[Any, ...]:
-    """Return the types that a value may have, without unions and annotations."""
+    """Return the types that an annotation allows, with unions and ``Annotated`` resolved."""
     origin = get_origin(annotation)
     if origin is Annotated:
         return members(get_args(annotation)[0])
@@ -49,7 +49,7 @@ def structures(info: FieldInfo) -> tuple[type[BaseModel], ...]:
 def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
     """Return the parameter set of a mapping: the one with the same fixed keys, such as ``shape: cone``.
 
-    Sets without fixed keys are distinguished by the number of keys in common, also misspelt ones.
+    If several sets fit, the one with most keys in common is returned, then the one with most misspelt keys in common.
     """
     if not isinstance(value, dict):
         return None

@@ -1,4 +1,4 @@
-"""A campaign from a dictionary: numbers of numpy and pint, paths, and messages without line numbers."""
+"""Read a campaign from a dictionary, which may hold numpy and pint numbers and paths; messages have no line numbers."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def _without_lines(messages: Sequence[str]) -> tuple[str, ...]:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as JSON holds it."""
+    """Return a value in a form that JSON can hold."""
     if isinstance(value, Mapping):
         return {str(key): _plain(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple | range):

@@ -1,4 +1,4 @@
-"""A table of what was measured: which columns are conditions of a study, and which one is an output of it."""
+"""Read a table of measured points: some columns are conditions of a study, and one column is an output of it."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from mdr_dask.tables import Column, Sheet, match, plain, read_sheet, read_table
 from mdr_dask.units import shown
 
 ERROR = "standard_error"
-#: Names of errors, before or behind the name of an output or beside it.
+#: Names of errors in a heading: before or after the name of an output, or in a column of their own.
 _ERROR = re.compile(
     r"(?<!\w)(?:(?:std|standard)? ?(?:dev|deviation|err|error|abw|abweichung|fehler)|uncertainty|std|sd|se)(?!\w)"
     r"|[σ±]|\+ ?/?"
 )
-#: Largest table that a study carries along, in bytes.
+#: Largest table that is stored with a study, in bytes.
 LARGEST = 10**6
-#: Conditions that agree to this part are the same.
+#: Conditions are equal if their relative difference is at most this.
 SAME = 1e-6
-#: Most rows outside a study that are named.
+#: Largest number of rows outside a study that a message names.
 FEW = 3
 
 
@@ -42,15 +42,15 @@ class Measured:
     output : str
         The output that was measured.
     values : array, shape (points,)
-        In SI.
+        The measured values, in SI.
     errors : array, shape (points,), or None
-        Their standard errors, where the table has them.
+        Standard errors of the values, if the table has them.
     conditions : dict of str to array, shape (points,)
-        Parameters at which they were measured, by the name of their coordinate, SI.
+        The parameters of each measurement in SI, by the name of their coordinate.
     lines : tuple of int
-        Their lines in the table, counted from 1.
+        The line of each measurement in the table, counted from 1.
     remark : str
-        Which columns are not used; empty if all are.
+        Describes unused columns and rows without a number; empty if there are none.
     """
 
     source: str
@@ -72,14 +72,14 @@ def read_measured(
     text, source : str
         The table and the name of its file.
     conditions, outputs : mapping of str to str
-        SI units of what the columns may be, by the names that they have in a store.
+        SI units of the quantities that a column may hold, by their names in a store.
     structures : iterable of str
-        Structures of parameters: where only one has a ``temperature``, the column may be called so.
+        Names of nested parameter sets. If only one of them has a ``temperature``, its column may have this short name.
 
     Raises
     ------
     DataError
-        If the table has no column, or several, of outputs, fewer than two points, or is no such table.
+        If the text is not a table, has no output or several, or has fewer than two points.
     """
     sheet = read_sheet(text, source)
     names = [cell.text for cell in sheet.names]
@@ -110,7 +110,7 @@ def read_measured(
 
 
 def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...], str]:
-    """Return the headings of errors of the last of some columns, and their unit if the table gives them none.
+    """Return the headings of the errors of the last of `columns`, and the unit of that column if the errors have none.
 
     A heading without the name of a quantity, such as ``std``, belongs to the nearest column before it.
     """
@@ -130,14 +130,14 @@ def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...],
 
 
 def _short_names(names: Sequence[str], structures: Iterable[str]) -> dict[str, list[str]]:
-    """Return the names of parameters without that of their structure, where nothing else is called so."""
+    """Return, for each nested parameter, its name without the name of its structure, if this name is unique."""
     short = [(name, name.removeprefix(f"{one}_")) for one in structures for name in names if name.startswith(f"{one}_")]
     called = [*names, *(inner for _, inner in short)]
     return {name: [inner] for name, inner in short if called.count(inner) == 1}
 
 
 def require_readable(text: str, source: str, model: str, outputs: Sequence[str], series: Sequence[Series]) -> None:
-    """Refuse a table that is of no series of a campaign; DataError with the reason of the first one."""
+    """Raise DataError if a table fits no series of a campaign, with the reason for the first series."""
     if len(text) > LARGEST:
         size, most = distinguishable(len(text) / 1e6, LARGEST / 1e6)
         raise DataError(f"{source}: expected a table of at most {most} MB, got {size} MB")
@@ -152,7 +152,7 @@ def require_readable(text: str, source: str, model: str, outputs: Sequence[str],
 
 
 def notes(campaign: Campaign) -> tuple[str, ...]:
-    """Return how the table of a campaign meets each series: the output, conditions, unknowns, and rows outside."""
+    """Return notes on the table for each series: its output, conditions, unknowns, and rows outside the study."""
     table = campaign.measured
     notes_found = []
     for series in campaign.series if table else ():
@@ -195,7 +195,7 @@ def _sentences(found: Measured, model: str, series: Series, units: Mapping[str, 
 
 
 def _reach(name: str, series: Series, conditions: Iterable[str]) -> dict[str, tuple[float, float]]:
-    """Return the ends of what a study holds of each condition; those of a fixed parameter are the same."""
+    """Return the smallest and the largest value of each condition in a study; both are equal for a fixed parameter."""
     held = {key: (value, value) for key, (value, _, _) in numbers_of(series.parameters).items()}
     coordinates = models.load(name).coordinates(series.parameters)
     held |= {key: (float(each.values.min()), float(each.values.max())) for key, each in coordinates.items()}
@@ -204,7 +204,7 @@ def _reach(name: str, series: Series, conditions: Iterable[str]) -> dict[str, tu
 
 
 def unknowns(campaign: Campaign) -> tuple[str, ...]:
-    """Return the axes of a campaign that its table of measurements does not name; none where it has no table."""
+    """Return the axes of a campaign that have no column in its table of measured points; none without a table."""
     table = campaign.measured
     if table is None:
         return ()
@@ -213,7 +213,7 @@ def unknowns(campaign: Campaign) -> tuple[str, ...]:
         try:
             measured = read_measured(table.read_text(), table.name, *_of_series(campaign.model, campaign.outputs, one))
         except DataError:
-            continue  # it is of another series
+            continue  # the table belongs to another series
         found += _unknown(measured, one)
     return tuple(dict.fromkeys(found))
 

@@ -17,7 +17,7 @@ from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.units import expected, likely, spelt
 
-#: Adds one problem: the path into the data, whether it concerns the key rather than its value, and the message.
+#: Function that adds a problem: path in the data, whether it concerns the key rather than the value, and message.
 Report = Callable[[Path, bool, str], None]
 
 _BOUNDS = {"greater_than": ("gt", "above"), "greater_than_equal": ("ge", "of at least")}
@@ -41,7 +41,7 @@ def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, repo
     Parameters
     ----------
     error : ValidationError
-        What ``kind.model_validate(data)`` raised.
+        The exception that ``kind.model_validate(data)`` raised.
     kind : type
         The parameter set.
     data : object
@@ -56,7 +56,7 @@ def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, repo
         groups.setdefault(path_into(data, details), []).append(details)
     for path, group in groups.items():
         inside = any(len(other) > len(path) and other[: len(path)] == path for other in groups)
-        if inside and group[0]["type"] == "too_short":  # the missing entries have messages of their own
+        if inside and group[0]["type"] == "too_short":  # each missing entry has a message of its own
             continue
         _report_group(path, group, kind, data, report)
 
@@ -77,7 +77,7 @@ def path_into(data: Any, details: ErrorDetails) -> Path:
 
 
 def _is_of_another_branch(details: ErrorDetails, kind: type[BaseModel], data: Any) -> bool:
-    """Return whether an error belongs to a structure that the keys of the value exclude."""
+    """Return whether an error belongs to another structure than the one that the keys of the value select."""
     path: Path = ()
     value = data
     for part in details["loc"]:
@@ -158,7 +158,7 @@ def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel]
 
 
 def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return a hint how to write a word that was given in place of a mapping or a list."""
+    """Return a hint on how to write a mapping or a list, where only a word was given."""
     value, info = value_at(data, path), _field(kind, path, data)
     if not info or not isinstance(value, str):
         return ""
@@ -177,14 +177,14 @@ def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
 
 
 def _of_file(info: FieldInfo) -> list[str]:
-    """Return the entries of the structures of a field that take the name of a file."""
+    """Return the names of those entries in the structures of a field that take the name of a file."""
     inner = [entry for one in fields.structures(info) for entry in one.model_fields.items()]
     named = (DataFile, NamedByFile)
     return [name for name, entry in inner if any(issubclass(one, named) for one in fields.structures(entry))]
 
 
 def required(kind: type[BaseModel]) -> list[str]:
-    """Return the required fields of a parameter set, without those that have one value only."""
+    """Return the required fields of a parameter set, except fields with only one possible value."""
     return [name for name, info in kind.model_fields.items() if info.is_required() and name not in fields.fixed(kind)]
 
 
@@ -225,7 +225,7 @@ def _kinds(path: Path, kind: type[BaseModel], data: Any) -> str:
 
 
 def plain(number: float) -> str:
-    """Return a number as short as it can be written."""
+    """Return a number as a short text: a whole number in full, any other with at most 12 digits."""
     return str(number) if isinstance(number, int) else f"{number:.12g}"
 
 

@@ -50,7 +50,7 @@ class Problems:
         self._found.setdefault((place, where), Problem(place, where, what))
 
     def raise_if_any(self) -> None:
-        """Raise one `CampaignError` with all problems, file by file and by line."""
+        """Raise one `CampaignError` with all problems, sorted by file and line."""
         if self._found:
             sources = list(dict.fromkeys(place.source for place, _ in self._found))
             ordered = sorted(self._found.values(), key=lambda problem: (sources.index(problem.place.source), problem))

@@ -47,9 +47,9 @@ def loads(text: str, source: str, directory: str) -> Campaign:
     text : str
         YAML 1.2.
     source : str
-        Its name in messages.
+        Name of the campaign file in messages.
     directory : str
-        Folder of the files that it names.
+        Folder to which the names of files in the campaign are relative.
 
     Raises
     ------

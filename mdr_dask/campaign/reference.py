@@ -87,7 +87,7 @@ def reference_page() -> str:
 
 
 def parameter_rows(model: Model[Any]) -> list[dict[str, str]]:
-    """Return parameter, unit, default, allowed values and meaning of every parameter of a model, nested ones too."""
+    """Return name, unit, default, allowed values and meaning of every parameter of a model, including nested ones."""
     return list(_rows(model.parameters, "parameter"))
 
 
@@ -105,7 +105,7 @@ def _ways(parameters: type[BaseModel], before: str) -> Iterator[str]:
 
 
 def output_rows(model: Model[Any]) -> list[dict[str, str]]:
-    """Return output, unit, own dimensions, whether it is a default, and meaning of every output of a model."""
+    """Return name, unit, own dimensions, whether computed by default, and meaning of every output of a model."""
     return [
         {
             "output": output.name,
@@ -201,7 +201,7 @@ def _default(info: FieldInfo) -> str:
 
 
 def yaml_text(value: Any) -> str:
-    """Return a value as a campaign file has it, on one line."""
+    """Return a value as YAML on one line."""
     if isinstance(value, BaseModel):
         return yaml_text(value.model_dump(exclude_none=True))
     if isinstance(value, dict):

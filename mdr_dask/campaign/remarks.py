@@ -36,13 +36,13 @@ def remarks(
     Parameters
     ----------
     document : Document
-        The file.
+        The campaign file.
     parameters : type
         The parameter set of the model.
     data : mapping
-        Plain data of the parameters by name.
+        Values of the parameters as read from the file, by name.
     paths : mapping of str to path
-        Their paths in the document.
+        Path of each parameter in the document.
     units : mapping of str to str
         Units that differ from the declared ones, as in a dimensionless campaign.
     """

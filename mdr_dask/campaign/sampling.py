@@ -33,12 +33,12 @@ def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Va
     seed : int
         Seed of the scrambling.
     variations : sequence of Variation
-        Each with an interval.
+        The varied parameters, each with an interval.
 
     Returns
     -------
     tuple of Variation
-        The same, each with one value for each point.
+        The same parameters, with one value for each point.
     """
     import numpy as np
     from scipy.stats import qmc
@@ -60,7 +60,7 @@ def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Va
 
 
 def _exchanged(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return for each pair of points a, b: a, b, and for every input the point a with that input of b."""
+    """Return for each pair of points a and b: a, b, and for every input a copy of a with this input taken from b."""
     import numpy as np
 
     number, inputs = first.shape
@@ -85,17 +85,17 @@ def tabled(
     Parameters
     ----------
     name, directory : str
-        The file, relative to the directory.
+        Name of the file, and the folder to which it is relative.
     origin : Origin
-        Where the campaign names it.
+        Position of the file name in the campaign.
     parameters : type
         The parameter set of the model.
     data : mapping
-        Plain data of the other parameters.
+        Values of the other parameters, as read from the campaign file.
     problems : Problems
         Receives misspelt columns, units and missing cells.
     remarks : list of str
-        Receives a sentence about the columns that are no parameters.
+        Receives a sentence about the columns that are not parameters.
     """
     path = Path(directory, name)
     try:
@@ -131,7 +131,7 @@ def tabled(
 
 
 def _is_unused(heading: str, entries: Sequence[str], parameters: type[Parameters]) -> bool:
-    """Return whether a column is no parameter; one with numbers and a similar name is a misspelt parameter."""
+    """Return whether a column is not a parameter; a column of numbers with a similar name is a misspelt parameter."""
     if heading.split(".")[0] in parameters.model_fields:
         return False
     has_numbers = any(isinstance(_value(entry, ""), int | float) for entry in entries)

@@ -64,7 +64,7 @@ def is_of_fit(name: str, model: Model[Any]) -> bool:
 
 
 def answers(document: Document, path: Path, given: Mapping[str, Written], problems: Problems) -> dict[str, Tolerance]:
-    """Return the tolerances of fitted constants by ``fit.constant``: relative with ``%``, otherwise absolute."""
+    """Return the tolerances of fitted constants by their names ``fit.constant``: with ``%`` relative, else absolute."""
     found = {}
     for name, written in given.items():
         constant = name if "." in name else f"{name}.{name}"

@@ -16,18 +16,18 @@ from mdr_dask.campaign.document import Document
 from mdr_dask.campaign.problems import Path, Place, Problems, dotted, shown
 from mdr_dask.units import expected, to_si
 
-#: More values than this on one axis are a mistake in the file, not a study.
+#: Largest number of values on one axis; a larger number is taken to be a mistake in the file.
 MOST_VALUES = 10**6
 RANGES = ("linear", "geometric", "values", "adaptive")
 #: Number of values with which an adaptive axis begins.
 FIRST = 5
-#: Ratio of the ends of an adaptive axis beyond which its natural scale is logarithmic.
+#: An adaptive axis is interpolated on a logarithmic scale if the ratio of its ends exceeds this number.
 DECADE = 10.0
 
 
 @dataclass(frozen=True)
 class Origin:
-    """The origin of a value for messages: its name and position, and its path if it is in the document."""
+    """The origin of a value, for messages: name and position, and the path if the value is in the document."""
 
     name: str
     place: Place
@@ -35,7 +35,7 @@ class Origin:
 
 
 class Item(NamedTuple):
-    """One value of a varied parameter, as written or in SI; inner ones lie between the ends of a range."""
+    """One value of a varied parameter, as written or in SI; `inner` marks values between the ends of a range."""
 
     value: Any
     origin: Origin
@@ -44,7 +44,7 @@ class Item(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The value as it is written in the file, or as a number of a range."""
+        """The text of the value in the file; for an inner value of a range, the number."""
         return self.written or f"{self.value:g}"
 
 
@@ -52,7 +52,7 @@ class Item(NamedTuple):
 class Variation:
     """A varied parameter: its path in the parameters, and its values or the interval from which they are drawn.
 
-    An adaptive axis has both; `written` is its path in the document.
+    An adaptive axis has both values and an interval; `written` is its path in the document.
     """
 
     path: tuple[str, ...]
@@ -80,24 +80,24 @@ def find(
     Parameters
     ----------
     document : Document
-        The file.
+        The campaign file.
     parameters : type
         The parameter set of the model.
     data : mapping
-        Plain data of the parameters by name.
+        Values of the parameters as read from the file, by name.
     paths : mapping of str to path
-        Their paths in the document.
+        Path of each parameter in the document.
     drawn : bool
-        Whether ranges are intervals to draw from, without a number of values.
+        Whether values are drawn from the ranges, which then have no number of values.
     problems : Problems
-        Receives wrong ranges and empty lists; their variations have neither items nor an interval.
+        Receives wrong ranges and empty lists; the variation of such a parameter has neither items nor an interval.
     """
     search = _Search(document, parameters, data, drawn, problems)
     return tuple(found for name, value in data.items() for found in search.below((name,), value, paths[name]))
 
 
 class _MalformedError(Exception):
-    """Stops the reading of a wrong range; the problem has been reported."""
+    """Raised to end the reading of a wrong range, after its problem was reported."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class _Search:
     problems: Problems
 
     def below(self, path: tuple[str, ...], value: Any, at: Path) -> Iterator[Variation]:
-        """Yield the variations of one parameter and of those nested in it."""
+        """Yield the variations of one parameter and of the parameters nested in it."""
         info = self._field(path)
         if info is None:
             return
@@ -191,7 +191,7 @@ class _Search:
     def _items(self, spread: Spread, content: list[Any], at: Path) -> list[Item]:
         name, count = at[:-1], content[2]
         if isinstance(count, str) and count.isascii() and count.isdigit():
-            count = int(count)  # in quotes, as any number may be
+            count = int(count)  # numbers may be written in quotes
         if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MOST_VALUES:
             self._complain(
                 (*at, 2),
@@ -245,7 +245,7 @@ def spaced(spread: Spread, count: int) -> list[float]:
     Parameters
     ----------
     spread : Spread
-        The interval; one of whole numbers gives each of them once, perhaps fewer than `count`.
+        The interval. If its values are whole numbers, each appears once, and there may be fewer than `count`.
     count : int
         Number of values, at least 2.
     """
