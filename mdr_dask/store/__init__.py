@@ -1,9 +1,10 @@
-"""The Zarr store of a study: the only room that uses Zarr.
+"""The Zarr store of a study. Only this package uses Zarr.
 
-A group holds one array for every output and ``status``, the ledger, over (axes..., realisation, ...), and a coordinate
-for every parameter. The driver lays arrays out. A block is written by the process that computed it: its record with the
-digest of every chunk, one whole chunk of every array, and ``status`` last. Readers see consolidated metadata, which are
-replaced in one write.
+A group holds one array for every output, the array ``status`` (the ledger), and a coordinate for every parameter. The
+dimensions of the arrays are the axes, ``realisation``, and further dimensions of an output. The driver creates the
+arrays. The process that computes a block also writes it: first its record with the digest of every chunk, then one
+whole chunk of every array, and its chunk of ``status`` last. Readers see consolidated metadata, which are replaced in
+one write.
 """
 
 from mdr_dask.store.blocks import Place, is_written, layout_mark, read_block, values, write_block

@@ -33,15 +33,15 @@ class Place:
     Parameters
     ----------
     url, series : str
-        Store and name of the group.
+        The store, and the name of the group.
     index : tuple of int
-        The block's place in the grid of blocks.
+        Index of the block in the grid of blocks.
     region : tuple of slice
-        The block's place over (axes..., realisation).
+        Slices of the block along (axes..., realisation).
     layout : str
-        The `layout_mark` of the store that the driver sees. A worker that sees another one writes nothing.
+        The `layout_mark` of the store on the driver. A worker that finds a different mark writes nothing.
     lock : Lock
-        Lock of the run that the block is computed for.
+        Lock of the run that computes the block.
     """
 
     url: str
@@ -59,23 +59,23 @@ def write_block(
     status: NDArray[np.int8],
     record: Mapping[str, Any],
 ) -> None:
-    """Write a block: its record, then whole chunks of every output, and its part of the ledger last.
+    """Write a block: first its record, then one whole chunk of every output, and its chunk of the ledger last.
 
-    A block is done if and only if its part of the ledger says so. The record holds the digest of every chunk and comes
-    first, so that every chunk that a killed task leaves behind is known.
+    The ledger alone decides which results of a block are done. The record is written first, because it holds the digest
+    of every chunk: the chunks of a task that was killed can then be identified.
 
     Parameters
     ----------
     place : Place
         Where to write it.
     attempt : int
-        How often the block has been begun, this time included.
+        How often the computation of the block has been begun, including this time.
     values : mapping of str to float array
-        The outputs, each of the shape of the region, further dimensions last; none if only the ledger changes.
+        The outputs, each with the shape of the region and further dimensions last; empty if only the ledger changes.
     status : int8 array, shape of the region
-        The block's part of the ledger.
+        The ledger of the block.
     record : mapping
-        Its record, without digests.
+        The record of the block, without digests.
     """
     arrays, encoded = _in_memory(place.url, place.series, place.layout)
     given = {**values, "status": status}
@@ -98,13 +98,13 @@ def _chunk(place: Place, array: Any, name: str) -> str:
 
 
 def is_written(place: Place, record: Mapping[str, Any]) -> bool:
-    """Return whether the ledger holds what a record says was written."""
+    """Return whether the stored ledger of a block has the digest that is in a record."""
     content = read_bytes(place.url, chunk_name(place.series, "status", place.index))
     return content is not None and record.get("chunks", {}).get("status") == digest(content)
 
 
 def read_block(place: Place, outputs: tuple[str, ...]) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int8]]:
-    """Return the values of a block and its part of the ledger, as arrays that may be changed."""
+    """Return the values and the ledger of a block, as arrays that the caller may change."""
     arrays = _arrays(place.url, place.series, place.layout)
 
     async def read() -> list[Any]:
@@ -116,14 +116,14 @@ def read_block(place: Place, outputs: tuple[str, ...]) -> tuple[dict[str, NDArra
 
 
 def values(url: str, series: str, output: str) -> NDArray[np.float64]:
-    """Return one output of a group as it is now, axes in the order of the store."""
+    """Return the current values of one output of a group, with the axes in the order of the store."""
     (held,) = _opened(url, series, bytes_of(url), [output]).values()
     with guarded(url, f"reading {output}"):
         return np.asarray(held[...])
 
 
 def _opened(url: str, series: str, store: Store, names: Iterable[str] = ()) -> dict[str, Any]:
-    """Return some arrays of a group, or the ledger and all outputs."""
+    """Return the named arrays of a group; without names, the ledger and all outputs."""
     held = document(url, series)
     if held is None:
         raise StoreError(f"{url}: removed since it was laid out")
@@ -134,7 +134,7 @@ def _opened(url: str, series: str, store: Store, names: Iterable[str] = ()) -> d
 
 @lru_cache(maxsize=64)
 def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
-    """Return the arrays of a group; they stay open as long as its layout is the same."""
+    """Return the arrays of a group; they are cached as long as the layout stays the same."""
     seen = layout_mark(url)
     if seen != layout:
         raise StoreError(f"{url}: {_other_store(seen)}")
@@ -143,7 +143,7 @@ def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
 
 @lru_cache(maxsize=64)
 def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict[str, Buffer]]:
-    """Return arrays in memory of the same metadata, and the dictionary in which they put encoded chunks."""
+    """Return arrays in memory with the metadata of the stored ones, and the dictionary of their encoded chunks."""
     shown, encoded = _arrays(url, series, layout), dict[str, Buffer]()
     memory = zarr.storage.MemoryStore(encoded)
     empty = {name: array_of(_whole_chunks(array), memory, array.path) for name, array in shown.items()}
@@ -151,7 +151,7 @@ def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict
 
 
 def _whole_chunks(array: Any) -> dict[str, Any]:
-    """Return the metadata of an array, rounded up to whole chunks: a block may go beyond the stored shape."""
+    """Return the metadata of an array with its shape rounded up to whole chunks, because a block may exceed it."""
     shape = [-(-size // length) * length for size, length in zip(array.shape, array.chunks, strict=True)]
     return {**array.metadata.to_dict(), "shape": shape}
 

@@ -24,26 +24,26 @@ from mdr_dask.errors import MdrDaskError, StoreError
 
 T = TypeVar("T")
 
-#: Name of the study without series in a store that has series as well.
+#: Name of the results without series in a store that also has series.
 ROOT = "-"
 #: Folder of claims in a store whose file system, or server, has no locks.
 CLAIMS = ".claims/"
 #: Ending of files that were set aside.
 ASIDE = ".aside"
-#: What clearing a store that was never laid out leaves: its first document, and the claims of its runner.
+#: Entries that remain when an unfinished layout is cleared: the first metadata file, and the claims of the run.
 KEPT = ("zarr.json", CLAIMS.rstrip("/"))
-#: Requests to a server at a time.
+#: Number of simultaneous requests to a server.
 AT_ONCE = 64
-#: Seconds after which a request that a server has not answered has failed.
+#: Seconds after which a request to a server fails if there is no answer.
 LONGEST_REQUEST = 120.0
-#: Threads that wait for a disk.
+#: Number of threads that wait for the disk.
 FLUSHERS = 8
-#: Version of the layout; stores of a later one are refused. Since 2, records hold the digest of every chunk.
+#: Version of the layout; stores of a later version are refused. Since version 2, records hold digests of all chunks.
 LAYOUT = 2
 
 
 def local(url: str) -> Path | None:
-    """Return the path of a store on this machine, None for one at a URL."""
+    """Return the path of a store on this machine, or None for a store at a URL."""
     path = url.removeprefix("file://")
     return None if "://" in path else Path(path)
 
@@ -81,14 +81,14 @@ def bytes_of(url: str) -> Any:
 
 
 def absolute(url: str) -> str:
-    """Return the same place for a process in another folder."""
+    """Return a path or URL that is valid in every working directory."""
     path = local(url)
     return url if path is None else str(path.absolute())
 
 
 @contextmanager
 def guarded(url: str, doing: str) -> Iterator[None]:
-    """Turn errors of the file system or the network into one sentence."""
+    """Turn errors of the file system or the network into a StoreError with one sentence."""
     try:
         yield
     except MdrDaskError:
@@ -111,14 +111,14 @@ def read_bytes(url: str, name: str) -> bytes | None:
 
 
 def read_json(url: str, name: str) -> dict[str, Any] | None:
-    """Return a JSON document, or None if there is none of that name."""
+    """Return the content of a JSON file, or None if there is no such file."""
     content = read_bytes(url, name)
     with guarded(url, f"reading {name}"):
         return None if content is None else parsed(content)
 
 
 def parsed(content: bytes) -> Any:
-    """Return a JSON document; ValueError if it is none."""
+    """Return the content of a JSON text; raise ValueError if it is not JSON."""
     try:
         return json.loads(content)
     except RecursionError:
@@ -126,7 +126,7 @@ def parsed(content: bytes) -> Any:
 
 
 def read_many(url: str, files: Iterable[str]) -> Iterator[tuple[str, bytes | None]]:
-    """Yield name and content of many files in order, None for those that are gone; from a server, many at once."""
+    """Yield name and content of many files in order, None for missing ones; a server is asked for many at once."""
     path = local(url)
     if path is not None:
         with guarded(url, "reading its files"):
@@ -147,7 +147,7 @@ def read_many(url: str, files: Iterable[str]) -> Iterator[tuple[str, bytes | Non
 
 
 def _content(file: str) -> bytes | None:
-    """Return the content of a file, None if there is none; faster than a Path for a hundred thousand files."""
+    """Return the content of a file, or None if it is missing; with many files this is faster than `Path.read_bytes`."""
     try:
         descriptor = os.open(file, os.O_RDONLY)
     except (FileNotFoundError, NotADirectoryError):
@@ -163,15 +163,15 @@ def _content(file: str) -> bytes | None:
 
 
 def write_bytes(url: str, name: str, content: bytes) -> None:
-    """Replace a file at once."""
+    """Replace a file in one step, so that readers see the old content or the new one."""
     write_stages(url, [{name: content}])
 
 
 def write_stages(url: str, stages: Iterable[Mapping[str, bytes]]) -> None:
-    """Write files, each at once, and those of each stage after those of the stage before.
+    """Write files in stages: each file is replaced in one step, after all files of the stages before it.
 
-    On a disk, all contents are written and flushed under temporary names. Then the files of all stages but the last get
-    their names, and the names are flushed before the files of the last stage get theirs.
+    On a disk, all contents are first written and flushed under temporary names. Then the files of all stages but the
+    last are renamed, and their folders flushed. The files of the last stage are renamed after that.
     """
     stages = [stage for stage in stages if stage]
     path = local(url)
@@ -220,12 +220,12 @@ def put(path: Path, content: bytes) -> None:
 
 
 def give_name(leftover: Path, target: Path) -> None:
-    """Rename a complete file to its name, replacing what was there."""
+    """Rename a complete temporary file to its final name, replacing an existing file."""
     os.replace(leftover, target)  # noqa: PTH105 (of many)
 
 
 def _make(folder: Path) -> list[Path]:
-    """Make a folder and its parents; return the folders that have a new entry."""
+    """Make a folder and its missing parents; return the folders that got a new entry or may have got one."""
     if folder.is_dir():
         return []
     above = [*_make(folder.parent), folder.parent]
@@ -234,7 +234,7 @@ def _make(folder: Path) -> list[Path]:
 
 
 def _flush(paths: Sequence[Path]) -> None:
-    """Wait until files, and the names in folders, are on the disk; in threads, because a disk flushes many at once."""
+    """Wait until files and the entries of folders are on the disk; in threads, because a disk flushes many at once."""
     shares = (paths[first::FLUSHERS] for first in range(min(FLUSHERS, len(paths))))
     list(_flushers().map(_flush_in_turn, shares))
 
@@ -245,12 +245,12 @@ def _flush_in_turn(paths: Sequence[Path]) -> None:
 
 
 def flush(path: Path) -> None:
-    """Wait until a file, or the names in a folder, are on the disk."""
+    """Wait until a file, or the entries of a folder, are on the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTSUP) or not path.is_dir():  # some have no flush for folders
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP) or not path.is_dir():  # some cannot flush folders
             raise
     finally:
         os.close(descriptor)
@@ -266,7 +266,7 @@ if hasattr(os, "register_at_fork"):  # the threads of a pool do not exist in a f
 
 
 def create(url: str, name: str, content: bytes) -> bool:
-    """Write a new file and return True; if there is one of that name, leave it and return False."""
+    """Write a new file and return True; if a file of that name exists, leave it unchanged and return False."""
     path = local(url)
     with guarded(url, f"writing {name}"):
         try:
@@ -283,7 +283,7 @@ def create(url: str, name: str, content: bytes) -> bool:
 
 
 def conditional(url: str) -> bool:
-    """Return whether `create` is one atomic request of the server."""
+    """Return whether `create` is atomic: a local operation, or a single request to a server."""
     if local(url) is not None:
         return True
     from fsspec import AbstractFileSystem
@@ -309,7 +309,7 @@ def remove(url: str, files: Iterable[str]) -> None:
 
 
 def set_aside(url: str, files: Iterable[str]) -> None:
-    """Rename files so that nothing reads them."""
+    """Rename files, so that they are kept but no longer read."""
     for name in files:
         content = read_bytes(url, name)
         if content is not None:
@@ -318,7 +318,7 @@ def set_aside(url: str, files: Iterable[str]) -> None:
 
 
 def clear(url: str) -> None:
-    """Remove what a run left that was stopped before it laid the study out."""
+    """Remove the files of a run that was stopped before it had laid the study out."""
 
     async def remove() -> None:
         for name in [name async for name in bytes_of(url).list_dir("") if name not in KEPT]:
@@ -329,7 +329,7 @@ def clear(url: str) -> None:
 
 
 def sweep(url: str) -> None:
-    """Remove the temporary files of killed writers; only for the holder of the lock."""
+    """Remove the temporary files of killed processes; call this only while holding the lock."""
     path = local(url)
     if path is not None and path.is_dir():
         with guarded(url, "removing what a killed run left"):
@@ -340,7 +340,7 @@ def sweep(url: str) -> None:
 
 
 def listed(url: str, prefix: str = "") -> list[str]:
-    """Return the names of all files below a prefix, in order."""
+    """Return the names of all files below a prefix, sorted."""
     path = local(url)
     if path is not None:
         with guarded(url, f"listing {prefix}"):
@@ -361,18 +361,18 @@ def _raise_unless_gone(error: OSError) -> None:
 
 
 def group_name(series: str, member: str = "") -> str:
-    """Return the path of a member of a series' group, or of the group itself; arrays without series are at the root."""
+    """Return the path of the group of a series, or of a member of it; without series, arrays are at the root."""
     return "/".join(part for part in ("" if series == ROOT else series, member) if part)
 
 
 def chunk_name(series: str, array: str, block: Iterable[int], further: int = 0) -> str:
-    """Return the name of the chunk of a block; `further` counts the dimensions that the array has beyond the ledger."""
+    """Return the name of the chunk of a block; `further` is the number of dimensions beyond those of the ledger."""
     return group_name(series, "/".join([array, "c", *map(str, block), *["0"] * further]))
 
 
 def digest(content: bytes) -> str:
     """Return the digest of a file.
 
-    It is not a checksum, because chunks end with theirs, and the CRC of bytes followed by their CRC is a constant.
+    A CRC would not do: chunks end with their own CRC, and the CRC of bytes followed by their CRC is a constant.
     """
     return hashlib.blake2b(content, digest_size=8).hexdigest()

@@ -1,4 +1,4 @@
-"""Compare a campaign with the store that it extends: name what differs, and put new values behind stored ones."""
+"""Compare a campaign with the store that it extends: name all differences, and append new values to stored ones."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from mdr_dask.store.study import attributes, document, series_names
 
 @dataclass(frozen=True)
 class Stored:
-    """What a store holds already of a campaign that is about to run.
+    """The part of a campaign that a store already holds.
 
     Parameters
     ----------
     campaign : Campaign
-        The campaign with every axis extended to what is stored: stored values first, in their order.
+        The campaign with its own and all stored values on every axis: first the stored ones, in their order.
     chunks : mapping of series name to chunk lengths
-        Layout of the stored groups.
+        Chunk lengths of the stored groups.
     realisations : int
         Number of stored realisations.
     places : mapping of series name to (mapping of dimension to int array)
-        For the stored groups, where the campaign's own entries of each dimension lie among the extended ones.
+        For each stored group, the positions of the campaign's own entries along each extended dimension.
     """
 
     campaign: Campaign
@@ -46,10 +46,10 @@ class Stored:
 
 
 def reconcile(url: str, campaign: Campaign) -> Stored:
-    """Compare a campaign with the store it wants to go on with.
+    """Compare a campaign with the store that it resumes or extends.
 
-    A study made without series stays at the root, and series are put beside it; the one that is that study goes on
-    there.
+    Results without series stay at the root of the store when series are added. A series of the campaign with the same
+    parameters and axes as these results is continued at the root.
 
     Parameters
     ----------
@@ -61,9 +61,9 @@ def reconcile(url: str, campaign: Campaign) -> Stored:
     Raises
     ------
     StoreError
-        If the store was made from another campaign; every difference is named, and nothing was touched.
+        If the store was made from another campaign; the message names every difference. The store is unchanged.
     """
-    attributes(url)  # what is no study at all is refused in its own words
+    attributes(url)  # raises StoreError if this is not a study
     campaign = _with_root(url, campaign)
     groups = {series.name: _group_attributes(url, series.name) for series in campaign.series}
     held = {name: found for name, found in groups.items() if found is not None}
@@ -90,7 +90,7 @@ def reconcile(url: str, campaign: Campaign) -> Stored:
 
 
 def _require_version(url: str, campaign: Campaign) -> None:
-    """Raise StoreError if another version of the same model made the store: results of two versions do not mix."""
+    """Raise StoreError if another version of the same model made the store, because their results must not mix."""
     held, version = attributes(url), models.load(campaign.model).version
     if held["model"] == campaign.model and held["model_version"] != version:
         program = held.get("versions", {}).get("mdr_dask", "another version")
@@ -131,7 +131,7 @@ def _arrays_at_root(url: str) -> set[str]:
 
 
 def _with_root(url: str, campaign: Campaign) -> Campaign:
-    """Return the campaign with the series that is the study at the root, if one is, without a name."""
+    """Return the campaign; a series that matches the results at the root of the store gets an empty name."""
     root = _group_attributes(url, "")
     if root is None or any(not series.name for series in campaign.series):
         return campaign
@@ -176,7 +176,7 @@ def _below_any(path: str, axes: Set[str]) -> bool:
 
 
 def _leaves(tree: Mapping[str, Any], prefix: str) -> dict[str, Any]:
-    """Flatten parameters to dotted paths; of a named file only the digest counts."""
+    """Flatten nested parameters to dotted paths; a named file is represented by its digest."""
     found: dict[str, Any] = {}
     for name, value in tree.items():
         if isinstance(value, Mapping) and not _is_file(value):
@@ -191,14 +191,14 @@ def _is_file(value: Any) -> bool:
 
 
 def _by_digest(value: Any) -> Any:
-    """Return a value with the digests of named files in their place, those of lists, too."""
+    """Return a value in which each named file, also inside a list, is replaced by its digest."""
     if isinstance(value, list):
         return [_by_digest(each) for each in value]
     return value["sha256"] if _is_file(value) else value
 
 
 def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, IntArray]]:
-    """Put the stored entries of every dimension first and the new ones behind them; say where the wanted ones are."""
+    """Append new entries to the stored ones; return the series and, by dimension, the positions of its own entries."""
     places = {}
     axes = []
     for dim in dict.fromkeys(axis["dim"] for axis in held["axes"]):
@@ -218,9 +218,9 @@ def _axis(series: Series, path: str) -> Axis:
 
 
 def _entries(columns: list[list[Any]]) -> dict[tuple[str, int], int]:
-    """Return the position of every entry of a dimension, by the text of its values and its number among equal ones.
+    """Return the position of every entry of a dimension, by the text of its values and a counter of equal entries.
 
-    Values that agree to `SAME_DIGITS` are the same. Designs of whole numbers may have the same case twice.
+    Values that agree to `SAME_DIGITS` are equal. The counter is needed because sampled whole numbers may repeat a case.
     """
     found: dict[tuple[str, int], int] = {}
     seen: Counter[str] = Counter()
@@ -245,7 +245,7 @@ def _longer(series: Series, axis: Axis, stored: Mapping[str, Any], new: list[int
 
 
 def _restore(series: Series, path: str, plain: Any) -> Any:
-    """Return a value as it was before it was stored; one with structure by way of its field in the parameter set."""
+    """Return an axis value from its stored form; lists and mappings are validated by the field of the parameter set."""
     if not isinstance(plain, Mapping | list):
         return plain
     *above, last = path.split(".")

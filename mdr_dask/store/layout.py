@@ -1,4 +1,4 @@
-"""Lay out a study: arrays from templates, and the one write that makes a new shape visible."""
+"""Lay out a study: create or extend its arrays from templates, and make the new shape visible by one write."""
 
 from __future__ import annotations
 
@@ -30,28 +30,28 @@ from mdr_dask.store.study import document, only_claimed
 from mdr_dask.version import __version__
 
 _COORDINATE_CHUNK = 4096
-#: What `_series_attributes` writes. At the root it is kept when series are added.
+#: Attributes that `_series_attributes` writes. Those at the root are kept when series are added.
 OF_SERIES = ("series", "parameters", "axes", "outputs", "blocks", "notes")
 _Coordinate = tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]
 
 
 def lay_out(url: str, layout: Sequence[Template]) -> None:
-    """Create the arrays of every template, or grow existing ones. Readers see the old shape or the new one.
+    """Create the arrays of every template, or extend existing ones. Readers see either the old shape or the new one.
 
     Files are written in this order: a copy of the layout of each group, arrays and coordinates, the metadata of groups,
-    and the metadata of the study, which make the new shape visible.
+    and finally the metadata of the study. This last write makes the new shape visible.
 
     Parameters
     ----------
     url : str
         Path or URL of the store.
     layout : sequence of Template
-        All groups; existing ones only grow, at the end of a dimension.
+        All groups; existing groups are extended at the ends of their dimensions.
 
     Raises
     ------
     StoreError
-        If it cannot be written.
+        If the store cannot be written.
     """
     if is_laid_out(url, layout):
         return
@@ -90,7 +90,7 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
 
 
 def is_laid_out(url: str, layout: Sequence[Template]) -> bool:
-    """Return whether a store has the shape of some templates already."""
+    """Return whether a store already has the shape and the attributes of all templates."""
     root = document(url)
     return root is not None and all(_has_shape(url, root, template) for template in layout)
 
@@ -108,31 +108,31 @@ def _has_shape(url: str, root: Mapping[str, Any], template: Template) -> bool:
 
 @dataclass(frozen=True)
 class Copy:
-    """A copy of everything that lays a group out: metadata and coordinates.
+    """A copy of the layout of a group: metadata and coordinates.
 
-    It is written before the files themselves. A file is sound if it is as in the copy, or as it was before: a run may
-    have been killed while it laid the study out.
+    The copy is written before the files themselves. A file is intact if it equals the copy or the previous file,
+    because a run may have been killed while it was writing the layout.
 
     Parameters
     ----------
     files : mapping of str to bytes
-        The files, with the metadata of the study among them, by their names in the store.
+        Contents of the files, including the metadata of the study, by their names in the store.
     before : mapping of str to str
-        Digests of the files that were there before.
+        Digests of the previous files.
     """
 
     files: Mapping[str, bytes]
     before: Mapping[str, str]
 
     def accepts(self, name: str, content: bytes | None, root: bytes | None) -> bool:
-        """Return whether a file is as it was laid out; a new one may be missing as long as `root` is the old one."""
+        """Return whether a file is intact; a new file may be missing as long as `root` is the previous metadata."""
         if content is None:
             return name not in self.before and root is not None and digest(root) == self.before.get("zarr.json")
         return content == self.files[name] or digest(content) == self.before.get(name)
 
     @property
     def age(self) -> int:
-        """How often the study had been laid out."""
+        """How often the study had been laid out when the copy was made."""
         return len(json.loads(self.files["zarr.json"])["attributes"]["history"])
 
 
@@ -142,7 +142,7 @@ def copy_name(series: str) -> str:
 
 
 def copy_of(series: str, files: Mapping[str, bytes], before: Mapping[str, str]) -> dict[str, bytes]:
-    """Return the file that holds the copy of the layout of a group, by its name."""
+    """Return name and content of the file with the copy of the layout of a group."""
     encoded = {name: base64.b64encode(content).decode() for name, content in files.items()}
     held = {"files": encoded, "before": before}
     stated = digest(json.dumps(held, sort_keys=True).encode())
@@ -150,12 +150,12 @@ def copy_of(series: str, files: Mapping[str, bytes], before: Mapping[str, str]) 
 
 
 def read_copy(url: str, series: str) -> Copy | None:
-    """Return the copy of the layout of a group, None if there is none.
+    """Return the copy of the layout of a group, or None if there is none.
 
     Raises
     ------
     StoreError
-        If it is damaged.
+        If the copy is damaged.
     """
     content = read_bytes(url, copy_name(series))
     if content is None:
@@ -174,7 +174,7 @@ def read_copy(url: str, series: str) -> Copy | None:
 
 
 def damaged_layout(url: str, series: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Yield name and fault (``missing`` or ``damaged``) of every file of a layout that is not as it was made."""
+    """Yield name and fault (``missing`` or ``damaged``) of every layout file that is not intact."""
     root = document(url) or {}
     copies = []
     for name in series:
@@ -194,7 +194,7 @@ def damaged_layout(url: str, series: Sequence[str]) -> Iterator[tuple[str, str]]
 
 
 def _signpost(members: Mapping[str, Any]) -> dict[str, str]:
-    """Return the comment of a study with series: opened as one dataset, it looks empty."""
+    """Return a comment for a study with series, because such a study looks empty when opened as one dataset."""
     series = sorted(name for name, member in members.items() if member["node_type"] == "group")
     groups = " or ".join(f"group={name!r}" for name in series)
     text = f"the results of each series are in a group: open_datatree, or open_zarr with {groups}"
@@ -229,7 +229,7 @@ def _laid_out_files(template: Template) -> dict[str, bytes]:
 def _array_file(
     template: Template, further: tuple[str, ...], extra: tuple[int, ...], dtype: str, attrs: dict[str, Any]
 ) -> bytes:
-    """Return the metadata of an array of blocks."""
+    """Return the metadata of an output or of the ledger."""
     files: dict[str, Any] = {}
     zarr.create_array(
         zarr.storage.MemoryStore(files),
@@ -268,7 +268,7 @@ def _compressors() -> list[Any]:
 
 
 def _coordinates(template: Template) -> dict[str, _Coordinate]:
-    """Return dims, values and attrs of every coordinate: axes, realisation, further dimensions, fixed numbers."""
+    """Return dims, values and attrs of every coordinate: axes, realisation, further dimensions, fixed parameters."""
     found: dict[str, _Coordinate] = {}
     for axis in template.series.axes:
         values = np.array(axis.labels or axis.values, dtype=object if axis.labels else None)
@@ -292,7 +292,7 @@ def _attrs(unit: str | None, long_name: str) -> dict[str, Any]:
 
 @cache
 def _packages() -> dict[str, str]:
-    """Return the versions of the packages that a store names."""
+    """Return the versions of packages that are written to the store."""
     return {name: version(name) for name in ("numpy", "scipy", "numba", "dask", "zarr", "xarray")}
 
 
@@ -346,7 +346,7 @@ def _series_attributes(template: Template) -> dict[str, Any]:
 
 
 def plain_values(values: tuple[Any, ...]) -> list[Any]:
-    """Return axis values as JSON."""
+    """Return axis values in a form that JSON can hold."""
     return [_plain(value) for value in values]
 
 
@@ -357,7 +357,7 @@ def _plain(value: Any) -> Any:
 
 
 def group_document(members: Mapping[str, Any], attrs: Mapping[str, Any]) -> bytes:
-    """Return the metadata of a group with those of its members: one file, so that a new shape is visible at once."""
+    """Return the metadata of a group and of its members as one file, so that one write makes a new shape visible."""
     held = {
         "zarr_format": 3,
         "node_type": "group",

@@ -1,4 +1,4 @@
-"""The ledger of a group: the array ``status``, and where the chunks of its blocks are."""
+"""The ledger of a group: the array ``status``, and the file names of the chunks of blocks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from mdr_dask.store.files import chunk_name, group_name, guarded, listed, read_m
 from mdr_dask.store.layout import damaged_layout
 from mdr_dask.store.study import array_of, document
 
-#: Most faults that a message names.
+#: Largest number of faults that a message names.
 NAMED = 3
 
 
@@ -35,7 +35,7 @@ class Blocks:
     grid, lengths : tuple of int
         Number of blocks along each dimension, and length of a block.
     further : mapping of str to int
-        Number of dimensions of each array beyond those of the ledger, which comes first.
+        Number of dimensions of each array beyond those of the ledger; the first array is the ledger itself.
     """
 
     series: str
@@ -45,7 +45,7 @@ class Blocks:
 
     @classmethod
     def of(cls, series: str, metadata: Mapping[str, Any]) -> Blocks:
-        """Find them in the metadata of a group."""
+        """Return the blocks of a group from its metadata."""
         arrays = metadata["consolidated_metadata"]["metadata"]
         status = arrays["status"]
         lengths = tuple(status["chunk_grid"]["configuration"]["chunk_shape"])
@@ -55,7 +55,7 @@ class Blocks:
 
     @property
     def indices(self) -> Iterator[BlockIndex]:
-        """All blocks."""
+        """The indices of all blocks."""
         return itertools.product(*map(range, self.grid))
 
     def chunk(self, array: str, block: BlockIndex) -> str:
@@ -68,9 +68,10 @@ class Blocks:
 
 
 def ledger(url: str, series: str, shape: tuple[int, ...] | None = None) -> NDArray[np.int8]:
-    """Return the ``status`` array of a group as it is now.
+    """Return the current ``status`` array of a group.
 
-    With a `shape`, results beyond the stored array are missing; another part may also have grown the array beyond it.
+    With a `shape`, the array is padded with "missing" or cut to this shape; the run of another part may have extended
+    the stored array beyond it.
     """
     metadata = document(url, series)
     if metadata is None:
@@ -89,7 +90,7 @@ def ledger(url: str, series: str, shape: tuple[int, ...] | None = None) -> NDArr
 
 
 def _read(url: str, blocks: Blocks, metadata: Mapping[str, Any]) -> NDArray[np.int8]:
-    """Read the ledger, decoding each different chunk once: most blocks are alike, and Zarr takes long for each."""
+    """Read the ledger. Equal chunks are decoded once, because most are equal and decoding in Zarr is slow."""
     different: dict[bytes | None, int] = {None: 0}
     names = (blocks.chunk("status", block) for block in blocks.indices)
     numbers = [different.setdefault(content, len(different)) for _, content in read_many(url, names)]
@@ -112,10 +113,10 @@ def _read(url: str, blocks: Blocks, metadata: Mapping[str, Any]) -> NDArray[np.i
 def require_sound(url: str, series: Sequence[str]) -> None:
     """Raise StoreError if the layout of a study is damaged or a chunk of a finished block is missing.
 
-    This reads the layout and the ledger, but no values: `mdr_dask.store.verify` compares everything with its digest.
+    Only the layout and the ledger are read, no values; `mdr_dask.store.verify` compares every file with its digest.
     """
     faults = _faults(url, series)
-    if any(faults):  # a run may have changed a file in between
+    if any(faults):  # check again: a run may have changed a file during the first check
         first = list(itertools.islice(_faults(url, series), NAMED + 1))
         if first:
             more = ", and more" if len(first) > NAMED else ""
@@ -128,17 +129,17 @@ def _faults(url: str, series: Sequence[str]) -> Iterator[str]:
     for name in series:
         metadata = document(url, name) or {}
         blocks = Blocks.of(name, metadata)
-        if metadata["attributes"]["mdr_dask_layout"] < 2:  # version 0.1 wrote no chunks of NaN alone
+        if metadata["attributes"]["mdr_dask_layout"] < 2:  # version 0.1 wrote no chunk if all its values were NaN
             continue
         done = _has_done(ledger(url, name), blocks.lengths)
-        present = set(listed(url, group_name(name)))  # after the ledger: values are written before it
+        present = set(listed(url, group_name(name)))  # after the ledger, which is written after the values
         for array in list(blocks.further)[1:]:
             chunks = (blocks.chunk(array, tuple(block)) for block in np.argwhere(done).tolist())
             yield from (f"{chunk} is missing" for chunk in chunks if chunk not in present)
 
 
 def _has_done(status: NDArray[np.int8], lengths: Sequence[int]) -> NDArray[np.bool_]:
-    """Return which blocks have a result that is done."""
+    """Return which blocks have at least one result that is done."""
     done = status == Status.DONE
     for axis, length in enumerate(lengths):
         if done.shape[axis]:

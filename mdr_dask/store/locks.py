@@ -1,10 +1,11 @@
-"""Locks: one run per store, or the parts of a campaign side by side. Tasks of a dead run cannot write.
+"""Locks: a store has one exclusive run, or several parts of a campaign at the same time.
 
-On a file system with locks, the operating system releases a lock however its holder ends. Elsewhere, and at URLs, a run
-makes a claim instead: a file that is created only if it is missing, with a sign of life that its owner renews.
+On a file system with locks, the operating system releases a lock when the process of the run ends for any reason. On
+other file systems and at URLs, a run makes a claim instead: a file that can only be created if it is missing. Its owner
+regularly writes a second file as a sign of life. Tasks of a run that has ended cannot write.
 
-Every run passes the gate, a lock that is held for moments only. Whoever holds it can see which other runs there are. So
-a part and an exclusive run never start together, and one of them lays a study out while the others wait.
+Every run first acquires the gate, a lock that is held for a short time only. Its holder can check which other runs are
+active. So a part and an exclusive run never start together, and one part lays out a study while the other parts wait.
 """
 
 from __future__ import annotations
@@ -42,19 +43,19 @@ from mdr_dask.store.files import (
 
 try:
     import fcntl
-except ImportError:  # a system without it: runs make claims instead
+except ImportError:  # this system has no such locks: runs make claims instead
     fcntl = None  # type: ignore[assignment]
 
-#: Seconds between two signs of life of the owner of a claim, and after which a silent owner is taken for dead.
+#: Seconds between two signs of life of a run with a claim, and seconds without any after which it counts as ended.
 BEAT = 10.0
 SILENCE = 60.0
-#: How often claims are listed again when the last one disappears before it is read.
+#: Largest number of attempts to list the claims, if the last one disappears before it is read.
 LISTINGS = 10
-#: Seconds for which a lock is tried: somebody may only have looked whether it is held.
+#: Seconds during which acquiring a lock is tried again: another process may only be checking whether it is held.
 GLANCE = 0.5
-#: Seconds between two tries, and after which a wait at the gate is reported.
+#: Seconds between two attempts to acquire the gate, and seconds of waiting after which a message is logged.
 KNOCK, PATIENCE = 0.1, 4.0
-#: Errors of a file system without locks, and of one that can only be read.
+#: Errors of a file system without locks, and errors of a file system that can only be read.
 NO_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP}
 READ_ONLY = {errno.EACCES, errno.EPERM, errno.EROFS}
 
@@ -71,13 +72,13 @@ class Lock:
     Parameters
     ----------
     name : str
-        Which lock of the study; the exclusive one has no name.
+        Name of the lock; the exclusive lock has an empty name.
     owner : str
-        Differs from one run to the next; empty for a run that may only read.
+        Unique identifier of the run; empty for a run that can only read.
     claim : int or None
-        Number of the claim, None where the operating system keeps the lock.
+        Number of the claim, or None for a lock of the operating system.
     begun : tuple of str
-        Blocks that earlier runs began and did not end because they crashed or were killed, as `note_begun` had them.
+        Blocks that `note_begun` recorded for earlier runs that crashed or were killed before these blocks ended.
     """
 
     name: str
@@ -93,7 +94,7 @@ class Part:
     Parameters
     ----------
     number, count : int
-        Which one, from 1, and of how many.
+        Number of the part, counted from 1, and number of parts.
     """
 
     number: int
@@ -104,15 +105,15 @@ class Part:
 
     @property
     def lock(self) -> str:
-        """Name of its lock."""
+        """Name of the lock of the part."""
         return f"{_PART}{self.number}-of-{self.count}"
 
     @classmethod
     def of(cls, position: int, count: int) -> Part:
         """Return the part that a block belongs to, by its position among all blocks.
 
-        Blocks are dealt in turn, each turn beginning one part further on. Otherwise all blocks at one value of an axis
-        that has as many of them as there are parts would belong to the same part.
+        Blocks are assigned to the parts 1, 2, ..., then to 2, 3, ..., 1, and so on. Without this shift, all blocks at
+        one value of an axis would belong to the same part if the axis has as many blocks as there are parts.
         """
         return cls((position + position // count) % count + 1, count)
 
@@ -124,9 +125,9 @@ def exclusive(url: str) -> Iterator[Lock]:
     Raises
     ------
     StoreBusyError
-        If another run or a part is at work on it; the message names it.
+        If another run or a part is active in the store; the message names it.
     StoreError
-        If nothing can be written there.
+        If locking fails. In a read-only store it does not fail: the lock then allows reading only.
     """
     with ExitStack() as held:
         with gate(url):
@@ -144,14 +145,14 @@ def exclusive(url: str) -> Iterator[Lock]:
 
 @contextmanager
 def shared(url: str, part: Part) -> Iterator[Lock]:
-    """Lock one part of a study, while other parts of the same number run side by side.
+    """Lock one part of a study; the other parts of the same division may run at the same time.
 
     Raises
     ------
     StoreBusyError
-        If this part, a part of another number of parts, or an exclusive run is at work.
+        If this part, a part of a division into another number of parts, or an exclusive run is active.
     StoreError
-        If nothing can be written there.
+        If locking fails. In a read-only store it does not fail: the lock then allows reading only.
     """
     with ExitStack() as held:
         with gate(url), acquire(url):
@@ -167,7 +168,7 @@ def shared(url: str, part: Part) -> Iterator[Lock]:
 
 @contextmanager
 def gate(url: str) -> Iterator[None]:
-    """Hold the gate of a study: meanwhile no other run starts or lays it out."""
+    """Hold the gate of a study. Meanwhile no other run can start or lay the study out."""
     start, is_reported = time.monotonic(), False
     with ExitStack() as held:
         while True:
@@ -183,27 +184,27 @@ def gate(url: str) -> Iterator[None]:
 
 
 def at_work(url: str) -> tuple[str | None, list[Part]]:
-    """Return who is at work on a study: the exclusive run if there is one, and the parts. This only reads."""
+    """Return the active runs of a study: the holder of the exclusive lock (or None), and the parts; write nothing."""
     return (_holder(url) if _is_held(url) else None), _parts(url)
 
 
 @contextmanager
 def acquire(url: str, name: str = "") -> Iterator[Lock]:
-    """Hold a lock of a study. Where nothing can be written, it is a lock to read with.
+    """Hold a lock of a study. If the store is read-only, the lock allows reading only.
 
     Parameters
     ----------
     url : str
         Path or URL of the store.
     name : str
-        Which of its locks; the exclusive one has no name.
+        Name of the lock; the exclusive lock has an empty name.
 
     Raises
     ------
     StoreBusyError
-        If another process holds it; the message names that process.
+        If another process holds the lock; the message names that process.
     StoreError
-        If there is no lock because of another error.
+        If locking fails for another reason.
     """
     if local(url) is None:
         with _claimed(url, name) as lock:
@@ -229,12 +230,12 @@ def acquire(url: str, name: str = "") -> Iterator[Lock]:
 
 @contextmanager
 def while_locked(url: str, lock: Lock) -> Iterator[None]:
-    """Write for a run that must still hold its lock; the next run waits until this has ended.
+    """Check that a run still holds its lock, and make the next run wait until the body of this context has ended.
 
     Raises
     ------
     StoreBusyError
-        If that run has ended, or another one has taken over.
+        If the run has ended, or another run has taken over its lock.
     StoreError
         If the store can only be read.
     """
@@ -260,7 +261,7 @@ def while_locked(url: str, lock: Lock) -> Iterator[None]:
 
 
 def note_begun(url: str, lock: Lock, begun: list[str]) -> None:
-    """Write down which blocks a run has begun, for the next run in case this process crashes."""
+    """Record which blocks a run has begun; the next run needs them if this process crashes."""
     if lock.claim is None and local(url) is not None:
         content = "\n".join([_me(), *begun]) + "\n"
         with guarded(url, "noting a block"), _runner(url, lock).open("r+") as file:
@@ -269,17 +270,17 @@ def note_begun(url: str, lock: Lock, begun: list[str]) -> None:
 
 
 def _lock_file(url: str, name: str = "") -> Path:
-    """Return the file of a lock beside a store on this machine."""
+    """Return the path of a lock file, which lies next to a store on this machine."""
     path = Path(url.removeprefix("file://"))
     try:
         path = path.resolve()
-    except (OSError, RuntimeError, ValueError) as error:  # a link to itself, a null character
+    except (OSError, RuntimeError, ValueError) as error:  # for example a link to itself, or a null character
         raise StoreError(f"{url}: expected a path: {error}") from None
     return path.with_name(".".join(["", path.name, *filter(None, [name]), "lock"]))
 
 
 def _locked(file: Path) -> int:
-    """Return the descriptor of a lock file that is now locked and still has its name."""
+    """Lock a lock file and return its descriptor; a file that was deleted meanwhile is created and locked again."""
     give_up = time.monotonic() + GLANCE
     while True:
         if not file.parent.exists():
@@ -301,14 +302,14 @@ def _locked(file: Path) -> int:
 
 
 def _flock(descriptor: int, shared: bool = False) -> None:
-    """Take a lock of the operating system, or fail at once."""
+    """Acquire a lock of the operating system without waiting; raise BlockingIOError if it is held."""
     if fcntl is None:
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
     fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
 
 
 def _is_held(url: str, name: str = "") -> bool:
-    """Return whether somebody holds a lock, without writing anything."""
+    """Return whether a process holds a lock, without writing anything."""
     standing = _numbers(url, name)
     if standing and _is_alive(url, name, max(standing)):
         return True
@@ -330,14 +331,14 @@ def _is_held(url: str, name: str = "") -> bool:
 
 
 def _parts(url: str) -> list[Part]:
-    """Return the parts at work."""
+    """Return the active parts."""
     numbers = (name.removeprefix(_PART).split("-of-") for name in _part_locks(url))
     known = sorted(Part(int(number), int(count)) for number, count in numbers)
     return [part for part in known if _is_held(url, part.lock)]
 
 
 def _part_locks(url: str) -> list[str]:
-    """Return the names of the locks of parts that have been held and not removed since."""
+    """Return the names of the existing locks of parts, whether they are held or not."""
     names = {claim.removeprefix(CLAIMS).partition("/")[0] for claim in listed(url, CLAIMS)}
     if local(url) is not None:
         file = _lock_file(url)
@@ -348,7 +349,7 @@ def _part_locks(url: str) -> list[str]:
 
 
 def _named(parts: list[Part]) -> str:
-    """Return the subject and the verb of a sentence about parts."""
+    """Return ``part 1/8 is`` or ``parts 1/8, 2/8 are``, the beginning of a message."""
     names = ", ".join(map(str, parts))
     return f"part {names} is" if len(parts) == 1 else f"parts {names} are"
 
@@ -358,7 +359,7 @@ def _busy(url: str, who: str) -> StoreBusyError:
 
 
 def _holder(url: str, name: str = "") -> str:
-    """Return who holds a lock that is held."""
+    """Return the process that holds a lock, as text for messages."""
     names = [_told(url, _claim(name, number)).get("who", "") for number in _numbers(url, name)]
     for runner in _runners(url, name) if local(url) is not None else ():
         with suppress(OSError):
@@ -381,7 +382,10 @@ def _runners(url: str, name: str) -> list[Path]:
 
 @contextmanager
 def _registered(url: str, name: str) -> Iterator[Lock]:
-    """Write who holds a lock, in a file that tasks lock together while they write; remove those of earlier holders."""
+    """Write the holder of a lock to a runner file, and remove the runner files of earlier holders.
+
+    Tasks hold a shared lock on the runner file while they write.
+    """
     begun: list[str] = []
     for runner in _runners(url, name):
         begun += _retire(url, runner)
@@ -396,7 +400,7 @@ def _registered(url: str, name: str) -> Iterator[Lock]:
 
 
 def _retire(url: str, runner: Path) -> list[str]:
-    """Remove the file of a run that has ended as soon as no task of it is writing; return the blocks it had begun."""
+    """Remove the runner file of an ended run once none of its tasks is writing; return the blocks that it had begun."""
     give_up = time.monotonic() + SILENCE
     with guarded(url, "removing the file of a run"), runner.open("rb+") as file:
         while True:
@@ -414,7 +418,7 @@ def _retire(url: str, runner: Path) -> list[str]:
 
 
 def _remove_lock(url: str, name: str) -> list[str]:
-    """Remove the files of a lock that nobody holds; return the blocks that its last holder had begun."""
+    """Remove the files of a lock that no process holds; return the blocks that its last holder had begun."""
     if local(url) is None:
         return []
     begun = [block for runner in _runners(url, name) for block in _retire(url, runner)]
@@ -441,7 +445,7 @@ def _numbers(url: str, name: str) -> list[int]:
 
 @contextmanager
 def _claimed(url: str, name: str) -> Iterator[Lock]:
-    """Hold a claim, and give signs of life until the end."""
+    """Hold a claim, and write signs of life until the end."""
     owner = uuid.uuid4().hex
     number = _make_claim(url, name, owner)
     ended = threading.Event()
@@ -458,18 +462,18 @@ def _claimed(url: str, name: str) -> Iterator[Lock]:
     finally:
         ended.set()
         alive.join()
-        with suppress(StoreError):  # without a network, another run will take it over
+        with suppress(StoreError):  # without a network the claim stays, and the next run replaces it
             if _told(url, _claim(name, number)).get("owner") == owner:
                 remove(url, [_claim(name, number), _life(name, number)])
 
 
 def _make_claim(url: str, name: str, owner: str) -> int:
-    """Make the next claim, unless the owner of the last one is alive; return its number."""
+    """Make the next claim and return its number; raise StoreBusyError if the owner of the last claim is active."""
     for _ in range(LISTINGS):
         standing = _numbers(url, name)
         if not standing or not _is_alive(url, name, max(standing)):
             break
-        if read_bytes(url, _claim(name, max(standing))) is not None:  # otherwise its owner has just left
+        if read_bytes(url, _claim(name, max(standing))) is not None:  # otherwise its owner has just ended
             raise _busy(url, _told(url, _claim(name, max(standing))).get("who", "another process"))
     else:
         raise _busy(url, "another process")
@@ -477,7 +481,7 @@ def _make_claim(url: str, name: str, owner: str) -> int:
     content = json.dumps({"owner": owner, "who": _me(), "time": time.time()}).encode()
     if not create(url, _claim(name, number), content):
         held = _told(url, _claim(name, number))
-        if held.get("owner") != owner:  # we own it if only the reply to our first request was lost
+        if held.get("owner") != owner:  # it is ours if only the reply to the first request was lost
             raise _busy(url, held.get("who", "another process"))
     elif not name and (not conditional(url) or create(url, _claim(name, number), content)):
         log.warning("%s: nothing keeps two runs apart here (no conditional write): start one at a time", url)
@@ -486,20 +490,20 @@ def _make_claim(url: str, name: str, owner: str) -> int:
 
 
 def _is_alive(url: str, name: str, number: int) -> bool:
-    """Return whether the owner of a claim has given a sign of life: recently by its own clock, or while we wait."""
+    """Return whether the owner of a claim is active: its last sign of life is recent, or a new one appears soon."""
     claim = _told(url, _claim(name, number))
     last = _told(url, _life(name, number)) or claim
     if time.time() - last.get("time", 0.0) <= SILENCE:
         return True
     if not claim and read_bytes(url, _claim(name, number)) is None:
-        return True  # its owner has just left, and somebody else may have come
+        return True  # its owner has just ended, and another run may have started
     log.warning("%s: waiting %g s for a sign of life of %s", url, 2 * BEAT, claim.get("who", "another process"))
     time.sleep(2 * BEAT)
     return (_told(url, _life(name, number)) or claim) != last
 
 
 def _told(url: str, name: str) -> dict[str, Any]:
-    """Return a claim or a sign of life; nothing if its owner is writing it."""
+    """Return the content of a claim or of a sign of life; an empty dictionary if it is missing or being written."""
     try:
         return read_json(url, name) or {}
     except StoreError:

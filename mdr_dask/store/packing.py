@@ -1,4 +1,4 @@
-"""The files of a published study: what goes into its zip, and whether a zip is as it was packed."""
+"""The zip of a published study: list the files to pack, and verify a zip."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from mdr_dask.store.verification import CHECKSUMS, Finding, Inspection, of_store
 
 
 def contents(url: str) -> Iterator[tuple[str, bytes]]:
-    """Yield name and content of every file of a store, without files that were published or set aside."""
+    """Yield name and content of every file of a store, except published files and files that were set aside."""
     for name, content in read_many(url, of_store(listed(url))):
         if content is not None:
             yield name, content
 
 
-#: Largest ratio of the sizes of a file and of its packed form; chunks are compressed already, metadata to a tenth.
+#: Largest accepted compression ratio of a file: chunks are compressed already, and metadata shrink to a tenth.
 LARGEST_RATIO = 100
-#: Size below which the ratio does not matter, and size of the pieces in which files are read.
+#: File size below which any ratio is accepted, and size of the pieces in which files are read; both in bytes.
 SMALL, PIECE = 2**20, 2**20
 
 
@@ -33,7 +33,7 @@ def verify_packed(path: Path) -> Inspection:
     Raises
     ------
     StoreError
-        If it is no zip that this program wrote: encrypted, of another compression, or much larger than its packed form.
+        If this program did not write the zip: if it is encrypted, uses another compression, or unpacks to a huge size.
     """
     try:
         with zipfile.ZipFile(path) as packed, tempfile.TemporaryDirectory() as folder:
@@ -52,7 +52,7 @@ def verify_packed(path: Path) -> Inspection:
 
 
 def _checksums(path: Path, packed: zipfile.ZipFile) -> dict[str, str]:
-    """Return the checksum of every file, after a look at the table of contents."""
+    """Check the table of contents, and return the expected checksum of every file."""
     for entry in packed.infolist():
         if entry.flag_bits & 1:
             raise StoreError(f"{path}: {entry.filename!r:.80} is encrypted, expected a zip of 'mdr-dask publish'")
@@ -71,7 +71,7 @@ def _checksums(path: Path, packed: zipfile.ZipFile) -> dict[str, str]:
 
 
 def _unpack(packed: zipfile.ZipFile, expected: dict[str, str], folder: Path) -> Iterator[Finding]:
-    """Unpack the files inside the store, and yield what is not as it was packed."""
+    """Unpack the files inside the store, and yield a finding for each file that is foreign, missing or damaged."""
     there = packed.namelist()
     for name in sorted(set(there) - expected.keys() - {CHECKSUMS}):
         yield Finding("foreign", name, "it has no checksum" if _is_inside(name) else "a place outside the store")
@@ -90,7 +90,7 @@ def _is_inside(name: str) -> bool:
 
 
 def _extract(packed: zipfile.ZipFile, name: str, target: Path) -> str:
-    """Unpack a file piece by piece, and return its checksum."""
+    """Unpack a file piece by piece, and return its checksum; an empty text if it cannot be unpacked."""
     checksum = hashlib.sha256()
     target.parent.mkdir(parents=True, exist_ok=True)
     with target.open("wb") as file:

@@ -20,13 +20,13 @@ from mdr_dask.store.study import document, series_names
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Reading through Dask is several times slower for small groups, and the only way for those beyond memory.
+#: Groups larger than this are read through Dask, which is several times slower but also works beyond the memory.
 LAZY_BYTES = 2**30
 
 
 @contextmanager
 def readable(url: str) -> Iterator[None]:
-    """Turn errors of Zarr while arrays are loaded into one sentence."""
+    """Turn errors of Zarr while arrays are loaded into a StoreError with one sentence."""
     try:
         yield
     except Exception as error:
@@ -95,7 +95,7 @@ def save(dataset: xr.Dataset, path: Path) -> None:
     plain.attrs = {
         name: value if isinstance(value, str | int | float) and not isinstance(value, bool) else json.dumps(value)
         for name, value in dataset.attrs.items()
-        if value is not None and name != "mdr_dask_layout"  # no study that could be run on
+        if value is not None and name != "mdr_dask_layout"  # so no run extends the copy
     }
     if path.suffix == ".nc":
         if find_spec("h5netcdf") is None:

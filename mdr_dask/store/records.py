@@ -1,7 +1,7 @@
 """Records of blocks: times, versions, messages, and the digest of every chunk.
 
-During a run each block has a file of its own; from time to time these are merged, so that no folder holds a hundred
-thousand files.
+During a run each block has a record file of its own. These files are merged from time to time, so that no folder holds
+a hundred thousand files.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ def name_of(series: str, index: BlockIndex, attempt: int) -> str:
 
 
 def encoded(record: Mapping[str, Any]) -> bytes:
-    """Return a record as one line that ends with its own digest."""
+    """Return a record as one line of JSON that includes the digest of the record."""
     text = json.dumps(record, sort_keys=True)
     return json.dumps({**record, "digest": digest(text.encode())}, sort_keys=True).encode()
 
 
 def decoded(line: bytes) -> dict[str, Any] | None:
-    """Return a record; None if it is damaged. Records of version 0.1 have no digest."""
+    """Return a record, or None if it is damaged. Records of version 0.1 have no digest and count as undamaged."""
     try:
         record: dict[str, Any] = json.loads(line)
         if not _is_one(record):
@@ -48,14 +48,14 @@ def decoded(line: bytes) -> dict[str, Any] | None:
         stated = record.pop("digest", None)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return None
-    if stated is None or stated == digest(line.replace(f'"digest": "{stated}", '.encode(), b"", 1)):  # as it stands
+    if stated is None or stated == digest(line.replace(f'"digest": "{stated}", '.encode(), b"", 1)):
         return record
     text = json.dumps(record, sort_keys=True)
     return record if stated == digest(text.encode()) else None
 
 
 def _is_one(found: Mapping[str, Any]) -> bool:
-    """Return whether a document has the shape of a record."""
+    """Return whether a JSON document has the structure of a record."""
     whole = type(found["attempt"]) is int and all(type(i) is int and i >= 0 for i in found["block"])
     texts = all(type(one) is str for one in found.get("chunks", {}).values()) and type(found.get("kind", "")) is str
     return whole and texts and type(found["messages"]) is list and all(map(_is_message, found["messages"]))
@@ -68,7 +68,7 @@ def _is_message(message: Mapping[str, Any]) -> bool:
 
 
 def record(url: str, series: str, index: BlockIndex, attempt: int) -> dict[str, Any] | None:
-    """Return the record of an attempt at a block, as long as it has a file of its own."""
+    """Return the record of an attempt at a block, or None if it has no file of its own or is damaged."""
     content = read_bytes(url, name_of(series, index, attempt))
     return None if content is None else decoded(content)
 
@@ -83,7 +83,7 @@ def lines(url: str, series: str) -> Iterator[tuple[str, bytes]]:
 
 
 def records(url: str, series: str) -> Iterator[dict[str, Any]]:
-    """Yield the records of all blocks of a group, each once, without damaged ones."""
+    """Yield each record of a group once; damaged records are left out."""
     seen: set[tuple[BlockIndex, int]] = set()
     damaged = 0
     for _, line in lines(url, series):
@@ -99,7 +99,7 @@ def records(url: str, series: str) -> Iterator[dict[str, Any]]:
 
 @lru_cache(maxsize=16)
 def _warn_of_damaged(url: str, count: int) -> None:
-    """Warn once of damaged records."""
+    """Warn of damaged records, once for each store and number."""
     log.warning("%s: %d damaged records are left out; 'mdr-dask verify %s' names them", url, count, url)
 
 
@@ -121,8 +121,8 @@ def kinds(url: str, series: Sequence[str]) -> dict[str, int]:
 def merge_records(url: str, series: str) -> None:
     """Merge the records of single blocks into files of many.
 
-    Records of attempts that did not reach the ledger stay apart. If two processes merge at the same time, or one is
-    killed, some records are in two files; they count once.
+    Records of attempts that were not written to the ledger are not merged. If two processes merge at the same time, or
+    one is killed, some records are in two files; readers use them once.
     """
     prefix = folder(series)
     loose = [name for name in listed(url, prefix) if _LOOSE.fullmatch(name.removeprefix(prefix))]

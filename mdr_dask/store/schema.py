@@ -1,4 +1,4 @@
-"""What the metadata of a study must contain before Zarr opens anything: stores may come from strangers."""
+"""Check the metadata of a study before Zarr opens anything, because a store may come from an unknown source."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class _Document(BaseModel):
 
 
 class _Codec(_Document):
-    """Another codec than those that this program writes might run code."""
+    """A codec of an array. Only codecs that this program writes are accepted, because others might run code."""
 
     name: Literal["bytes", "crc32c", "vlen-utf8", "zstd"]
 
@@ -84,7 +84,7 @@ class _Root(_Document):
 
 
 def faults(found: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what is wrong with the metadata of a group; whether its parts agree only if each is right."""
+    """Yield the faults of the metadata of a group; contradictions between its parts only if every part is valid."""
     attributes = found["attributes"]
     wrong = [*_unlike(_Root, found, ""), *_unlike(_Group if "axes" in attributes else _Study, attributes, "")]
     if not wrong:
@@ -111,7 +111,7 @@ def _unlike(kind: type[_Document], found: Mapping[str, Any], where: str) -> Iter
 
 
 def _disagreements(attributes: Mapping[str, Any], arrays: Mapping[str, Any]) -> Iterator[str]:
-    """Yield where the arrays of a group, their dimensions and the axes do not agree."""
+    """Yield contradictions between the arrays of a group, their dimensions and the axes."""
     wanted = ["status", "realisation", *attributes["outputs"], *(axis["name"] for axis in attributes["axes"])]
     lacking = [name for name in wanted if name not in arrays]
     if lacking:

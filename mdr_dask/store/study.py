@@ -1,4 +1,4 @@
-"""What is at a path or URL: a study, something else, or nothing; and the metadata of a study."""
+"""Find out whether there is a study at a path or URL, and read its metadata."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _HINTS = {".yaml": "; 'mdr-dask run {}' runs a campaign", ".zip": "; unpack it f
 
 
 def document(url: str, series: str = "") -> Mapping[str, Any] | None:
-    """Return the checked metadata of a group, or None if there are none. Do not change them: they are cached.
+    """Return the checked metadata of a group, or None if there are none. Do not change the result, which is cached.
 
     Raises
     ------
@@ -38,7 +38,7 @@ def document(url: str, series: str = "") -> Mapping[str, Any] | None:
 
 @lru_cache(maxsize=16)
 def _checked(content: bytes) -> tuple[dict[str, Any], str | None]:
-    """Return the metadata of a group, and the first thing that is wrong with them."""
+    """Return the metadata of a group, and their first fault, or None if they have none."""
     found = parsed(content)
     if not isinstance(found, dict) or not isinstance(found.get("attributes", {}), dict):
         return found, " is damaged"
@@ -51,12 +51,12 @@ def _checked(content: bytes) -> tuple[dict[str, Any], str | None]:
 
 
 def array_of(metadata: Mapping[str, Any], store: Store, path: str = "") -> Any:
-    """Return the array of some metadata, without the time that Zarr takes to open a group."""
+    """Return the Zarr array that belongs to metadata; this avoids the time to open a group."""
     return zarr.Array(zarr.AsyncArray(dict[str, Any](metadata), StorePath(store, path)))  # type: ignore[call-overload]
 
 
 def refuse_file(url: str, expected: str = "the folder of a store") -> None:
-    """Raise StoreError for a file, and for a place below one, where a store is expected."""
+    """Raise StoreError if a file, or a path below a file, is given where a store is expected."""
     path = local(url)
     for place in () if path is None else (path, *path.parents):
         if place.is_file():
@@ -70,7 +70,7 @@ def exists(url: str) -> bool:
     Raises
     ------
     StoreError
-        If there is something else.
+        If there is something other than a study.
     """
     refuse_file(url, "the folder of a store or nothing")
     path, found = local(url), _root_attributes(url)
@@ -95,7 +95,7 @@ def _root_attributes(url: str) -> dict[str, Any] | None:
 
 
 def only_claimed(found: Mapping[str, Any]) -> bool:
-    """Return whether a run was stopped before it laid the study out."""
+    """Return whether the attributes are those of a study whose run was stopped before laying it out."""
     return list(found) == ["mdr_dask_layout"]
 
 

@@ -38,7 +38,7 @@ IGNORED = (".partial", ASIDE, "status/seal.json")  # the last one was written by
 #: Files of a published store beside those of the study.
 PUBLISHED = "published/"
 CHECKSUMS = f"{PUBLISHED}checksums.sha256"
-#: What earlier versions published beside them.
+#: A file of a published study that earlier versions wrote next to the store's own files.
 _CRATE = "ro-crate-metadata.json"
 
 #: Digests of the chunks that each attempt at a block has written, by array, in the order of the attempts.
@@ -56,7 +56,7 @@ class Finding:
     name : str
         The file.
     what : str
-        What is wrong with it.
+        The fault, for messages.
     """
 
     kind: str
@@ -66,7 +66,7 @@ class Finding:
 
 @dataclass
 class Group:
-    """A group of a store as `inspect` finds it: its blocks, and what `repair` has to do."""
+    """A group of a store during verification: its blocks, and the faults that `repair` removes."""
 
     blocks: Blocks
     bad_blocks: set[BlockIndex] = field(default_factory=set)
@@ -81,17 +81,17 @@ class Inspection:
     Parameters
     ----------
     findings : list of Finding
-        Everything that is not as it was written.
+        All files that are not as they were written.
     notes : list of str
-        What is no damage, but of interest: an interrupted run, an earlier version.
+        Facts that are not damage, such as an interrupted run or an earlier version.
     groups : list of Group
-        Its groups.
+        The groups of the store.
     copies : list of Copy
-        Copies of their layouts.
+        Copies of the layouts of the groups.
     uncopied : dict of str to set of str
-        Files of the layout of each group without such a copy.
+        Layout files of each group that has no copy of its layout.
     files, blocks : int
-        Number of files and of blocks in the ledgers.
+        Number of files, and number of blocks in the ledgers.
     """
 
     findings: list[Finding] = field(default_factory=list)
@@ -111,7 +111,7 @@ def verify(url: str) -> Inspection:
     StoreError
         If there is no store of mdr_dask, or it cannot be read.
     StoreBusyError
-        If a run is at work on it.
+        If a run is active in the store.
     """
     refuse_file(url)
     runner, parts = at_work(url)
@@ -122,17 +122,17 @@ def verify(url: str) -> Inspection:
 
 
 def repair(url: str) -> tuple[Inspection, Inspection]:
-    """Repair a store as far as possible, and return what was found before and after.
+    """Repair a store as far as possible, and return the inspections before and after the repair.
 
-    Metadata and coordinates are written again from their copy. Damaged blocks are marked as missing, so that the next
-    run computes them. Records and chunks that do not belong are renamed. Other foreign files stay.
+    Metadata and coordinates are written again from their copies. Damaged blocks are removed, so that the next run
+    computes them. Records and chunks that do not belong to the study are renamed. Other foreign files are kept.
 
     Raises
     ------
     StoreError
         If there is no store of mdr_dask, or it cannot be written.
     StoreBusyError
-        If a run is at work on it.
+        If a run is active in the store.
     """
     refuse_file(url)
     with exclusive(url):
@@ -155,7 +155,7 @@ def repair(url: str) -> tuple[Inspection, Inspection]:
 
 
 def of_store(names: Iterable[str]) -> Iterator[str]:
-    """Yield the names of files that belong to a study, not to a run, a repair or a publication."""
+    """Yield the names of files that belong to a study; leave out those of a run, a repair or a publication."""
     for name in names:
         if not name.endswith(IGNORED) and not name.startswith((CLAIMS, PUBLISHED)) and name != _CRATE:
             yield name
@@ -181,7 +181,7 @@ def _inspect(url: str) -> Inspection:
 
 
 def _check_layout(url: str, found: Inspection, present: set[str]) -> set[str]:
-    """Compare metadata and coordinates with their copies; return the names of the files that belong to them."""
+    """Compare metadata and coordinates with their copies; return the names of all layout files."""
     suffix, known, documents = copy_name(""), {"zarr.json"}, {}
     series = {
         name.removesuffix(suffix).rstrip("/") for name in present if name.endswith(suffix) and name.count("/") < 3
@@ -226,7 +226,7 @@ def _copy(url: str, series: str, found: Inspection) -> Copy | None:
 
 
 def _compared(url: str, found: Inspection) -> set[str]:
-    """Compare the files of layouts with their copies; return their names."""
+    """Compare layout files with their copies; return the names of these files."""
     contents = {content: name for copy in found.copies for name, content in copy.files.items()}
     names, root = {name for copy in found.copies for name in copy.files}, read_bytes(url, "zarr.json")
     for name, content in read_many(url, sorted(names)):
@@ -251,7 +251,7 @@ def _document(url: str, series: str) -> Mapping[str, Any] | None:
 
 
 def _unverified(url: str, series: str, metadata: Mapping[str, Any], found: Inspection, present: set[str]) -> set[str]:
-    """Read the coordinates of a group without a copy of its layout; return the names of their files."""
+    """Check metadata and coordinates of a group that has no copy of its layout; return the names of their files."""
     members = metadata.get("consolidated_metadata", {}).get("metadata", {})
     known = {group_name(series, "zarr.json")}
     for name, member in members.items():
@@ -276,20 +276,20 @@ def _parsed(content: bytes) -> Any:
 
 
 def _reading(url: str, path: str, block: BlockIndex | None = None) -> str | None:
-    """Return the error of Zarr for an array, or one of its blocks, that cannot be read."""
+    """Read an array or one of its blocks; return the error of Zarr, or None if there is none."""
     try:
         array: Any = zarr.open_group(bytes_of(url), mode="r", use_consolidated=True, zarr_format=3)[path]
         if block is None:
             array[...]
         else:
             array.blocks[block]
-    except Exception as error:  # whatever a damaged file makes Zarr and its codecs raise
+    except Exception as error:  # a damaged file may cause any error in Zarr and its codecs
         return str(error) or type(error).__name__
     return None
 
 
 def _check_records(url: str, group: Group, found: Inspection, present: set[str]) -> set[str]:
-    """Find records that are damaged or not in their place; return the files of all."""
+    """Find records that are damaged, swapped or foreign; return the names of all record files."""
     series, known = group.blocks.series, set[str]()
     for name, line in lines(url, series):
         known.add(name)
@@ -344,7 +344,7 @@ def _check_blocks(url: str, group: Group, found: Inspection, present: set[str]) 
 
 
 def _histories(url: str, group: Group) -> tuple[dict[BlockIndex, History], set[BlockIndex]]:
-    """Return the digests of every block from its sound records, and the blocks that were done when records merged."""
+    """Return the digests of every block from its intact records, and the blocks whose records were merged when done."""
     known: dict[tuple[BlockIndex, int], Mapping[str, str]] = {}
     merged = set()
     for name, line in lines(url, group.blocks.series):
@@ -368,7 +368,7 @@ def _faults(
     contents: Mapping[str, bytes | None],
     owners: Mapping[tuple[str, str], BlockIndex],
 ) -> Iterator[Finding]:
-    """Yield what is wrong with a block that is in the ledger."""
+    """Yield the faults of a block that is in the ledger."""
     if not history:
         yield Finding("missing", name_of(group.blocks.series, block, 1), "the record of a block that is done")
         return
@@ -376,7 +376,7 @@ def _faults(
     for name, content in contents.items():
         file, written = group.blocks.chunk(name, block), {chunks[name] for chunks in history if name in chunks}
         expected = written if name == "status" else _expected(history, status, name)
-        if not written:  # by version 0.1
+        if not written:  # records of version 0.1 have no digests
             fault = content is not None and _reading(url, group_name(group.blocks.series, name), block)
             if fault:
                 yield Finding("damaged", file, fault)
@@ -392,9 +392,10 @@ def _faults(
 
 
 def _expected(history: History, status: str, name: str) -> set[str]:
-    """Return the digests that the chunk of an array may have beside a chunk of the ledger.
+    """Return the digests that the chunk of an array may have, given the digest of the ledger of the same block.
 
-    It was written by the last attempt that wrote this ledger, or by a later one that was killed before its own ledger.
+    The chunk was written by the attempt that wrote this ledger, by the last attempt before it that wrote this array, or
+    by a later attempt that was killed before it wrote its own ledger.
     """
     first = next((i for i, chunks in enumerate(history) if chunks.get("status") == status), len(history))
     found, last = set[str](), set[str]()
@@ -405,7 +406,7 @@ def _expected(history: History, status: str, name: str) -> set[str]:
 
 
 def _set_aside_records(url: str, group: Group) -> None:
-    """Rename files with records that are damaged or of bad blocks, after the other records in them are written anew."""
+    """Rename files with damaged records or records of damaged blocks; first copy their good records to a new file."""
     series, bad = group.blocks.series, set(group.bad_records)
     found = [(name, line, decoded(line)) for name, line in lines(url, series)]
     bad |= {name for name, _, record in found if record is None or tuple(record["block"]) in group.bad_blocks}
