@@ -1,7 +1,8 @@
-"""Lines that an elastomer slides over: where they come from and how they run between their nodes.
+"""Lines over which an elastomer slides: their sources, and their shape between nodes.
 
-Read `waves` (the common form of any roughness), `roughness` (generated lines), `measured` (recorded lines), `shapes`
-(indenters), `rough_line` (roughness over an indenter or a plane) and `cubic_line` (the line that the solvers take);
-`splines` are lines of few points, for what is decided between these.
-Measured surfaces: `maps` and `scans` lead to a `spectrum`, of which lines are made; `self_affine` fits its slope.
+`waves` is the common form of all roughness. `roughness` generates lines, `measured` prepares recorded lines, and
+`shapes` holds indenters. `rough_line` puts roughness on an indenter or a plane, and `cubic_line` is the line for the
+solvers. `splines` are lines with few points, for quantities that depend on the shape between points.
+For measured surfaces, `maps` and `scans` compute a `spectrum`, from which lines are made; `self_affine` fits power
+laws.
 """

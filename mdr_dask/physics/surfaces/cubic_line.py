@@ -1,6 +1,6 @@
-"""The line used by the solvers: cubic cells between equidistant nodes, counted from the highest point.
+"""The line used by the solvers: cubic cells between equidistant nodes, starting at the highest point.
 
-Lengths are in cells and slopes are rises over a cell. Heights, in any unit, point into the elastomer.
+Lengths are in cells, and slopes are rises per cell. Heights may have any unit and are positive towards the elastomer.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.surfaces import shapes
 
-NONE = 2.0  # a position in a cell that is not there
-STEEPEST_RISE = 4 / 27  # of a cubic over its ends, of the slopes there
-UNRESOLVED = 0.5  # of the slope squared, between sums over nodes and over cells; noise without gaps has 0.1
+NONE = 2.0  # result if there is no such position in the cell
+STEEPEST_RISE = 4 / 27  # largest rise of a cubic above its ends, over the slopes at the ends
+UNRESOLVED = 0.5  # relative difference of the squared slope, summed over nodes and over cells; white noise has 0.1
 
 
 class CubicLine(NamedTuple):
@@ -27,12 +27,12 @@ class CubicLine(NamedTuple):
     height : array, shape (n + 1,)
         Heights at the nodes; a periodic line repeats the first at the end.
     enter, leave : array, shape (n,)
-        Slopes at the start and the end of each cell; they differ across a node where the line has a kink.
+            Slopes at the start and the end of each cell; at a kink of the line, those of adjacent cells differ.
     periodic : bool
-        Whether the line closes; if not, elements enter undeformed at its first node.
+            Whether the line is periodic; if not, elements are undeformed at its first node.
     smooth : bool
-        Whether slopes of a periodic line are continuous, so that the integral of their square is summed by Euler and
-        Maclaurin: exact over the whole line where the nodes resolve it.
+            Whether the slopes of a periodic line are continuous, so that the integral of their square can be computed
+            with the Euler-Maclaurin formula: exact over the whole line if the nodes resolve it.
     """
 
     height: FloatArray
@@ -68,7 +68,8 @@ def indented_line(height: FloatArray, slope: FloatArray | None, body: shapes.Sha
     height, slope
         The roughness, periodic, as in :func:`periodic_line`.
     body : Shape
-        What is under the roughness, its tip at node n // 2, in units of the length of the line and of the heights.
+            The shape under the roughness, with its tip at node n // 2, in units of the line's length and of the
+            heights.
     """
     n = height.size
     smooth, left, right = body.at((np.arange(n + 1) - n // 2) / n)
@@ -81,7 +82,7 @@ def indented_line(height: FloatArray, slope: FloatArray | None, body: shapes.Sha
 
 
 def without_kinks(line: CubicLine) -> CubicLine:
-    """Return the line with both slopes averaged at every inner node; a kink is rounded over two cells."""
+    """Return the line with the mean of both slopes at every inner node; this rounds a kink over two cells."""
     slope = 0.5 * (line.leave[:-1] + line.enter[1:])
     return line._replace(enter=np.append(line.enter[0], slope), leave=np.append(slope, line.leave[-1]))
 
@@ -92,8 +93,8 @@ class Cells(NamedTuple):
     Parameters
     ----------
     height : array, shape (n + 2,)
-        Heights at the nodes, below the highest point of the line: never positive, so that a light contact loses no
-        digits.
+            Heights at the nodes relative to the highest point of the line; they are never positive, which keeps all
+            digits in light contact.
     enter, leave : array, shape (n + 1,)
         Slopes at the start and the end of each cell.
     peak : array, shape (n + 1,)
@@ -101,11 +102,11 @@ class Cells(NamedTuple):
     mean, stretch : array, shape (n + 1,)
         Integrals of the height and of the slope squared over each cell.
     start : float
-        Place in cell 0 (and cell n) where a period of the line begins and ends: its highest point.
+            Position in cell 0 (and cell n) at which a period begins and ends: the highest point of the line.
     top : float
-        The height of that point in the line.
+            Height of the highest point.
     periodic : bool
-        Whether the line closes on itself; if not, elements enter undeformed at cell 0.
+            Whether the line is periodic; if not, elements are undeformed at cell 0.
     """
 
     height: FloatArray
@@ -121,8 +122,8 @@ class Cells(NamedTuple):
 
 @jit_inline
 def cubic(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> tuple[float, float, float, float]:
-    """Return the coefficients of the height in cell i, by rising power."""
-    here, after = np.uintp(i), np.uintp(i + 1)  # an index with a sign would be looked at for it
+    """Return the coefficients of the height in cell i, in ascending powers."""
+    here, after = np.uintp(i), np.uintp(i + 1)  # unsigned, so that compiled code need not test for negative indices
     first, last = enter[here], leave[here]
     rise = height[after] - height[here]
     return height[here], first, 3 * rise - 2 * first - last, first + last - 2 * rise
@@ -141,11 +142,11 @@ def summit(a: float, b: float, c: float) -> float:
 
 @jit_inline
 def _peak(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> tuple[float, float]:
-    """Return the position within a cell of its highest point, and the height there."""
+    """Return the height of the highest point of a cell, and its position in the cell."""
     here, after = np.uintp(i), np.uintp(i + 1)
     first, last, begin, end = enter[here], leave[here], height[here], height[after]
     rise, place, peak = end - begin, 0.0 if begin >= end else 1.0, max(begin, end)
-    between = 3 * rise - first - last  # a control point of the slope: where all three agree in sign, none is inside
+    between = 3 * rise - first - last  # Bezier coefficient of the slope; if all three have one sign, no extreme inside
     if not (min(min(first, between), last) >= 0 or max(max(first, between), last) <= 0):
         b, c = 3 * rise - 2 * first - last, first + last - 2 * rise
         inside = summit(first, b, c)
@@ -171,7 +172,7 @@ def _highest(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[
 def cut(line: CubicLine) -> Cells:
     """Split a line into its cells; a periodic line starts at its highest point."""
     best, place, top = _highest(line.height, line.enter, line.leave)
-    if line.smooth and place == 1:  # a period begins with a whole cell, wherever the line begins
+    if line.smooth and place == 1:  # so that the result does not depend on the first node of the line
         best, place = (best + 1) % line.enter.size, 0.0
     columns = _turned(line, top, best if line.periodic else 0)
     if line.smooth and _is_resolved(columns[1][:-1], columns[5][:-1]):
@@ -194,7 +195,7 @@ def running(integrals: FloatArray) -> FloatArray:
 def _turned(
     line: CubicLine, top: float, first: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return the cells rotated to start at a given one, repeated at the end; heights are relative to the top."""
+    """Return the cells in the order from cell `first` on, with that cell repeated; heights are relative to `top`."""
     nodes, entered, left, n = line.height, line.enter, line.leave, line.enter.size
     height, enter, leave, peak, mean, stretch = (
         np.empty(n + 2),
@@ -220,16 +221,16 @@ def _turned(
 
 
 def _is_resolved(slope: FloatArray, stretch: FloatArray) -> bool:
-    """Return whether the sum over nodes equals the integral of the squared slope (more than two nodes a wave)."""
+    """Return whether the sum over nodes is close to the integral of the squared slope (over two nodes per wave)."""
     by_nodes, by_cells = np.dot(slope, slope), np.sum(stretch)
     return bool(abs(by_nodes - by_cells) < UNRESOLVED * by_cells)
 
 
 @jit
 def _resum(slope: FloatArray, stretch: FloatArray) -> None:
-    """Write the integrals of the squared slope over cells by the Euler-Maclaurin formula; the total is exact.
+    """Compute the integrals of the squared slope over cells by the Euler-Maclaurin formula; their total is exact.
 
-    The first cell is cut in two and integrated as a polynomial, and keeps that value: the others take the difference.
+    The first cell keeps its polynomial integral, because it is split in two; the other cells share the difference.
     """
     n, kept = slope.size - 1, stretch[0]
     before, here, after = slope[n - 1] ** 2, slope[0] ** 2, slope[1] ** 2
@@ -249,7 +250,7 @@ def _resum(slope: FloatArray, stretch: FloatArray) -> None:
 
 @jit
 def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float, float]:
-    """Return the cell of the highest point of a periodic line of cubic cells, the place in it, 0..1, and the height.
+    """Return the cell of the highest point of a periodic cubic line, its position in the cell, 0..1, and its height.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Areal maps: spectrum in rings of the wave vector, straight cuts, slopes and anisotropy."""
+"""Areal maps: spectrum in rings of the wave vector, straight profiles, slopes and anisotropy."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from mdr_dask.physics.surfaces.spectrum import Spectrum
 Order = Literal["none", "mean", "plane", "parabola"]
 
 LEAST_POINTS = 16  # along each axis
-MOST_MISSING = 0.05  # share of the points that may be filled
-FAR = 19.0  # robust standard deviations; no generated rough surface reaches it
-BAND = 128  # rows processed at once, so that they fit into the processor's cache
-TELLING = 1e-3  # share of the largest ring below which a ring may be rounding
-MOST_SCATTER = 0.02  # mean square of the angular harmonics that an isotropic octave may have by chance
-FLAT = 1e-12  # range of heights over the largest height, below which a map is flat
-ROUNDING = 1e-20  # share of the largest ring that rounding of the transform leaves
+MOST_MISSING = 0.05  # largest fraction of missing points, which are filled
+FAR = 19.0  # robust standard deviations; generated rough surfaces do not reach this value
+BAND = 128  # rows processed together, so that they fit into the processor's cache
+TELLING = 1e-3  # fraction of the largest ring below which a ring may be due to rounding
+MOST_SCATTER = 0.02  # largest mean square of the angular harmonics by chance in an octave of an isotropic surface
+FLAT = 1e-12  # a map is flat if the range of heights over the largest height is below this value
+ROUNDING = 1e-20  # rounding of the transform, as a fraction of the largest ring
 HANN_MODES = 0.3  # independent waves per wave of the transform, under Hann's window
 
 
@@ -33,9 +33,9 @@ class SurfaceMap(NamedTuple):
     Parameters
     ----------
     height : array, shape (points along x, points along y)
-        Heights, m, positive into the elastomer; NaN where a point is missing.
+            Heights, m, positive towards the elastomer; NaN for missing points.
     size : tuple of float
-        Lengths along x and y, m: points times spacing.
+            Lengths along x and y, m: number of points times spacing.
     """
 
     height: FloatArray
@@ -57,16 +57,16 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
     for down, right in np.ndindex(3, 3):
         beside = np.clip(row + down - 1, 0, away.shape[0] - 1), np.clip(column + right - 1, 0, away.shape[1] - 1)
         largest = np.fmax(largest, away[beside])
-    # a neighbour of an outlier is an outlier only if it deviates nearly as much
+    # a neighbour of an outlier is itself an outlier only if it deviates at least half as much
     telling = away[row, column] > 0.5 * largest
     found[row[telling] + 1, column[telling] + 1] = True
     return found
 
 
 def _off_neighbours(height: FloatArray) -> FloatArray:
-    """Return the distance of inner points from the mean of their two neighbours, along the axis where it is smaller.
+    """Return how far inner points are from the mean of their two neighbours, along the axis where this is less.
 
-    A point on a crest is close to its neighbours along the crest, though far from those across it.
+    A point on a crest is close to its neighbours along the crest, although it is far from those across it.
     """
     middle = height[1:-1, 1:-1]
     along = np.abs(middle - 0.5 * (height[2:, 1:-1] + height[:-2, 1:-1]))
@@ -91,7 +91,7 @@ def require_few_missing(missing: NDArray[np.bool_]) -> None:
 
 
 def filled(surface: SurfaceMap) -> SurfaceMap:
-    """Return a map whose missing points are filled by Laplace's equation: each is the mean of its four neighbours.
+    """Return a map with missing points filled by Laplace's equation: each one is the mean of its four neighbours.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def filled(surface: SurfaceMap) -> SurfaceMap:
 
 
 def _harmonic(height: FloatArray, missing: NDArray[np.bool_]) -> FloatArray:
-    """Return heights in which each missing one is the mean of its four neighbours."""
+    """Return heights in which each missing point is the mean of its four neighbours."""
     number = np.full(height.shape, -1)
     number[missing] = np.arange(np.count_nonzero(missing))
     size, diagonal, right = number.max() + 1, np.zeros(number.max() + 1), np.zeros(number.max() + 1)
@@ -129,7 +129,7 @@ def _harmonic(height: FloatArray, missing: NDArray[np.bool_]) -> FloatArray:
 def without_trend(surface: SurfaceMap, order: Order) -> SurfaceMap:
     """Return a map without its least-squares polynomial: the mean, a plane, or a paraboloid with its mixed term.
 
-    Missing points (NaN) do not count, and stay missing.
+    Missing points (NaN) are ignored and stay missing.
     """
     if order == "none":
         return surface
@@ -150,7 +150,7 @@ def without_trend(surface: SurfaceMap, order: Order) -> SurfaceMap:
 
 
 def hann_disc(points: tuple[int, int], size: tuple[float, float]) -> FloatArray:
-    """Return Hann's window of the distance from the middle, with mean square 1; 0 beyond half the shorter side."""
+    """Return Hann's window versus the distance from the centre, mean square 1; 0 beyond half the short side."""
     x, y = (length * np.arange(n // 2 + 1) / n for n, length in zip(points, size, strict=True))
     distance = np.minimum(np.hypot(x[:, None], y) / (0.5 * min(size)), 1.0)
     quarter = 0.5 + 0.5 * np.cos(np.pi * distance)
@@ -161,18 +161,19 @@ def hann_disc(points: tuple[int, int], size: tuple[float, float]) -> FloatArray:
 
 @dataclass(frozen=True)
 class MapSpectrum:
-    """The spectrum of a map, in rings of the wave vector one step apart.
+    """The spectrum of a map, in rings of the wave vector of width dq.
 
     Parameters
     ----------
     wavenumber : array, shape (rings,)
-        q = k dq, k = 1, 2, ..., with dq = 2 pi over the shorter side; to the Nyquist wave number of the wider spacing.
+            q = k dq, k = 1, 2, ..., with dq = 2 pi over the shorter side, up to the Nyquist wave number of the wider
+            spacing.
     density : array, shape (rings,)
-        C2D, m^4: the power of a ring over its area, so that rms height and gradient are kept.
+            C2D, m^4: the power of a ring over its area; so rms height and gradient are preserved.
     count : array, shape (rings,)
-        Number of waves in each, both signs.
+            Number of waves in each ring, both signs.
     independent : float
-        Independent waves per wave.
+            Number of independent waves per wave.
     rms_height : float
         rms height of the windowed map, m.
     slopes : tuple of float
@@ -180,9 +181,9 @@ class MapSpectrum:
     angular : complex array, shape (2, rings)
         Mean of exp(2 i angle) and exp(4 i angle), weighted by power, in each ring; 0 if isotropic.
     cuts : tuple of (array, array)
-        Wave numbers and C_cut, m^3, of straight cuts along x and along y.
+            Wave numbers and C_cut, m^3, of straight profiles along x and along y.
     axes : tuple of float
-        Median over rings of the power of waves along x and along y over the mean power of the ring; 1 if isotropic.
+            Power of waves along x, and along y, over the mean power of their ring, median over rings; 1 if isotropic.
     """
 
     wavenumber: FloatArray
@@ -213,19 +214,19 @@ class MapSpectrum:
         return averaged(*rings)
 
     def along(self, axis: int) -> Spectrum:
-        """Return the C2D whose line is the straight cut along an axis (0 for x), for sliding across grooves."""
+        """Return the C2D whose line equals the straight profile along an axis (0 for x), for sliding across grooves."""
         q, cut = self.cuts[axis]
         there = cut > ROUNDING * cut.max()
         return Spectrum(q[there], cut[there] / (np.pi * q[there]))
 
     def anisotropy(self) -> float:
-        """Return the anisotropy: 0 for isotropic, 1 for waves in one direction only; corrected for scatter.
+        """Return the anisotropy, 0 if isotropic and 1 if all waves have one direction, corrected for scatter.
 
-        It is the larger of the second and fourth harmonics of the angle, rms over octaves with enough waves.
+        It is the larger of the second and the fourth angular harmonic, rms over octaves with enough waves.
         """
         there = np.flatnonzero(telling(self.wavenumber, self.density))
         octave = np.floor(np.log2(self.wavenumber[there] / self.wavenumber[there[0]] + 1e-9)).astype(int)
-        _, octave = np.unique(octave, return_inverse=True)  # octaves without a ring do not count
+        _, octave = np.unique(octave, return_inverse=True)  # leaves out octaves without a ring
         power = self.density[there] * self.wavenumber[there]
         weight = np.bincount(octave, power)
         scatter = np.bincount(octave, power**2 * 2 / (self.count[there] * self.independent)) / weight**2
@@ -243,9 +244,9 @@ def spectrum_of_map(surface: SurfaceMap, hann: bool = True) -> MapSpectrum:
     Parameters
     ----------
     surface : SurfaceMap
-        Without its trend.
+        Map without its trend.
     hann : bool
-        Whether to apply the window `hann_disc`. A periodic map needs none.
+        Whether to apply the window `hann_disc`, which a periodic map does not need.
     """
     points, size = surface.height.shape, surface.size
     height = surface.height - surface.height.mean()
@@ -256,7 +257,7 @@ def spectrum_of_map(surface: SurfaceMap, hann: bool = True) -> MapSpectrum:
     waves = fft.rfft2(height, overwrite_x=True)
     power = np.abs(waves) ** 2 / height.size**2
     power[0, 0] = 0.0
-    power[:, 1 : (points[1] + 1) // 2] *= 2  # the other half of the plane
+    power[:, 1 : (points[1] + 1) // 2] *= 2  # rfft2 leaves out the conjugate half of the plane
     del waves, height
     q_x, q_y = wavenumbers(points, size)
     return _rings(power, q_x, q_y, points, size, HANN_MODES * (min(size) / max(size)) if hann else 1.0)
@@ -270,7 +271,7 @@ def _rings(
     size: tuple[float, float],
     modes: float,
 ) -> MapSpectrum:
-    """Sum squared amplitudes in rings."""
+    """Return the spectrum in rings, from the squared amplitudes."""
     step = 2 * np.pi / min(size)
     last = int(np.pi * min(n / length for n, length in zip(points, size, strict=True)) / step + 1e-9)
     square_x, square_y = (q_x**2)[:, None], q_y**2
@@ -310,19 +311,19 @@ def _rings(
 
 
 def telling(wavenumber: FloatArray, density: FloatArray) -> NDArray[np.bool_]:
-    """Return the rings that contribute to the height or to the gradient beyond the rounding of a file."""
+    """Return the rings whose contribution to height or gradient exceeds the rounding of a file."""
     height, gradient = density * wavenumber, density * wavenumber**3
     return np.asarray((height > TELLING * height.max()) | (gradient > TELLING * gradient.max()))
 
 
 def _cut(power: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-    """Return wave numbers and two-sided C_cut from the summed power of both signs."""
+    """Return wave numbers and two-sided C_cut, from the summed power of both signs."""
     step = 2 * np.pi / length
     return np.asarray(step * np.arange(1, power.size + 1), dtype=np.float64), power / (2 * step)
 
 
 def _axis(power: FloatArray, ring: NDArray[np.int32], total: FloatArray, count: FloatArray) -> float:
-    """Return the median over rings of the power of waves along an axis over the mean power in the ring."""
+    """Return the power of waves along an axis over the mean power of their ring, median over rings."""
     number = np.arange(1.0, total.size + 1)
     alive = number[telling(number, total / number)]
     inner = (ring >= 4) & np.isin(ring, alive)
@@ -332,7 +333,7 @@ def _axis(power: FloatArray, ring: NDArray[np.int32], total: FloatArray, count: 
 
 
 def wavenumbers(points: tuple[int, int], size: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    """Return the angular wave numbers, rad/m, along both axes of the half of a spectrum that `rfft2` gives."""
+    """Return the angular wave numbers, rad/m, along both axes, in the order of `rfft2`."""
     q_x = 2 * np.pi * fft.fftfreq(points[0], size[0] / points[0])
     q_y = 2 * np.pi * fft.rfftfreq(points[1], size[1] / points[1])
     return np.asarray(q_x), np.asarray(q_y)

@@ -1,4 +1,4 @@
-"""Measured lines: from positions and heights as recorded to a periodic line on a regular grid, and its statistics."""
+"""Measured lines: conversion of recorded positions and heights to a periodic line on a regular grid; statistics."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Detrend = Literal["none", "mean", "line", "parabola"]
 
 ORDERS: dict[str, int] = {"mean": 0, "line": 1, "parabola": 2}
 UNEVEN = 1e-3
-"""Spacings that differ by less than this part count as uniform: instruments print positions with few digits."""
+"""Spacings with a smaller relative difference count as uniform, because instruments print positions with few digits."""
 
 LEAST_POINTS = 8
 
@@ -28,7 +28,7 @@ class MeasuredLine:
     Parameters
     ----------
     height : array, shape (points,)
-        Heights, m, positive into the elastomer where the body is high.
+            Heights, m, positive towards the elastomer.
     length : float
         Period L = points * spacing, m.
     """
@@ -38,7 +38,7 @@ class MeasuredLine:
 
     @property
     def spacing(self) -> float:
-        """Distance of points, m."""
+        """Distance between points, m."""
         return self.length / self.height.size
 
 
@@ -50,20 +50,20 @@ def measured_line(
     shortest: float = 0.0,
     longest: float = 0.0,
 ) -> MeasuredLine:
-    """Turn a recorded line into one period of a regular one.
+    """Turn a recorded line into one period of a line with uniform spacing.
 
     Parameters
     ----------
     position, height : array_like, shape (points,)
-        x and z, m; x ascending or descending, not necessarily uniform. The samples are one period: L = points *
-        spacing.
+            x and z, m; x ascending or descending, not necessarily uniform. The samples form one period: L = points *
+            spacing.
     detrend : {"none", "mean", "line", "parabola"}
-        Polynomial subtracted, fitted by least squares.
+            Least-squares polynomial to be subtracted.
     taper : float
-        Part of the line, at both ends together, over which the heights are brought to their mean by a cosine, so that
-        the line closes without a step; 0 to 1.
+            Fraction of the line, both ends together, in which a cosine window brings the heights to their mean, so that
+            the line is periodic without a step; 0 to 1.
     shortest, longest : float
-        Wavelengths, m, outside of which the spectrum is cut off; 0 keeps that end.
+            Limits of the wavelengths, m, that are kept; 0 for no limit.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def _window(points: int, taper: float) -> FloatArray:
 
 
 def detrended(height: FloatArray, order: Detrend) -> FloatArray:
-    """Return heights minus their least-squares polynomial; the orders are named as in `measured_line`."""
+    """Return heights minus their least-squares polynomial, named as in `measured_line`."""
     if order == "none":
         return height.copy()
     place = np.linspace(-1, 1, height.size)
@@ -113,7 +113,7 @@ def detrended(height: FloatArray, order: Detrend) -> FloatArray:
 
 
 def band_limited(height: FloatArray, length: float, shortest: float = 0.0, longest: float = 0.0) -> FloatArray:
-    """Return a periodic line without the waves below the first or above the second wavelength; 0 keeps that end."""
+    """Return a periodic line without waves shorter than `shortest` or longer than `longest`; 0 for no limit."""
     waves = np.fft.rfft(height)
     number = np.arange(waves.size)
     if shortest > 0:
@@ -124,9 +124,9 @@ def band_limited(height: FloatArray, length: float, shortest: float = 0.0, longe
 
 
 def resampled(height: FloatArray, points: int) -> FloatArray:
-    """Return a periodic line at another number of points by its Fourier series, from the same first point.
+    """Return a periodic line at another number of points, from its Fourier series; the first point stays the same.
 
-    Waves beyond the Nyquist wavelength of fewer points are left out.
+    With fewer points, waves shorter than the new Nyquist wavelength are left out.
     """
     waves, mean = waves_of(height), height.mean()
     return np.asarray(series(waves.coefficients[: points // 2], points) + mean, dtype=np.float64)
@@ -138,5 +138,5 @@ def rms_height(height: FloatArray) -> float:
 
 
 def rms_slope(height: FloatArray, length: float) -> float:
-    """Return the spectral rms slope of the periodic line through samples, including the wave of two points."""
+    """Return the spectral rms slope of the periodic line through samples, including the wave with two points a period."""
     return waves_of(height).rms_slope() / length

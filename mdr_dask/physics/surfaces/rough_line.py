@@ -9,19 +9,19 @@ from mdr_dask.physics.surfaces.cubic_line import CubicLine, highest_point, inden
 from mdr_dask.physics.surfaces.shapes import Shape
 from mdr_dask.physics.surfaces.waves import Waves
 
-SEEN = 8  # nodes for every Nyquist point that show the highest point of a line
+SEEN = 8  # nodes per Nyquist point with which the highest point of a line is found
 
 
 @dataclass(frozen=True)
 class RoughLine:
-    """A rough line, in units of its length and of one height.
+    """A rough line, in units of its length and of one unit of height.
 
     Parameters
     ----------
     roughness : Waves
-        What it is rough by.
+            The roughness.
     body : Shape or None
-        What is under the roughness; None for a plane, whose line is periodic.
+            The shape under the roughness; None for a plane, which gives a periodic line.
     """
 
     roughness: Waves
@@ -53,7 +53,7 @@ class RoughLine:
         return self.through(self.heights(nodes), None)
 
     def from_summit(self) -> RoughLine:
-        """Return a periodic line shifted so that its highest point is a node of every grid."""
+        """Return the line; if it is periodic, shifted so that its highest point is a node of every grid."""
         if self.body is not None:
             return self
         nodes = SEEN * self.points

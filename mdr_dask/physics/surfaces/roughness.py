@@ -1,4 +1,4 @@
-"""Self-affine rough lines: spectra with an exact rms height, phases from a counter-based stream, lines by FFT."""
+"""Self-affine rough lines: spectra of exact rms height, phases from a counter-based random stream, lines by FFT."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mdr_dask.physics.surfaces.waves import series
 
 ComplexArray = NDArray[np.complex128]
 
-# Taylor coefficients by falling power of x^2, below rounding for |x| <= pi / 4
+# Taylor coefficients in descending powers of x^2; the error is below rounding for |x| <= pi / 4
 SINE = tuple((-1) ** k / math.factorial(2 * k + 1) for k in reversed(range(8)))
 COSINE = tuple((-1) ** k / math.factorial(2 * k) for k in reversed(range(9)))
 
@@ -73,8 +73,8 @@ def spectral_slope(amplitude: FloatArray) -> float:
 def phases(seed: int, realisation: int, modes: int) -> FloatArray:
     """Return the phases of a realisation in [0, 2 pi), shape (modes,).
 
-    They depend on the seed and the index of the realisation only. A longer spectrum begins with the same phases, so
-    that lines of any Hurst exponent, rms height or cut-off are common random numbers (thesis Fig. 2.6).
+    They depend only on the seed and the index of the realisation. A longer spectrum begins with the same phases, so
+    lines of any Hurst exponent, rms height or cut-off use common random numbers (thesis Fig. 2.6).
     """
     phase: FloatArray = 2 * np.pi * _generator(seed, realisation).random(modes)
     return phase
@@ -86,11 +86,11 @@ def _generator(seed: int, realisation: int) -> np.random.Generator:
 
 def phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     """Return exp(i phi_k) for the phases of a realisation, shape (modes,); cached."""
-    # rounded up, so that lines of many cut-offs share them
+    # rounded up to a power of two, so that lines with similar numbers of modes share the cache
     return _phase_factors(seed, realisation, 1 << max(modes - 1, 0).bit_length())[:modes]
 
 
-@lru_cache(maxsize=8)  # powers of two: lines of a hundred times the points share them
+@lru_cache(maxsize=8)  # lengths are powers of two: eight cover a range of a factor 100 in the number of points
 def _phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     factors = np.empty((modes, 2))
     _turn(_generator(seed, realisation).random(modes), factors)
@@ -101,7 +101,7 @@ def _phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
 
 @jit
 def _turn(share: FloatArray, factors: FloatArray) -> None:
-    """Write cosine and sine of fractions 0..1 of a revolution by series about the nearest quarter."""
+    """Write cosine and sine of fractions 0..1 of a full circle, by series about the nearest quarter circle."""
     for k in range(share.size):
         quarter = np.floor(4 * share[k] + 0.5)
         x = 2 * np.pi * (share[k] - 0.25 * quarter)
@@ -119,7 +119,7 @@ def _turn(share: FloatArray, factors: FloatArray) -> None:
 
 
 def line(amplitude: FloatArray, phase: FloatArray, nodes: int, derivative: int = 0) -> FloatArray:
-    """Return h(x) = sum A_k cos(2 pi k x + phi_k) or a derivative of it at x = 0, 1/nodes, ..., by FFT.
+    """Return h(x) = sum A_k cos(2 pi k x + phi_k), or a derivative of h, at x = 0, 1/nodes, ..., by FFT.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def line(amplitude: FloatArray, phase: FloatArray, nodes: int, derivative: int =
     nodes : int
         Number of nodes, at least twice the number of modes.
     derivative : int
-        Order of the derivative with respect to x, where the line has unit length; exact at the nodes.
+            Order of the derivative with respect to x, for a line of unit length; exact at the nodes.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def line(amplitude: FloatArray, phase: FloatArray, nodes: int, derivative: int =
 
 
 def line_of_factors(amplitude: FloatArray, factors: ComplexArray, nodes: int, derivative: int = 0) -> FloatArray:
-    """Return the line of :func:`line` from exp(i phi_k), as :func:`phase_factors` gives them."""
+    """Return the line of :func:`line` from the factors exp(i phi_k) of :func:`phase_factors`."""
     coefficients = 0.5 * amplitude * factors
     if derivative:
         coefficients *= (2j * np.pi * np.arange(1, amplitude.size + 1)) ** derivative

@@ -1,7 +1,7 @@
-"""From straight cuts through an isotropic surface back to its spectrum: the inverse of Abel's transform.
+"""The spectrum of an isotropic surface from straight profiles through it: the inverse Abel transform.
 
-A cut has the spectrum C_cut(q) = 2 int_q^inf C2D(k) k / sqrt(k^2 - q^2) dk, not the pi q C2D of the method's line: its
-harmonics are smaller, and its rms slope is that of the surface over the root of two.
+A straight profile (cut) has the spectrum C_cut(q) = 2 int_q^inf C2D(k) k / sqrt(k^2 - q^2) dk, while the line of the
+method has pi q C2D. The harmonics of the cut are smaller; its rms slope is the surface's rms gradient over sqrt(2).
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from mdr_dask.errors import DataError
 from mdr_dask.physics.surfaces.measured import MeasuredLine
 from mdr_dask.physics.surfaces.spectrum import Spectrum, quadrature
 
-BINS = 10  # for every decade of the wave number
-BEND = 3.0  # prior standard deviation of the change of d log C2D / d log q from bin to bin
-NOISE_SLOPE = -0.5  # a tail of a cut that is flatter is noise: d log C / d log q is -1 of H = 0
+BINS = 10  # per decade of the wave number
+BEND = 3.0  # prior standard deviation of the change of d log C2D / d log q between bins
+NOISE_SLOPE = -0.5  # a tail of a cut with a flatter slope d log C / d log q is noise; H = 0 has the slope -1
 NOISE_TAIL = 0.5  # decades at the end of the cut that are tested for noise
-STEEPEST = 30.0  # a steeper fall -d log C / d log q is the end of the spectrum
+STEEPEST = 30.0  # where -d log C / d log q is larger, the spectrum ends
 
 
 class Cut(NamedTuple):
-    """The spectrum of straight cuts, averaged over lines and over waves of similar length.
+    """The spectrum of straight profiles, averaged over lines and over waves of similar length.
 
     Parameters
     ----------
@@ -54,14 +54,14 @@ def cut_of_lines(lines: Sequence[MeasuredLine], hann: bool = True) -> Cut:
     Parameters
     ----------
     lines : sequence of MeasuredLine
-        Detrended scans of one length and spacing.
+            Detrended scans of equal length and spacing.
     hann : bool
-        Whether to apply Hann's window, normalised so that <h^2> is kept.
+            Whether to apply Hann's window, normalised so that <h^2> is preserved.
 
     Raises
     ------
     DataError
-        If lengths or numbers of points differ.
+            If lengths or numbers of points are different.
     """
     points, length = lines[0].height.size, lines[0].length
     if any(line.height.size != points or not math.isclose(line.length, length, rel_tol=1e-3) for line in lines):
@@ -72,22 +72,22 @@ def cut_of_lines(lines: Sequence[MeasuredLine], hann: bool = True) -> Cut:
     window = hann_window(points) if hann else np.ones(points)
     power = length / (2 * np.pi) * np.mean(np.abs(np.fft.rfft(height * window) / points) ** 2, axis=0)[1:]
     waves = np.arange(1, power.size + 1)
-    last = (points - 1) // 2  # the wave of two points has no phase
+    last = (points - 1) // 2  # leaves out the wave with two points, for which the phase is unknown
     independent = len(lines) / (1.94 if hann else 1.0)  # 1 / sum of squares of the window's squared correlation
     return averaged(2 * np.pi / length * waves[:last], power[:last], independent)
 
 
 def averaged(wavenumber: FloatArray, density: FloatArray, independent: float, count: FloatArray | None = None) -> Cut:
-    """Average a spectrum in logarithmic bins; the power in each bin is kept.
+    """Average a spectrum in logarithmic bins; the power in each bin is preserved.
 
     Parameters
     ----------
     wavenumber, density : array, shape (waves,)
-        Ascending wave numbers, and the spectrum there.
+            Ascending wave numbers, and the spectrum at them.
     independent : float
-        Independent squared amplitudes in every wave counted.
+            Number of independent squared amplitudes per wave.
     count : array, shape (waves,), optional
-        Waves at each wave number; 1 if not given.
+            Number of waves at each wave number; 1 by default.
     """
     count = np.ones(wavenumber.size) if count is None else count
     bins = np.floor(np.log10(wavenumber / wavenumber[0] + 0.5) * BINS).astype(int)
@@ -104,7 +104,7 @@ def hann_window(points: int) -> FloatArray:
 
 
 def _until_the_end(cut: Cut) -> slice:
-    """Return the bins before the end of the spectrum, the first fall steeper than `STEEPEST`."""
+    """Return the bins before the end of the spectrum, which is the first fall steeper than `STEEPEST`."""
     with np.errstate(divide="ignore"):
         logs = np.log(cut.density)
     falls = np.flatnonzero(np.diff(logs) < -STEEPEST * np.diff(np.log(cut.wavenumber)))
@@ -112,11 +112,11 @@ def _until_the_end(cut: Cut) -> slice:
 
 
 def of_cut(cut: Cut) -> Spectrum:
-    """Return the isotropic spectrum with a given cut (inverse Abel transform).
+    """Return the isotropic spectrum of a surface with the given cut (inverse Abel transform).
 
-    C2D is a power law between the wave numbers of the cut, so that it is positive. Its logarithms are fitted to the
-    cut within its errors. The change of slope from bin to bin has a normal prior of standard deviation `BEND`. The
-    explicit inverse -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk would amplify noise.
+    C2D is a power law between the wave numbers of the cut, so it is positive. The logarithms of C2D are fitted to the
+    cut within the errors of the cut. The change of slope between bins has a normal prior with the standard deviation
+    `BEND`. The explicit inverse -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk would amplify noise.
 
     Raises
     ------
@@ -128,7 +128,7 @@ def of_cut(cut: Cut) -> Spectrum:
         raise DataError(f"expected a spectrum of three wave numbers or more, got {q.size}")
     edge = (
         q[-1] ** 2 / q[-2]
-    )  # the cut at the last wave number comes from shorter waves, which are taken to end one step beyond
+    )  # only waves shorter than the last one contribute to the cut there; they are assumed to end one step further
     knots = np.append(q, edge)
     place, weight = quadrature(q, knots)
     where = np.clip(np.searchsorted(knots, place, side="right") - 1, 0, knots.size - 2)

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.surfaces.scans import Cut
 
-LEAST_ERROR = 0.05  # relative, of a bin: a spectrum is no power law to better than that
-LEAST_BINS = 5  # of the power law
-LOWEST, HIGHEST = -0.1, 1.2  # Hurst exponents that are looked for
-CHI_SQUARED = 3.84  # of one parameter, 95 %
-STEEPEST, FLATTEST = -6.0, -1.0  # d log C2D / d log q: beyond H = 1 by far, and less than H = 0 has
-ABOVE_NOISE = 2.0  # times the noise that roughness has to be
+LEAST_ERROR = 0.05  # smallest relative error of a bin, because no spectrum is a more exact power law
+LEAST_BINS = 5  # smallest number of bins for the power law
+LOWEST, HIGHEST = -0.1, 1.2  # range of Hurst exponents
+CHI_SQUARED = 3.84  # 95 % point for one parameter
+STEEPEST, FLATTEST = -6.0, -1.0  # limits of d log C2D / d log q for roughness; H = 1 has -4 and H = 0 has -2
+ABOVE_NOISE = 2.0  # smallest ratio of roughness to noise
 
 
 class Interval(NamedTuple):
@@ -27,23 +27,23 @@ class Interval(NamedTuple):
 
 
 class SelfAffine(NamedTuple):
-    """A power law C2D ~ q^(-2 - 2 H) between two wavelengths, m; None where the data do not reach a cut-off."""
+    """A power law C2D ~ q^(-2 - 2 H) between two wavelengths, m; None for a cut-off outside the range of the data."""
 
     hurst: Interval
     longest: Interval | None
     shortest: Interval | None
-    misfit: float  # rms of log C2D off the law, over the errors
+    misfit: float  # rms deviation of log C2D from the law, over the errors
 
 
 def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> float:
-    """Return the wave number beyond which the spectrum is flat, as that of noise; infinite if there is no such tail.
+    """Return the wave number beyond which the spectrum is flat, like noise; infinite if there is no flat tail.
 
     Parameters
     ----------
     bins : Cut
-        C2D, or a cut, in logarithmic bins.
+            C2D, or the spectrum of straight profiles, in logarithmic bins.
     flattest : float
-        Slope d log C / d log q of a tail that is noise: -1 of C2D, -0.5 of a cut.
+            Slope d log C / d log q above which a tail is noise: -1 for C2D, -0.5 for a straight profile.
     decades : float
         Length of the tail.
     """
@@ -59,7 +59,7 @@ def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> 
 
 
 def steep_limit(bins: Cut) -> float:
-    """Return the wave number beyond which C2D falls more steeply than any roughness; infinite if it never does."""
+    """Return the wave number beyond which C2D falls more steeply than roughness can; infinite if there is none."""
     wavenumber, density = bins.wavenumber, bins.density
     there = density > 0
     x, y = np.log(wavenumber[there]), np.log(density[there])
@@ -71,7 +71,7 @@ def steep_limit(bins: Cut) -> float:
 
 
 def fit_self_affine(bins: Cut) -> SelfAffine | None:
-    """Fit a power law with cut-offs where the data show them; None if there is no power law or too few bins.
+    """Fit a power law, with cut-offs if the data show them; return None without a power law or with too few bins.
 
     Parameters
     ----------
@@ -81,8 +81,8 @@ def fit_self_affine(bins: Cut) -> SelfAffine | None:
     Returns
     -------
     SelfAffine or None
-        Bends are chosen among the bins by the information criterion of Schwarz; intervals are those of the likelihood,
-        widened by the misfit.
+            Cut-offs are chosen among the bins by Schwarz's information criterion. Intervals follow from the likelihood
+            and are widened by the misfit.
     """
     wavenumber, density, error = bins
     if wavenumber.size < LEAST_BINS:
@@ -134,7 +134,7 @@ def fit_self_affine(bins: Cut) -> SelfAffine | None:
 
 class _Fit(NamedTuple):
     chi_squared: float
-    slope: float  # of the middle
+    slope: float  # of the power law between the cut-offs
     error: float
 
 

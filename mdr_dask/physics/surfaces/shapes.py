@@ -1,4 +1,4 @@
-"""Indenters of power-law shape: the MDR rule, and smooth ones sliding over a Kelvin foundation in closed form."""
+"""Indenters: the MDR rule for power laws, and smooth indenters sliding over a Kelvin foundation in closed form."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mdr_dask.physics.jit import jit
 
 ITERATIONS = 200
 
-# What `smooth` writes for every case, in this order
+# Columns of the results of `smooth`
 DEPTH, DRAG, LEADING, TRAILING, STRETCH = range(5)
 COLUMNS = 5
 
@@ -30,10 +30,10 @@ def mapped(exponent: float) -> float:
 
 
 class Shape(Protocol):
-    """The line of an indenter: the interface that the solvers use."""
+    """The line of an indenter, as used by the solvers."""
 
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the height into the elastomer, 0 at the tip, and the slopes on the left and right of every x."""
+        """Return the height towards the elastomer, 0 at the tip, and the slopes left and right of every x."""
 
     def body(self, r: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return height and slope of the body of revolution that corresponds to the line."""
@@ -59,7 +59,7 @@ class PowerLaw:
         return cls(mapped(exponent) * coefficient, exponent)
 
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the height -c |x|^n into the elastomer and its slopes on the left and on the right of every x."""
+        """Return the height -c |x|^n towards the elastomer, and its slopes on the left and right side of every x."""
         distance = np.abs(x)
         steepness = self.coefficient * self.exponent * distance ** (self.exponent - 1)
         left = np.where(x > 0, -steepness, steepness)
@@ -68,7 +68,7 @@ class PowerLaw:
 
     @property
     def breaks(self) -> tuple[float, ...]:
-        """The body is smooth except at its tip."""
+        """Return no radii: the body is smooth except at its tip."""
         return ()
 
     def body(self, r: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -93,14 +93,14 @@ class RoundedCone:
     steepness : float
         s, the slope of the cone.
     blend : float
-        b, the radius at which the tip goes over into the cone without a kink.
+            b, the radius at which the rounded tip ends and the cone begins, without a kink.
     """
 
     steepness: float
     blend: float
 
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the height into the elastomer, and its slope, which is the same on the left and on the right."""
+        """Return the height towards the elastomer, and its slope, which is equal on both sides."""
         place, b = np.abs(x), self.blend
         outer = np.maximum(place, b)
         root = np.sqrt((outer - b) * (outer + b))
@@ -113,7 +113,7 @@ class RoundedCone:
 
     @property
     def breaks(self) -> tuple[float, ...]:
-        """The curvature jumps where the tip ends."""
+        """Return the end of the tip, where the curvature jumps."""
         return (self.blend,)
 
     def body(self, r: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -127,14 +127,14 @@ class RoundedCone:
 
 
 def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatArray:
-    """Return the static half-width a of the contact of a smooth line c |x|^n.
+    """Return the static half-width a of the contact with a smooth line c |x|^n.
 
     Parameters
     ----------
     load : array
         F_N / (4 G), so that ``load = 2 n c a^(n+1) / (n + 1)`` (thesis 3.3.2).
     coefficient, exponent : float
-        c_n > 0 and n of the line, already mapped.
+            c_n > 0 and n of the line after the MDR rule.
     """
     width: FloatArray = ((exponent + 1) * load / (2 * exponent * coefficient)) ** (1 / (exponent + 1))
     return width
@@ -142,10 +142,10 @@ def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatAr
 
 @jit
 def _trailing(drop: float, deborah: float, exponent: float) -> float:
-    """Return b >= 0 with b^n + n deborah b^(n-1) = drop, or 0 where there is none (n = 1)."""
+    """Return the solution b >= 0 of b^n + n deborah b^(n-1) = drop; 0 if there is none (n = 1)."""
     if exponent == 1:
         return max(drop - deborah, 0.0)
-    # in y = log b the logarithm of the left side is convex and rising: Newton from the right
+    # the logarithm of the left side is convex and increasing in y = log b: Newton's method from the right
     y = math.log(drop) / exponent
     for _ in range(ITERATIONS):
         b = math.exp(y)
@@ -160,7 +160,7 @@ def _trailing(drop: float, deborah: float, exponent: float) -> float:
 
 @jit
 def _carried(depth: float, deborah: float, coefficient: float, exponent: float) -> tuple[float, float, float]:
-    """Return F_N / (4 G) at a depth, and the leading and trailing edges."""
+    """Return F_N / (4 G) at a depth, and the distances of the leading and the trailing edge."""
     drop = depth / coefficient
     a = drop ** (1 / exponent)
     b = _trailing(drop, deborah, exponent)
@@ -174,18 +174,19 @@ def smooth(
 ) -> None:
     """Slide smooth lines c |x|^n towards -x at prescribed loads.
 
-    The contact lies between -a with c a^n = d and b with d = c (b^n + n v tau b^(n-1)), or the apex; the load is
-    convex in d, with slope a + b + v tau, so that Newton from the static depth comes down to the root.
+    The contact lies between -a and b, where c a^n = d and d = c (b^n + n v tau b^(n-1)), or b = 0 if there is no such
+    b. The load is a convex function of d with the slope a + b + v tau, so Newton's method from the static depth
+    converges to the root from above.
 
     Parameters
     ----------
     loads, deborah : array, shape (cases,)
         F_N / (4 G) and v tau, positive and finite.
     coefficients, exponents : array, shape (cases,)
-        c_n > 0 and n >= 1 of the lines, already mapped.
+            c_n > 0 and n >= 1 of the lines after the MDR rule.
     results : array, shape (cases, COLUMNS)
-        Written: the depth, F_x / (4 G), a, b, and the integral of the slope squared over the contact; NaN where no
-        depth is found.
+            Written: depth, F_x / (4 G), a, b, and the integral of the squared slope over the contact; NaN if no depth
+            is found.
     """
     results[:] = np.nan
     for k in range(loads.size):

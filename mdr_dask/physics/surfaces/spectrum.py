@@ -1,4 +1,4 @@
-"""The isotropic spectrum of a surface: power laws between points; line, cut and moments derived from it.
+"""The isotropic spectrum of a surface: power laws between points; line, straight profile and moments.
 
 Angular wave numbers q are in rad/m; spectra are two-sided (thesis 2.12 and 2.13).
 """
@@ -16,26 +16,26 @@ from numpy.typing import ArrayLike
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 
-ROUNDING = 1e-9  # of a wave number that lies on an end
+ROUNDING = 1e-9  # relative tolerance for a wave number at an end of the spectrum
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
-STEP = 0.1  # longest piece of a quadrature, in log q
+STEP = 0.1  # longest interval of the quadrature, in log q
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """The spectrum C2D(q) of an isotropic surface: a power law between its points, ends included, 0 outside.
+    """The spectrum C2D(q) of an isotropic surface: a power law between adjacent points; 0 outside the outermost points.
 
     Parameters
     ----------
     wavenumber : array, shape (points,)
-        Angular wave numbers q, rad/m, ascending; two points at least.
+            Angular wave numbers q, rad/m, ascending; at least two points.
     density : array, shape (points,)
         C2D, m^4, positive.
 
     Raises
     ------
     DataError
-        If there are fewer than two points, or they do not ascend, or are not positive and finite.
+            If there are fewer than two points, they do not ascend, or values are not positive and finite.
     """
 
     wavenumber: FloatArray
@@ -81,20 +81,20 @@ class Spectrum:
         Returns
         -------
         array, shape (modes,)
-            A_k = 2 sqrt(C1D(q_k) 2 pi / L), m, with C1D = pi q C2D (thesis 2.19, 2.20): the line has the rms height and
-            the full rms gradient of the surface.
+                A_k = 2 sqrt(C1D(q_k) 2 pi / L), m, with C1D = pi q C2D (thesis 2.19, 2.20). The line has the rms height
+                and the full rms gradient of the surface.
         """
         q = 2 * np.pi / length * np.arange(1, modes + 1)
         amplitude: FloatArray = 2 * np.sqrt(np.pi * q * self.at(q) * (2 * np.pi / length))
         return amplitude
 
     def between(self, longest: float = 0.0, shortest: float = 0.0) -> Spectrum:
-        """Return the spectrum of the waves between two wavelengths, m; 0 keeps that end.
+        """Return the spectrum of the waves between two wavelengths, m; 0 for no limit.
 
         Raises
         ------
         DataError
-            If nothing is left.
+                If no waves are left.
         """
         low = max(2 * np.pi / longest if longest else 0.0, float(self.wavenumber[0]))
         high = min(2 * np.pi / shortest if shortest else math.inf, float(self.wavenumber[-1]))
@@ -106,10 +106,10 @@ class Spectrum:
         return Spectrum(q, self.at(q))
 
     def continued(self, longest: float = 0.0, shortest: float = 0.0, decades: float = 1.0) -> Spectrum:
-        """Return the spectrum with power laws to wavelengths, m, beyond its ends; 0 leaves that end.
+        """Return the spectrum, continued by power laws to wavelengths, m, beyond its ends; 0 for no continuation.
 
-        Each power law starts at the last point, with the slope of a straight line fitted to the logarithms of the last
-        decade.
+        Each power law starts at the last point. Its slope is that of a straight line fitted to the logarithms in the
+        last `decades`.
         """
         q, density = [self.wavenumber], [self.density]
         for index, end in (
@@ -127,7 +127,7 @@ class Spectrum:
         return Spectrum(np.concatenate(q), np.concatenate(density))
 
     def cut(self, wavenumber: ArrayLike) -> FloatArray:
-        """Return the spectrum of a straight cut through the surface, m^3: 2 int C2D(sqrt(q^2 + u^2)) du from 0 on."""
+        """Return the spectrum of a straight profile, m^3: 2 int C2D(sqrt(q^2 + u^2)) du from 0 to infinity."""
         k, weight = quadrature(np.asarray(wavenumber, dtype=np.float64), self.wavenumber)
         cut: FloatArray = np.sum(weight * self.at(k), axis=1)
         return cut
@@ -141,10 +141,10 @@ class Spectrum:
         return math.sqrt(2 * np.pi * self._moment(3))
 
     def _moment(self, order: int) -> float:
-        """Return the integral of q^order C2D, exact for power laws."""
+        """Return the integral of q^order C2D; it is exact for the power laws between points."""
         q, value = self._logs[0], np.exp(self._logs[1] + (order + 1) * self._logs[0])
         rise = np.diff(np.log(value))
-        # int exp(v) dx for linear v is the logarithmic mean of its end values
+        # the integral of exp(v) with a linear v is the width times the logarithmic mean of the end values
         small = np.abs(rise) < 1e-8
         safe = np.where(small, 1.0, rise)
         mean = np.where(small, 0.5 * (value[1:] + value[:-1]), np.diff(value) / safe)
@@ -152,18 +152,18 @@ class Spectrum:
 
 
 def self_affine(hurst: float, longest: float, shortest: float, rms: float = 1.0, rolloff: float = 0.0) -> Spectrum:
-    """Return C2D ~ q^(-2 - 2 H) between two wavelengths, constant above the wavelength `rolloff`, m (thesis 2.14).
+    """Return C2D ~ q^(-2 - 2 H) between two wavelengths, constant above the wavelength `rolloff` (thesis 2.14).
 
     Parameters
     ----------
     hurst : float
         Hurst exponent H.
     longest, shortest : float
-        Wavelengths of the ends, m.
+            Limits of the wavelengths, m.
     rms : float
         Rms height of the surface, m.
     rolloff : float
-        Wavelength, m; 0 for none.
+            Roll-off wavelength, m; 0 for none.
     """
     corners = sorted({2 * np.pi / end for end in (longest, shortest, rolloff) if end and shortest <= end <= longest})
     q = np.array(corners)
@@ -175,7 +175,7 @@ def self_affine(hurst: float, longest: float, shortest: float, rms: float = 1.0,
 def quadrature(wavenumber: FloatArray, edges: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return nodes k and weights of the integral along a cut, shape (wave numbers, nodes).
 
-    sum(weight * C2D(k)) = 2 int C2D(k) k / sqrt(k^2 - q^2) dk over k from q on, for a C2D that is smooth between edges.
+    sum(weight * C2D(k)) = 2 int C2D(k) k / sqrt(k^2 - q^2) dk, from k = q to infinity, for a C2D smooth between edges.
     """
     parts = [np.geomspace(low, high, 1 + math.ceil(math.log(high / low) / STEP))[:-1] for low, high in pairwise(edges)]
     bounds = np.append(np.concatenate(parts), edges[-1])

@@ -1,8 +1,8 @@
 """A closed line as a cubic spline with one coefficient per node.
 
-With coefficients c_k and the uniform cubic B-spline, the line between two nodes is ``a0 + a1 t + a2 t^2 + a3 t^3`` with
-t from 0 to 1 and the numbers of `piece`. It never leaves the range of the four coefficients that make it (de Boor, *A
-Practical Guide to Splines*, 1978, chapter IX).
+For coefficients c_k and the uniform cubic B-spline, the line between two nodes is ``a0 + a1 t + a2 t^2 + a3 t^3`` with
+t from 0 to 1 and the numbers returned by `piece`. Its values are between the least and the largest of the four
+coefficients involved (de Boor, *A Practical Guide to Splines*, 1978, chapter IX).
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ def closest(waves: NDArray[np.complex128], nodes: int) -> FloatArray:
     Parameters
     ----------
     waves : complex array, shape (modes,)
-        Half the complex amplitude of each wave, as of `waves.Waves`.
+            Half the complex amplitude of each wave, as in `waves.Waves`.
     nodes : int
-        At least two for the shortest wave.
+            Number of nodes, at least two per shortest wave.
 
     Returns
     -------
     array, shape (nodes,)
-        Coefficients in the unit of the waves. Each wave is divided by the sum over all its images of the squared
-        transform of the B-spline, and multiplied by that transform (Unser, IEEE Signal Process. Mag. 16 (1999) 22).
+            Coefficients in the unit of the waves. Each wave is multiplied by the transform of the B-spline and divided
+            by the squared transform, summed over all aliases (Unser, IEEE Signal Process. Mag. 16 (1999) 22).
     """
     return series(waves * _closest(waves.size, nodes), nodes)
 
 
 def through(waves: NDArray[np.complex128], nodes: int) -> FloatArray:
-    """Return the spline that interpolates a sum of waves at its nodes; arguments and result as for `closest`."""
+    """Return the spline that interpolates a sum of waves at its nodes; arguments and result as in `closest`."""
     return series(waves * _through(waves.size, nodes), nodes)
 
 
@@ -57,7 +57,7 @@ def heights(spline: FloatArray) -> FloatArray:
 
 @lru_cache(maxsize=8)
 def _closest(modes: int, nodes: int) -> FloatArray:
-    """Return the factor by which the least-squares spline multiplies each wave."""
+    """Return the factors of the waves in the least-squares spline."""
     phase = _phases(modes, nodes)
     cosine = np.cos(phase)
     transform = np.sinc(phase / (2 * np.pi)) ** 4
@@ -67,12 +67,12 @@ def _closest(modes: int, nodes: int) -> FloatArray:
 
 @lru_cache(maxsize=8)
 def _through(modes: int, nodes: int) -> FloatArray:
-    """Return the factor by which the interpolating spline multiplies each wave."""
+    """Return the factors of the waves in the interpolating spline."""
     return 1 / _at_nodes(_phases(modes, nodes))
 
 
 def _phases(modes: int, nodes: int) -> FloatArray:
-    """Return the phase increment of each wave from node to node."""
+    """Return the phase increment of each wave between nodes."""
     return 2 * np.pi * np.arange(1, modes + 1) / nodes
 
 
@@ -83,7 +83,7 @@ def _at_nodes(phase: FloatArray) -> FloatArray:
 
 @jit
 def piece(spline: FloatArray, k: int) -> Piece:
-    """Return the polynomial between the second and the third of four coefficients, the first of them at place k."""
+    """Return the polynomial between the second and the third of the four coefficients from index k on."""
     c0, c1, c2, c3 = spline[k], spline[k + 1], spline[k + 2], spline[k + 3]
     return (c0 + 4 * c1 + c2) / 6, (c2 - c0) / 2, (c0 - 2 * c1 + c2) / 2, (c3 - 3 * c2 + 3 * c1 - c0) / 6
 
@@ -102,7 +102,7 @@ def integral(of: Piece, t: float) -> float:
 
 @jit
 def shares(t: float) -> Piece:
-    """Return the contribution of each of four coefficients to the integral of their piece from 0 to t."""
+    """Return the weights of the four coefficients in the integral of their piece from 0 to t."""
     square = t * t
     second, third = t * (4 - 2 * square + 0.75 * t * square) / 6, t * (1 + 1.5 * t + square - 0.75 * t * square) / 6
     return (1 - (1 - t) ** 4) / 24, second, third, square * square / 24
@@ -110,12 +110,12 @@ def shares(t: float) -> Piece:
 
 @jit
 def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
-    """Append the positions between k and k + 1 where a piece changes sign, and return the new count.
+    """Append the positions between k and k + 1 at which a piece changes sign to `found`; return the new count.
 
-    There are three at most, and none where all four coefficients are above zero or none is.
+    There are at most three, and none if all four coefficients are positive or none of them is.
     """
     of = piece(spline, k)
-    end = (spline[k + 1] + 4 * spline[k + 2] + spline[k + 3]) / 6  # as the next piece has it
+    end = (spline[k + 1] + 4 * spline[k + 2] + spline[k + 3]) / 6  # the same formula as at the start of the next piece
     t_before, before = 0.0, of[0]
     first, second = _extremes(of)
     for number in range(3):
@@ -132,7 +132,7 @@ def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
 
 @jit
 def _extremes(of: Piece) -> tuple[float, float]:
-    """Return the positions of the extremes of a piece in ascending order; 0 replaces one outside 0..1."""
+    """Return the positions of the extremes of a piece, ascending; 0 for an extreme outside 0..1."""
     a, b, c = 3 * of[3], of[2], of[1]  # a t^2 + 2 b t + c
     root = b * b - a * c
     if root <= 0:
@@ -147,7 +147,7 @@ def _extremes(of: Piece) -> tuple[float, float]:
 
 @jit
 def _zero(of: Piece, low: float, at_low: float, high: float, at_high: float) -> float:
-    """Return the zero of a piece between `low` and `high`, where it is monotonic and changes sign: bracketed Newton."""
+    """Return the zero of a piece between `low` and `high`, where it is monotonic and changes sign."""
     t = low + (high - low) * at_low / (at_low - at_high)
     for _ in range(STEPS):
         here = value(of, t)
@@ -165,5 +165,5 @@ def _zero(of: Piece, low: float, at_low: float, high: float, at_high: float) -> 
     return t
 
 
-#: A step of Newton's so short leaves an error of its square; so many halvings find any zero.
+#: After a Newton step this short, the error is about its square; after this many halvings, any zero is found.
 CLOSE, STEPS = 1e-7, 60

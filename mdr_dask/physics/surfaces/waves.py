@@ -31,11 +31,11 @@ class Waves:
         return series(self.coefficients, nodes)
 
     def slopes(self, nodes: int) -> FloatArray:
-        """Return dh/dx at the same places, exact."""
+        """Return dh/dx at x = 0, 1/nodes, ..., exactly."""
         return series(self.coefficients * (2j * np.pi * np.arange(1, self.coefficients.size + 1)), nodes)
 
     def from_place(self, place: float) -> Waves:
-        """Return the line shifted by a fraction 0..1 of its length; needs more than two nodes for the shortest wave."""
+        """Return the line shifted by a fraction 0..1 of its length; needs more than two nodes per shortest wave."""
         wave = np.arange(1, self.coefficients.size + 1)
         return Waves(self.coefficients * np.exp(2j * np.pi * wave * place), self.points)
 
@@ -67,7 +67,8 @@ def series(coefficients: NDArray[np.complex128], nodes: int) -> FloatArray:
 def waves_of(height: FloatArray) -> Waves:
     """Return the waves of the periodic line through equidistant samples, without the mean.
 
-    The last wave of an even number of samples, two samples long, is the cosine that they show; it counts in full.
+    For an even number of samples, the last wave, two samples long, is the cosine through the samples, with full
+    amplitude.
     """
     coefficients = np.fft.rfft(height)[1:] / height.size
     if height.size % 2 == 0:
