@@ -138,5 +138,5 @@ def rms_height(height: FloatArray) -> float:
 
 
 def rms_slope(height: FloatArray, length: float) -> float:
-    """Return the spectral rms slope of the periodic line through samples, including the wave with two points a period."""
+    """Return the spectral rms slope of the periodic line through samples, including the wave of two points."""
     return waves_of(height).rms_slope() / length
