@@ -1,4 +1,4 @@
-"""Run a campaign: rounds, resume, failures, progress. The only package that uses Dask."""
+"""Run a campaign: rounds, resumed runs, failures, progress. Only this package uses Dask to compute."""
 
 from mdr_dask.execute.events import Event, Tell
 from mdr_dask.execute.progress import Progress

@@ -1,4 +1,4 @@
-"""Rounds for a fitted constant: which cases take part in the next one."""
+"""Rounds for a fitted constant: choose the cases of the next round."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from mdr_dask.models.base import Status
 from mdr_dask.plan import Template
 from mdr_dask.refinement import Mesh, Stage
 
-#: Fewest realisations for the interval of a fitted constant.
+#: Smallest number of realisations from which the interval of a fitted constant is computed.
 FEWEST = 10
 
 
 def cases_that_narrow(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, taken: Sequence[IntArray]
 ) -> list[BoolArray]:
-    """Return the cases that those constants follow from whose intervals are too wide.
+    """Return the cases that need more realisations: constants with a too wide interval were fitted to them.
 
     Parameters
     ----------
     url, stage, layout, places
-        The store, the campaign, and where its cases lie in the store.
+        The store, the campaign, and the positions of its cases in the store.
     taken : sequence of int array
-        Number of realisations of every case that count, by group; further ones in the store are ignored.
+        For each group, the number of realisations of every case to use; further stored realisations are ignored.
     """
     answers = stage.campaign.replication.answers
     if max(int(each.max()) for each in taken) < FEWEST:
@@ -45,7 +45,7 @@ def cases_that_narrow(
         try:
             wide = still_wide(fit, constant, groups, tolerance, stage.campaign.replication.at_most)
         except FitError:
-            continue  # `unanswered` reports it at the end
+            continue  # `unanswered` reports the error at the end
         for result, flags in wide.items():
             for name in [result] if fit.apart else groups:
                 if bool(flags.any()):
@@ -55,7 +55,7 @@ def cases_that_narrow(
 
 
 def unanswered(url: str, stage: Stage, layout: Sequence[Template], taken: Sequence[IntArray]) -> Iterator[str]:
-    """Yield a sentence for every constant that misses its tolerance."""
+    """Yield a sentence for every fitted constant that does not meet its tolerance."""
     answers = stage.campaign.replication.answers
     groups = _groups(url, stage, layout, taken)
     known = fits.available(stage.campaign.model)
@@ -80,11 +80,11 @@ def unanswered(url: str, stage: Stage, layout: Sequence[Template], taken: Sequen
 
 
 def _groups(url: str, stage: Stage, layout: Sequence[Template], taken: Sequence[IntArray]) -> dict[str, xr.Dataset]:
-    """Return the cases of a campaign with the realisations that count, by series; others are NaN."""
+    """Return the cases of a campaign by series; realisations beyond those in `taken` are NaN."""
     opened, groups = store.datasets(url), {}
     for mesh, template, count in zip(stage.meshes, layout, taken, strict=True):
         name = template.series.name
-        data = opened[name if name in opened else next(iter(opened))]  # without a name it is the first one
+        data = opened[name if name in opened else next(iter(opened))]  # results without series
         counts = xr.DataArray(count, dims=template.dims[:-1], coords=_coordinates(template.series))
         counts = counts.sel({dim: data[dim] for dim in counts.indexes})
         here = {dim: data[dim].isin(list(own)).to_numpy() for dim, own in _coordinates(mesh.series).items()}
@@ -101,6 +101,6 @@ def _coordinates(series: Series) -> dict[str, list[object]]:
 
 
 def _of_mesh(cases: xr.DataArray, mesh: Mesh) -> BoolArray:
-    """Return cases over the dimensions of a series, in its own order."""
+    """Return a mask of cases along the dimensions of a series, in the order of its axes and values."""
     ordered = cases.sel({dim: own for dim, own in _coordinates(mesh.series).items() if dim in cases.indexes})
     return np.asarray(ordered.transpose(*mesh.series.sizes).to_numpy())

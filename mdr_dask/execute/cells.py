@@ -1,4 +1,4 @@
-"""Which results of a group a round has to compute, and the tasks that compute them."""
+"""Find the results that a round has to compute, and the tasks that compute them."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from mdr_dask.task import Work, versions
 
 @dataclass(frozen=True)
 class Cells:
-    """Which results of a group a round has to compute, and which only have to be marked as not needed.
+    """The results of a group that a round has to compute, and those that it has to mark as not needed.
 
     Parameters
     ----------
     template : Template
         The group.
     wanted, spared : bool array, shape of the group
-        Results to compute, and those to write down as not needed.
+        Results to compute, and results to mark as not needed.
     kept, failed : int
-        Number of results of the round that are in the store already, and how many of them have failed.
+        Number of results of the round that are already in the store, and number of failed ones among them.
     """
 
     template: Template
@@ -39,11 +39,11 @@ class Cells:
 
     @property
     def new(self) -> int:
-        """Number of results that are not in the store yet, with those that are not needed."""
+        """Number of results to compute or to mark as not needed."""
         return int(np.count_nonzero(self.wanted) + np.count_nonzero(self.spared))
 
     def seconds(self, index: BlockIndex) -> float:
-        """Return the estimated work of a block, in proportion to what is wanted of it."""
+        """Return the estimated time of a block, in proportion to the results to compute in it."""
         part = float(np.mean(self.wanted[self.template.region(index)]))
         return part * self.template.seconds(index) if part else 0.0
 
@@ -59,7 +59,7 @@ def find_cells(
 ) -> Cells:
     """Compare a round with the ledger.
 
-    `asked` are the cases of the round, `needed` those of them that need its `realisations` (from, to), and `own` the
+    `asked` marks the cases of the round, `needed` those that need its `realisations` (first, last + 1), and `own` the
     results that belong to a part.
     """
     status = store.ledger(url, template.series.name, template.shape)
@@ -79,7 +79,7 @@ def find_cells(
 
 
 def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]]:
-    """Yield for each group the number of the part, of `count`, that each result belongs to."""
+    """Yield for each group an array with the number of the part that each result belongs to; `count` parts in all."""
     position = itertools.count()
     for template in layout:
         numbers = np.zeros(template.shape, dtype=np.int32)
@@ -89,7 +89,7 @@ def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]
 
 
 def tasks(url: str, groups: Iterable[Cells], lock: Lock) -> Iterator[Work]:
-    """Yield the tasks of a round one by one, so that only a window of them exists at a time."""
+    """Yield the tasks of a round one by one, so that only the tasks of the window exist at the same time."""
     laid_out = store.layout_mark(url)
     if laid_out is None:
         raise StoreError(f"{url}: removed since it was laid out")

@@ -1,8 +1,8 @@
-"""Compute blocks in child processes of this machine, which may crash or take too long.
+"""Compute blocks in child processes of this machine, because a block may crash its process or take too long.
 
-One process imports everything and forks a keeper for each child, which forks the child. The child computes one block
-after the other: it reads blocks from a pipe and writes outcomes. If it dies, its keeper reports that and forks the next
-one within milliseconds.
+A server process imports everything and forks one keeper for each child; the keeper forks the child. The child reads
+blocks from a pipe, computes them one after the other, and writes the outcomes. If the child dies, its keeper reports
+that and forks a new child within milliseconds.
 """
 
 from __future__ import annotations
@@ -28,34 +28,34 @@ from mdr_dask import models
 from mdr_dask.errors import MachineError
 from mdr_dask.task import Outcome, Work, kind, one_blas_thread, run_block, write_off
 
-#: What the process runs that forks the others.
+#: Code of the server process.
 COMMAND = "import sys; from mdr_dask.execute.children import serve; serve(sys.argv[1], [int(x) for x in sys.argv[2:]])"
-#: Seconds beyond the limit of a case before its process is killed: Python code raises an exception before.
+#: Seconds beyond the time limit of a case after which its process is killed. Python code raises TimeoutError before.
 GRACE = 1.0
-#: Results of a case that must have crashed before the rest of the case is written off.
+#: Number of results of a case that must crash before its other results are marked as failed.
 CONVICTED = 2
 
 
 @dataclass(frozen=True)
 class Death:
-    """The end of a child process while it computed a block."""
+    """The reason why a child process ended while it was computing a block."""
 
     why: str
 
 
 @dataclass(frozen=True)
 class Child:
-    """The pipe to a child process; one block at a time."""
+    """The pipe to a child process, which computes one block at a time."""
 
     pipe: Connection
 
     def run(self, work: Work, limit: float | None = None) -> Outcome | Death:
-        """Compute a block in the child; `limit` is the time in seconds for each result.
+        """Compute a block in the child process; `limit` is the largest time of each result in seconds.
 
         Raises
         ------
         MdrDaskError
-            What the child raised: the store cannot be written, or the machine has a fault.
+            The error that the child raised, if the store cannot be written or the machine has a fault.
         """
         try:
             self.pipe.send((work, limit))
@@ -79,7 +79,7 @@ class Child:
 
 @contextmanager
 def children(count: int, model: str) -> Iterator[list[Child]]:
-    """Start child processes for a model; at the end, wait until each has computed its block."""
+    """Start child processes for a model; at the end of the context, wait until each has finished its block."""
     pipes = [Pipe() for _ in range(count)]
     numbers = [theirs.fileno() for _, theirs in pipes]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
@@ -95,9 +95,9 @@ def children(count: int, model: str) -> Iterator[list[Child]]:
 
 
 def compute_apart(child: Child, work: Work, limit: float | None = None) -> Iterator[tuple[Work, Outcome]]:
-    """Compute a block that may crash: by halves if it does, down to the results to blame, which have failed.
+    """Compute a block that may crash. If it does, compute its halves, down to single results, which then have failed.
 
-    After `CONVICTED` results of a case have crashed, its other results are written off.
+    After `CONVICTED` results of a case have crashed, its other results are marked as failed without computing them.
     """
     pieces, attempts = [work], itertools.count(work.attempt)
     crashed: Counter[int] = Counter()
@@ -123,11 +123,11 @@ def compute_apart(child: Child, work: Work, limit: float | None = None) -> Itera
 
 
 def serve(model: str, numbers: list[int]) -> None:
-    """Import what blocks need, and fork a keeper for each pipe; end when all of them have ended."""
+    """Import the modules that blocks need, fork a keeper for each pipe, and return when all keepers have ended."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all processes; the driver decides
     one_blas_thread()
     kind()
-    with suppress(Exception):  # the first block reports it
+    with suppress(Exception):  # the first block reports this error
         models.load(model)
     pipes = [Connection(number) for number in numbers]
     keepers = []
@@ -147,7 +147,7 @@ def serve(model: str, numbers: list[int]) -> None:
 
 
 def _keep(pipe: Connection) -> None:
-    """Fork a child that computes blocks, and another one whenever it dies; end when the pipe is closed."""
+    """Fork a child that computes blocks, and a new one whenever it dies; return when the pipe is closed."""
     while True:
         child = os.fork()
         if child == 0:
@@ -168,7 +168,7 @@ def _describe(status: int) -> str:
 
 
 def _compute_blocks(pipe: Connection) -> None:
-    """Compute the blocks of a pipe in this process, until the other end is closed."""
+    """Compute the blocks from a pipe in this process, until the other end is closed."""
     while True:
         try:
             request = pipe.recv_bytes()
@@ -185,7 +185,7 @@ def _compute_blocks(pipe: Connection) -> None:
 
 
 class _limited:  # noqa: N801
-    """Raise TimeoutError in a case of plain Python that takes too long."""
+    """Raise TimeoutError in a case of a plain Python model that takes too long."""
 
     def __init__(self, limit: float | None) -> None:
         self._limit = limit
@@ -205,7 +205,7 @@ class _limited:  # noqa: N801
 
 
 def _reply(pipe: Connection, content: Any) -> None:
-    """Send something to the driver; end this process if the driver has died."""
+    """Send an object to the driver; end this process if the driver has died."""
     try:
         pipe.send(content)
     except OSError:

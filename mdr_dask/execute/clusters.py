@@ -1,4 +1,4 @@
-"""Start a Dask cluster, or connect to one that runs."""
+"""Start a Dask cluster, or connect to a running one."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from mdr_dask.execute.resources import Resources
 from mdr_dask.execute.window import TaskWindow
 from mdr_dask.task import one_blas_thread
 
-#: Seconds that a scheduler has to answer.
+#: Seconds to wait for the answer of a scheduler.
 SCHEDULER_PATIENCE = 10
-#: Where the page of a scheduler is served: to this machine alone.
+#: Address of the web page of a scheduler: only this machine can open it.
 DASHBOARD = "127.0.0.1:0"
-#: Seconds of work that a cluster which grows by itself should have for each of its threads: about a block.
+#: Work for each thread of an adaptive cluster, by which it chooses its size: about one block.
 TARGET_DURATION = "1s"
-#: Loggers whose messages explain why workers cannot be started: they are quoted in ours.
+#: Loggers whose messages explain why workers cannot be started; messages of the run quote them.
 STARTING = ("distributed.deploy", "dask_jobqueue", "tornado")
-#: Loggers whose messages follow from an error that is reported anyway.
+#: Loggers whose messages are discarded, because they only repeat errors that are reported anyway.
 ECHOES = ("distributed", "asyncio")
-#: Settings of a cluster on this machine. A worker that dies is a suspect at the first death, and its nanny starts it
-#: again. There is no profile, which would take four hundredths of a core for each worker.
+#: Settings of a cluster on this machine. A block is suspected as soon as one worker dies while computing it, and the
+#: nanny process restarts the worker. Profiling is off, because it takes 4 % of a core for each worker.
 ON_THIS_MACHINE = {
     "distributed.deploy.lost-worker-timeout": "1 day",
     "distributed.scheduler.allowed-failures": 0,
@@ -45,7 +45,7 @@ ON_THIS_MACHINE = {
 
 
 class _LastMessage(logging.Handler):
-    """Keeps the last error message of a library, in one line."""
+    """A handler that stores the last error message of a library, in one line."""
 
     text = ""
 
@@ -57,19 +57,19 @@ class _LastMessage(logging.Handler):
 
 @contextmanager
 def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
-    """Yield the workers of a cluster that is started, or of one that runs.
+    """Start a cluster or connect to a running one, and yield a task window on its workers.
 
     Raises
     ------
     ClusterError
-        If it cannot be started, or does not answer.
+        If the cluster cannot be started, or does not answer.
     """
     message = _LastMessage(logging.ERROR)
     with ExitStack() as stack:
         for names, handler in ((ECHOES, logging.NullHandler()), (STARTING, message)):
             for logger in _loggers(names):
                 stack.enter_context(_redirected(logger, handler))
-        stack.enter_context(one_blas_thread())  # a client may have its workers in this process
+        stack.enter_context(one_blas_thread())  # the workers of a client may be threads of this process
         most: int = 0
         replace_lost: Callable[[], None] = _nothing
         if resources.client is not None:
@@ -85,7 +85,7 @@ def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
             is_local = issubclass(cluster_class(plan["class"]), LocalCluster)
             stack.enter_context(dask.config.set(ON_THIS_MACHINE if is_local else {}))
             cluster = stack.enter_context(_started(plan))
-            if "scale" in plan and not is_local:  # jobs that have reached their wall time are not replaced otherwise
+            if "scale" in plan and not is_local:  # Dask does not replace jobs that reach their wall time
                 replace_lost = partial(cluster.scale, **plan["scale"])
             client, most = stack.enter_context(Client(cluster, set_as_default=False)), _most(plan)
         timeout = resources.case_timeout
@@ -93,7 +93,7 @@ def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
 
 
 def _require_guard() -> None:
-    """Raise ClusterError in a script without the guard that new processes need, because they import the script."""
+    """Raise ClusterError in a script without ``if __name__ == "__main__"``, because new processes import the script."""
     main = sys.modules.get("__main__")
     source = getattr(main, "__file__", None)
     frame = sys._getframe()
@@ -107,18 +107,18 @@ def _require_guard() -> None:
 
 
 def _nothing() -> None:
-    """Leave a cluster as it is."""
+    """Do nothing: the workers of this cluster are not replaced by a run."""
 
 
 def _loggers(names: tuple[str, ...]) -> list[logging.Logger]:
-    """Return loggers and those below them, which Dask gives handlers of their own."""
+    """Return the named loggers and all loggers below them, because Dask adds handlers to these too."""
     below = [known for known in logging.root.manager.loggerDict for name in names if known.startswith(f"{name}.")]
     return [logging.getLogger(name) for name in (*names, *below)]
 
 
 @contextmanager
 def _redirected(logger: logging.Logger, handler: logging.Handler) -> Iterator[None]:
-    """Send the messages of a logger to one handler alone."""
+    """Send the messages of a logger only to the given handler."""
     before = logger.handlers[:], logger.propagate, logger.level
     logger.handlers, logger.propagate = [handler], False
     logger.setLevel(logging.ERROR)
@@ -152,17 +152,17 @@ def _started(plan: Mapping[str, Any]) -> Iterator[Cluster]:
         try:
             yield cluster
         finally:
-            with suppress(AssertionError, OSError, RuntimeError, TimeoutError):  # of workers that were never started
+            with suppress(AssertionError, OSError, RuntimeError, TimeoutError):  # raised if workers were never started
                 cluster.close()
 
 
 def cluster_class(name: str) -> type[Cluster]:
-    """Return the class of that name; nothing but a Dask cluster is ever called.
+    """Return the class with a dotted name, which must be a class of Dask clusters.
 
     Raises
     ------
     ClusterError
-        If it cannot be loaded, or is anything else.
+        If it cannot be loaded, or is not a class of Dask clusters.
     """
     package, _, attribute = name.rpartition(".")
     try:
@@ -175,11 +175,11 @@ def cluster_class(name: str) -> type[Cluster]:
 
 
 def _closed_to_others(kind: type[Cluster], arguments: Mapping[str, Any], stack: ExitStack) -> dict[str, Any]:
-    """Add to the arguments what keeps other users out, unless they say otherwise: TLS, and a page for here alone."""
+    """Add arguments that exclude other users, unless set already: TLS, and a web page for this machine only."""
     own = dict(arguments)
     if issubclass(kind, LocalCluster):
         own["dashboard_address"] = own.get("dashboard_address") or DASHBOARD
-    elif hasattr(kind, "job_cls"):  # jobs of a queue
+    elif hasattr(kind, "job_cls"):  # a cluster of batch jobs
         own["scheduler_options"] = {"dashboard_address": DASHBOARD, **own.get("scheduler_options", {})}
     else:
         return own
@@ -194,7 +194,7 @@ def _closed_to_others(kind: type[Cluster], arguments: Mapping[str, Any], stack: 
 
 
 def _in_files(keys: Security, folder: Path) -> Security:
-    """Write keys to files, where jobs of a queue find them and other users do not."""
+    """Write TLS keys to files that batch jobs can read and other users cannot."""
     names = [f"tls_{role}_{part}" for role in ("client", "scheduler", "worker") for part in ("cert", "key")]
     for name in ("tls_ca_file", *names):
         (folder / name).write_text(getattr(keys, name))
@@ -202,7 +202,7 @@ def _in_files(keys: Security, folder: Path) -> Security:
 
 
 def _most(plan: Mapping[str, Any]) -> int:
-    """Return the threads that a cluster may grow to by itself, by its cluster file."""
+    """Return the largest number of threads of an adaptive cluster according to its cluster file, otherwise 0."""
     arguments = plan.get("arguments", {})
     adapt = plan.get("adapt", {})
     each = arguments.get("cores", 1) if "maximum_jobs" in adapt else arguments.get("threads_per_worker", 1)

@@ -17,9 +17,9 @@ class Event:
     Parameters
     ----------
     name : str
-        Such as ``laid out`` or ``block done``.
+        Name of the event, such as ``laid out`` or ``block done``.
     facts : mapping
-        Details, as JSON can hold them.
+        Details, in a form that JSON can hold.
     sentence : str
         A message for the user; empty if there is none.
     """
@@ -29,20 +29,20 @@ class Event:
     sentence: str = ""
 
 
-#: Takes events, from any thread.
+#: Function that receives events, from any thread.
 Tell = Callable[[Event], None]
-#: Takes a task that has ended.
+#: Function that receives a task that has ended, with its outcome.
 Settle = Callable[[Work, Outcome], None]
 
 
 def of_block(name: str, work: Work, **facts: Any) -> Event:
-    """Return an event of a block."""
+    """Return an event about a block."""
     own = {"series": work.place.series, "block": list(work.place.index), "attempt": work.attempt}
     return Event(f"block {name}", {**own, **facts})
 
 
 def ended(work: Work, outcome: Outcome) -> Event:
-    """Return the end of a block: it failed where any of its results did."""
+    """Return the event of the end of a block; the block has failed if any of its results has failed."""
     counts = {state.name.lower(): outcome.counts[state] for state in Status if outcome.counts[state]}
     failed = outcome.counts[Status.FAILED] + outcome.counts[Status.NOT_CONVERGED]
     seconds = outcome.compute_seconds + outcome.write_seconds

@@ -23,16 +23,16 @@ if TYPE_CHECKING:
     from mdr_dask.execute.children import Child
     from mdr_dask.execute.window import TaskWindow
 
-#: Blocks that wait for each thread, so that none is idle.
+#: Number of blocks submitted for each thread, so that no thread is idle.
 AHEAD = 2
-#: Seconds for which a model in plain Python is computed in this process, before it is worth while to start others.
+#: Seconds for which a plain Python model is computed in this process; starting others pays off only for longer runs.
 SHORT = 2.0
 
 Compute = Callable[[Work], list[tuple[Work, Outcome]]]
 
 
 def check(resources: Resources) -> None:
-    """Raise ClusterError for a cluster file that names no Dask cluster."""
+    """Raise ClusterError if the class in a cluster file is not a class of Dask clusters."""
     if resources.cluster is not None:
         from mdr_dask.execute.clusters import cluster_class
 
@@ -40,7 +40,7 @@ def check(resources: Resources) -> None:
 
 
 class Executor(AbstractContextManager["Executor"]):
-    """Runs blocks on the resources named. Processes and clusters are started when there is work for them.
+    """Computes blocks on the given resources. Processes and clusters are started when there is work for them.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Executor(AbstractContextManager["Executor"]):
     url : str
         The store.
     tell : callable
-        Takes events.
+        Receives events.
     """
 
     def __init__(self, resources: Resources, model: str, url: str, tell: Tell) -> None:
@@ -72,26 +72,26 @@ class Executor(AbstractContextManager["Executor"]):
         self._stack.close()
 
     def hold(self, lock: Lock) -> None:
-        """Compute under the lock of a run; blocks that a crashed run had begun are computed in their own processes."""
+        """Set the lock of the run. Blocks that a crashed run had begun will be computed in a child process."""
         self._lock = lock
         self._suspects, self._begun = set(lock.begun), set(lock.begun)
 
     def connect(self) -> None:
-        """Start or find the cluster, if one is named, before anything is written."""
+        """Start the cluster or connect to it, if the resources name one; called before anything is written."""
         if self._resources.remote and self._window is None:
             from mdr_dask.execute.clusters import task_window
 
             self._window = self._stack.enter_context(task_window(self._resources, self._tell))
 
     def __call__(self, works: Iterable[Work], settle: Settle) -> None:
-        """Compute blocks, and settle each that has ended, in whatever order."""
+        """Compute blocks, and call `settle` for each block when it ends; blocks may end in any order."""
         remaining = iter(works)
         first = next(remaining, None)
         if first is None:
             return
         remaining = itertools.chain([first], remaining)
         with store.while_locked(self._url, self._lock):
-            pass  # raises where nothing can be written
+            pass  # raises StoreError in a read-only store
         if self._resources.remote:
             self._on_cluster(remaining, settle)
             return
@@ -106,14 +106,14 @@ class Executor(AbstractContextManager["Executor"]):
             self._in_pool(ordinary, self._here, settle)
 
     def _without_suspects(self, works: Iterator[Work], settle: Settle) -> Iterator[Work]:
-        """Yield blocks; those that a run had begun when it crashed are computed in a process of their own first."""
+        """Yield the ordinary blocks; compute blocks that a crashed run had begun in a child process instead."""
         for work in works:
             if (key := work.key) in self._suspects and self._may_fork:
                 sentence = f"an earlier run ended while it computed block {key}: it is computed in a process of its own"
                 self._tell(Event("block suspected", {"block": key}, sentence))
                 try:
                     outcomes = self._in_child(work)
-                except (ImportError, ModelError):  # a model that is known in this process only
+                except (ImportError, ModelError):  # the model exists in this process only
                     outcomes = self._here(work)
                 for part, outcome in outcomes:
                     settle(part, outcome)
@@ -128,7 +128,7 @@ class Executor(AbstractContextManager["Executor"]):
         self._window.run(works, settle)
 
     def _in_pool(self, works: Iterable[Work], compute: Compute, settle: Settle) -> None:
-        """Run a window of blocks in threads. However it ends, the blocks that have begun are finished."""
+        """Compute a window of blocks in threads. Even after an error, the blocks that have begun are finished."""
         remaining = iter(works)
         running: set[Future[list[tuple[Work, Outcome]]]] = set()
         with ThreadPoolExecutor(self._threads) as pool:
@@ -158,7 +158,7 @@ class Executor(AbstractContextManager["Executor"]):
             self._note(work.key, is_begun=False)
 
     def _note(self, key: str, is_begun: bool) -> None:
-        """Write down which blocks have begun: if this process crashes, the next run knows where."""
+        """Record the blocks that are being computed, for the next run in case this process crashes."""
         with self._noting:
             (self._begun.add if is_begun else self._begun.discard)(key)
             store.note_begun(self._url, self._lock, sorted(self._begun))
@@ -174,7 +174,7 @@ class Executor(AbstractContextManager["Executor"]):
             self._children.put(child)
 
     def _free_child(self) -> Child:
-        """Return a child process that computes nothing; all are started together, when the first is needed."""
+        """Return an idle child process; all child processes are started when the first one is needed."""
         from mdr_dask.execute.children import children
 
         with self._noting:
@@ -186,7 +186,7 @@ class Executor(AbstractContextManager["Executor"]):
 
 
 def _for_a_while(works: Iterator[Work]) -> Iterator[Work]:
-    """Yield the blocks that are begun within `SHORT` seconds."""
+    """Yield blocks until `SHORT` seconds have passed."""
     start = time.monotonic()
     for work in works:
         yield work

@@ -10,23 +10,24 @@ from mdr_dask.task import Outcome
 
 @dataclass(frozen=True)
 class Progress:
-    """The state of a run, in results (one case in one realisation).
+    """The state of a run, in results (a result is one case in one realisation).
 
     Parameters
     ----------
     total, kept, done, failed, not_needed : int
-        All results of the campaign so far, those that were in the store before, and those of this run.
+        Numbers of results: in all rounds so far; in the store before the run; done, failed (or not converged), and
+        marked as not needed in this run.
     kept_failed : int
-        Those of `kept` that have failed.
+        Number of failed results among `kept`.
     warned : int
         Results of this run that are done and have a warning, such as a missed accuracy.
     blocks, solves : int
-        Blocks computed and solutions really computed in this run.
+        Number of blocks and of solutions that this run computed; results that share a solution count once.
     estimated, finished : float
-        Work by the model's estimate, in seconds: of all rounds so far, and of the blocks computed.
+        Time that the model estimates for all rounds so far, and for the finished blocks, in seconds.
     compute_seconds, compile_seconds, write_seconds, wall_seconds : float
-        Time in models, the part of it in which kernels were compiled, and time for writing, each summed over threads;
-        and time since the start.
+        Time in models, the part of it spent compiling kernels, and time for writing, each summed over threads; and time
+        since the start.
     """
 
     total: int = 0
@@ -47,12 +48,12 @@ class Progress:
 
     @property
     def to_do(self) -> int:
-        """Results still to come in this round."""
+        """Number of results that this round has not computed yet."""
         return self.total - self.kept - self.done - self.failed - self.not_needed
 
     @property
     def seconds_left(self) -> float | None:
-        """Time until the end of this round, from the pace of the blocks so far without compiling; None before any."""
+        """Time to the end of this round, from the pace of the blocks so far without compiling; None without a block."""
         busy = self.compute_seconds + self.write_seconds
         if not (self.finished > 0 and busy > 0 and self.wall_seconds > 0):
             return None
@@ -61,7 +62,7 @@ class Progress:
         return pace * max(self.estimated - self.finished, 0.0) / side_by_side
 
     def after(self, outcome: Outcome, wall_seconds: float) -> Progress:
-        """Return the state after one more block, so many seconds after the start."""
+        """Return the state after one more block, which ended `wall_seconds` after the start."""
         counts = outcome.counts
         return replace(
             self,

@@ -1,4 +1,4 @@
-"""What a run computes with."""
+"""The threads, processes or cluster of a run."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Resources:
-    """Where to run. By default on all cores of this machine: in threads, or in processes for a model in plain Python.
+    """Where a run computes. The default is all cores of this machine: in threads, or processes for plain Python models.
 
     Parameters
     ----------
     threads : int or None
-        Threads of this process.
+        Number of threads of this process.
     workers : int or None
-        Processes of this machine instead; threads where the system cannot fork.
+        Number of processes of this machine to use instead; threads if the system cannot fork.
     scheduler : str or None
-        Address of a running Dask scheduler instead.
+        Address of a running Dask scheduler to use instead.
     cluster : mapping or None
-        Content of a cluster file, as `mdr_dask.campaign.cluster.load_cluster` reads it: any Dask cluster instead.
+        Content of a cluster file, as `mdr_dask.campaign.cluster.load_cluster` returns it, of a Dask cluster to start.
     client : distributed.Client or None
-        A Dask client instead; it stays open.
+        A Dask client to use instead; it is not closed.
     patience : float
-        Seconds without any worker after which a run on a cluster gives up.
+        Seconds without any worker after which a run on a cluster ends with an error.
     case_timeout : float or None
-        Seconds after which a case has failed. Blocks are then computed in processes of their own.
+        Seconds after which a case fails. With a limit, blocks are computed in child processes.
     """
 
     threads: int | None = None

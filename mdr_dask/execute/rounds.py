@@ -1,7 +1,8 @@
-"""A run: stage after stage, round after round, until nothing of a campaign is missing in its store.
+"""A run: stage after stage, round after round, until no result of the campaign is missing in its store.
 
-A stage is a campaign with the values that its adaptive axes have so far. A round adds realisations to the cases that
-are not known well enough. Each follows from the results of the one before alone, so a run can be repeated at any time.
+A stage is a campaign with the values that its adaptive axes have so far. A round adds realisations to the cases whose
+errors are still too large. Each stage and each round depends only on the results of the previous one, so a run can be
+repeated at any time.
 """
 
 from __future__ import annotations
@@ -28,13 +29,13 @@ from mdr_dask.replication import GROWTH, growth_needed, known_scatter, next_roun
 from mdr_dask.store import Lock, Part
 from mdr_dask.task import Outcome, Work
 
-#: Seconds between two looks at what other parts have still to do, and between two messages about it.
+#: Seconds between two checks of the progress of other parts, and between two messages about it.
 LOOK, PAUSE = 1.0, 4.0
 
 
 @dataclass(frozen=True)
 class _Job:
-    """What a run computes, and whom it reports to."""
+    """The arguments of a run: what to compute, where, and the functions that receive progress and events."""
 
     stage: Stage
     url: str
@@ -55,13 +56,13 @@ class _Round:
     layout : tuple of Template
         The shape of the store.
     places : tuple
-        Where the cases of the stage are in the store.
+        Positions of the cases of the stage in the store.
     asked, needed : list of bool array, shape of the cases
-        Cases of the stage in each group, and those that need the realisations of this round.
+        For each group, the cases of the stage, and the cases that need the realisations of this round.
     realisations : tuple of int
-        From, to.
+        First realisation of the round, and the one after its last.
     taken : tuple of int array, shape of the cases
-        How many realisations each case has.
+        For each group, the number of realisations of each case after the round.
     """
 
     layout: tuple[Template, ...]
@@ -81,42 +82,42 @@ def run(
     part: Part | None = None,
     tell: Tell = lambda _: None,
 ) -> Progress:
-    """Run a campaign into a store: everything, or what is missing.
+    """Compute the results of a campaign that are missing in its store.
 
     Parameters
     ----------
     campaign : Campaign
-        What to compute.
+        The campaign.
     url : str
-        Path or URL of the store; made, resumed or extended.
+        Path or URL of the store, which is created, resumed or extended.
     resources : Resources
-        Where to compute it.
+        Threads, processes or cluster of the run.
     report : callable
         Called with the progress after every block.
     retry_failed : bool
-        Compute the cases again that failed or did not converge.
+        Whether to compute failed and not converged cases again.
     part : Part, optional
-        Only the blocks of this part, while other parts run at the same time.
+        Compute only the blocks of this part; other parts may run at the same time.
     tell : callable
         Called with every `Event`, from any thread.
 
     Returns
     -------
     Progress
-        The state at the end, of the part if it is one.
+        The state at the end, counting only the results of the part if `part` is given.
 
     Raises
     ------
     StoreError
-        If the store was made from another campaign, or is damaged; nothing is touched.
+        If the store was made from another campaign, or is damaged; the store is then unchanged.
     StoreBusyError
-        If another run is at work on it.
+        If another run is active in the store.
     CampaignError
         If the campaign is too large to be run.
     ClusterError
-        If a cluster cannot be started, goes away, or has no worker for too long.
+        If a cluster cannot be started, disappears, or has no worker for too long.
     MachineError
-        If this machine cannot compute the model, because a disk is full, for example.
+        If this machine cannot compute the model, for example because a disk is full.
     """
     check(resources)
     if campaign.replication.answers:
@@ -124,11 +125,11 @@ def run(
 
         require_known(campaign)
     stage = Stage.first(campaign)
-    stored_layout(stage, url)  # refuses before anything is locked
+    stored_layout(stage, url)  # raises an error before anything is locked
     url = store.absolute(url)  # a model may change the working directory
     with Executor(resources, campaign.model, url, tell) as execute:
         if not store.exists(url):
-            execute.connect()  # a cluster that cannot be reached leaves no new store
+            execute.connect()  # before a new store is created
         with store.exclusive(url) if part is None else store.shared(url, part) as lock:
             execute.hold(lock)
             if store.exists(url):
@@ -153,9 +154,10 @@ def _merge(job: _Job) -> None:
 
 
 def outlook(campaign: Campaign, url: str) -> Progress:
-    """Return what a store holds of a campaign, without touching it: results kept and to do.
+    """Return how many results of a campaign are in a store and how many are missing; the store is only read.
 
-    Of realisations in rounds the first round counts, of adaptive axes all values that are known to be needed.
+    If realisations are added in rounds, only the first round counts. On adaptive axes, all values count that are known
+    to be needed.
 
     Raises
     ------
@@ -180,7 +182,7 @@ def outlook(campaign: Campaign, url: str) -> Progress:
 
 
 def _run_stages(job: _Job) -> Progress:
-    """Run a campaign, and again with the values that its adaptive axes still need, until they need no more."""
+    """Run the stages of a campaign, until its adaptive axes need no more values."""
     start = time.monotonic()
     progress = Progress()
 
@@ -218,9 +220,9 @@ def _run_stages(job: _Job) -> Progress:
 def _run_rounds(
     job: _Job, run_round: Callable[[_Round, list[Cells]], None], current: _Round | None = None
 ) -> _Round | None:
-    """Run round after round, each over the cases that the one before left too uncertain.
+    """Run round after round; each adds realisations to the cases whose errors are still too large.
 
-    Returns the last round; None if this part ends while other parts are not done with it.
+    Return the last round, or None if another part has not finished a round and is not running.
     """
     replication = job.stage.campaign.replication
     while current is None or (replication.goes_on and current.realisations[1] < replication.at_most):
@@ -241,7 +243,7 @@ def _run_rounds(
 
 
 def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], None], realisations: int) -> None:
-    """Run rounds for fitted constants with all values of the axes, and mark what nothing needs as not needed."""
+    """Run the rounds for fitted constants, with all values of the axes; then mark the unused results as not needed."""
     layout, places = stored_layout(job.stage, job.url)
     if job.stage.campaign.replication.answers:
         job = replace(job, stage=replace(job.stage, new=tuple(mesh.cases for mesh in job.stage.meshes)))
@@ -260,14 +262,14 @@ def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], None], rea
 
 
 def _without_answers(job: _Job) -> _Job:
-    """Return a job that chooses values of axes alone: fits need all of them."""
+    """Return the job without tolerances of fitted constants, because fits need all values of the adaptive axes."""
     campaign = job.stage.campaign
     campaign = replace(campaign, replication=replace(campaign.replication, answers={}))
     return replace(job, stage=replace(job.stage, campaign=campaign))
 
 
 def _next(job: _Job, last: _Round | None) -> _Round:
-    """Return the next round, with the store laid out for it if any case takes part; other parts wait meanwhile."""
+    """Return the next round; if any case needs it, lay out the store for it while other parts wait."""
     replication = job.stage.campaign.replication
     with store.gate(job.url):
         layout, places = stored_layout(job.stage, job.url)
@@ -286,7 +288,7 @@ def _next(job: _Job, last: _Round | None) -> _Round:
 
 
 def _laid_out(job: _Job, layout: tuple[Template, ...], count: int) -> tuple[Template, ...]:
-    """Lay a study out for so many realisations."""
+    """Lay a study out for `count` realisations, unless this was done before."""
     sizes = [{**t.sizes, "realisation": max(t.sizes["realisation"], count)} for t in layout]
     layout = tuple(replace(template, sizes=each) for template, each in zip(layout, sizes, strict=True))
     if not store.is_laid_out(job.url, layout):
@@ -299,14 +301,14 @@ def _laid_out(job: _Job, layout: tuple[Template, ...], count: int) -> tuple[Temp
 
 
 def _growth(job: _Job, layout: tuple[Template, ...], places: Places, last: _Round) -> list[FloatArray]:
-    """Return how many times as many realisations each case of a round needs; at most 1 if it has enough."""
+    """Return the factor by which the number of realisations of each case must grow; at most 1 if there are enough."""
     own = [
         np.where(mask, _growth_of(job.url, template, last.realisations[1]), 0.0) if mask.any() else np.zeros(mask.shape)
         for mask, template in zip(last.needed, layout, strict=True)
     ]
     if not job.stage.campaign.replication.answers:
         return own
-    from mdr_dask.execute.answers import cases_that_narrow  # imports the fits
+    from mdr_dask.execute.answers import cases_that_narrow  # late, because it imports the fits
 
     narrow = cases_that_narrow(job.url, job.stage, layout, places, last.taken)
     return [np.where(cases, np.maximum(each, GROWTH), each) for each, cases in zip(own, narrow, strict=True)]
@@ -331,7 +333,7 @@ def _find(job: _Job, current: _Round) -> list[Cells]:
 
 
 def _require_seen(job: _Job, current: _Round) -> None:
-    """Raise StoreError unless everything that was computed is seen in the store from here."""
+    """Raise StoreError unless this process finds all computed results in the store."""
     lost = sum(cells.new for cells in _find(replace(job, retry_failed=False), current))
     if lost:
         where = "workers need a shared file system or a URL"
@@ -339,7 +341,7 @@ def _require_seen(job: _Job, current: _Round) -> None:
 
 
 def _others_are_done(job: _Job, part: Part, current: _Round) -> bool:
-    """Wait until the other parts have done their share of a round; return False if one of them is not at work."""
+    """Wait until the other parts have finished a round; return False if a part that has not finished is not running."""
     what = f"the round of {current.realisations[1]} realisations needs results of parts"
     reported = time.monotonic()
     while True:
@@ -358,7 +360,7 @@ def _others_are_done(job: _Job, part: Part, current: _Round) -> bool:
 
 
 def _late(job: _Job, part: Part, current: _Round) -> set[int]:
-    """Return the numbers of the parts that a round still needs results of."""
+    """Return the numbers of the parts whose results are still missing in a round."""
     groups = _find(replace(job, part=None, retry_failed=False), current)
     numbers = owners(current.layout, part.count)
     return {int(n) for cells, owner in zip(groups, numbers, strict=True) for n in owner[cells.wanted | cells.spared]}

@@ -1,7 +1,7 @@
-"""Stages of a campaign with adaptive axes: what the store holds of one, and which values the next one adds.
+"""Stages of a campaign with adaptive axes: the cases of a stage in the store, and the values of the next stage.
 
-A stage follows from the results of the one before alone. So it can be found again at any time, whatever else the store
-holds.
+A stage depends only on the results of the previous stage. So it can be determined again at any time, whatever other
+results the store holds.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from mdr_dask.models.base import Status
 from mdr_dask.plan import Template, templates
 from mdr_dask.refinement import Mean, Mesh, Stage, refined
 
-#: For each group, where the entries of each dimension of a stage lie in the store.
+#: For each group, the positions in the store of the entries of a stage along each dimension.
 Places = tuple[Mapping[str, IntArray], ...]
 
 
 def stored_layout(stage: Stage, url: str) -> tuple[tuple[Template, ...], Places]:
-    """Return the layout of a stage together with the stored study, and the places of its own cases in it.
+    """Return the layout of the stored study extended by a stage, and the positions of the cases of the stage in it.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def _all_of(template: Template) -> Mapping[str, IntArray]:
 
 
 def cases_of(stage: Stage, layout: Sequence[Template], places: Places, cases: Sequence[BoolArray]) -> list[BoolArray]:
-    """Return some cases of a stage, given over the dimensions of its series, over those of the store."""
+    """Return masks of cases over the dimensions of the store, from masks over the dimensions of each series."""
     found = []
     for mesh, template, place, wanted in zip(stage.meshes, layout, places, cases, strict=True):
         dims = template.dims[:-1]
@@ -59,7 +59,7 @@ def cases_of(stage: Stage, layout: Sequence[Template], places: Places, cases: Se
 def following(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, realisations: int
 ) -> tuple[Stage | None, Event]:
-    """Choose more values by so many realisations of a stage that is done; return the next stage, if there is one."""
+    """Return the next stage after a finished one, or None if no values are needed; use the first `realisations`."""
     meshes, short = [], []
     facts: dict[str, int] = {}
     for mesh, template, place in zip(stage.meshes, layout, places, strict=True):
@@ -75,7 +75,7 @@ def following(
 
 
 def _short(series: str, mesh: Mesh, number: int, count: int) -> str:
-    """Return why some cases of the other axes miss the tolerance along an adaptive one."""
+    """Return a sentence with the reason why interpolation along an adaptive axis misses its tolerance in some cases."""
     axis, values = mesh.series.axes[number], mesh.used[number].sum(axis=-1)
     others, most = values.size, mesh.refinement(number).at_most
     why = f"{most} values are allowed" if (values >= most).any() else "it jumps or bends within a 1000th of the axis"
@@ -86,7 +86,7 @@ def _short(series: str, mesh: Mesh, number: int, count: int) -> str:
 def _means(
     url: str, mesh: Mesh, template: Template, place: Mapping[str, IntArray], realisations: int
 ) -> dict[str, Mean]:
-    """Return the means of the outputs that decide, over the cases of a series."""
+    """Return the means of all outputs with a tolerance for interpolation, over the cases of a series."""
     dims, own, name = template.dims[:-1], list(mesh.series.sizes), template.series.name
     cases = np.ix_(*(place[dim] for dim in dims), np.arange(realisations))
     order = [*(dims.index(dim) for dim in own), len(dims)]

@@ -1,4 +1,4 @@
-"""A window of tasks on a Dask cluster, one block each: as many as keep its workers busy."""
+"""A window of tasks on a Dask cluster: enough blocks are submitted at the same time to keep its workers busy."""
 
 from __future__ import annotations
 
@@ -19,41 +19,41 @@ from mdr_dask.execute.children import Child, children, compute_apart
 from mdr_dask.execute.events import Event, Settle, Tell, of_block
 from mdr_dask.task import Outcome, Work, finished, one_blas_thread, run_block, write_off
 
-#: Seconds between two looks at the cluster.
+#: Seconds between two checks of the cluster.
 LOOK = 1.0
 #: Seconds between two messages that there is no worker.
 SILENCE = 3.0
-#: Seconds that a scheduler has for a short answer.
+#: Seconds to wait for a short answer of the scheduler.
 ANSWER = 3.0
-#: Topic under which workers report the blocks that they begin.
+#: Name of the Dask topic under which workers report blocks that they begin.
 TOPIC = "mdr_dask"
 KEPT = "what is in the store is kept: run the campaign again"
 
-#: Holds the child process of a worker open; its threads use it one after the other.
+#: Context of the child process of a worker, and the lock with which the threads of the worker take turns to use it.
 _OPEN, _APART = ExitStack(), threading.Lock()
 
 Outcomes = list[tuple[Work, Outcome]]
 
 
 class TaskWindow:
-    """Blocks on the workers of a cluster, a few more than are being computed.
+    """The blocks that are submitted to a cluster at the same time, a few more than it computes.
 
     Parameters
     ----------
     client : Client
         Connection to the cluster.
     tell : callable
-        Takes events.
+        Receives events.
     patience : float
-        Seconds without any worker after which to give up.
+        Seconds without any worker after which the run ends with an error.
     most : int
-        Threads that the cluster may grow to by itself, 0 if it does not.
+        Largest number of threads of an adaptive cluster, 0 for any other.
     replace_lost : callable
         Requests new workers in place of lost ones.
     last_message : callable
         Returns the last error message of the cluster, or an empty string.
     case_timeout : float or None
-        Seconds after which a case has failed.
+        Seconds after which a case fails.
     """
 
     def __init__(
@@ -77,12 +77,12 @@ class TaskWindow:
         client.subscribe_topic("all", self._hear_of_worker)
 
     def run(self, works: Iterable[Work], settle: Settle) -> None:
-        """Compute blocks; those whose worker died are computed once more, in a process that may die.
+        """Compute blocks. A block whose worker died is computed once more, in a child process of a worker.
 
         Raises
         ------
         ClusterError
-            If the scheduler goes away, there is no worker for too long, or a worker cannot do its task.
+            If the scheduler disappears, there is no worker for too long, or a worker cannot run its task.
         StoreError
             If the store cannot be read or written.
         """
@@ -106,7 +106,7 @@ class TaskWindow:
                     outcomes = _outcomes(future)
                 except Empty:
                     continue
-                except TimeoutError:  # its worker went away with the result
+                except TimeoutError:  # the worker with the result has disappeared
                     future.add_done_callback(self._ended.put)
                     continue
                 work = self._running.pop(future)
@@ -129,7 +129,7 @@ class TaskWindow:
         future.add_done_callback(self._ended.put)
 
     def _look(self) -> None:
-        """Give up when the scheduler is gone, or when there has been no worker for too long."""
+        """Check the cluster: raise ClusterError if the scheduler is gone or there was no worker for too long."""
         if self._client.status != "running":
             raise ClusterError(f"the scheduler went away; {KEPT}")
         self._replace_lost()
@@ -164,7 +164,7 @@ class TaskWindow:
 
 
 def _outcomes(future: Future) -> Outcomes | None:
-    """Return the result of a task, None if its workers died; other errors end the run with one sentence."""
+    """Return the result of a task, or None if its workers died; raise other errors, with one sentence."""
     from concurrent.futures import CancelledError
 
     try:
@@ -181,7 +181,7 @@ def _outcomes(future: Future) -> Outcomes | None:
 
 
 def _run(work: Work, _: float | None) -> Outcomes:
-    """Compute a block in a worker, unless it was finished by a worker that died before it could say so."""
+    """Compute a block in a worker, unless another worker wrote it completely and died before it could report that."""
     outcome = finished(work)
     if outcome is None:
         _report(work)
@@ -195,7 +195,7 @@ def _run_apart(work: Work, limit: float | None) -> Outcomes:
     try:
         with _APART:
             return list(compute_apart(_child(work.model), work, limit))
-    except (ImportError, ModelError):  # a model that only this process has
+    except (ImportError, ModelError):  # the model exists in this process only
         return _run(work, limit)
 
 
@@ -206,5 +206,5 @@ def _report(work: Work) -> None:
 
 @lru_cache(maxsize=1)
 def _child(model: str) -> Child:
-    """Return the child process of this worker; it ends with the worker."""
+    """Return the child process of this worker, which ends together with the worker."""
     return _OPEN.enter_context(children(1, model))[0]
