@@ -1,6 +1,6 @@
-"""The lubricated line contact: film, pressure and traction over load, speed and material parameter.
+"""The lubricated line contact: film, pressure and traction as functions of load, speed and material parameter.
 
-`declaration` has parameters and outputs and is light to import; `solve` turns a block into arrays.
+`declaration` holds parameters and outputs and is fast to import; `solve` computes the arrays of a block.
 """
 
 from mdr_dask.models.ehl_line.declaration import MODEL, EhlLineParameters, groups

@@ -12,12 +12,12 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import distinguishable
 from mdr_dask.models.base import Alternatives, Block, Coordinate, Model, Number, Output, Parameters, deferred, quantity
 
-#: Contact modulus of steel on steel, 210 GPa and 0.3 each.
+#: Contact modulus of steel on steel, with E = 210 GPa and nu = 0.3 for both.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
-#: Relative error of the films where the campaign names none.
+#: Relative error of the films if the campaign states no accuracy.
 ACCURACY = 1e-3
 
-#: Each dimensionless number, its dimensional counterpart, and the parameters that the latter needs.
+#: Each dimensionless number, its dimensional counterpart, and the further parameters that the counterpart needs.
 _PAIRS = (
     ("load_parameter", "line_load", ("radius",)),
     ("speed_parameter", "mean_velocity", ("radius", "viscosity")),
@@ -74,7 +74,7 @@ class EhlLineParameters(Parameters):
 
     @model_validator(mode="after")
     def _one_of_each_pair(self) -> Self:
-        """Demand one of each pair and what it needs."""
+        """Require one parameter of each pair, and the parameters that it needs."""
         for number, dimensional, companions in _PAIRS:
             given = [name for name in (number, dimensional) if getattr(self, name) is not None]
             if len(given) != 1:
@@ -130,7 +130,7 @@ def groups(lookup: Callable[[str], Any]) -> tuple[Any, Any, Any]:
     Parameters
     ----------
     lookup : callable, str -> array or None
-        Gives the values of a parameter, None for one that is not given.
+            Returns the values of a parameter, or None if it is not given.
     """
     modulus = 2 * lookup("contact_modulus")
     W, U, G = lookup("load_parameter"), lookup("speed_parameter"), lookup("material_parameter")
@@ -152,7 +152,7 @@ distinct = deferred("mdr_dask.models.ehl_line.solve", "distinct")
 
 
 def seconds(block: Block[EhlLineParameters]) -> float:
-    """Return the estimated time of `compute`: some 6 ms a solution, or the finest grid where a spike is requested."""
+    """Return the estimated time of `compute`: about 6 ms per solution; the finest grid if a spike must be accurate."""
     accuracy = block.accuracy or ACCURACY
     is_sharp = block.accuracy is not None and {"pressure", "spike_pressure", "spike_position"} & set(block.outputs)
     each = 1.5 if is_sharp else 0.006 * float(np.clip((ACCURACY / accuracy) ** 0.4, 0.8, 30.0))
@@ -160,12 +160,12 @@ def seconds(block: Block[EhlLineParameters]) -> float:
 
 
 def memory(_: Block[EhlLineParameters]) -> float:
-    """Return the memory of one solution on the finest grid allowed: some three dense matrices of 1281 nodes."""
+    """Return the memory of one solution on the finest grid: about three dense matrices of 1281 nodes."""
     return 3.0 * 8 * 1281**2
 
 
 def coordinates(parameters: EhlLineParameters) -> dict[str, Coordinate]:
-    """Return the positions of film and pressure."""
+    """Return the coordinate of film and pressure."""
     return {"position": Coordinate(positions(parameters), "1", "position over the half width x/a, flow to the right")}
 
 

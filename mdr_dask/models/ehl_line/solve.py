@@ -1,4 +1,4 @@
-"""From a block of lubricated line contacts to arrays."""
+"""Solution of a block of lubricated line contacts."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from mdr_dask.physics.lubrication.line_contact import (
 )
 from mdr_dask.physics.outcome import Outcome
 
-#: Outputs whose errors count relative to the half width, in which they are given.
+#: Outputs whose errors are relative to the half width, which is their unit.
 _POSITIONS = {"minimum_position", "rupture_position", "spike_position"}
 
 
@@ -43,7 +43,7 @@ def _groups(block: Block[EhlLineParameters]) -> Groups:
 
 
 def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
-    """Return the dimensionless case of every case; equal ones share a solution."""
+    """Return the dimensionless form of every case; equal ones share a solution."""
     names = ("contact_modulus", "viscosity_law", "viscosity", "compressible", "inlet")
     columns = zip(*(block.column(name).tolist() for name in names), strict=True)
     return [
@@ -57,7 +57,7 @@ def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
 
 
 def _readings(case: EhlLineParameters, W: float, contact: LineContact) -> dict[str, Reading]:
-    """Return how each output is read from a grid, in Hertz units."""
+    """Return, for each output, a function that evaluates it on a grid, in Hertz units."""
     p0 = highest_pressure(case.contact_modulus, W)
     stress = case.eyring_stress / p0 if case.shear_law == "eyring" else None
     place = positions(case)
@@ -76,14 +76,14 @@ def _readings(case: EhlLineParameters, W: float, contact: LineContact) -> dict[s
 
 
 def highest_pressure(contact_modulus: float, W: float) -> float:
-    """Return Hertz' highest pressure p0 in Pa."""
+    """Return Hertz' maximum pressure p0 in Pa."""
     return 2 * contact_modulus * float(np.sqrt(W / (2 * np.pi)))
 
 
 def _estimates(
     case: EhlLineParameters, W: float, solution: LineSolution, outputs: Collection[str]
 ) -> dict[str, Estimate]:
-    """Return the requested outputs that the solution gives, each with its error, in their units."""
+    """Return the requested outputs of a solution, each with its error, in their units."""
     film, p0 = square_of_half_width(W), highest_pressure(case.contact_modulus, W)
     metres = film * (np.nan if case.radius is None else case.radius)
     place, readings = positions(case), _readings(case, W, solution.case)
@@ -105,7 +105,7 @@ def _estimates(
 
 
 def compute(block: Block[EhlLineParameters]) -> Result:
-    """Solve every different case of a block once; realisations of a case are the same."""
+    """Solve every different case of a block once; all realisations of a case are equal."""
     parameters = _groups(block)
     given = dict(
         zip(

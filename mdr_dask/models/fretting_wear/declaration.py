@@ -25,7 +25,7 @@ class Parabola(Parameters):
 
     @property
     def power_law(self) -> tuple[float, float]:
-        """Coefficient, NaN if it is not given, and exponent of the body c r^n."""
+        """Coefficient (NaN if it is not given) and exponent of the body c r^n."""
         return (math.nan if self.radius is None else 0.5 / self.radius), 2.0
 
 
@@ -39,7 +39,7 @@ class Cone(Parameters):
 
     @property
     def power_law(self) -> tuple[float, float]:
-        """Coefficient, NaN if it is not given, and exponent of the body c r^n."""
+        """Coefficient (NaN if it is not given) and exponent of the body c r^n."""
         return (math.nan if self.angle is None else math.tan(self.angle)), 1.0
 
 
@@ -52,7 +52,7 @@ class Power(Parameters):
 
     @property
     def power_law(self) -> tuple[float, float]:
-        """Coefficient, NaN if it is not given, and exponent of the body c r^n."""
+        """Coefficient (NaN if it is not given) and exponent of the body c r^n."""
         return (math.nan if self.coefficient is None else self.coefficient), self.exponent
 
 
@@ -85,10 +85,10 @@ def profile_columns(file: NamedFile) -> tuple[FloatArray, FloatArray]:
 
 
 Indenter = Annotated[Parabola | Cone | Power | Other | Table, Field(discriminator="shape")]
-#: Bodies whose image is known at one depth only.
+#: Bodies that are not power laws; each indentation depth needs its own image.
 Pressed = Other | Table
 
-#: What gives the size of a body in a dimensional campaign.
+#: The parameter that gives the size of a body in a dimensional campaign.
 _SIZES = {"parabola": "radius", "cone": "angle", "power": "coefficient"}
 
 
@@ -100,7 +100,7 @@ class LoadStep(Parameters):
     load_factor: float = quantity("1", "depth or force over its first value", gt=0, default=1.0)
 
 
-#: The fast rule under constant force.
+#: Message if the fast rule is requested under constant force.
 FAST_AT_DEPTH = "wear_rule fast is for constant depth only: write wear_rule: exact for hold: force"
 _OSCILLATION = ("effective_shear_modulus", "friction", "amplitude")
 
@@ -182,7 +182,7 @@ class FrettingWear(Parameters):
 
     @property
     def dimensionless(self) -> bool:
-        """Whether lengths are over a0, heights over d0 and so on."""
+        """Whether the campaign is dimensionless: lengths over a0, heights over d0, and so on."""
         return self.stick_radius is not None or (self.path is not None and self.contact_modulus is None)
 
     @model_validator(mode="after")
@@ -283,12 +283,12 @@ OUTPUTS = (
 
 
 def axis(parameters: FrettingWear) -> FloatArray:
-    """Return the radii, or positions, of the profiles, over a0."""
+    """Return the radii or positions of the profiles, over a0."""
     return np.linspace(0.0, parameters.extent, parameters.points)
 
 
 def coordinates(parameters: FrettingWear) -> dict[str, Coordinate]:
-    """Return radii, positions and numbers of blocks."""
+    """Return the coordinates of the outputs: radii, positions and block numbers."""
     places = axis(parameters)
     return {
         "radius": Coordinate(places, "1", "radius over the first contact radius a0"),
@@ -298,7 +298,7 @@ def coordinates(parameters: FrettingWear) -> dict[str, Coordinate]:
 
 
 def units(parameters: FrettingWear) -> dict[str, str]:
-    """Return the units of a dimensionless campaign: every output is a pure number, and so is the path."""
+    """Return the units of a dimensionless campaign, in which every output and the path are pure numbers."""
     return {"path": "1"} | {output.name: "1" for output in OUTPUTS} if parameters.dimensionless else {}
 
 

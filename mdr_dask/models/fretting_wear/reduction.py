@@ -1,4 +1,4 @@
-"""From the parameters of a block to what the physics of wear needs: n, g_c and N of every case and realisation."""
+"""Conversion of the parameters of a block to n, g_c and N of every case and realisation."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from mdr_dask.models.parts.indenter import Other
 if TYPE_CHECKING:
     from mdr_dask.physics.mdr.revolution import TableProfile
 
-LEAST = 1e-60  # units of length, height and force from here to its reciprocal have cubes
-MOST_CYCLES = 1e12  # N beyond which nothing is left to wear off
+LEAST = 1e-60  # smallest unit of length, height and force, and reciprocal of the largest: their cubes do not overflow
+MOST_CYCLES = 1e12  # largest N; wear has ended long before
 
 
 @dataclass(frozen=True)
 class Numbers:
-    """What the physics needs of every case and realisation, and the units of the case; shape (cases, realisations).
+    """The input of the physics for every case and realisation, and the units of the cases; shape (cases, realisations).
 
     `level` is g_c = 1 - eta, the image at the stick border; `advance` is the factor from cycles to N.
     """
@@ -40,14 +40,14 @@ class Numbers:
 
 
 def indenters(block: Block[FrettingWear]) -> list[Indenter]:
-    """Return the indenter of every case, or the one that all share but for numbers that vary."""
+    """Return the indenter of every case, or a single one if all cases share it except for numbers that vary."""
     if isinstance(block.parameters.indenter, Pressed) and any(path.startswith("indenter") for path in block.columns):
         return [block.case(case).indenter for case in range(block.cases)]
     return list(block.columns["indenter"]) if "indenter" in block.columns else [block.parameters.indenter]
 
 
 def _power_laws(block: Block[FrettingWear]) -> tuple[FloatArray, FloatArray]:
-    """Return coefficient and exponent of every case, NaN where they are not given."""
+    """Return coefficient and exponent of every case, NaN if they are not given."""
     none = np.nan, np.nan
     coefficient, exponent = np.array(
         [none if isinstance(one, Pressed) else one.power_law for one in indenters(block)]
@@ -63,12 +63,12 @@ def _power_laws(block: Block[FrettingWear]) -> tuple[FloatArray, FloatArray]:
 
 
 def has_tables(block: Block[FrettingWear]) -> bool:
-    """Return whether an indenter is no power law."""
+    """Return whether any indenter is not a power law."""
     return any(isinstance(one, Pressed) for one in indenters(block))
 
 
 def _column(block: Block[FrettingWear], name: str) -> FloatArray:
-    """Return a number of every case, NaN where it is not given."""
+    """Return the value of a parameter for every case, NaN if it is not given."""
     if name not in block.columns:
         value = getattr(block.parameters, name)
         return np.full(block.cases, np.nan if value is None else float(value))
@@ -86,13 +86,13 @@ def _scatter(block: Block[FrettingWear]) -> FloatArray:
 
 
 def _factor(block: Block[FrettingWear], name: str, normal: FloatArray) -> FloatArray:
-    """Return log-normal factors of mean one, shape (cases, realisations)."""
+    """Return log-normal factors with mean one, shape (cases, realisations)."""
     width = np.sqrt(np.log1p(_column(block, name) ** 2))[:, None]
     return np.asarray(np.exp(width * normal - 0.5 * width**2))
 
 
 def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str]]:
-    """Turn every case into n, g_c and N, and keep its units a0, d0 and E* d0 a0; sliding has g_c = 0, and s for N."""
+    """Return n, g_c and N of every case, and its units a0, d0, E* d0 a0; for sliding g_c = 0, and N is the path s."""
     with np.errstate(all="ignore"):
         numbers, messages = _reduced(block)
     for case, position in np.argwhere(numbers.level >= 1):
@@ -143,7 +143,7 @@ def _first_contact(
     modulus: FloatArray,
     messages: dict[tuple[int, int], str],
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a0 and d0 of dimensional cases; a table that cannot be pressed so deep is a message."""
+    """Return a0 and d0 of dimensional cases; if a table is too short for the depth, add a message."""
     from mdr_dask.physics.mdr import power_law_contact as contact
 
     depth, force = _column(block, "depth"), _column(block, "normal_force")
@@ -162,7 +162,7 @@ def _first_contact(
 
 
 def table_profile(indenter: Indenter, depth: float) -> TableProfile:
-    """Press a body that is no power law; cached by content."""
+    """Return the contact of a body that is not a power law at a depth; cached by content."""
     if not isinstance(indenter, Pressed):
         raise ValueError("power laws and other profiles cannot be mixed along one axis")
     return _pressed_table(indenter.file, depth) if isinstance(indenter, Table) else _pressed_body(indenter, depth)
@@ -183,7 +183,7 @@ def _pressed_body(indenter: Other, depth: float) -> TableProfile:
 
 
 def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: dict[tuple[int, int], str]) -> None:
-    """Note every case in which nothing sticks, unless its blocks of load are allowed to slip."""
+    """Add a message for every case of gross slip, which only histories and sliding along a path allow."""
     if block.parameters.path is not None or block.parameters.history or "history" in block.columns:
         return
     for case, realisation in np.argwhere(~(numbers.level > 0.0)):

@@ -1,4 +1,4 @@
-"""From a block of fretting wear to arrays: each distinct (body, c, rule) is solved once, for all its cycles."""
+"""Solution of a block of fretting wear: each distinct body, stick radius and rule is solved once for all cycles."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ from mdr_dask.physics.wear.forced import SETTINGS as FORCED
 from mdr_dask.physics.wear.history import LoadBlock, history
 from mdr_dask.physics.wear.worn import Worn
 
-#: Numbers of the closed forms, which are computed for many cases at once.
+#: Outputs of the closed forms, which are computed for many cases at once.
 _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border")
-#: Outputs whose name in a campaign is not that of a worn contact's number: a parameter has it.
+#: Outputs whose name differs from the attribute of `Worn`, because a parameter already has that name.
 _RENAMED = {"contact_force": "normal_force"}
-#: Resolution of the evolution (error of the profile over eta d0) without an accuracy of the campaign, and at best.
+#: Error of the profile over eta d0 for which the evolution is solved: without an accuracy in the campaign; the least.
 _USUAL, _FINEST = 1e-3, 1e-5
-#: With one, the first resolution over the accuracy, and the factor to the next one where an output misses it.
+#: With an accuracy: first such error over the accuracy, and the factor for the next one if an output misses it.
 _FIRST, _FINER = {"depth": 0.2, "force": 0.6}, 0.25
 
-#: Positions of cases in a block.
+#: Indices (case, realisation) in a block.
 Places = list[tuple[int, int]]
 
 
 @dataclass(frozen=True)
 class Task:
-    """What makes a solution that several cases share: everything but the number of cycles and xi."""
+    """Input of a solution that several cases share: everything except the number of cycles and xi."""
 
     table: Pressed | None
     depth: float
@@ -75,7 +75,7 @@ def compute(block: Block[FrettingWear]) -> Result:
 
 
 def distinct(block: Block[FrettingWear]) -> int:
-    """Count the different solutions among the cases of a block, those of `compute`."""
+    """Return the number of different solutions of a block, as `compute` counts them."""
     numbers, _, status = _reduced(block)
     if _is_plain(block):
         return _count(numbers.exponent, numbers.level, numbers.cycles, numbers.xi)
@@ -83,7 +83,7 @@ def distinct(block: Block[FrettingWear]) -> int:
 
 
 def seconds(block: Block[FrettingWear]) -> float:
-    """Estimate the time of a block."""
+    """Return the estimated time of a block in seconds."""
     parameters, size = block.parameters, block.cases * len(block.realisations)
     if _is_plain(block):
         return 0.01 + 1e-5 * size
@@ -101,14 +101,14 @@ def seconds(block: Block[FrettingWear]) -> float:
 
 
 def _followed(hold: str, accuracy: float) -> float:
-    """Estimate the time of one evolution with its errors, but for what describes its moments."""
+    """Return the estimated time of one evolution and its errors, without the evaluation at single times."""
     if hold == "force":
         return 0.09 * float(max(FORCED.coarsest / accuracy, 1.0) ** 1.1)
     return 0.012 * float((_USUAL / accuracy) ** 0.6)
 
 
 def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str], NDArray[np.int8]]:
-    """Return the numbers of a block, what is wrong with cases, and their status so far."""
+    """Return the numbers of a block, messages about invalid cases, and the status that follows from them."""
     numbers, messages = reduce_block(block)
     refuse_gross_slip(block, numbers, messages)
     status = np.full(numbers.level.shape, Status.DONE, dtype=np.int8)
@@ -118,20 +118,20 @@ def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int],
 
 
 def _plain_name(name: str) -> tuple[str, bool]:
-    """Return the output of one contact that an output, or an error, of a campaign is, and whether it is an error."""
+    """Return the name of a worn contact's output for an output of a campaign, and whether the latter is an error."""
     owners = {companion.name: owner for owner, companion in MODEL.companions.items()}
     plain = owners.get(name, name).removeprefix("block_")
     return _RENAMED.get(plain, plain), name in owners
 
 
 def _sizes(parameters: FrettingWear, name: str) -> tuple[int, ...]:
-    """Return the lengths of the dimensions that an output has of its own."""
+    """Return the sizes of an output's own dimensions."""
     lengths = {"block": max(len(parameters.history), 1)}
     return tuple(lengths.get(dim, parameters.points) for dim in MODEL.output(name).dims)
 
 
 def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
-    """Give the outputs of dimensional cases their units; dimensionless cases have units of one."""
+    """Multiply the outputs by the units of their case, which are 1 for dimensionless cases."""
     units = {
         "contact_radius": numbers.length,
         "stick_border": numbers.length,
@@ -149,7 +149,7 @@ def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
 
 
 def _is_plain(block: Block[FrettingWear]) -> bool:
-    """Return whether every case is a power law with scalar outputs by the limit or the fast rule at constant depth."""
+    """Return whether closed forms suffice: power laws, scalars, limit or fast rule, constant depth, no history."""
     simple = set(block.columns.get("wear_rule", [block.parameters.wear_rule])) <= {"limit", "fast"}
     depth = set(block.columns.get("hold", [block.parameters.hold])) == {"depth"}
     wanted = {
@@ -163,7 +163,7 @@ def _is_plain(block: Block[FrettingWear]) -> bool:
 def _solve_plain(
     block: Block[FrettingWear], numbers: Numbers, values: dict[str, FloatArray], good: NDArray[np.bool_]
 ) -> int:
-    """Solve limits and fast rules of power laws, all at once; return how many were distinct."""
+    """Solve limits and fast rules of power laws, all at once; return the number of distinct ones."""
     is_fast = np.asarray(block.column("wear_rule") == "fast")
     fast = np.broadcast_to(is_fast[:, None], good.shape)[good]
     cycles, xi = np.where(fast, numbers.cycles[good], np.inf), np.where(fast, numbers.xi[good], 0.0)
@@ -204,7 +204,7 @@ def _solve_each(
     status: NDArray[np.int8],
     messages: dict[tuple[int, int], str],
 ) -> int:
-    """Solve one task after the other, each for all its cycles."""
+    """Solve one task after the other, each for all its cycles; return the number of solutions."""
     solves, places = 0, axis(block.parameters)
     for task, wanted in _tasks(block, numbers, status).items():
         try:
@@ -225,7 +225,7 @@ def _solve_each(
 
 
 def _answer(records: Sequence[Worn], name: str, places: FloatArray) -> float | FloatArray:
-    """Return one output of a solution; those of the blocks of a history have a row for each block."""
+    """Return one output of a solution; outputs of a history's blocks have a row for each block."""
     plain, is_error = _plain_name(name)
     answers = [
         one.error(plain, places) if is_error else one.value(plain, places)
@@ -235,12 +235,12 @@ def _answer(records: Sequence[Worn], name: str, places: FloatArray) -> float | F
 
 
 def _judged(block: Block[FrettingWear]) -> list[str]:
-    """Return the outputs that an accuracy holds for."""
+    """Return the outputs to which an accuracy applies."""
     return [name for name in block.outputs if name in MODEL.companions]
 
 
 class _Demand:
-    """Accuracy and outputs that a block requests."""
+    """The accuracy and the outputs that a block requests."""
 
     def __init__(self, block: Block[FrettingWear], places: FloatArray) -> None:
         self.accuracy, self.places = block.accuracy, places
@@ -248,7 +248,7 @@ class _Demand:
         self.errors = self.accuracy is not None or any(_plain_name(name)[1] for name in block.outputs)
 
     def missed(self, records: Sequence[Worn]) -> str:
-        """Return which outputs miss the relative accuracy and by how much, empty if none does."""
+        """Return a message about the outputs that miss the relative accuracy, or an empty string."""
         if self.accuracy is None:
             return ""
         values = {name: self._finite(records, name) for name in self.outputs}
@@ -256,13 +256,13 @@ class _Demand:
         return missed_accuracy(values, errors, self.accuracy).get(0, "")
 
     def _finite(self, records: Sequence[Worn], name: str) -> FloatArray:
-        """Return an output as that of one case, NaN where it is infinite, as the pressure below a sharp tip."""
+        """Return an output with a leading case axis, NaN where it is infinite, such as the pressure at a sharp tip."""
         answer = np.asarray(_answer(records, name, self.places))
         return np.where(np.isfinite(answer), answer, np.nan)[None]
 
 
 def _solves_of(task: Task, wanted: Collection[tuple[float, float]]) -> int:
-    """Return how many solutions a task takes: one for all cycles if they are moments of one march, or none matter."""
+    """Return the number of solutions of a task: one if all cycles belong to one march or if N does not matter."""
     marched = task.rule == "sliding" or (task.rule == "exact" and not task.blocks)
     return 1 if marched or task.rule == "limit" else len(wanted)
 
@@ -270,7 +270,7 @@ def _solves_of(task: Task, wanted: Collection[tuple[float, float]]) -> int:
 def _tasks(
     block: Block[FrettingWear], numbers: Numbers, status: NDArray[np.int8]
 ) -> dict[Task, dict[tuple[float, float], Places]]:
-    """Gather the positions of each task by (N, xi)."""
+    """Return, for each task, the positions of its cases by (N, xi)."""
     tasks: dict[Task, dict[tuple[float, float], Places]] = {}
     bodies = indenters(block)
     for case in range(block.cases):
@@ -309,14 +309,15 @@ def _task(parameters: FrettingWear, indenter: Indenter, numbers: Numbers, place:
 
 
 def _first_resolution(accuracy: float | None, hold: str) -> float:
-    """Return the resolution that a case is first solved at."""
+    """Return the resolution at which a case is solved first."""
     return _USUAL if accuracy is None else max(_FIRST[hold] * accuracy, _FINEST)
 
 
 def _contacts(task: Task, wanted: Sequence[tuple[float, float]], demand: _Demand) -> list[tuple[Sequence[Worn], str]]:
-    """Solve a task for all its (N, xi), more finely where an output misses the accuracy; return what still misses it.
+    """Solve a task for all its (N, xi), again at a finer resolution for outputs that miss the accuracy.
 
-    The resolution of a result depends on its case alone. Results at the same resolution are solved together.
+    Return contacts, each with a message about outputs that still miss it. The final resolution of a result depends only
+    on its own case. Results with the same resolution are solved together.
     """
     resolution, left = _first_resolution(demand.accuracy, task.hold), list(range(len(wanted)))
     found: dict[int, tuple[Sequence[Worn], str]] = {}
@@ -333,7 +334,7 @@ def _contacts(task: Task, wanted: Sequence[tuple[float, float]], demand: _Demand
 def _solved(
     task: Task, wanted: Sequence[tuple[float, float]], accuracy: float, *, errors: bool
 ) -> list[Sequence[Worn]]:
-    """Solve a task for (N, xi) at an accuracy: the contact, or those after every block of a history."""
+    """Return the contact for every (N, xi) at an accuracy; for a history, the contacts after every block."""
     profile, force = task.profile, task.hold == "force"
     if task.blocks:
         return [_loaded(task, profile, errors=errors)] * len(wanted)
@@ -354,7 +355,7 @@ def _solved(
 
 
 def _loaded(task: Task, profile: Profile, *, errors: bool) -> list[Worn]:
-    """Run the blocks of a history."""
+    """Return the contacts after every block of a history."""
     abscissa, weight = gauss(64)
     first = 2.0 * float((1.0 - profile.image(abscissa)) @ weight)
     blocks = [

@@ -1,7 +1,7 @@
 """Mixed lubrication of two rough rollers with breakthrough of the boundary layer (thesis chapter 5).
 
-`declaration` has parameters and outputs and is light to import. `solve` turns a block into arrays: `operation` is a
-case before its roughness (contact, film, shares of the load), `lines` has the rough lines, and `revolution` the
+`declaration` holds parameters and outputs and is fast to import. `solve` computes the arrays of a block. It uses
+`operation` for the smooth contact (contact, film, load shares), `lines` for the rough lines, and `revolution` for the
 intimate contact during one revolution of the rollers.
 """
 

@@ -28,13 +28,13 @@ from mdr_dask.physics.lubrication.film_formulas import HertzLine, hertz_line
 from mdr_dask.physics.lubrication.oil import OILS, Oil
 
 Positive = Annotated[float, Field(gt=0)]
-#: Contact modulus of steel on steel, 210 GPa and 0.3 each.
+#: Contact modulus of steel on steel, with E = 210 GPa and nu = 0.3 for both.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
-#: Points of a line at most; and the fewest spacings of its shortest wave where the accuracy chooses the points.
+#: Largest number of points of a line; least spacings per shortest wave, if the accuracy determines the points.
 MOST_POINTS, LEAST_PER_WAVE = 10**7, 2.5
-#: Shortest waves around a roller, where neither they nor the points are given.
+#: Number of shortest waves around a roller, if neither shortest_wavelength nor points are given.
 WAVES = 100_000
-#: Places of the profiles in half widths of the contact.
+#: Positions of the profiles, in half widths of the contact.
 POSITIONS = np.linspace(-1.5, 1.5, 1501)
 
 
@@ -138,11 +138,11 @@ class MixedLubrication(Parameters):
 
     @property
     def perimeter(self) -> float:
-        """Length around a roller in m."""
+        """Circumference of a roller in m."""
         return 2 * float(np.pi) * self.roller_radius
 
     def source(self) -> Source:
-        """Return where the lines come from; equal for cases that can share them."""
+        """Return the source of the lines; it is equal for cases that can share lines."""
         one, two = self.surface_1, self.surface_2
         if one is not None and two is not None and one.profile is not None and two.profile is not None:
             return Measured(one.profile, two.profile, self.rms_roughness is not None)
@@ -165,7 +165,7 @@ class MixedLubrication(Parameters):
         return self.longest_wavelength
 
     def problem(self) -> str:
-        """Return why the case cannot be computed, an empty string if it can."""
+        """Return the reason why the case cannot be computed, or an empty string."""
         problem = self._problem_of_surfaces()
         problem = problem or self._problem_of_points()
         if problem:
@@ -215,7 +215,7 @@ class MixedLubrication(Parameters):
         return ""
 
     def oil_data(self) -> Oil:
-        """Return the oil, whether named or given."""
+        """Return the oil, either by its name or from the given data."""
         return OILS[self.oil] if isinstance(self.oil, str) else self.oil.oil
 
     def dry_contact(self, force: float) -> HertzLine:
@@ -278,7 +278,7 @@ DRAWN = {output.name for output in OUTPUTS if output.dims}
 
 
 def coordinates(parameters: MixedLubrication) -> dict[str, Coordinate]:
-    """Return the angles of a trace and the places, in half widths, of the profiles."""
+    """Return the angles of a trace and the positions, in half widths, of the profiles."""
     angles = 2 * np.pi * np.arange(parameters.trace_points) / parameters.trace_points
     return {
         "angle": Coordinate(angles, "rad", "rolling angle"),
@@ -286,7 +286,7 @@ def coordinates(parameters: MixedLubrication) -> dict[str, Coordinate]:
     }
 
 
-#: Parameters on which lines depend: cases that differ in others share theirs.
+#: Parameters that change the lines; cases with equal values of these share their lines.
 OF_LINES = {
     *("points", "hurst", "longest_wavelength", "shortest_wavelength", "cutoff_force", "surface_1", "surface_2"),
     *("roller_radius", "roller_width", "contact_modulus"),
@@ -294,7 +294,7 @@ OF_LINES = {
 
 
 def seconds(block: Block[MixedLubrication]) -> float:
-    """Estimate the time of a block from its lines, points, cases, creep, drawn places and solutions of the film."""
+    """Return the estimated time of a block, from numbers of lines, points, cases and films, creep, and profiles."""
     millions = _expected_points(block) / 1e6
     creep = np.asarray(block.column("slide_roll_ratio"), dtype=np.float64) != 0
     of_case = np.where(creep, 0.012 + 0.06 * millions, 0.0025 + 0.011 * millions)
@@ -306,7 +306,7 @@ def seconds(block: Block[MixedLubrication]) -> float:
 
 
 def _expected_points(block: Block[MixedLubrication]) -> FloatArray:
-    """Return the points of every case; where the accuracy chooses them, those of a usual layer."""
+    """Return the points of every case; if the accuracy determines them, those for a usual boundary layer."""
     per_wave = LEAST_PER_WAVE * max(1.0, float(0.033 / (block.accuracy or 0.01)) ** 0.28)
     columns = (block.column(name) for name in ("points", "shortest_wavelength", "roller_radius"))
     expected = np.empty(block.cases)

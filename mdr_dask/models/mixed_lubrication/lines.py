@@ -1,4 +1,4 @@
-"""The two rough lines of a case: generated, of measured surfaces, or measured; and why there may be none."""
+"""The two rough lines of a case: generated, from measured surfaces, or measured; with the reasons for invalid input."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mdr_dask.models.parts.surface import Surface, lines_of
 
 @dataclass(frozen=True)
 class _Random:
-    """Two lines of random phases; what fixes them but for their phases and their spectra."""
+    """Two lines with random phases; the parameters they have in common, without phases and spectra."""
 
     points: int
     longest: float  # harmonic number of the longest wavelength
@@ -24,15 +24,15 @@ class _Random:
 
     @property
     def per_wave(self) -> float:
-        """Points of the shortest wave."""
+        """Points per shortest wave."""
         return self.points / self.modes
 
     def spacing(self, perimeter: float) -> float:
-        """Return the distance of the points in m on a roller of a perimeter in m."""
+        """Return the distance between points in m, around a roller with the circumference `perimeter` in m."""
         return perimeter / self.points
 
     def problem(self, perimeter: float) -> str:
-        """Return why there are no such lines around a roller of a perimeter in m, an empty string if there are."""
+        """Return the reason why such lines are impossible around a roller, or an empty string."""
         if self.longest > self.modes:
             longest, shortest = distinguishable(perimeter / self.longest, perimeter / max(self.modes, 1), digits=4)
             return f"expected the longest wavelength above the shortest, got {longest} m and {shortest} m"
@@ -46,13 +46,13 @@ class _Random:
         raise NotImplementedError
 
     def slope(self, perimeter: float) -> float:
-        """Return the rms slope of both lines together, over their unit of height, around a perimeter in m."""
+        """Return the rms slope of both lines together, in their unit of height per m."""
         return _slope(self) / perimeter
 
     def lines(self, seed: int, realisation: int, other: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Return the splines closest to both lines, or through their nodes, which differ from them by more.
+        """Return the least-squares splines of both lines; if `other`, the interpolating splines, which are less close.
 
-        One stream feeds both lines in turn, so that a shorter cut-off keeps the longer waves.
+        Both lines take their phases in turn from one random stream, so a shorter cut-off keeps the longer waves.
         """
         from mdr_dask.physics.surfaces.splines import closest, through
 
@@ -61,7 +61,7 @@ class _Random:
         return spline(first, self.points), spline(second, self.points)
 
     def together(self, seed: int, realisation: int, other: bool = False) -> FloatArray:
-        """Return the spline of the sum of both lines, which is enough for pure rolling."""
+        """Return the spline of the sum of both lines, which is sufficient for pure rolling."""
         from mdr_dask.physics.surfaces.splines import closest, through
 
         spline = through if other else closest
@@ -104,14 +104,14 @@ class Generated(_Random):
 
 @dataclass(frozen=True)
 class OfSurfaces(_Random):
-    """Two lines with the spectra of measured surfaces, in m; of several files realisation r takes the r-th."""
+    """Two lines with the spectra of measured surfaces, in m; with several files, realisation r uses them in turn."""
 
     surface_1: Surface
     surface_2: Surface
     perimeter: float
 
     def combined_rms(self) -> float:
-        """Return the rms height of both lines together, in m, over all files."""
+        """Return the rms height of both lines together in m, averaged over all files."""
         squares = [np.mean([np.sum(line**2) / 2 for line in lines]) for lines in self._both()]
         return float(np.sqrt(sum(squares)))
 
@@ -121,7 +121,7 @@ class OfSurfaces(_Random):
         return first, second
 
     def problem(self, perimeter: float) -> str:
-        """Return why there are no such lines, an empty string if there are."""
+        """Return the reason why such lines are impossible, or an empty string."""
         flat = "expected waves of both surfaces between longest_wavelength and shortest_wavelength"
         return super().problem(perimeter) or (
             "" if all(np.any(line) for both in self._both() for line in both) else flat
@@ -138,7 +138,7 @@ class OfSurfaces(_Random):
 
 @dataclass(frozen=True)
 class Measured:
-    """Two measured lines, closed to rings; a realisation turns one ring against the other."""
+    """Two measured lines, each closed to a ring; every realisation rotates the rings by random offsets."""
 
     file_1: ProfileFile
     file_2: ProfileFile
@@ -146,20 +146,20 @@ class Measured:
 
     @property
     def points(self) -> int:
-        """Number of points of the shorter file; the longer one is cut."""
+        """Number of points of the shorter file; the longer line is cut to this length."""
         return min(line_of(file).height.size for file in (self.file_1, self.file_2))
 
     @property
     def per_wave(self) -> float:
-        """Points of the shortest wave: infinite, since measured lines are defined by their points."""
+        """Points per shortest wave: infinite, because a measured line is defined by its points."""
         return np.inf
 
     def spacing(self, _: float) -> float:
-        """Return the distance of the points in m, as in the files, whatever the perimeter."""
+        """Return the distance between points in m, which is that of the files for any perimeter."""
         return line_of(self.file_1).spacing
 
     def problem(self, _: float) -> str:
-        """Return why the lines do not fit each other, an empty string if they do."""
+        """Return the reason why the lines cannot be combined, or an empty string."""
         one, two = (line_of(file).spacing for file in (self.file_1, self.file_2))
         if abs(one - two) > 1e-3 * one:
             return f"expected profiles of the same spacing, got {one:.6g} m and {two:.6g} m; resample one of them"
@@ -170,11 +170,11 @@ class Measured:
         return float(np.sqrt(sum(np.mean(line**2) for line in self._pair())))
 
     def lines(self, seed: int, realisation: int, other: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Return the splines through both lines, each of which starts at a random point of its ring.
+        """Return interpolating splines of both lines; each begins at a random point of its ring.
 
         With creep, one revolution of the mean surface covers 1 + S/2 of line 1 and 1 - S/2 of line 2. Means over
-        realisations are therefore unbiased only if the starts of both lines are random. `other` gives the splines
-        through every second point.
+        realisations are therefore unbiased only if both lines begin at random points. `other` gives splines through
+        every second point.
         """
         from mdr_dask.physics.surfaces.splines import through_heights
 
@@ -188,7 +188,7 @@ class Measured:
         return first, second
 
     def slope(self, perimeter: float) -> float:
-        """Return the rms slope of both lines together, over their unit of height."""
+        """Return the rms slope of both lines together, in their unit of height per m."""
         squares = sum(np.mean(np.diff(line) ** 2) for line in self._pair())
         return float(np.sqrt(squares)) / self.spacing(perimeter)
 
@@ -197,7 +197,7 @@ class Measured:
         return np.add(*self.lines(seed, realisation, other))
 
     def _pair(self) -> tuple[FloatArray, FloatArray]:
-        """Return the lines without mean and tilt, so that their ends nearly meet."""
+        """Return the lines without mean and tilt, so that the step between their ends is small."""
         from mdr_dask.physics.surfaces.measured import detrended, rms_height
 
         lines = [detrended(line_of(file).height[: self.points], "line") for file in (self.file_1, self.file_2)]

@@ -1,4 +1,4 @@
-"""An oil of one's own: two viscosities of a data sheet, or a table of measured ones."""
+"""Oils defined in a campaign: by two viscosities of a data sheet, or by a table of measured viscosities."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class OilData(Parameters):
     @model_validator(mode="after")
     def _is_an_oil(self, info: ValidationInfo) -> OilData:
         self.require_one_alternative()
-        if self.viscosities is None or info.context is not None:  # a table is looked at where a campaign names it
+        if self.viscosities is None or info.context is not None:  # a table is read only in a campaign, with context
             try:
                 walther_constants(*self.two_viscosities)
             except DataError as problem:
@@ -64,7 +64,7 @@ class OilData(Parameters):
 
     @property
     def two_viscosities(self) -> tuple[float, float, float, float]:
-        """Two temperatures in K, each with the kinematic viscosity there in m^2/s: given, or on the law fitted."""
+        """Two temperatures in K, each followed by the kinematic viscosity in m^2/s, given or from the fitted law."""
         if self.viscosities is not None:
             found = _fitted(self.viscosities, self.density, self.density_temperature)
             low, high = float(found.temperature[0]), float(found.temperature[-1])
@@ -81,7 +81,7 @@ class OilData(Parameters):
         return Oil(*data, self.density, self.density_temperature, self.correlation, low, high, "campaign file")
 
     def notes(self) -> tuple[str, ...]:
-        """Return how well the law fits a table, and how far the oil is extrapolated."""
+        """Return notes about the fit of the law to a table, and about extrapolation of the viscosity."""
         notes = []
         if self.viscosities is not None:
             found = _fitted(self.viscosities, self.density, self.density_temperature)
@@ -102,25 +102,25 @@ class OilData(Parameters):
 
 
 class _Fit(NamedTuple):
-    """Temperatures of a table in K, ascending, the constants of the law, and how far the viscosities are from it."""
+    """Temperatures of a table in K, ascending, constants of the law, and relative deviations of the viscosities."""
 
     temperature: FloatArray
     constants: tuple[float, float]
     departures: FloatArray
 
     def at(self, temperature: float) -> float:
-        """Return the kinematic viscosity of the law in m^2/s."""
+        """Return the kinematic viscosity by the law in m^2/s."""
         return float(kinematic_viscosity(temperature, *self.constants))
 
 
 @lru_cache(maxsize=16)
 def _fitted(file: DataFile, density: float, density_temperature: float) -> _Fit:
-    """Return the law that a table of viscosities follows.
+    """Return the law fitted to a table of viscosities.
 
     Raises
     ------
     DataError
-        If it has not the columns, or is of no oil.
+            If columns are missing, or the viscosities are not those of an oil.
     """
     text = file.read_text()
     is_dynamic = any(_is_dynamic(unit) for unit in read_sheet(text, file.name).units)

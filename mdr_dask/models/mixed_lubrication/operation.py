@@ -1,4 +1,4 @@
-"""What a case is before its roughness: contact, oil, and the load shared between film and asperities; its friction."""
+"""The smooth contact of a case: Hertzian contact, oil, load shared between film and asperities, and friction."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mdr_dask.physics.lubrication.film_formulas import HertzLine
 from mdr_dask.physics.lubrication.load_sharing import Asperities, SharedLoad, share_load
 from mdr_dask.physics.outcome import Outcome
 
-#: Relative error of a film of the EHL solution where the campaign names none.
+#: Relative error of the film from the EHL solution if the campaign states no accuracy.
 ACCURACY = 1e-3
 
 
@@ -32,10 +32,10 @@ class Film(NamedTuple):
 
 @dataclass(frozen=True)
 class Operation:
-    """Contact, film and boundary layer of a case, in units of its rough lines.
+    """Contact, film and boundary layer of a case, converted to the units of its rough lines.
 
-    `shared` has the film in m; `film_error` is its relative error, and `strength` that of the layer for lines in units
-    of `scale`, the heights of the lines in m. `width` is that of the contact in m.
+    `shared` holds the film in m, and `film_error` its relative error. `scale` is the unit of the lines' heights in m,
+    and `strength` the layer strength for lines in this unit. `width` is the width of the contact in m.
     """
 
     case: MixedLubrication
@@ -57,12 +57,12 @@ class Operation:
 
     @property
     def level(self) -> float:
-        """Film thickness in units of the lines."""
+        """Film thickness in the unit of the lines' heights."""
         return self.film / self.scale
 
     @property
     def spacing(self) -> float:
-        """Distance of the points of the lines in m."""
+        """Distance between points of the lines in m."""
         return self.source.spacing(self.case.perimeter)
 
     @property
@@ -72,22 +72,24 @@ class Operation:
 
     @property
     def coarseness(self) -> float:
-        """Spacing of the points over the length ``slope/s`` of the pieces, cut off by an edge, that break the layer."""
+        """Spacing of the points over the length ``slope/s`` of pieces of clusters that break the layer at a window
+        edge.
+        """
         return self.spacing * self.strength / self.source.slope(self.case.perimeter)
 
     def on(self, source: Source) -> Operation:
-        """Return the same case on the points of another source of the same lines."""
+        """Return the case with another source, which has the same lines on other points."""
         return replace(self, source=source)
 
     def pair(self, lines: tuple[FloatArray, FloatArray]) -> breakthrough.Pair:
-        """Return the splines of two lines as they meet in this case."""
+        """Return the splines of two lines at the film thickness of this case."""
         return breakthrough.Pair(*lines, self.level, self.length / lines[0].size, self.strength)
 
     @property
     def squares(self) -> float:
-        """Number of squares with the longest wavelength as edge, side by side in the width of the rollers.
+        """Number of squares, with the longest wavelength as edge, across the width of the rollers.
 
-        One line stands for one square.
+        One line represents one square.
         """
         return self.case.roller_width / self.case.longest()
 
@@ -98,12 +100,12 @@ class Operation:
 
 
 def operation_of(case: MixedLubrication, accuracy: float | None = None) -> Operation:
-    """Return the smooth contact of a case and its film; they do not depend on the other cases of a block.
+    """Return the smooth contact and the film of a case; they do not depend on other cases of a block.
 
     Raises
     ------
     NoFilmError
-        If the EHL solution is requested and not found.
+            If the EHL solution is requested but has not been found.
     """
     data, source = case.oil_data(), case.source()
     viscosity = float(data.dynamic(case.temperature))
@@ -148,7 +150,7 @@ def _mean_pressure(case: MixedLubrication) -> float:
 def _shared_load(
     case: MixedLubrication, asperities: Asperities, film_of: tuple[Callable[[float], Film], str], accuracy: float
 ) -> tuple[SharedLoad, float, str]:
-    """Return film and shares of the load, the film's relative error, and a warning."""
+    """Return film and load shares, the relative error of the film, and a warning."""
     pressure = _mean_pressure(case)
 
     def asperity_share(film: float) -> float:
@@ -169,7 +171,7 @@ def _shared_load(
 def _film_of(
     case: MixedLubrication, viscosity: float, alpha: float, accuracy: float
 ) -> tuple[Callable[[float], Film], str]:
-    """Return the film over the share of the load that it carries, and a warning if a formula leaves its range."""
+    """Return the film as a function of its load share, and a warning if a formula is outside its range."""
     E_star, radius = case.contact_modulus, _radius(case)
     velocity = case.rotation_speed * case.roller_radius
     line_load = case.normal_force / case.roller_width
@@ -194,10 +196,10 @@ def _film_of(
 
 @lru_cache(maxsize=1024)
 def _solved(contact: line_contact.LineContact, accuracy: float) -> Film:
-    """Return the central film of the EHL solution in ``a^2/R``, once for all realisations, and its relative error."""
+    """Return the central film of the EHL solution in ``a^2/R`` and its relative error; cached for all realisations."""
     solution = line_contact.solve_film(contact, accuracy)
     if solution.outcome == Outcome.FILM_COLLAPSED:
-        return Film(0.0)  # too thin for the grids; the asperities will carry most of the load
+        return Film(0.0)  # the film is too thin for the grids; nearly all load will be on the asperities
     if solution.reason:
         raise NoFilmError(solution.reason)
     film = solution.central_film
@@ -205,7 +207,7 @@ def _solved(contact: line_contact.LineContact, accuracy: float) -> Film:
 
 
 def fixed_values(operation: Operation) -> dict[str, float]:
-    """Return the outputs that no realisation of the roughness changes, each with its error."""
+    """Return the outputs that do not depend on the realisation, with their errors."""
     film, share, error = operation.film, operation.shared.asperity_share, operation.film_error
     values = {
         "film": film,
@@ -215,7 +217,7 @@ def fixed_values(operation: Operation) -> dict[str, float]:
     }
     errors = dict.fromkeys(values, 0.0)
     if error > 0:
-        # the asperities feel the film's error in full: their share is that of a film thinner by it
+        # the error of the film changes the asperity load: take the load for a film that is thinner by this error
         asperities = Asperities(operation.rms, operation.case.longest(), operation.case.contact_modulus)
         loaded = asperities.pressure(film * (1 - error)) / _mean_pressure(operation.case)
         errors = {
@@ -234,7 +236,7 @@ def fixed_values(operation: Operation) -> dict[str, float]:
 
 
 def friction(operation: Operation, film: float, asperity_share: float) -> float:
-    """Return the coefficient of friction: boundary friction of the asperities, and shear of the film between them."""
+    """Return the coefficient of friction: boundary friction of the asperities plus shear of the film between them."""
     case = operation.case
     sliding = case.slide_roll_ratio * case.rotation_speed * case.roller_radius
     if sliding == 0:

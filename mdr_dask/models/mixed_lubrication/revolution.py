@@ -1,4 +1,4 @@
-"""One realisation of a case: intimate contact during one revolution of the rollers, its error, and its points."""
+"""One realisation of a case: intimate contact in one revolution of the rollers, its error, and the points needed."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from mdr_dask.physics.lubrication import breakthrough, film_formulas
 from mdr_dask.physics.lubrication.clusters import find_clusters
 from mdr_dask.physics.surfaces.splines import heights
 
-#: Relative error where the campaign gives none.
+#: Relative error if the campaign states no accuracy.
 ACCURACY = 0.01
-#: A probability below this one is judged relative to this one, since 0 is a normal value.
+#: Errors of smaller probabilities are judged relative to this probability, because a probability of 0 is normal.
 FLOOR = 0.1
 #: Outputs that follow from the lengths in contact of the windows.
 OF_LENGTH = {
@@ -30,18 +30,19 @@ OF_LENGTH = {
     "upper_profile",
     "lower_profile",
 }
-#: With creep, windows are an eighth of their width apart: closer ones see nearly the same contact.
+#: With creep, windows follow at an eighth of their width; closer windows would have nearly the same contact.
 STRIDES = 8
-#: A revolution is divided into 16 parts at most; the other spline is compared in a quarter of them, at least in 4.
+#: Largest number of parts of a revolution. The other spline is compared in a quarter of the parts, but at least in 4.
 PARTS, SAMPLE, FEWEST = 16, 4, 4
-#: Error over the standard deviation of the change from part to part.
+#: Ratio of the error to the standard deviation of the changes among parts.
 SCATTER = 0.75
-#: Clusters close to breaking that are judged wrongly, times the power 3/2 of the points of the shortest wave.
+#: Number of clusters near breaking that are judged wrongly, times (points per shortest wave)^(3/2).
 CLUSTERS = 18.0
-#: Error with the fewest points over the power 0.6 of the length of the shortest wave in that of the pieces that break,
-#: and the power of the spacing that it falls with. A guess for the first line only: the error itself is estimated.
+#: First guess of the error at the fewest points, 0.2 r^0.6, where r is the length of the shortest wave over that of the
+#: pieces that break; and the order at which the error falls with the spacing. It only sets the points of the first
+#: line; the error itself is estimated from results.
 FIRST, COARSE, ORDER = 0.2, 0.6, 3.6
-#: The points grow in steps of a quarter of an octave, so that cases share lines, up to four times the first ones.
+#: Points grow in steps of a quarter of an octave, so that cases can share lines, up to four times the first number.
 STEPS, MOST_TIMES = 4, 4
 
 
@@ -52,15 +53,15 @@ class Revolution:
     Parameters
     ----------
     contact : int array, shape (windows,)
-        Length in intimate contact at equal steps in time, as `breakthrough.contact_lengths` counts it.
+            Length in intimate contact at equal time steps, in the unit of `breakthrough.contact_lengths`.
     spacing : float
-        Distance of the nodes of the lines in m.
+            Distance between nodes of the lines in m.
     per_wave : float
-        Nodes in the shortest wave.
+            Nodes per shortest wave.
     apart : int
-        Steps after which the window has nothing in common with the first one.
+            Number of time steps after which the window no longer overlaps the first one.
     parts : int
-        Number of parts, two windows long or longer, in which contact is counted.
+            Number of parts in which contact is counted; each is at least two windows long.
     overlaps : bool
         Whether the lines overlap anywhere.
     """
@@ -88,44 +89,44 @@ class Revolution:
 
     @property
     def unit(self) -> float:
-        """Metres of one count of contact."""
+        """Length in m of one count of contact."""
         return self.spacing / breakthrough.PARTS
 
     @property
     def standard_error(self) -> float:
-        """Standard error of the probability, from that of the parts; NaN of a single part."""
+        """Standard error of the probability, from the scatter among parts; NaN for a single part."""
         return float(self._means()[0].std(ddof=1) / np.sqrt(self.parts)) if self.parts > 1 else np.nan
 
     def errors(self, other: Revolution) -> FloatArray:
-        """Return the errors of probability and length in m.
+        """Return the errors of the probability and of the length in m.
 
-        They come from the change to another spline through the same waves in the first parts of the revolution, and
-        from two errors that no change shows: contact begins and ends between two steps in time, and clusters close to
-        breaking may be judged wrongly on all splines.
+        They follow from the change to another spline through the same waves in the first parts of the revolution. Two
+        errors that this change does not show are added: contact begins and ends between two time steps, and all splines
+        may judge a cluster near breaking wrongly.
         """
         changes = self._means()[:, : other.parts] - other._means()
         change = np.abs(changes.mean(axis=1))
         if self.parts >= FEWEST:
             change += SCATTER * changes.std(axis=1, ddof=1)
-        steps = 2 * np.sqrt(self._counts.ends.sum() / 12)  # two standard errors of places known to a step each
+        steps = 2 * np.sqrt(self._counts.ends.sum() / 12)  # two standard errors of all ends, each uniform in a step
         clusters = CLUSTERS / self.per_wave**1.5 * self.apart if self.overlaps else 0.0
         in_contact = self.length / self.probability if self.length else self.spacing * min(self.per_wave, STRIDES)
         return np.asarray(change + (steps + clusters) / self.contact.size * np.array([1, in_contact]))
 
     def sizes(self) -> dict[str, float]:
-        """Return the sizes relative to which errors of probability and length count; rare contact has a floor."""
+        """Return the sizes that divide the errors of probability and length; for rare contact they have a floor."""
         probability = max(self.probability, FLOOR)
         length = self.length * probability / self.probability if self.length else np.inf
         return {"breakthrough_probability": probability, "contact_length": length}
 
     def _means(self) -> FloatArray:
-        """Return the shares of windows in contact and the mean lengths in m, part by part."""
+        """Return the fraction of windows in contact and the mean length in m, for each part."""
         ends = np.arange(self.parts + 1) * self.contact.size // self.parts
         return np.asarray(np.array(self._counts[:2]) / np.diff(ends) * [[1], [self.unit]])
 
 
 def _course(operation: Operation, points: int, sample: bool) -> tuple[float, float, int, int]:
-    """Return spacing, width of the window in nodes, positions and parts of a revolution, or of its first parts."""
+    """Return spacing, window width in nodes, positions and parts of a revolution; if `sample`, of its first parts."""
     spacing = operation.length / points
     parts = whole = max(1, min(PARTS, int(operation.length / (2 * operation.width))))
     if sample:
@@ -134,7 +135,7 @@ def _course(operation: Operation, points: int, sample: bool) -> tuple[float, flo
 
 
 def rolling(operation: Operation, line: FloatArray, sample: bool = False) -> Revolution:
-    """Return a revolution of pure rolling, or its first parts, from the spline of the sum of both lines."""
+    """Return a revolution of pure rolling, or its first parts if `sample`, from the spline of the sum of both lines."""
     spacing, width, positions, parts = _course(operation, line.size, sample)
     stretch = line[: positions + int(width) + 2] if sample else line
     clusters = find_clusters(stretch, operation.level, spacing, operation.strength)
@@ -144,10 +145,10 @@ def rolling(operation: Operation, line: FloatArray, sample: bool = False) -> Rev
 
 
 def creeping(operation: Operation, lines: tuple[FloatArray, FloatArray], sample: bool = False) -> Revolution:
-    """Return a revolution with creep, or its first parts, from the splines of both lines."""
+    """Return a revolution with creep, or its first parts if `sample`, from the splines of both lines."""
     spacing, width, positions, parts = _course(operation, lines[0].size, sample)
     stride = max(1, int(width / STRIDES))
-    begin = stride // 2 if sample else 0  # so that the change contains the error of the places of the windows
+    begin = stride // 2 if sample else 0  # shifted, so that the change includes the error of the window positions
     steps = np.arange(begin, positions, stride)
     starts = breakthrough.creep_positions(steps, lines[0].size, operation.case.slide_roll_ratio)
     contact = breakthrough.judge_windows(operation.pair(lines), width, starts, operation.case.edge_rule)
@@ -159,9 +160,9 @@ def creeping(operation: Operation, lines: tuple[FloatArray, FloatArray], sample:
 def values(
     operation: Operation, revolution: Revolution, errors: Callable[[], FloatArray], wanted: Collection[str]
 ) -> dict[str, float]:
-    """Return the requested scalar outputs of a realisation, and their errors.
+    """Return the requested scalar outputs of a realisation and their errors.
 
-    Conductance and resistance are those of the whole width, whose squares conduct in parallel.
+    Conductance and resistance apply to the whole width, in which the squares conduct in parallel.
     """
     specific = operation.case.resistivity / operation.squares
     length = revolution.length
@@ -201,7 +202,7 @@ def trace(
 def profiles(
     operation: Operation, revolution: Revolution, lines: tuple[FloatArray, FloatArray]
 ) -> dict[str, FloatArray]:
-    """Return both surfaces around the contact at the moment of the greatest length in intimate contact."""
+    """Return both surfaces around the contact, at the moment with the largest length in intimate contact."""
     case, points = operation.case, operation.source.points
     steps = np.linspace(0, points, revolution.contact.size, endpoint=False)
     starts = breakthrough.creep_positions(steps[[np.argmax(revolution.contact)]], points, case.slide_roll_ratio)
@@ -217,7 +218,7 @@ def profiles(
 
 
 def with_first_points(operation: Operation, accuracy: float | None) -> Operation:
-    """Return the case on the points that its layer and its shortest wave probably need, unless it gives points."""
+    """Return the case with the points that layer and shortest wave are expected to need, unless points are given."""
     source = operation.source
     if isinstance(source, Measured) or operation.case.points != "auto":
         return operation
@@ -232,7 +233,7 @@ def with_more_points(
     accuracy: float | None,
     outputs: Collection[str],
 ) -> Operation | None:
-    """Return the case on more points if its revolution misses the accuracy and may have more, else None."""
+    """Return the case with more points if its revolution misses the accuracy and more are allowed; otherwise None."""
     here = operation.source
     if accuracy is None or isinstance(here, Measured) or operation.case.points != "auto":
         return None
@@ -243,13 +244,13 @@ def with_more_points(
     relative = max(of_probability, of_length) if OF_LENGTH & set(outputs) else of_probability
     if relative <= accuracy:
         return None
-    # errors fall with the square of the spacing at least, also where single clusters decide
+    # the error falls at least with the square of the spacing, even if it is due to single clusters
     wanted = min(float(relative / accuracy) ** 0.5 * here.points, most)
     return _on(operation, wanted / (LEAST_PER_WAVE * here.modes))
 
 
 def _on(operation: Operation, times: float) -> Operation:
-    """Return a case on some times the fewest points or a step more, a number that Fourier transforms are fast for."""
+    """Return the case with at least `times` the fewest points, rounded up to a step and a fast length for FFTs."""
     from scipy.fft import next_fast_len
 
     assert not isinstance(operation.source, Measured)

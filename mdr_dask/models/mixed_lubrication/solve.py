@@ -18,20 +18,20 @@ from mdr_dask.models.mixed_lubrication.operation import NoFilmError, Operation, 
 from mdr_dask.models.mixed_lubrication.revolution import Revolution
 from mdr_dask.models.parts.accuracy import missed_accuracy
 
-#: Film ratio below which overlapping asperities merge into clusters that no longer break.
+#: Below this film ratio, overlapping asperities merge into clusters that do not break.
 LEAST_FILM_RATIO = 0.5
-#: Outputs that need the rough lines.
+#: Outputs for which the rough lines are computed.
 _OF_LINES = {"breakthrough_probability", "revolution_error"} | revolution.OF_LENGTH
-#: Absolute size below which an error is not relative to its output.
+#: Magnitude of an output below which its error is absolute.
 _FLOORS = {"asperity_load_share": 1.0}
 _PROFILES = {"upper_profile", "lower_profile"}
 _ELECTRICAL = {"contact_conductance", "contact_resistance"}
 
 
 def compute(block: Block[MixedLubrication]) -> Result:
-    """Return the values of a block; one realisation is one revolution of the rollers with its own lines.
+    """Return the values of a block; one realisation is one revolution of the rollers with random lines.
 
-    Cases that differ in load, speed, temperature, rms height or layer share the lines of a realisation.
+    Cases that differ in load, speed, temperature, rms height or layer use the same lines in each realisation.
     """
     result = _empty(block)
     groups: dict[Source, list[tuple[int, Operation]]] = {}
@@ -70,7 +70,7 @@ def _empty(block: Block[MixedLubrication]) -> Result:
 
 
 def _refuse(result: Result, index: int, status: Status, why: str) -> None:
-    """Set the status of a case in all its realisations, with the reason."""
+    """Set the status of a case for all realisations, and give the reason as message."""
     result.status[index] = status
     result.messages.update({(index, position): why for position in range(result.status.shape[1])})
 
@@ -83,7 +83,7 @@ def _store(
 
 
 def _note(result: Result, index: int, position: int, note: str) -> None:
-    """Add to the message of one case in one realisation."""
+    """Append a note to the message of one case in one realisation."""
     if note:
         before = result.messages.get((index, position))
         result.messages[index, position] = f"{before}; {note}" if before else note
@@ -95,7 +95,7 @@ def _missed(
     advice: str = "",
     floors: Mapping[str, float] | None = None,
 ) -> str:
-    """Return which requested outputs miss the accuracy of the campaign, empty if none does."""
+    """Return a message about requested outputs that miss the accuracy of the campaign, or an empty string."""
     if block.accuracy is None:
         return ""
     known = [name for name in block.outputs if np.isfinite(found.get(name, np.nan))]
@@ -114,7 +114,7 @@ def _realise(
     members: list[tuple[int, Operation]],
     position: int,
 ) -> None:
-    """Compute the cases of one pair of lines in one realisation; those that miss the accuracy again on more points."""
+    """Compute one realisation of all cases that share lines; repeat those that miss the accuracy on more points."""
     drawn = block.seed, block.realisations[position]
     lines, together = cache(partial(source.lines, *drawn)), cache(partial(source.together, *drawn))
 
@@ -137,7 +137,7 @@ def _realise(
         found: dict[str, Any] = revolution.values(operation, window, errors, block.outputs)
         advice = "" if operation.case.points == "auto" else "; raise points"
         sizes = window.sizes()
-        if window.length:  # conductance and resistance have the relative error of the length
+        if window.length:  # the relative errors of conductance and resistance equal that of the length
             factor = sizes["contact_length"] / window.length
             sizes |= {name: factor * found[name] for name in _ELECTRICAL & found.keys()}
         _note(result, index, position, _missed(block, found, advice, sizes))
@@ -151,7 +151,7 @@ def _realise(
 
 
 def _warn(result: Result, block: Block[MixedLubrication], index: int, operation: Operation) -> None:
-    """Add a message, at realisation 0, where an assumption of the model fails."""
+    """Add a warning to realisation 0 if an assumption of the model is violated."""
     if 0 not in block.realisations:
         return
     position = block.realisations.index(0)
