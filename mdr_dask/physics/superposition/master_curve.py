@@ -215,7 +215,11 @@ def _merged(
     lifted -= offsets[:, None, :1]
     factors = np.hstack([shifts * width, offsets - offsets[:, :1] + rise - rise[0]])
     vertical = factors[:, count:].mean(axis=0)
-    curve, centred = lifted.mean(axis=0), factors - factors.mean(axis=0)
+    # the curve through the points where the mean factors put them, which the mean of the curves leaves on a plateau
+    likeliest = solve(problem, rows.mean(axis=0)[None]).mean
+    curve = np.concatenate([problem.spline(c, likeliest, mean[None], grid) for c in range(channels)])
+    curve -= likeliest[:, -count:][:, :1] if problem.offset else 0.0
+    centred = factors - factors.mean(axis=0)
     order = np.argsort(x, kind="stable")
     scales = rows[:, lines + channels * count : lines + channels * (count + 1)]
     own = x[problem.member == 0] * width
@@ -234,7 +238,7 @@ def _merged(
         member=problem.member[order],
         curve_x=grid * width,
         curve_y=curve,
-        curve_error=lifted.std(axis=0),
+        curve_error=np.sqrt(np.mean((lifted - curve) ** 2, axis=0)),
         curve_cross=np.einsum("dcj,df->cjf", lifted - curve, centred) / (len(rows) - 1),
         measured=(float(own.min()), float(own.max())),
         undetermined=_runs(values, loose),

@@ -19,6 +19,10 @@ CHAINS, WARM, KEPT = 24, 16, 20
 """Number of chains, and moves of each that are discarded and kept: 480 draws give the ends of an interval of 95 % to
 about 5 %."""
 
+CONVERGED = 1.1
+"""Potential scale reduction factor below which chains count as converged; otherwise two, four and eight times as many
+moves are made for each one that is kept."""
+
 PATH, STEPS = 1.5, 3
 """Length of a move in standard deviations (a quarter of a period), and its number of steps."""
 
@@ -84,34 +88,56 @@ def draws(curves: Curves, generator: np.random.Generator) -> tuple[Curves, Float
     start = _best(curves, start)
     scale = _scale(curves, start)
     place = start + generator.standard_normal((CHAINS, start.size)) @ scale.T
-    here, share, kept = solve(curves, place), 1.0, []
-    for move in range(WARM + KEPT):
-        length = share * PATH / STEPS * generator.uniform(0.7, 1.3, (CHAINS, 1))
-        momentum = generator.standard_normal(place.shape)
-        speed, new, there = momentum, place, here
-        for _ in range(STEPS):
-            speed = speed - 0.5 * length * (there.gradient @ scale)
-            further = new + length * (speed @ scale.T)
-            new = np.where(np.all(np.isfinite(further), axis=1, keepdims=True), further, place)
-            there = solve(curves, new)
-            speed = speed - 0.5 * length * (there.gradient @ scale)
-        rise = there.energy - here.energy + 0.5 * np.sum(speed**2 - momentum**2, axis=1)
-        probability = np.exp(-np.clip(np.nan_to_num(rise, nan=np.inf), 0, 700))
-        taken = generator.uniform(size=CHAINS) < probability
-        place = np.where(taken[:, None], new, place)
-        here = _chosen(taken, there, here)
-        for _ in range(HOPS):
-            new, rise = _hop(curves, place, generator)
-            there = solve(curves, new)
-            rise = there.energy - here.energy - rise
-            taken = np.log(generator.uniform(size=CHAINS)) < -rise
-            place, here = np.where(taken[:, None], new, place), _chosen(taken, there, here)
-        if move < WARM:
-            share *= 1.25 if np.mean(probability) > 0.8 else 0.75
-            share = min(share, 1.0)
-        else:
+    here, share = solve(curves, place), 1.0
+    for _ in range(WARM):
+        place, here, accepted = _moved(curves, place, here, share * scale, generator)
+        share = min(share * (1.25 if accepted > 0.8 else 0.75), 1.0)
+    for length in (1, 2, 4, 8):
+        kept = []
+        for _ in range(KEPT):
+            for _ in range(length):
+                place, here, _ = _moved(curves, place, here, share * scale, generator)
             kept.append(place)
+        if _reduction(np.array(kept)[:, :, : shifts.size]) < CONVERGED:
+            break
     return curves, np.concatenate(kept)
+
+
+def _moved(
+    curves: Curves, place: FloatArray, here: Solved, scale: FloatArray, generator: np.random.Generator
+) -> tuple[FloatArray, Solved, float]:
+    """Move all chains by one Hamiltonian step and `HOPS` jumps; return the mean acceptance of the step too."""
+    length = PATH / STEPS * generator.uniform(0.7, 1.3, (CHAINS, 1))
+    momentum = generator.standard_normal(place.shape)
+    speed, new, there = momentum, place, here
+    for _ in range(STEPS):
+        speed = speed - 0.5 * length * (there.gradient @ scale)
+        further = new + length * (speed @ scale.T)
+        new = np.where(np.all(np.isfinite(further), axis=1, keepdims=True), further, place)
+        there = solve(curves, new)
+        speed = speed - 0.5 * length * (there.gradient @ scale)
+    rise = there.energy - here.energy + 0.5 * np.sum(speed**2 - momentum**2, axis=1)
+    probability = np.exp(-np.clip(np.nan_to_num(rise, nan=np.inf), 0, 700))
+    taken = generator.uniform(size=CHAINS) < probability
+    place, here = np.where(taken[:, None], new, place), _chosen(taken, there, here)
+    for _ in range(HOPS):
+        new, rise = _hop(curves, place, generator)
+        there = solve(curves, new)
+        rise = there.energy - here.energy - rise
+        taken = np.log(generator.uniform(size=CHAINS)) < -rise
+        place, here = np.where(taken[:, None], new, place), _chosen(taken, there, here)
+    return place, here, float(np.mean(probability))
+
+
+def _reduction(kept: FloatArray) -> float:
+    """Return the largest potential scale reduction factor of some parameters, shape (moves, chains, parameters).
+
+    It compares the variance of the means of the chains with that within the chains (A. Gelman, D. B. Rubin, Stat. Sci.
+    7 (1992) 457), and is 1 for chains that all represent the same distribution.
+    """
+    within = kept.var(axis=0, ddof=1).mean(axis=0)
+    between = kept.mean(axis=0).var(axis=0, ddof=1)
+    return float(np.sqrt(np.max((len(kept) - 1) / len(kept) + between / np.maximum(within, 1e-300))))
 
 
 def _chosen(taken: NDArray[np.bool_], new: Solved, old: Solved) -> Solved:

@@ -53,10 +53,10 @@ def test_intervals_of_95_percent_hold_the_factors(shape, vertical):
         result = superpose(groups, pieces, vertical)
         low, high = result.interval()
         truth = np.append(shifts, heights)[: groups.size * (1 + (vertical == "free"))]
-        low, high = low[: truth.size], high[: truth.size]
-        free = high > low
-        held += list(((low <= truth) & (truth <= high))[free])
-        ratios += list((np.abs(truth - (low + high) / 2) / (high - low) * 2)[free])
+        free = high[: truth.size] > low[: truth.size]
+        low, high, truth = low[: truth.size][free], high[: truth.size][free], truth[free]
+        held += list((low <= truth) & (truth <= high))
+        ratios += list(np.abs(truth - (low + high) / 2) / (high - low) * 2)
     assert np.mean(held) >= 0.9
     assert np.max(ratios) < 3
 
