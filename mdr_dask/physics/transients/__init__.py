@@ -1,7 +1,8 @@
-"""Friction that changes in time, after a jump of the velocity or under any history of velocity and load.
+"""Friction as a function of time, after a velocity jump or under any history of velocity and load.
 
-Read `velocity_jump` first: it goes from one steady state to the next (`limits`) by a `march` of the depth, which finds
-the contact patches at every moment (`contact_search`) and the displacement of the elements between them
-(`free_recovery`). `patches` holds the forces on a patch. `accuracy` chooses the grids and estimates the errors.
-`elements` follows every element: slower, but for any history, solid and indenter.
+Read `velocity_jump` first. It starts from the steady state before the jump (`limits`) and marches the depth in time
+(`march`) until the steady state after the jump is reached. At every time step the march finds the contact patches
+(`contact_search`) and the displacements of the elements that are out of contact (`free_recovery`). `patches` computes
+the forces on a patch. `accuracy` chooses the grids and estimates the errors. `elements` computes the motion of every
+element: it is slower, but accepts any history, solid and indenter.
 """

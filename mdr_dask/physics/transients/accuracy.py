@@ -1,9 +1,9 @@
 """Velocity jumps on the grids that an accuracy needs, with estimated errors.
 
 The steady states before and after a jump, and the instant of the jump, are solved on finer and finer grids
-(:mod:`mdr_dask.physics.refine`). The transient between them is marched on one grid and counted from the steady state of
-that grid: so it keeps its digits, however small it is beside friction itself. Its error is estimated from the same path
-on half the nodes with half the steps.
+(:mod:`mdr_dask.physics.refine`). The transient between them is marched on one grid, and is taken as the difference from
+the steady state on that grid. This keeps its relative accuracy even if the transient is much smaller than the friction.
+Its error is estimated by a second march on half as many nodes with half as many steps.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits, steady_limits
 from mdr_dask.physics.transients.velocity_jump import Jump, MarchRequest, Path, jump_between, retraced
 
-FINEST = 64  # most nodes for every Nyquist point in steady states
-ORDER = 2  # of the steady states, at least
-CAUTION = 2 * SAFETY  # for steady states: contact of a few nodes changes irregularly from grid to grid
-TRANSIENT = SAFETY  # times the change of a transient: first order, because single asperities come and go
+FINEST = 64  # largest number of nodes per Nyquist point in steady states
+ORDER = 2  # order of convergence of the steady states, at least
+CAUTION = 2 * SAFETY  # safety factor of steady states: contacts of a few nodes change irregularly from grid to grid
+TRANSIENT = SAFETY  # safety factor of a transient: first order, because single asperities enter and leave contact
 
 
 class JumpProblem(NamedTuple):
-    """Jumps on one line without dimensions.
+    """Velocity jumps on one line, in dimensionless numbers.
 
     Parameters
     ----------
@@ -44,19 +44,20 @@ class JumpProblem(NamedTuple):
 
 
 class JumpRequest(NamedTuple):
-    """What is wanted of the jumps of a line.
+    """Requested accuracy, grid and outputs for the velocity jumps on a line.
 
     Parameters
     ----------
     accuracy : float or None
-        Error allowed for every level, relative to its value, for the depth at least to h. None if neither an accuracy
-        nor errors are wanted: the steady states are then those of the grid of the march.
+        Allowed relative error of every level; the error of the depth is relative to h if the depth is smaller than h.
+        None if neither an accuracy nor errors are requested: the steady states are then solved on the grid of the
+        march.
     oversampling : int
-        Even number of nodes for every Nyquist point, for the march, and at least for the steady states.
+        Nodes per Nyquist point in the march, an even number; the steady states use at least as many.
     march : MarchRequest or None
-        None if the transient is not wanted.
+        None if the transient is not requested.
     with_errors : bool
-        Whether the error of the transient is wanted; it takes an accuracy.
+        Whether the error of the transient is requested. This requires an accuracy.
     """
 
     accuracy: float | None
@@ -66,7 +67,7 @@ class JumpRequest(NamedTuple):
 
 
 class Levels(NamedTuple):
-    """Drag before the jump, its change at the jump, drag and depth long after; or errors of these; shape (cases,)."""
+    """Drag before the jump, its change at the jump, steady drag and depth after it; or their errors; shape (cases,)."""
 
     before: FloatArray
     jump: FloatArray
@@ -81,18 +82,18 @@ class Levels(NamedTuple):
 
 
 class Jumps(NamedTuple):
-    """The jumps of a line; drags are F_x / (4 G L h) in units of h / L, depths in h.
+    """Results of the velocity jumps on a line; drags are F_x / (4 G L h) in units of h / L, depths in units of h.
 
     Parameters
     ----------
     levels, errors : Levels
         Levels and their estimated absolute errors.
     trace, depth : array, shape (cases, times)
-        Drag and depth after the jump: the level long after, plus the transient of the march.
+        Drag and depth after the jump: the steady value after the jump plus the transient of the march.
     trace_error, depth_error : array, shape (cases, times)
-        Estimated absolute errors; NaN where they are not wanted.
+        Estimated absolute errors; NaN if they are not requested.
     contact : array, shape (cases,)
-        Fraction of the line in contact before or long after the jump, the larger of the two.
+        Fraction of the line in contact in steady sliding before or after the jump, the larger of the two.
     outcome : array, shape (cases,)
     """
 
@@ -107,7 +108,7 @@ class Jumps(NamedTuple):
 
 
 def solve_jumps(problem: JumpProblem, request: JumpRequest) -> Jumps:
-    """Return the jumps of a line: their levels to an accuracy, and the transient on the grid of the request."""
+    """Return the velocity jumps on a line: levels to the requested accuracy, the transient on the grid of the march."""
     cases, grid = problem.loads.size, request.oversampling
     guesses = np.full((cases, 2), np.nan)
     lines: dict[int, PreparedLine] = {}
@@ -153,7 +154,7 @@ def solve_jumps(problem: JumpProblem, request: JumpRequest) -> Jumps:
 
 
 def _left_out(jump: Jump, limits: SteadyLimits, request: MarchRequest) -> FloatArray:
-    """Return errors of drag and depth where nothing was marched: the changes that were left out, if any."""
+    """Return the errors of drag and depth if nothing was marched: the neglected changes, or 0 in full contact."""
     changes = np.array([jump.left_out, abs(limits.depth[1] - limits.depth[0]) if jump.left_out > 0 else 0.0])
     return np.repeat(changes[:, None], request.times.size, axis=1)
 
@@ -161,10 +162,11 @@ def _left_out(jump: Jump, limits: SteadyLimits, request: MarchRequest) -> FloatA
 def _change(
     fine: Path, limits: SteadyLimits, coarse: Path | None, others: SteadyLimits, times: FloatArray
 ) -> FloatArray:
-    """Return the largest changes of drag and depth from each time on between a path and the same on another grid.
+    """Return, for every time, the largest change of drag and of depth at later times between two paths.
 
-    Both are counted from the steady states on their own grids, and are compared at the times and at all moments of the
-    fine path. The change is infinite if there is no path on the other grid.
+    The paths are the same march on two grids. Each is taken relative to the steady state on its own grid. They are
+    compared at the given times and at all time steps of the fine path. The change is infinite if there is no path on
+    the coarse grid.
     """
     if coarse is None:
         return np.full((2, times.size), np.inf)

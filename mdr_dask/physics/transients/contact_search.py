@@ -1,26 +1,27 @@
 """Find the contact patches at one instant after a velocity jump.
 
-The search walks along the line from its highest point, in the direction in which the elements move, and carries along
-the place where contact ended last and the places where free elements may have separated (`FreeRecovery`). The force on
-an element in contact is lift + h + D h', where the lift is depth plus rate. In each cell that has to be examined:
+The search visits the cells of the line one by one, from the highest point on and in the direction in which the elements
+move. It records where contact last ended and where free elements may have separated (`FreeRecovery`). The force on an
+element in contact is lift + h + D h', where the lift is the depth plus its rate. In each cell that is examined:
 
-* In contact, it ends where the force falls through zero, or where free elements overtake the line, because they were
-  pressed further than the line presses there (contact is then lost under a positive force).
-* Outside, contact begins where the line rises above the free elements and the force would be positive.
+* Inside a patch, contact ends where the force falls through zero, or where free elements that were pressed deeper
+  elsewhere arrive and are below the line (contact is then lost although the contact force is positive).
+* Outside a patch, contact begins where the line rises above the free elements and the force would be positive.
 
-A patch is added to the sums when its end is found. Three bounds, all of them safe, let most cells be skipped:
+A patch is added to the sums when its end is found. Three bounds, none of which can miss a contact, allow most cells to
+be skipped:
 
-* A pressed cell needs no examination if the force has been positive in all of it while any element now ahead passed
-  it, and free elements cannot overtake the line there: along the line u' = (drift - u) / D, so that u stays below
-  w wherever w + D h' exceeds the largest drift.
-* A free cell needs none if the displacement of its free elements has a lower bound above its highest point. That bound
-  follows along the line from the last displacement computed, by the least drift.
-* A free cell in which the gap was found to be wider than it can have opened since elements left is skipped until the
-  line has come nearer by that gap. The gap closes at most at the rate of the depth plus the largest drift; the sum of
-  that over time is the *approach*, the same for all cells.
+* A cell in contact is skipped if the force was positive in the whole cell while every element now ahead passed it, and
+  if free elements cannot be displaced further than the line there. Along the line u' = (drift - u) / D, so that u stays
+  below w wherever w + D h' exceeds the largest drift.
+* A free cell is skipped if a lower bound of the displacement of its free elements is above its highest point. The bound
+  is computed along the line from the last known displacement and the least drift.
+* A free cell is also skipped if its gap is wider than a gap can have opened since the elements separated: the cell was
+  then out of contact all the time. It is skipped until the line has approached by that gap. The gap closes at most at
+  the rate of the depth plus the largest drift. The integral of this rate over time is the *approach*.
 
-Elements that travel more than a whole period of the line can pass over the highest point. In that case the search is
-repeated with the places of separation of the period before.
+Elements that travel more than a whole period of the line can pass the highest point out of contact. In that case the
+search is repeated with the places of separation of the previous period.
 """
 
 from __future__ import annotations
@@ -66,31 +67,31 @@ from mdr_dask.physics.transients.patches import (
     unloading,
 )
 
-SEPARATIONS = 1024  # most places of separation at a time
-PERIODS = 3  # most periods of the line that an element is followed for
-VISITS = 6  # most changes of contact in a cell: a force that is a cubic changes sign three times at most
-ROUNDING = 1e-9  # part of a displacement
-CLOSE = 1e-9  # cells: accuracy of the place where contact is lost
-FULL = -1  # instead of a number of patches: no capacity for more, or a patch does not end within its stretch
-DEPTH_CHANGES = 4.0  # most by which a displacement changes with the last depth, a guess at first
+SEPARATIONS = 1024  # largest number of places of separation at one instant
+PERIODS = 3  # largest number of periods of the line over which an element is followed
+VISITS = 6  # largest number of changes of contact in a cell: a cubic force changes sign at most three times
+ROUNDING = 1e-9  # relative to a displacement
+CLOSE = 1e-9  # cells: accuracy of the place where contact is lost to free elements
+FULL = -1  # returned instead of a number of patches: capacity exceeded, or a patch does not end within its run of cells
+DEPTH_CHANGES = 4.0  # largest derivative of a displacement by the last depth; an assumption
 
-# Entries of `Workspace.scan`, the state of the walk
+# Entries of `Workspace.scan`, the state of the search
 BEGIN, FREE_FROM, HELD, FIRM_LIFT, FIRM_UNTIL, LOWEST, LOWEST_PASSED, PASSED = range(8)
 # Entries of `SkipBounds.state`
 APPROACH, LARGEST, TIME, DEPTH, DRIFT = range(5)
 
 
 class Reachable(NamedTuple):
-    """Where elements can be in contact between two depths.
+    """Where elements can be in contact at depths between two limits.
 
     Parameters
     ----------
     runs : int array, shape (m, 2)
-        First and last node of the stretches in which contact is possible.
+        First and last node of each run of cells in which contact is possible.
     from_depth : array, shape (n + 2,)
-        Depth up to which the line is below all elements in a cell.
+        For each cell, the largest depth at which the cell is certainly out of contact.
     second : float
-        Height of the highest point outside the patch around the highest point of all.
+        Largest height outside the patch that contains the highest point of the line.
     """
 
     runs: IntArray
@@ -99,14 +100,14 @@ class Reachable(NamedTuple):
 
 
 class SkipBounds(NamedTuple):
-    """Cells that need no examination until the line has come nearer.
+    """Bounds that show which cells can be skipped until the line has approached further.
 
     Parameters
     ----------
     skip_until : array, shape (n + 2,)
-        Approach up to which the line is below all elements in a cell.
+        For each cell, the approach up to which the cell is certainly out of contact.
     state : array, shape (5,)
-        Approach so far, the largest entry of `skip_until`, and time, depth and largest drift of the last search.
+        Approach so far, the largest entry of `skip_until`, and time, depth and largest drift at the last search.
     """
 
     skip_until: FloatArray
@@ -114,23 +115,23 @@ class SkipBounds(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Arrays of a search, and what it finds.
+    """Work arrays of a search, and its results.
 
     Parameters
     ----------
     start, end : array
-        Where the patches begin and end.
+        Places where the patches begin and end.
     sums : array, shape (SUMS,)
         Sums over the patches, and their derivatives.
     scan : array
-        State of the walk: where the current patch begins, where contact ended last, up to where contact is known to
-        hold, the barrier below which cells in contact need no examination and up to where that is so, the least
-        displacement of free elements at the end of the cell before, the same of those only that passed the end of the
-        last patch after the jump, and how far these have come.
+        State of the search, in this order: where the current patch begins; where contact last ended; up to where
+        contact is certain; the barrier below which cells in contact can be skipped, and up to where this barrier is
+        valid; the least displacement of free elements at the end of the previous cell; the same for those elements only
+        that passed the end of the last patch after the jump; and how far these elements have come.
     recovery : FreeRecovery
     skip : SkipBounds
     barriers : Barriers
-        Of the cells at the Deborah number after the jump.
+        Barriers of the cells at the Deborah number after the jump.
     """
 
     start: FloatArray
@@ -143,9 +144,9 @@ class Workspace(NamedTuple):
 
 
 def workspace_for(patches: int, barriers: Barriers, below: FloatArray) -> Workspace:
-    """Return a workspace with a capacity of four times as many patches as given, and 4096 more.
+    """Return a workspace with a capacity of four times the given number of patches, plus 4096.
 
-    `below` is by how much the depth can increase before the line reaches elements in each cell.
+    `below` is the increase of depth, for each cell, up to which the cell certainly stays out of contact.
     """
     start, end = np.empty((2, 4 * patches + 4096))
     bounds = PathBounds(*np.empty((5, WINDOWS)))
@@ -157,16 +158,17 @@ def workspace_for(patches: int, barriers: Barriers, below: FloatArray) -> Worksp
 
 
 class Motion(NamedTuple):
-    """How the depth has moved until an instant.
+    """Changes of the depth up to an instant.
 
     Parameters
     ----------
     rise, fall : float
-        Largest mean rate at which the lift has risen until now, and largest rate at which it has fallen.
+        Largest mean rate at which the lift has risen from any earlier moment until now, and largest rate at which it
+        has fallen.
     shallowest, deepest, highest : float
         Least depth, largest depth and largest lift so far.
     passes_top : bool
-        Whether elements from before the patch of the highest point may have passed over it.
+        Whether elements that separated before the patch of the highest point may have passed this point out of contact.
     """
 
     rise: float
@@ -179,7 +181,7 @@ class Motion(NamedTuple):
 
 @jit_inline_uncounted
 def motion_until(now: Instant, second: float) -> Motion:
-    """Return how the depth has moved; `second` is the highest point outside the patch of the highest point of all."""
+    """Return the changes of the depth; `second` is the largest height outside the patch of the highest point."""
     history, deborah, last = now.history, now.deborah, now.history.count - 1
     depth, rate = history.depth[last], history.rate[last]
     lift, rise, fall, passes_top = depth + rate, 0.0, 0.0, False
@@ -205,10 +207,10 @@ def motion_until(now: Instant, second: float) -> Motion:
 
 @jit_inline_uncounted
 def add_approach(now: Instant, bounds: PathBounds, state: FloatArray) -> None:
-    """Add to the approach what has come since the last search, or end all skipping if that was at another instant."""
+    """Add the approach since the last search; reset all skipping if the last search was at an unrelated instant."""
     history, last = now.history, now.history.count - 1
     depth, drift = history.depth[last], bounds.most_drift[WINDOWS - 1]
-    if now.time == state[TIME]:  # another guess of the depth
+    if now.time == state[TIME]:  # the same instant with another guess of the depth
         state[APPROACH] += DEPTH_CHANGES * abs(depth - state[DEPTH])
     elif last > 0 and history.time[last - 1] == state[TIME]:
         before = history.depth[last - 1]
@@ -221,7 +223,7 @@ def add_approach(now: Instant, bounds: PathBounds, state: FloatArray) -> None:
 
 @jit_inline_uncounted
 def skip_until(skip: SkipBounds, cell: int, gap: float) -> None:
-    """Skip a cell until the line has come nearer by a gap."""
+    """Skip a cell until the line has approached by the given gap."""
     until = skip.state[APPROACH] + gap
     skip.skip_until[np.uintp(cell)] = until
     skip.state[LARGEST] = max(skip.state[LARGEST], until)
@@ -229,16 +231,17 @@ def skip_until(skip: SkipBounds, cell: int, gap: float) -> None:
 
 @jit_uncounted
 def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
-    """Find the patches in contact at an instant, at the last depth and rate of its history, and add up their forces.
+    """Find the contact patches at an instant, at the last depth and rate of its history, and add up their forces.
 
     Parameters
     ----------
     now : Instant
     reachable : Reachable
-        Its stretches must hold the patches at this depth.
+        Its runs must contain all patches at this depth.
     work : Workspace
-        Written: the patches, and in `sums` load and drag over 4 G dx, length in contact, rise over it, the derivatives
-        of load and drag by the depth, and what they gain in time where patches begin.
+        Written: the patches, and in `sums` load and drag over 4 G dx, length in contact, integral of the slope over
+        this length, the derivatives of load and drag by the depth, and the rates at which load and drag grow because
+        patches grow.
 
     Returns
     -------
@@ -251,7 +254,7 @@ def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
     work.recovery.count[0] = 0
     found = _search_period(now, motion, reachable, work)
     if motion.passes_top:
-        work.skip.state[TIME] = np.nan  # what free elements do in one period is no bound for the next instant
+        work.skip.state[TIME] = np.nan  # bounds found in a repeated search are invalid at the next instant
         for _ in range(min(int(now.deborah * now.time / now.track.cells) + 1, PERIODS)):
             _move_back_one_period(now, work.recovery, motion)
             if work.recovery.count[0] == 0:
@@ -262,7 +265,7 @@ def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
 
 @jit_inline_uncounted
 def _move_back_one_period(now: Instant, recovery: FreeRecovery, motion: Motion) -> None:
-    """Move all places of separation to before the highest point, and keep those that matter behind it."""
+    """Shift all places of separation back by one period, and keep those that still matter after the highest point."""
     for k in range(recovery.count[0]):
         recovery.earliest[k] -= now.track.cells
         recovery.place[k] -= now.track.cells
@@ -274,8 +277,8 @@ def _move_back_one_period(now: Instant, recovery: FreeRecovery, motion: Motion) 
 def _search_period(now: Instant, motion: Motion, reachable: Reachable, work: Workspace) -> int:
     """Search one period of the line; return the number of patches, or `FULL`.
 
-    Places of separation that are in the workspace already belong to the period before. Without any, the highest point
-    is taken to be in contact.
+    Places of separation that the workspace already contains belong to the previous period. If there are none, the
+    highest point is taken to be in contact.
     """
     track, history, scan, sums, recovery = now.track, now.history, work.scan, work.sums, work.recovery
     last, runs = history.count - 1, reachable.runs
@@ -289,7 +292,7 @@ def _search_period(now: Instant, motion: Motion, reachable: Reachable, work: Wor
     for run in range(runs.shape[0]):
         i, stop = runs[run, 0], runs[run, 1]
         if not contact:
-            scan[LOWEST] = scan[LOWEST_PASSED] = 0.0  # nothing is known of free elements between the stretches
+            scan[LOWEST] = scan[LOWEST_PASSED] = 0.0  # displacements between two runs of cells are not computed
         while True:
             if contact:
                 i = _skip_pressed(now, work, lift, i, stop)
@@ -314,13 +317,13 @@ def _search_period(now: Instant, motion: Motion, reachable: Reachable, work: Wor
 
 @jit_inline_uncounted
 def _oldest(recovery: FreeRecovery, otherwise: float) -> float:
-    """Return the first place at which elements ahead can have separated."""
+    """Return the first place at which elements found further along the line can have separated."""
     return recovery.earliest[0] if recovery.count[0] > 0 else otherwise
 
 
 @jit_inline_uncounted
 def _skip_pressed(now: Instant, work: Workspace, lift: float, i: int, stop: int) -> int:
-    """Return the first cell from i on in which contact may end or elements may have separated."""
+    """Return the first cell from cell i on in which contact may end or elements may have separated."""
     track, scan, barriers, bounds = now.track, work.scan, work.barriers, work.recovery.bounds
     n, depth = int(track.cells), now.history.depth[now.history.count - 1]
     firm, until, begin = scan[FIRM_LIFT], scan[FIRM_UNTIL], scan[BEGIN]
@@ -342,7 +345,7 @@ def _skip_pressed(now: Instant, work: Workspace, lift: float, i: int, stop: int)
 def _skip_free(
     now: Instant, motion: Motion, from_depth: FloatArray, work: Workspace, lift: float, i: int, stop: int
 ) -> int:
-    """Return the first cell from i on in which contact may begin."""
+    """Return the first cell from cell i on in which contact may begin."""
     track, scan, barriers, bounds, skip = now.track, work.scan, work.barriers, work.recovery.bounds, work.skip
     n, depth, approach = int(track.cells), now.history.depth[now.history.count - 1], skip.state[APPROACH]
     drift, fade = bounds.least_drift[WINDOWS - 1], np.exp(-1 / min(now.deborah, now.first.deborah))
@@ -366,7 +369,7 @@ def _skip_free(
 def _examine(
     now: Instant, motion: Motion, work: Workspace, lift: float, cell: int, contact: bool, found: int
 ) -> tuple[bool, int]:
-    """Follow contact through a cell; return whether there is contact at its end, and the number of patches so far."""
+    """Find where contact begins and ends in a cell; return whether its end is in contact, and the number of patches."""
     track, scan, recovery, barriers = now.track, work.scan, work.recovery, work.barriers
     n, finish = int(track.cells), track.cells + track.origin
     if recovery.count[0] + VISITS > recovery.place.size or found + VISITS > work.start.size:
@@ -396,7 +399,7 @@ def _examine(
             scan[FIRM_UNTIL] = 0.0
         elif x >= stop:
             break
-        else:  # elements that left the line here before would be pulled from here on
+        else:  # elements that separated earlier would be under tension from here on
             scan[FREE_FROM], ended = x, True
     return contact, found
 
@@ -413,9 +416,10 @@ def _contact_end(
     pressed: bool,
     separated: bool,
 ) -> tuple[float, float, bool, bool]:
-    """Return where contact ends in a cell from x on, where elements are free from, and why it ends, if it does.
+    """Return where contact ends in a cell from x on, from where elements are free, and which of two reasons applies.
 
-    Contact ends at the latest where the force falls to zero, and earlier where free elements overtake the line.
+    The two reasons are a displacement of free elements beyond the line, and a zero of the force. Both flags are False
+    if contact does not end in the cell. Contact ends at the latest where the force falls to zero.
     """
     scan, place = work.scan, NONE
     c0, c1, c2, c3 = line
@@ -434,9 +438,9 @@ def _contact_end(
 
 @jit_inline_uncounted
 def _overtaking(now: Instant, recovery: FreeRecovery, held: float, x: float) -> float:
-    """Return the displacement at x of free elements that may overtake a patch, or 0 if the line surely presses further.
+    """Return the displacement at x of free elements that may lose contact with a patch, or 0 if there can be none.
 
-    Contact is known to hold in the patch up to `held`, and no element has separated in it from there on.
+    Up to `held` the patch is certainly in contact, and no element has separated in the patch beyond `held`.
     """
     if x > held:
         depth = now.history.depth[now.history.count - 1]
@@ -450,7 +454,7 @@ def _overtaking(now: Instant, recovery: FreeRecovery, held: float, x: float) -> 
 
 @jit_uncounted
 def _contact_loss(now: Instant, recovery: FreeRecovery, low: float, high: float) -> float:
-    """Return where between two places free elements overtake the line, by bisection."""
+    """Return the place between `low` and `high` where contact is lost to free elements, by bisection."""
     depth = now.history.depth[now.history.count - 1]
     while high - low > CLOSE:
         x = 0.5 * (low + high)
@@ -465,7 +469,7 @@ def _contact_loss(now: Instant, recovery: FreeRecovery, low: float, high: float)
 def _close_patch(
     now: Instant, motion: Motion, work: Workspace, lift: float, cell: int, end: float, is_lost: bool, found: int
 ) -> None:
-    """Write down the current patch, which ends in a cell, and begin the bounds of the free elements behind it."""
+    """Store the current patch, which ends in this cell, and start the bounds of the free elements behind it."""
     scan, recovery = work.scan, work.recovery
     if is_lost:
         _, slope, _, by_depth, opening = gap_at(now, recovery, end)
@@ -483,7 +487,7 @@ def _close_patch(
 
 @jit_inline_uncounted
 def _lowest_behind(now: Instant, bounds: PathBounds, u: float) -> float:
-    """Return the least displacement that free elements have one cell behind a place where they have u."""
+    """Return the least displacement of free elements one cell behind a place where their displacement is u."""
     drift, fade = bounds.least_drift[WINDOWS - 1], np.exp(-1 / min(now.deborah, now.first.deborah))
     return float((u - drift) * fade + drift)
 
@@ -502,10 +506,10 @@ def _contact_begin(
     weak: bool,
     ended: bool,
 ) -> tuple[bool, float]:
-    """Return whether contact begins in a cell from x on, and where; if not, from where the search in it goes on.
+    """Return whether contact begins in a cell from x on, and where; if not, the place where the search continues.
 
-    It can begin only between `low`, where the force becomes positive, and `high`, where it falls to zero again. At
-    `high` elements may have separated earlier.
+    Contact can begin only between `low`, where the force becomes positive, and `high`, where it falls to zero again.
+    Elements may have separated earlier at `high`.
     """
     track, scan, recovery, (c0, c1, c2, c3) = now.track, work.scan, work.recovery, line
     low, high, depth = x - cell, NONE, now.history.depth[now.history.count - 1]
@@ -547,7 +551,10 @@ def _contact_begin(
 def _guess_begin(
     line: tuple[float, float, float, float], depth: float, u: float, u_slope: float, low: float, high: float
 ) -> float:
-    """Return about where in a cell the line rises above free elements that have u and its slope at `high`."""
+    """Return an approximate place in a cell where the line rises above free elements.
+
+    These have the displacement u and the slope `u_slope` at `high`.
+    """
     c0, c1, c2, c3 = line
     bend, y = u_slope * u_slope / u if u > 0 else 0.0, high
     for _ in range(5):
@@ -566,9 +573,10 @@ def _guess_begin(
 def _add_edge(
     now: Instant, lift: float, place: float, steep: float, by_depth: float, opening: float, sums: FloatArray
 ) -> None:
-    """Add what load and drag gain by depth and time where a patch grows at an edge: the force there is not zero.
+    """Add the derivatives of load and drag by depth and time due to the motion of an edge where the force is not zero.
 
-    The gap between line and free elements has the slope `steep` into the patch, a derivative by the depth, and a rate.
+    `steep` is the slope, towards the inside of the patch, of the gap between line and free elements; `by_depth` is its
+    derivative by the depth, and `opening` its rate.
     """
     h, slope, _ = height_at(now.track, place)
     force = lift + h + now.deborah * slope
@@ -582,7 +590,7 @@ def _add_edge(
 
 @jit_inline_uncounted
 def _add_separation(now: Instant, motion: Motion, work: Workspace, place: float) -> None:
-    """Add a place where the force falls to zero now, and up to where it can have done so since the jump."""
+    """Add a place where the force falls to zero now, with the farthest such place since the jump."""
     track, recovery, n = now.track, work.recovery, int(now.track.cells)
     i = min(int(place), n)
     h, slope, _ = height_at(track, i + 1.0)
@@ -598,7 +606,7 @@ def _add_separation(now: Instant, motion: Motion, work: Workspace, place: float)
 
 @jit_inline_uncounted
 def _add_stretch(recovery: FreeRecovery, cell: float, barrier: float) -> None:
-    """Add a cell in which elements can have separated although the force is positive now, or lengthen a stretch."""
+    """Add a cell where elements can have separated although the force is positive now, or extend the last stretch."""
     k, last = recovery.count[0], recovery.count[0] - 1
     if k > 0 and recovery.earliest[last] < recovery.place[last] and recovery.place[last] == cell:
         recovery.place[last] = recovery.farthest[last] = cell + 1
@@ -611,7 +619,7 @@ def _add_stretch(recovery: FreeRecovery, cell: float, barrier: float) -> None:
 
 @jit_inline_uncounted
 def _force_slopes(track: Track, deborah: float, i: int) -> tuple[float, float, float]:
-    """Return three slopes that bound the slope of the force in a cell: at its start, a control point, at its end."""
+    """Return three bounds of the slope of the force in a cell: at its start, at a control point and at its end."""
     _, c1, c2, c3 = cubic(track.height, track.enter, track.leave, i)
     enter, bend, turn = c1 + 2 * deborah * c2, c2 + 3 * deborah * c3, 3 * c3
     return enter, enter + bend, enter + 2 * bend + turn
@@ -619,9 +627,9 @@ def _force_slopes(track: Track, deborah: float, i: int) -> tuple[float, float, f
 
 @jit_inline_uncounted
 def _may_have_separated(track: Track, motion: Motion, deborah: float, i: int) -> bool:
-    """Return whether elements can have separated in or just before cell i, where the force is positive now.
+    """Return whether elements can have separated in cell i or just before it, although the force is positive now.
 
-    The force on such an element has fallen through zero and risen again on its way.
+    The force on such an element has fallen through zero and has risen again while the element travelled.
     """
     start, middle, end = _force_slopes(track, deborah, i)
     if deborah * max(start, middle, end) <= -motion.rise:

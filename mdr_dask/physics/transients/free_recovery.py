@@ -1,16 +1,18 @@
-"""The displacement of elements that recover freely after a jump.
+"""The displacement of elements that recover freely after a velocity jump.
 
-An element at x came along the path x' = x - D (t - t') with the Deborah number D = v tau in cells. Its displacement is
-the largest to which the line can have pressed it, faded since then:
+An element that is now at x was at x' = x - D (t - t') at the time t', with the Deborah number D = v tau in cells. Its
+displacement is the largest of the displacements that the line imposed on it earlier, each reduced by the decay since
+then:
 
     u(x, t) = max over t' <= t of (d(t') + h(x')) exp(-(t - t'))
 
-so that only the depth d(t) has a history. Free elements are never followed one by one: the place where an element
-separated from the line is the one where this expression is stationary, which is where the force on it was zero.
-`FreeRecovery` holds the places near which elements can have separated.
+Only the depth d(t) needs a history, so that elements are never followed one by one. The place where an element
+separated from the line is the place where this expression is stationary, that is, where the force on the element was
+zero. `FreeRecovery` holds the places near which elements can have separated.
 
-Along the line the *drift* D u' + u of free elements is minus the rate of the depth when they separated, faded since
-then. Its extremes over the recent past (`PathBounds`) bound how fast u can fall or rise along the line.
+Along the line the *drift* D u' + u of free elements is minus the rate of the depth at their separation, reduced by the
+decay since then. The extremes of the drift over the recent past (`PathBounds`) bound how fast u can change along the
+line.
 """
 
 from __future__ import annotations
@@ -23,15 +25,15 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted, last_until
 from mdr_dask.physics.transients.patches import History, Patches, Track, height_at, patch_before
 
-ITERATIONS = 60  # most iterations of Newton's method with bisection
-NEAR = 0.02  # cells: the last Newton step towards a place of separation; the error is its cube
-STRIDE = 2.0  # cells: the longest step towards a place of separation
-MET = 1e-3  # cells: the last step towards the begin of contact; the error is its cube
-CREST = 1e-3  # cells: resolution of the place where line and free elements are nearest inside a cell
-FARTHEST = 200  # cells behind x in which elements of a weak stretch are searched for
-MARGIN = 64.0  # cells added to twice a distance, over which the depth may change what is kept
-WINDOW, WINDOWS = 8.0, 16  # cells travelled in the shortest window of `PathBounds`; each next one is twice as long
-_DOUBLINGS = np.frexp(np.arange(1024))[1]  # how often `WINDOW` is doubled to exceed so many windows
+ITERATIONS = 60  # largest number of iterations of Newton's method with bisection
+NEAR = 0.02  # cells: size of the last Newton step towards a place of separation; the error is about its cube
+STRIDE = 2.0  # cells: longest step towards a place of separation
+MET = 1e-3  # cells: size of the last step towards the place where contact begins; the error is about its cube
+CREST = 1e-3  # cells: resolution of the place in a cell where the gap between line and free elements is smallest
+FARTHEST = 200  # cells behind x in which separated elements are searched for in a stretch
+MARGIN = 64.0  # cells added to twice a distance: over that way a change of the depth may matter for what `prune` keeps
+WINDOW, WINDOWS = 8.0, 16  # cells travelled in the shortest window of `PathBounds`; every next window is twice as long
+_DOUBLINGS = np.frexp(np.arange(1024))[1]  # index of the window that covers a given number of shortest windows
 
 
 class Instant(NamedTuple):
@@ -44,9 +46,9 @@ class Instant(NamedTuple):
     history : History
         Depth and rate up to this instant.
     time, deborah : float
-        Time since the jump, and the Deborah number since then.
+        Time since the jump, and the Deborah number after the jump.
     left : float
-        exp(-time), the part of a displacement at the jump that is left.
+        exp(-time), the decay of displacements since the jump.
     """
 
     track: Track
@@ -58,16 +60,16 @@ class Instant(NamedTuple):
 
 
 class PathBounds(NamedTuple):
-    """Bounds over the time in which the line travelled `WINDOW` cells, twice that, and so on; shape (WINDOWS,) each.
+    """Bounds over the times in which the line travels `WINDOW` cells, twice as many, and so on; shape (WINDOWS,) each.
 
     Parameters
     ----------
     spread : array
         Range of the depth.
     opened : array
-        Most by which the gap between line and free elements has opened at one place.
+        Largest increase of the gap between line and free elements at one place.
     least_lift : array
-        Least sum of depth and rate, the lift.
+        Least lift, the sum of depth and rate.
     most_drift, least_drift : array
         Largest and least drift (or 0) of elements that separated in that time or have been free since before the jump.
     """
@@ -80,15 +82,15 @@ class PathBounds(NamedTuple):
 
 
 class FreeRecovery(NamedTuple):
-    """Where elements can have separated from the line, `count[0]` places or stretches, ordered along the line.
+    """Places or stretches of the line where elements can have separated: `count[0]` entries in order along the line.
 
     Parameters
     ----------
     earliest, place, farthest : array
-        Where ``earliest == place``, contact ends there now, and ended between `place` and `farthest` since the jump.
+        If ``earliest == place``, contact ends there now, and has ended between `place` and `farthest` since the jump.
         Otherwise no contact ends there now, but elements can have separated in the cells from `earliest` to `place`.
     barrier : array
-        Such a stretch can only have let elements go while the lift was below this.
+        Elements can have separated in a stretch only while the lift was below this value.
     count : int array, shape (1,)
     bounds : PathBounds
     """
@@ -109,9 +111,9 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
     left, back = np.exp(-time), last
     shallowest, deepest, least_lift = depth, depth, depth + rate
     most, least = max(-rate, -history.rate[0] * left, 0.0), min(-rate, -history.rate[0] * left, 0.0)
-    if first.deborah > deborah:  # elements that were free at the jump recover over a longer way
+    if first.deborah > deborah:  # elements that are free since before the jump have the drift u (1 - D / D_1)
         most = max(most, min(depth, first.depth * left) * (1 - deborah / first.deborah))
-    # when the line is faster, elements that were free at the jump arrive with more displacement, for half a window
+    # if the velocity rises, elements that were free at the jump arrive with more displacement, for half a window
     rise, gains = 0.0, first.depth * (deborah / first.deborah - 1)
     for k in range(WINDOWS):
         duration = WINDOW / deborah * 2.0**k
@@ -133,14 +135,14 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
 
 @jit_inline_uncounted
 def window(distance: float) -> int:
-    """Return the index of the bounds that hold over a distance in cells."""
+    """Return the index of the window whose bounds are valid over a distance in cells."""
     windows = max(distance * (1 / WINDOW), 0.0)
     return int(_DOUBLINGS[np.uintp(windows)]) if windows < _DOUBLINGS.size else WINDOWS - 1
 
 
 @jit_inline_uncounted
 def _depth_at(history: History, t: float) -> tuple[float, float, float]:
-    """Return depth, rate and its derivative at time t by the cubic through values and rates."""
+    """Return depth, rate and second derivative at time t, by cubic Hermite interpolation of the history."""
     last = history.count - 1
     if last <= 0 or t >= history.time[last]:
         return history.depth[last], history.rate[last], 0.0
@@ -163,7 +165,7 @@ def _depth_at(history: History, t: float) -> tuple[float, float, float]:
 
 @jit_inline_uncounted
 def _by_last_depth(history: History, t: float) -> float:
-    """Return the derivative of the depth at time t by the last depth."""
+    """Return the derivative of the depth at time t by the last depth of the history."""
     last = history.count - 1
     if last <= 0 or t >= history.time[last]:
         return 1.0
@@ -176,18 +178,18 @@ def _by_last_depth(history: History, t: float) -> float:
 
 @jit_inline_uncounted
 def _in_period(now: Instant, s: float) -> float:
-    """Return the place in the first period of the line that repeats at s."""
+    """Return the place in the first period of the line that corresponds to the place s."""
     track = now.track
     return float(s - np.floor((s - track.origin) / track.cells) * track.cells)
 
 
 @jit_inline_uncounted
 def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tuple[float, float, float]:
-    """Return displacement, slope and derivative by the depth at x of an element that separated near a place.
+    """Return displacement, slope and derivative by the depth of an element at x that separated near a place.
 
-    It separated after the jump where the force on it vanished, between the place where the force vanishes now and the
-    farthest such place so far. The displacement is stationary there, so that few steps of Newton's method suffice. It
-    is -1 if no element at x separated there.
+    The element separated after the jump where the force on it vanished. This is between the place where the force
+    vanishes now and the farthest place where it has vanished since the jump. The displacement is stationary there, so
+    that few Newton steps are enough. The displacement is -1 if the element at x did not separate there.
     """
     deborah = now.deborah
     first = x - deborah * now.time
@@ -202,7 +204,7 @@ def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tu
         falls = (rate + change) / deborah + slope + deborah * curvature
         step = -force / falls if falls < 0 else STRIDE if force > 0 else -STRIDE
         if abs(step) < NEAR:
-            if s + step > x:  # the element has not arrived there yet
+            if s + step > x:  # the element at x has not reached that place yet
                 break
             fade = np.exp(-since)
             u = (d + h + 0.5 * force * step / deborah) * fade
@@ -223,7 +225,10 @@ def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tu
 
 @jit_uncounted
 def _separated_within(now: Instant, x: float, low: float, high: float) -> tuple[float, float, float]:
-    """Return the same for an element that separated anywhere in a stretch of cells; the nodes are searched first."""
+    """Return the results of `_separated_near` for an element at x that separated anywhere in a stretch of cells.
+
+    The node with the largest displacement is found first.
+    """
     most, place, s = 0.0, x, min(high, np.ceil(x) - 1)
     low = max(low, x - now.deborah * now.time, s - FARTHEST)
     while s >= low:
@@ -238,7 +243,7 @@ def _separated_within(now: Instant, x: float, low: float, high: float) -> tuple[
 
 @jit_inline_uncounted
 def _from_separation(now: Instant, recovery: FreeRecovery, k: int, x: float) -> tuple[float, float, float]:
-    """Return displacement, slope and derivative by the depth at x of elements that separated at the k-th place."""
+    """Return displacement, slope and derivative by the depth at x of elements that separated at entry k."""
     if recovery.earliest[k] < recovery.place[k]:
         if recovery.bounds.least_lift[window(x - recovery.earliest[k])] > recovery.barrier[k]:
             return -1.0, 0.0, 0.0
@@ -248,7 +253,10 @@ def _from_separation(now: Instant, recovery: FreeRecovery, k: int, x: float) -> 
 
 @jit_inline_uncounted
 def from_before(now: Instant, x: float, least: float) -> tuple[float, float]:
-    """Return displacement and slope at x that the state before the jump has left; 0 if that is at most `least`."""
+    """Return displacement and slope at x that remain from the state before the jump.
+
+    Both may be 0 if the displacement is at most `least`.
+    """
     first, s = now.first, _in_period(now, x - now.deborah * now.time)
     low = patch_before(first, s)
     if s <= first.end[low]:
@@ -269,7 +277,7 @@ def displacement_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[flo
         value, value_slope, value_by_depth = _from_separation(now, recovery, k, x)
         if value > u:
             u, slope, by_depth = value, value_slope, value_by_depth
-    if now.first.depth * now.left > u:  # no element had more at the jump: heights are below the highest point
+    if now.first.depth * now.left > u:  # at the jump no displacement exceeded the depth of the highest point
         value, value_slope = from_before(now, x, u)
         if value > u:
             u, slope, by_depth = value, value_slope, 0.0
@@ -278,10 +286,10 @@ def displacement_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[flo
 
 @jit_inline_uncounted
 def gap_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float, float, float, float]:
-    """Return by how much the line is above free elements at x, its slope, curvature, derivative by depth, and rate.
+    """Return the height of the line above free elements at x, and its slope, curvature, derivative by depth, and rate.
 
-    Free elements fade and move on, so that their displacement at x changes at the rate -u - D u'. It bends along the
-    line as an exponential does.
+    Free elements recover and move along the line, so that their displacement at x changes at the rate -u - D u'. Along
+    the line it is approximated by an exponential function to obtain the curvature.
     """
     u, u_slope, by_depth = displacement_at(now, recovery, x)
     last = now.history.count - 1
@@ -295,7 +303,10 @@ def gap_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float
 def contact_begin(
     now: Instant, recovery: FreeRecovery, low: float, high: float, x: float
 ) -> tuple[float, float, float, float]:
-    """Return where the line rises above free elements, and slope, derivative by depth and rate of the gap there."""
+    """Return where the line rises above free elements, and slope, derivative by depth and rate of the gap there.
+
+    `x` is the first guess, between `low` and `high`.
+    """
     slope, by_depth, opening = 1.0, 1.0, 0.0
     for _ in range(ITERATIONS):
         if not low < x < high:
@@ -317,7 +328,10 @@ def contact_begin(
 
 @jit_uncounted
 def nearest_approach(now: Instant, recovery: FreeRecovery, low: float, high: float) -> tuple[float, float]:
-    """Return where between two places the line is nearest to free elements or above them, and the gap there."""
+    """Return the place between `low` and `high` where the line is nearest to free elements, and its height above them.
+
+    The search stops at the first place where the line is above the free elements.
+    """
     x, gap = high, -1.0
     while gap <= 0 and high - low > CREST:
         x = 0.5 * (low + high)
@@ -331,12 +345,12 @@ def nearest_approach(now: Instant, recovery: FreeRecovery, low: float, high: flo
 
 @jit_inline_uncounted
 def prune(now: Instant, recovery: FreeRecovery, x: float, pressed: float, deepest: float) -> None:
-    """Keep only places of separation whose elements can still exceed those that separate at x with `pressed`."""
+    """Remove places of separation whose elements can no longer exceed the displacement `pressed` at x."""
     kept = 0
     for k in range(recovery.count[0]):
         place, farthest = recovery.place[k], recovery.farthest[k]
         u = _from_separation(now, recovery, k, x)[0]
-        if u < 0 and x - now.deborah * now.time < farthest:  # none at x separated there; some farther on may have
+        if u < 0 and x - now.deborah * now.time < farthest:  # elements farther on may have separated there
             height = height_at(now.track, _in_period(now, place))[0]
             u = (deepest + height) * np.exp(-max(x - farthest, 0.0) / now.deborah)
         if u + 2 * recovery.bounds.spread[window(2 * (x - place) + MARGIN)] >= pressed:

@@ -27,14 +27,14 @@ from mdr_dask.physics.transients.patches import (
     track_of,
 )
 
-KEPT_CELLS, KEPT_SPEEDS = 2**21, 4  # most cells whose barriers are kept (16 bytes each), but those of four speeds
-WHOLE = 1 - 1e-12  # fraction of the line in full contact, within rounding
+KEPT_CELLS, KEPT_SPEEDS = 2**21, 4  # barriers are kept for so many cells (16 bytes each), at least for four speeds
+WHOLE = 1 - 1e-12  # fraction of the line in contact that counts as full contact, within rounding
 NEWTON_STEPS = 60
-NEARLY = 1e-6  # part of the load that the last Newton step may still find missing; the error is its square
+NEARLY = 1e-6  # part of the load that may be missing before the last Newton step; the error is about its square
 
 
 class PreparedLine(NamedTuple):
-    """One periodic line as the steady sweep and the march need it, with the barriers of some Deborah numbers."""
+    """One periodic line in the form needed by the steady sweep and the march, with barriers of some Deborah numbers."""
 
     cells: Cells
     blocks: Blocks
@@ -48,7 +48,7 @@ class PreparedLine(NamedTuple):
         return cls(cells, blocks_of(cells), track_of(cells), {})
 
     def barriers(self, deborah: float) -> Barriers:
-        """Return the barriers at a Deborah number in cells; successive cases often have the same."""
+        """Return the barriers at a Deborah number in cells; keep them, because successive cases often share them."""
         if deborah not in self.known:
             if len(self.known) >= max(KEPT_CELLS // self.cells.mean.size, KEPT_SPEEDS):
                 self.known.clear()
@@ -56,7 +56,7 @@ class PreparedLine(NamedTuple):
         return self.known[deborah]
 
     def patches(self, depth: float, deborah: float) -> tuple[Patches, FloatArray]:
-        """Return the contact in steady sliding at a depth of the highest point, and the sums of the sweep."""
+        """Return the contact in steady sliding at a given depth of the highest point, and the sums of the sweep."""
         sums = np.empty(SWEEP_SUMS)
         start, end = patches_at(self.cells, self.blocks, self.barriers(deborah), deborah, depth, sums)
         pressed = _pressed(self.track, end, depth)
@@ -64,20 +64,20 @@ class PreparedLine(NamedTuple):
 
 
 class SteadyLimits(NamedTuple):
-    """Steady states before and after a jump, and the instant between; drags are F_x / (4 G L), height^2 over length.
+    """Steady states before and after a jump, and the instant of the jump; drags are F_x / (4 G L), height^2 / length.
 
     Parameters
     ----------
     before, at, after : float
         Drag in steady sliding at v_1, just after the jump, and in steady sliding at v_2.
     rate, tilt : float
-        Rate of the depth by t / tau just after the jump, and the derivative of `at` by it.
+        Rate of the depth by t / tau just after the jump, and the derivative of `at` by this rate.
     depth : array, shape (2,)
-        Depth before and long after the jump.
+        Steady depth before and after the jump.
     first, slower : Patches or None
         Contact before the jump, and in steady sliding at the lower velocity; None without a solution.
     contact : array, shape (2,)
-        Fraction of the line in contact before and long after the jump.
+        Fraction of the line in contact in steady sliding before and after the jump.
     outcome : Outcome
     """
 
@@ -94,7 +94,7 @@ class SteadyLimits(NamedTuple):
 
     @property
     def is_full(self) -> bool:
-        """Whether the whole line is in contact before and after."""
+        """Whether the whole line is in contact in steady sliding before and after the jump."""
         return bool(np.all(self.contact >= WHOLE))
 
 
@@ -103,8 +103,8 @@ def steady_limits(
 ) -> list[SteadyLimits]:
     """Solve the steady states before and after jumps on one line, and the instants of the jumps.
 
-    At the instant of a jump displacements and depth do not change, but the rate of the depth does, and elements whose
-    force would be negative separate.
+    At the instant of a jump the displacements and the depth do not change. The rate of the depth does, and elements
+    whose force would be negative separate.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def steady_limits(
     deborah : array, shape (cases, 2)
         v_1 tau / L and v_2 tau / L.
     guesses : array, shape (cases, 2), optional
-        Depths, such as those on another grid, where the searches begin; the results do not depend on them.
+        Depths at which the searches start, such as those on another grid; they do not affect the results.
     """
     guess = None if guesses is None else guesses.ravel()
     steady = steady_on_cells(line.cells, line.blocks, deborah.ravel(), np.repeat(loads, 2), guess)
@@ -142,7 +142,7 @@ def steady_limits(
 
 @jit
 def _pressed(track: Track, end: FloatArray, depth: float) -> FloatArray:
-    """Return the displacements with which elements leave patches."""
+    """Return the displacements of elements at the ends of the patches."""
     pressed = np.empty(end.size)
     for k in range(end.size):
         pressed[k] = depth + height_at(track, end[k])[0]
@@ -153,7 +153,10 @@ def _pressed(track: Track, end: FloatArray, depth: float) -> FloatArray:
 def _release(
     track: Track, first: Patches, barriers: Barriers, deborah: float, load: float
 ) -> tuple[float, float, float, int]:
-    """Return the drag just after a jump, the rate of the depth that carries the load, their slope, and the outcome."""
+    """Return the drag just after a jump, the rate of the depth that carries the load, the tilt, and the outcome.
+
+    The tilt is the derivative of the drag by the rate.
+    """
     rate, sums = 0.0, np.empty(SUMS)
     for _ in range(NEWTON_STEPS):
         released(track, first, barriers, deborah, rate, sums)

@@ -1,4 +1,4 @@
-"""The march of the depth through the time after a jump, at constant load."""
+"""The march of the depth in time after a velocity jump, at constant load."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from mdr_dask.physics.transients.patches import (
     Track,
 )
 
-TRIALS = 80  # most Newton steps for the depth at a moment
-ORDER = 3  # of the backward differentiation
-EXACT = 1e-11  # part of the load: the load is met
-NEWTON_LOAD = 0.03  # part of the load that may be missing before a Newton step is taken as the last one
-SETTLED = 1.5  # a march ends when depth and drag have been settled for this ratio of times
-LEFT_LIMITS = -1  # outcome of a march whose depth leaves the limits for which the reachable cells were found
+TRIALS = 80  # largest number of Newton steps for the depth at one moment
+ORDER = 3  # order of the backward differentiation
+EXACT = 1e-11  # part of the load: the load is met if less is missing
+NEWTON_LOAD = 0.03  # part of the load that may be missing before the last Newton step
+SETTLED = 1.5  # a march ends when depth and drag have been settled while the time grew by this ratio
+LEFT_LIMITS = -1  # outcome of a march whose depth leaves the limits for which the reachable cells were determined
 
 
 class Stepping(NamedTuple):
@@ -41,11 +41,11 @@ class Stepping(NamedTuple):
     first : float
         First step.
     growth : float
-        Largest ratio of one step to the one before.
+        Largest ratio of a step to the previous one.
     miss : float
         Largest difference between the extrapolated and the solved depth.
     close : float
-        Largest Newton step of the depth after which the next one is left out.
+        Size of a Newton step of the depth below which it is the last one.
     until : float
         Last time.
     """
@@ -58,7 +58,10 @@ class Stepping(NamedTuple):
 
 
 class Finish(NamedTuple):
-    """End of a march: final depth and drag, and allowed distances, of the drag relative to its largest distance."""
+    """Criterion for the end of a march: final depth and drag, and how near to them the march has to come.
+
+    The distance of the drag is relative to its largest distance during the march.
+    """
 
     depth: float
     drag: float
@@ -67,18 +70,18 @@ class Finish(NamedTuple):
 
 
 class Marching(NamedTuple):
-    """What is constant during a march.
+    """Quantities that are constant during a march.
 
     Parameters
     ----------
     track, first, reachable
-        The line, the contact before the jump, and where contact is possible between `low` and `high`.
+        The line, the contact before the jump, and the cells where contact is possible at depths from `low` to `high`.
     deborah, load : float
-        After the jump, and F_N / (4 G dx).
+        Deborah number after the jump, and F_N / (4 G dx).
     low, high : float
         Limits of the depth.
     onset : float
-        Time from which on steps grow in a constant ratio: all of them are alike in log(1 + t / onset).
+        Time from which on the steps grow in a constant ratio. They are equal in log(1 + t / onset).
     """
 
     track: Track
@@ -92,7 +95,7 @@ class Marching(NamedTuple):
 
 
 class Trajectory(NamedTuple):
-    """Time, log(1 + t / onset), depth, drag and their rates at every moment, beginning just after the jump."""
+    """Time, log(1 + t / onset), depth and its rate, drag and its rate at every moment, from just after the jump on."""
 
     time: FloatArray
     place: FloatArray
@@ -104,9 +107,9 @@ class Trajectory(NamedTuple):
 
 @jit_uncounted
 def _drag_rate(sums: FloatArray, stiff: float, step: float) -> float:
-    """Return the rate of the drag at constant load: patches grow where they begin, and the lift falls to balance that.
+    """Return the rate of the drag at constant load: patches grow where they begin, and the lift falls in balance.
 
-    A last Newton step of the depth changes its rate as well, and with it the growth at the edges.
+    The last Newton step of the depth also changes the rate of the depth, and so the growth at the edges of the patches.
     """
     edges = sums[STIFFNESS] - sums[LENGTH] * (1 + stiff)
     edges_drag = sums[DRAG_STIFFNESS] - sums[TILT] * (1 + stiff)
@@ -148,7 +151,7 @@ def _balance(
             drag = sums[DRAG] + step * sums[DRAG_STIFFNESS]
             return Outcome.CONVERGED, drag, _drag_rate(sums, a, step)
         if high - low <= 1e-13 * (abs(low) + abs(high)):
-            # the load is discontinuous in the depth, where a single asperity comes into contact
+            # the load jumps at this depth because a single asperity comes into contact
             return Outcome.CONVERGED, sums[DRAG], _drag_rate(sums, a, 0.0)
         guess += step
         if not marching.low <= guess <= marching.high:
@@ -162,7 +165,8 @@ def _balance(
 def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
     """Return a and b of d_dot = a d + b at moment `now` of a march that begins with a known rate.
 
-    This is backward differentiation over log(1 + t / onset), where a relaxation is smooth and steps are alike.
+    This is backward differentiation over log(1 + t / onset). In this variable the relaxation is smooth and the steps
+    are equal.
     """
     time, place, depth = found.time, found.place, found.depth
     if now == 1:
@@ -182,7 +186,7 @@ def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
 
 @jit_uncounted
 def _extrapolated(found: Trajectory, now: int) -> float:
-    """Extrapolate the depth to moment `now` by a parabola over log(1 + t / onset), if there are three depths."""
+    """Extrapolate the depth to moment `now` by a parabola over log(1 + t / onset), or over t for the first moments."""
     time, place, depth, rate, _, _ = found
     taken = time[now] - time[now - 1]
     if now == 1:
@@ -199,21 +203,21 @@ def _extrapolated(found: Trajectory, now: int) -> float:
 def march_depth(
     marching: Marching, pace: Stepping, finish: Finish, found: Trajectory, work: Workspace
 ) -> tuple[int, int]:
-    """March the depth at constant load by backward differentiation of order three over log(1 + t / onset).
+    """March the depth at constant load by backward differentiation of third order over log(1 + t / onset).
 
     Parameters
     ----------
     marching, pace, finish
-        What is constant, the steps, and the end of the march.
+        The constant quantities, the steps, and the criterion for the end of the march.
     found : Trajectory
         Written from the second entry on.
     work : Workspace
-        With the barriers of the Deborah number after the jump.
+        Contains the barriers at the Deborah number after the jump.
 
     Returns
     -------
     count : int
-        Number of moments computed.
+        Number of computed moments.
     outcome : int
         An `Outcome`, or `LEFT_LIMITS`.
     """
@@ -251,16 +255,16 @@ def march_depth(
 
 @jit_uncounted
 def retrace(marching: Marching, depths: FloatArray, found: Trajectory, work: Workspace) -> int:
-    """March through given moments along depths that are nearly right, with one Newton step for each.
+    """March through given moments with approximately known depths, with one Newton step for each depth.
 
     Parameters
     ----------
     marching, work
         As in `march_depth`.
     depths : array, shape (moments,)
-        Depths on another grid.
+        Depths at these moments on another grid.
     found : Trajectory
-        With times and places; the rest is written from the second entry on.
+        Contains times and places; the rest is written from the second entry on.
 
     Returns
     -------

@@ -1,8 +1,8 @@
-"""Patches of a line in contact, and the forces on them.
+"""Contact patches on a line, and the forces on them.
 
-Lengths are in cells of the line and slopes are rises over a cell, as in the steady sweep; heights are in any one unit
-and times in relaxation times. The Deborah number D is v tau in cells. The lift is the sum of the depth and its rate, so
-that the force on an element in contact is lift + h + D h', over 4 G dx.
+Lengths are in cells of the line and slopes are rises per cell, as in the steady sweep. Heights are in any unit, times
+in relaxation times. The Deborah number D is v tau in cells. The lift is the sum of the depth and its rate, so that the
+force on an element in contact, over 4 G dx, is lift + h + D h'.
 """
 
 from __future__ import annotations
@@ -17,27 +17,27 @@ from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, contact_end, write_
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
 ROOT_STEPS = 60
-CLOSE = 1e-2  # cells: the last step towards a zero of the force; the error is its cube
-NEARBY = 8  # patches that are tried one by one before bisection
+CLOSE = 1e-2  # cells: size of the last step towards a zero of the force; the error is about its cube
+NEARBY = 8  # patches that are tried one after the other before bisection
 LOAD, DRAG, LENGTH, TILT, STIFFNESS, DRAG_STIFFNESS, GROWTH, DRAG_GROWTH = range(8)
 SUMS = 8
 
 
 class Track(NamedTuple):
-    """The cells of a periodic line and their integrals up to every node.
+    """The cells of a periodic line, with integrals up to every node.
 
     Parameters
     ----------
     height : array, shape (n + 2,)
-        Heights at the nodes above the highest point, so that a light contact loses no digits.
+        Heights at the nodes relative to the highest point, which avoids rounding errors in light contacts.
     enter, leave, peak : array, shape (n + 1,)
-        Slopes at the start and the end of each cell, and its maximum; the last cell repeats the first one.
+        Slopes at the start and at the end of each cell, and its largest height; the last cell repeats the first one.
     area, square : array, shape (n + 2,)
-        Integrals of the height and of the slope squared up to each node.
+        Integrals of the height and of the square of the slope up to each node.
     cells : float
         n, the length of the line.
     origin : float
-        Place of the highest point, in the first cell, where the period begins.
+        Place of the highest point, in the first cell. The period begins here.
     """
 
     height: FloatArray
@@ -51,16 +51,17 @@ class Track(NamedTuple):
 
 
 def track_of(cells: Cells) -> Track:
-    """Return the cells of a periodic line with their integrals up to every node."""
+    """Return the cells of a periodic line with integrals up to every node."""
     area, square = running(cells.mean), running(cells.stretch)
     n = float(cells.mean.size - 1)
     return Track(cells.height, cells.enter, cells.leave, cells.peak, area, square, n, cells.start)
 
 
 class Patches(NamedTuple):
-    """Patches of a steady state: patch k reaches from ``start[k]`` to ``end[k]``.
+    """Patches of a steady state: patch k extends from ``start[k]`` to ``end[k]``.
 
-    ``pressed`` is the displacement with which elements leave a patch, ``cursor`` the patch that was found last.
+    ``pressed`` is the displacement of elements at the end of each patch. ``cursor`` is the index of the patch found by
+    the last search.
     """
 
     start: FloatArray
@@ -97,7 +98,7 @@ def height_at(track: Track, x: float) -> tuple[float, float, float]:
 
 @jit_inline_uncounted
 def patch_before(patches: Patches, s: float) -> int:
-    """Return the last patch that begins at s or before, or the first; the search begins at the last one found."""
+    """Return the last patch that begins at s or before, or the first patch; start from the patch found last time."""
     low, high = int(patches.cursor[0]), patches.count
     if patches.start[low] <= s:
         for _ in range(NEARBY):
@@ -116,7 +117,7 @@ def patch_before(patches: Patches, s: float) -> int:
 
 @jit_inline_uncounted
 def _part(c0: float, c1: float, c2: float, c3: float, y: float) -> tuple[float, float, float]:
-    """Return the height at y of a cubic over 0..1, and the integrals of it and of its slope squared from 0 to y."""
+    """Return the height at y of a cubic on [0, 1], and the integrals of height and slope squared from 0 to y."""
     height = c0 + y * (c1 + y * (c2 + y * c3))
     area = y * (c0 + y * (c1 / 2 + y * (c2 / 3 + y * c3 / 4)))
     square = y * c1 * c1 + y * y * (
@@ -127,9 +128,9 @@ def _part(c0: float, c1: float, c2: float, c3: float, y: float) -> tuple[float, 
 
 @jit_inline_uncounted
 def add_patch(track: Track, start: float, end: float, lift: float, deborah: float, sums: FloatArray) -> None:
-    """Add the forces of a patch in contact, f = lift + h + deborah h' with lift = d + d_dot, exactly.
+    """Add the exact forces of a patch in contact, f = lift + h + deborah h' with lift = d + d_dot.
 
-    Whole cells are taken from the running integrals, parts of cells from their cubics, as in the sweep.
+    The integrals over whole cells follow from the running integrals, those over parts of cells from the cubics.
     """
     last = track.enter.size - 1
     i, j = min(int(start), last), min(int(end), last)
@@ -153,9 +154,10 @@ def add_patch(track: Track, start: float, end: float, lift: float, deborah: floa
 
 @jit_uncounted
 def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
-    """Return where from y to 1 the cubic p + q y + r y^2 + c y^3, not negative at y, falls through zero, or `NONE`.
+    """Return the first place between y and 1 where p + q y + r y^2 + c y^3 falls through zero, or `NONE`.
 
-    Where its Bernstein coefficients over that part decrease, so does the cubic, and Newton's method finds the zero.
+    The cubic is not negative at y. If its Bernstein coefficients on [y, 1] decrease, the cubic decreases as well, and
+    Newton's method finds the zero.
     """
     width = 1 - y
     begin, end = p + y * (q + y * (r + y * c)), p + q + r + c
@@ -183,13 +185,13 @@ def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
 
 @jit_inline_uncounted
 def unloading(c0: float, c1: float, c2: float, c3: float, lift: float, deborah: float, y: float) -> float:
-    """Return where in a cell, from y on, the force lift + h + deborah h' falls through zero first, or `NONE`."""
+    """Return the first place in a cell from y on where the force lift + h + deborah h' falls through 0, or `NONE`."""
     return _zero(lift + c0 + deborah * c1, c1 + 2 * deborah * c2, c2 + 3 * deborah * c3, c3, y)
 
 
 @jit_inline_uncounted
 def loading(c0: float, c1: float, c2: float, c3: float, lift: float, deborah: float, y: float) -> float:
-    """Return where in a cell, from y on, the force rises through zero first, or `NONE`."""
+    """Return the first place in a cell from y on where the force rises through 0, or `NONE`."""
     return _zero(-lift - c0 - deborah * c1, -c1 - 2 * deborah * c2, -c2 - 3 * deborah * c3, -c3, y)
 
 
@@ -201,7 +203,7 @@ def force_at(c0: float, c1: float, c2: float, c3: float, lift: float, deborah: f
 
 @jit_inline_uncounted
 def keeps_pressed(track: Track, barriers: Barriers, deborah: float, i: int, lift: float) -> bool:
-    """Return whether the force is positive in all of cell i."""
+    """Return whether the contact force is positive everywhere in cell i."""
     block = np.uintp(i) // np.uintp(BLOCK)
     if np.isnan(barriers.block[block]):
         write_barriers(track.height, track.enter, track.leave, deborah, i // BLOCK, barriers)
@@ -215,13 +217,14 @@ def released(track: Track, first: Patches, barriers: Barriers, deborah: float, r
     Parameters
     ----------
     track, first : Track, Patches
-        The state before the jump; displacements and depth do not change at once.
+        The line, and the state before the jump; displacements and depth are the same just after the jump.
     barriers : Barriers
-        At the new Deborah number.
+        Barriers at the new Deborah number.
     deborah, rate : float
         New Deborah number, and new rate of the depth.
     sums : array, shape (SUMS,)
-        Written: load and drag over 4 G dx, length in contact, which is the derivative of the load by the rate.
+        Written: load and drag over 4 G dx, length in contact (the derivative of the load by the rate), and the integral
+        of the slope over this length.
     """
     sums[:] = 0.0
     lift, n = first.depth + rate, int(track.cells)

@@ -1,8 +1,8 @@
-"""Friction after a jump of the velocity at constant load, marched from one steady state to the next on one line.
+"""Friction after a velocity jump at constant load, marched from one steady state to the next on one line.
 
-The start is steady sliding at v_1. From the jump on the depth is marched by backward differentiation of order three
-over the logarithm of the time, and every edge of contact is solved at every moment (thesis 4.2, with the rate of the
-depth in the velocity of the elements).
+The march starts from steady sliding at v_1. After the jump the depth is marched by backward differentiation of third
+order over the logarithm of the time, and the edges of all patches are solved at every moment (thesis 4.2, with the rate
+of the depth in the velocity of the elements).
 """
 
 from __future__ import annotations
@@ -22,36 +22,36 @@ from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits, stead
 from mdr_dask.physics.transients.march import LEFT_LIMITS, Finish, Marching, Stepping, Trajectory, march_depth, retrace
 from mdr_dask.physics.transients.patches import Patches, Track
 
-ONSET = 0.5  # of the time in which the line travels 1 / q_max: steps grow in a constant ratio from then on
-ROOT = 10.0  # times earlier after a fall of the velocity: contact then grows as the square root of the time
+ONSET = 0.5  # part of the time in which the line travels 1 / q_max; steps grow in a constant ratio from then on
+ROOT = 10.0  # the first step is smaller by this factor if the velocity falls: contact then grows as sqrt(t)
 # The next three are divided by the steps per decade
-MISS = 1.0  # of the change of depth: a step is shortened if the extrapolated depth is wrong by more
-NEWTON = 0.2  # of the change of depth: the last Newton step; the error is its square
-SETTLED = 0.04  # of the change of depth, and of the largest change of drag: distances at the end of a march
-OF_ACCURACY = 0.1  # of the accuracy: the same, where that is larger
-NEGLIGIBLE = 1e-5  # of the mean displacement: least change of depth that the numbers above are measured by
-LONG, NOT_STEADY = 15.0, (0.02, 1e-3)  # then drag must be as near to its end, in parts of its changes and of itself
-MARGIN, WIDENINGS = 0.25, 3  # of the change of depth that a march may leave it by; four times more at each try
-SHALLOW = 0.01  # of the least depth of the steady states: no march goes below
-MOMENTS = 3000  # most moments of a march
-STEEPEST = 3.0  # times the lesser secant beside a moment: a cubic with a steeper tangent would overshoot
-EVERY = 2  # moments of a path in a step of the same path on another grid, but for the last step
+MISS = 1.0  # part of the change of depth: a step is shortened if the error of the extrapolated depth is larger
+NEWTON = 0.2  # part of the change of depth: largest size of the last Newton step; the error is about its square
+SETTLED = 0.04  # part of the changes of depth and drag: distances from the steady values at the end of a march
+OF_ACCURACY = 0.1  # part of the accuracy: the same distance, if this is larger
+NEGLIGIBLE = 1e-5  # part of the mean displacement: smallest change of depth to which the factors above are applied
+LONG, NOT_STEADY = 15.0, (0.02, 1e-3)  # from this time on drag must be near its end: parts of its changes and of itself
+MARGIN, WIDENINGS = 0.25, 3  # part of the change of depth by which a march may exceed it; four times more at each try
+SHALLOW = 0.01  # part of the lower steady depth: a march never becomes shallower
+MOMENTS = 3000  # largest number of moments of a march
+STEEPEST = 3.0  # times the smaller of the two secants at a moment: a cubic with a steeper tangent would overshoot
+EVERY = 2  # moments of a path per step of its repetition on another grid, except for the last step
 
 
 class MarchRequest(NamedTuple):
-    """What is wanted of a march.
+    """Requested times and accuracy of a march.
 
     Parameters
     ----------
     times : array, shape (m,)
-        (t - t_0) / tau at which friction and depth are wanted, increasing.
+        Requested (t - t_0) / tau, increasing.
     wavenumber : float
-        q_max L, which decides the first step.
+        q_max L, which decides the size of the first step.
     per_decade : float
-        Steps in a factor ten of the time.
+        Steps per factor of ten in time.
     accuracy : float
-        Error allowed for friction relative to the friction at the end. A smaller transient is not marched; another
-        march ends when drag and depth are within a tenth of it.
+        Allowed error of the friction relative to the steady friction after the jump. A smaller transient is not
+        marched. A march ends when drag and depth are within a tenth of this accuracy.
     """
 
     times: FloatArray
@@ -67,7 +67,7 @@ class Path(NamedTuple):
     ----------
     time : array, shape (moments,)
     values, rates : array, shape (2, moments)
-        The first rate of the drag is NaN: it is not known.
+        The first rate of the drag is NaN because it is unknown.
     falls : bool
         Whether the velocity falls.
     """
@@ -78,10 +78,11 @@ class Path(NamedTuple):
     falls: bool
 
     def at(self, times: FloatArray, after: FloatArray) -> FloatArray:
-        """Return drag and depth at increasing times, shape (2, times); `after` the last moment they are constant.
+        """Return drag and depth at increasing times, shape (2, times), equal to `after` beyond the last moment.
 
-        Between moments they are cubic in log(1 + t / t_1), where t_1 is the first moment. Up to t_1 they go as the
-        time, or as its square root if the velocity falls, because contact then grows behind every patch.
+        Between moments they are cubic in log(1 + t / t_1), where t_1 is the first moment after the jump. Before t_1
+        they change in proportion to the time, or to its square root if the velocity falls, because contact then grows
+        behind every patch.
         """
         power = 0.5 if self.falls else 1.0
         moments, wanted = (self.time / self.time[1]) ** power, (times / self.time[1]) ** power
@@ -91,10 +92,11 @@ class Path(NamedTuple):
 
 
 def _limited_cubic(x: FloatArray, rows: FloatArray, slopes: FloatArray, places: FloatArray) -> FloatArray:
-    """Return cubics through rows of points with known slopes; where the first one is NaN, a parabola begins there.
+    """Return cubics through rows of points with given slopes; if the first slope is NaN, the first piece is a parabola.
 
-    A slope far steeper than the secants beside its point belongs to a single asperity that comes into contact or loses
-    it. It is reduced, so that the cubic does not overshoot. (scipy's splines would take a tenth of the time of a jump.)
+    A slope that is much steeper than the secants at its point is due to a single asperity that enters or leaves
+    contact. It is reduced, so that the cubic does not overshoot. (Splines of scipy would take a tenth of the time of a
+    jump.)
     """
     step, rise = np.diff(x), np.diff(rows)
     sizes = np.abs(rise / step)[:, [0, *range(step.size), -1]]
@@ -114,18 +116,18 @@ def _limited_cubic(x: FloatArray, rows: FloatArray, slopes: FloatArray, places: 
 
 
 class Jump(NamedTuple):
-    """Friction before, at and after a jump of the velocity; drags are F_x / (4 G L) in height squared over length.
+    """Friction before, at and after a velocity jump; drags are F_x / (4 G L) in height squared over length.
 
     Parameters
     ----------
     before, at, after : float
-        Steady at v_1, just after the jump, and steady at v_2.
+        Drag in steady sliding at v_1, just after the jump, and in steady sliding at v_2.
     trace, depth : array, shape (times,)
         Drag and depth at the requested times.
     path : Path or None
-        Of the march; None if nothing was marched.
+        Path of the march; None if nothing was marched.
     left_out : float
-        Estimated size of a transient that was not marched because all of it is within the accuracy.
+        Estimated size of a transient that was not marched because it is smaller than the accuracy; otherwise 0.
     outcome : Outcome
     """
 
@@ -140,12 +142,12 @@ class Jump(NamedTuple):
 
     @property
     def moments(self) -> int:
-        """Number of moments computed."""
+        """Number of computed moments."""
         return 0 if self.path is None else self.path.time.size
 
 
 def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], request: MarchRequest) -> Jump:
-    """Return the friction of a Kelvin foundation on a periodic line through a jump of the velocity at constant load.
+    """Return the friction of a Kelvin foundation on a periodic line through a velocity jump at constant load.
 
     Parameters
     ----------
@@ -164,7 +166,7 @@ def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], re
 def jump_between(
     line: PreparedLine, load: float, deborah: FloatArray, limits: SteadyLimits, request: MarchRequest
 ) -> Jump:
-    """Return one jump between steady states that are known; the parameters are as in :func:`velocity_jump`."""
+    """Return one jump between known steady states; the other parameters are as in :func:`velocity_jump`."""
     times = request.times
     if limits.outcome != Outcome.CONVERGED:
         return _failed(times, limits.outcome)
@@ -172,7 +174,7 @@ def jump_between(
     settled = Jump(
         limits.before, limits.at, limits.after, after, np.full(times.size, limits.depth[1]), None, 0.0, limits.outcome
     )
-    if limits.is_full:  # then u = d + h, the depth is constant and nothing relaxes
+    if limits.is_full:  # in full contact u = d + h and the depth is constant: there is no transient
         return settled
     relaxation = _Relaxation(line, load * line.track.cells, deborah * line.track.cells, limits, request)
     transient = relaxation.transient() if request.accuracy > 0 else np.inf
@@ -189,9 +191,9 @@ def jump_between(
 def retraced(
     line: PreparedLine, load: float, deborah: FloatArray, limits: SteadyLimits, path: Path, request: MarchRequest
 ) -> Path | None:
-    """Return a path on another grid at every second of its moments, or None if there is no solution.
+    """Return a path on another grid at every second one of its moments, or None if there is no solution.
 
-    The parameters are as in :func:`jump_between`, on the other grid.
+    The other parameters are as in :func:`jump_between`, for the other grid.
     """
     if limits.outcome != Outcome.CONVERGED:
         return None
@@ -204,7 +206,7 @@ def _failed(times: FloatArray, outcome: Outcome) -> Jump:
 
 
 class _Relaxation(NamedTuple):
-    """One jump in units of cells: load, Deborah numbers, and the steady states before and after."""
+    """One jump with lengths in cells: load, Deborah numbers, and the steady states before and after."""
 
     line: PreparedLine
     load: float
@@ -214,20 +216,21 @@ class _Relaxation(NamedTuple):
 
     @property
     def ends(self) -> FloatArray:
-        """Depth of the highest point before and long after the jump."""
+        """Steady depth of the highest point before and after the jump."""
         ends: FloatArray = self.limits.depth + self.line.cells.top
         return ends
 
     @property
     def change(self) -> float:
-        """Change of the depth, by which errors of it are measured."""
+        """Change of the depth, relative to which its errors are measured."""
         return max(abs(float(np.diff(self.limits.depth)[0])), NEGLIGIBLE * self.load / self.line.track.cells)
 
     @property
     def stepping(self) -> Stepping:
-        """Steps that grow in a constant ratio from a part of the time in which the line travels 1 / q_max.
+        """Sizes of the steps.
 
-        It travels at v_2, and contact behind a patch grows at v_1 - v_2 if the velocity falls.
+        They grow in a constant ratio from a part of the time in which the line travels 1 / q_max. The line travels at
+        v_2, and contact behind a patch grows at v_1 - v_2 if the velocity falls.
         """
         before, after = self.deborah / self.line.track.cells
         growth = 10 ** (1 / self.request.per_decade)
@@ -241,8 +244,9 @@ class _Relaxation(NamedTuple):
     def transient(self) -> float:
         """Estimate the size of the transient, with a safety factor of two.
 
-        The difference of its ends alone is no bound, because friction may cross its end. Added are the friction of the
-        rate of the depth just after the jump, and that of the change of depth.
+        The difference between the drag just after the jump and the steady drag is no bound, because the drag may cross
+        its steady value. Two terms are added: the drag due to the rate of the depth just after the jump, and the drag
+        due to the change of depth.
         """
         _, sums = self.line.patches(self.ends[1], self.deborah[1])
         by_depth = abs(sums[DRAG_RATE] * (self.ends[1] - self.ends[0]))
@@ -250,7 +254,7 @@ class _Relaxation(NamedTuple):
         return float(2 * (abs(limits.at - limits.after) + abs(limits.rate * limits.tilt) + by_depth))
 
     def intervals(self, depths: FloatArray) -> Iterator[tuple[float, float]]:
-        """Yield wider and wider intervals around depths."""
+        """Yield wider and wider intervals around the given depths."""
         low, high = float(depths.min()), float(depths.max())
         margin = MARGIN * (high - low) + NEGLIGIBLE * self.load / self.line.track.cells
         for _ in range(WIDENINGS):
@@ -258,7 +262,7 @@ class _Relaxation(NamedTuple):
             margin *= 4
 
     def march(self, transient: float) -> tuple[Path | None, Outcome]:
-        """March from one steady state to the next; return the path, or the reason why there is none."""
+        """March from one steady state to the next; return the path (None if there is none) and the outcome."""
         after, request = self.limits.after, self.request
         near = max(SETTLED / request.per_decade, OF_ACCURACY * request.accuracy * after / max(transient, 1e-300))
         finish = Finish(float(self.ends[1]), after, near * self.change, near)
@@ -278,7 +282,7 @@ class _Relaxation(NamedTuple):
         return path, Outcome.CONVERGED
 
     def begun(self, interval: tuple[float, float], moments: int) -> tuple[Marching, Trajectory, Workspace]:
-        """Return a march between two depths at its first moment."""
+        """Return a march between two depths, with its first moment written, and its workspace."""
         line, limits, stepping = self.line, self.limits, self.stepping
         assert limits.first is not None
         assert limits.slower is not None
@@ -292,13 +296,13 @@ class _Relaxation(NamedTuple):
         return marching, found, workspace_for(limits.first.count, line.barriers(self.deborah[1]), below)
 
     def path(self, found: Trajectory) -> Path:
-        """Return the path of a trajectory, with depths of the mean line."""
+        """Return the path of a trajectory, with depths relative to the mean line."""
         values = np.stack([found.drag, found.depth - self.line.cells.top])
         falls = bool(self.deborah[1] < self.deborah[0])
         return Path(found.time, values, np.stack([found.drag_rate, found.rate]), falls)
 
     def retrace(self, path: Path) -> Path | None:
-        """Return the path on this grid at every second moment of a path on another one, or None."""
+        """Return the path on this grid at every second moment of a path on another grid, or None."""
         moments = np.unique(np.append(np.arange(0, path.time.size, EVERY), path.time.size - 1))
         time, depths = path.time[moments], path.values[1, moments] + self.line.cells.top
         for interval in self.intervals(np.append(depths + (self.ends[0] - depths[0]), self.ends)):
@@ -310,17 +314,17 @@ class _Relaxation(NamedTuple):
 
 
 def _reachable(track: Track, slower: Patches, interval: tuple[float, float]) -> Reachable:
-    """Return where elements can be in contact between two depths."""
+    """Return the cells where elements can be in contact at depths in an interval."""
     begin, end = int(np.ceil(slower.end[0])), int(slower.start[-1])
     return Reachable(*_runs(track, slower, interval), float(np.max(track.peak[begin:end], initial=-np.inf)))
 
 
 @jit
 def _runs(track: Track, slower: Patches, interval: tuple[float, float]) -> tuple[IntArray, FloatArray]:
-    """Return where elements can be in contact between two depths, and up to which depth those of a cell are not.
+    """Return the runs of cells where contact is possible at depths in an interval, and the bound for each cell.
 
-    The steady state at the lower velocity bounds them: where the depth is less by some length, displacements are less
-    by that length at most.
+    The bound is the largest depth at which a cell is certainly out of contact. It follows from the steady state at the
+    lower velocity: if the depth is smaller by some length, displacements are smaller by this length at most.
     """
     (low, high), cells, decay = interval, track.peak.size, np.exp(-1 / slower.deborah)
     from_depth = np.full(cells + 1, -np.inf)

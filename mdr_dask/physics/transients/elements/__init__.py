@@ -1,7 +1,7 @@
-"""Histories of velocity and load in which every element of a foundation is followed in time, for any linear solid.
+"""Friction under any history of velocity and load, for a foundation of any linear solid.
 
-This takes longer than the march of a jump. Read `foundation` first: a solid, and one element of it through one step.
-`edges` adds up the forces on a line over all elements, between which contact begins and ends. `steps` moves all
-elements through the moments of a history. `follow` starts from rest or from steady sliding. `loading_history` describes
-velocity and load in time, and chooses the moments.
+The motion of every element is computed, which takes longer than the march of a velocity jump. Read `foundation` first:
+it describes a solid, and one element of it during one step. `steps` moves all elements through the moments of a history
+and adds up their forces, with the places between elements where contact begins and ends. `loading_history` describes
+velocity and load in time, chooses the moments, and starts from rest or from steady sliding.
 """

@@ -1,9 +1,9 @@
-"""One element of a viscoelastic foundation through one step: pressed at constant speed, or recovering without force.
+"""One element of a viscoelastic foundation during one step: pressed at constant speed, or recovering without force.
 
 Functions take the strains of the dashpots of the Prony terms of all elements, shape (n, terms), and the index i of one
 element, because passing an index is faster than slicing.
 
-Units: the static modulus is 1, heights are in any unit, lengths in that of the line, times in one time of the material.
+Units: the static modulus is 1, heights are in any unit, lengths in the unit of the line, times in one unit for all.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ class Foundation(NamedTuple):
     viscosity : float
         eta / G_inf of the dashpot, 0 for none.
     rates : array, shape (modes,)
-        Rates of decay of the modes, positive. There is one mode for each Prony term, and one more for a dashpot.
+        Decay rates of the modes, positive. There is one mode for each Prony term, and one more for a dashpot.
     outward, inward : array, shape (modes, modes)
-        From modes to the state (u of a solid with a dashpot, a_1, ...), and back.
+        Transformation from the modes to the state (u of a solid with a dashpot, a_1, ...), and back.
     push : array, shape (modes,)
-        Growth of the modes of the total under a unit load.
+        Growth rates of the modes, summed over all elements, under a unit load.
     """
 
     moduli: FloatArray
@@ -78,7 +78,7 @@ KELVIN = foundation([], [], 1.0)
 
 
 class ElementWorkspace(NamedTuple):
-    """Workspace of one element: modes, decay over part of a step, fading over it, and terms, shape (1, terms)."""
+    """Work arrays of one element: modes, decay of modes and of terms over a part of a step, terms (1, terms)."""
 
     modes: FloatArray
     decay: FloatArray
@@ -94,7 +94,7 @@ def element_workspace(solid: Foundation) -> ElementWorkspace:
 
 
 class Lapse(NamedTuple):
-    """A duration, the decay of modes and terms over it, and the workspace of one element."""
+    """A duration, the decay of modes and terms during it, and the workspace of one element."""
 
     time: float
     decay: FloatArray
@@ -103,7 +103,7 @@ class Lapse(NamedTuple):
 
 
 class Rise(NamedTuple):
-    """Height of the line over one element at the begin and the end of a duration, and its rates there."""
+    """Height of the line over one element at the start and the end of a duration, and the rates of the height there."""
 
     w0: float
     w1: float
@@ -112,7 +112,11 @@ class Rise(NamedTuple):
 
 
 class Release(NamedTuple):
-    """Part of a time after which an element separates (1: not), where, and its displacement at the end then."""
+    """Separation of an element in a step: the part of the step before it (1 for none), and two displacements.
+
+    `leaves` is the displacement at the separation, `after` the displacement at the end of the step if the element
+    separates.
+    """
 
     part: float
     leaves: float
@@ -121,7 +125,7 @@ class Release(NamedTuple):
 
 @jit
 def fading(solid: Foundation, step: float, decay: FloatArray, fades: FloatArray) -> None:
-    """Write the decay of modes and terms over a time."""
+    """Write the decay of modes and terms over a duration."""
     for k in range(decay.size):
         decay[k] = np.exp(-solid.rates[k] * step)
     for m in range(fades.size):
@@ -130,7 +134,7 @@ def fading(solid: Foundation, step: float, decay: FloatArray, fades: FloatArray)
 
 @jit
 def recover(solid: Foundation, u: float, terms: FloatArray, i: int, decay: FloatArray, modes: FloatArray) -> float:
-    """Let an element recover without force; `terms` is overwritten."""
+    """Return the displacement of an element after free recovery; its `terms` are overwritten."""
     if solid.times.size == 0:
         return float(u * decay[0])
     extra = 1 if solid.viscosity > 0 else 0
@@ -155,7 +159,7 @@ def recover(solid: Foundation, u: float, terms: FloatArray, i: int, decay: Float
 
 @jit
 def at_rest(solid: Foundation, terms: FloatArray, i: int) -> float:
-    """Return the displacement without force of an element that has no dashpot."""
+    """Return the force-free displacement of an element without a dashpot."""
     pull, glass = 0.0, 1.0
     for m in range(solid.times.size):
         pull += solid.moduli[m] * terms[i, m]
@@ -167,10 +171,10 @@ def at_rest(solid: Foundation, terms: FloatArray, i: int) -> float:
 def press(
     solid: Foundation, u0: float, u1: float, terms: FloatArray, i: int, step: float, fades: FloatArray
 ) -> tuple[float, float]:
-    """Move an element from u0 to u1 at constant speed; return work and dissipation, whose difference is stored.
+    """Move an element from u0 to u1 at constant speed; return work and dissipation.
 
-    The stretch q = u - a of a term is A + B exp(-t / tau) with A = tau du/dt. Work is the integral of f du,
-    dissipation that of G q^2 / tau and of eta (du/dt)^2.
+    The difference of the two is stored. The stretch q = u - a of a term is A + B exp(-t / tau) with A = tau du/dt. Work
+    is the integral of f du, dissipation the integral of G q^2 / tau and of eta (du/dt)^2 over time.
     """
     if step <= 0:
         return 0.0, 0.0
@@ -198,7 +202,7 @@ def stored(solid: Foundation, u: float, terms: FloatArray, i: int) -> float:
 
 @jit
 def pull(solid: Foundation, u: float, terms: FloatArray, i: int) -> float:
-    """Return the force of the spring and the Prony terms."""
+    """Return the force of the spring and the Prony terms of an element."""
     force = 1.0 * u
     for m in range(solid.times.size):
         force += solid.moduli[m] * (u - terms[i, m])
@@ -207,9 +211,10 @@ def pull(solid: Foundation, u: float, terms: FloatArray, i: int) -> float:
 
 @jit_inline
 def release(solid: Foundation, lapse: Lapse, rise: Rise, terms: FloatArray, i: int) -> tuple[float, float]:
-    """Return the part of a time after which an element in contact separates, and where; 1 if it does not.
+    """Return the part of a duration after which an element in contact separates, and its displacement then.
 
-    The force is taken as linear in time, the rise as cubic.
+    The part is 1 if the element does not separate. The force is taken as linear in time, the height of the line as
+    cubic.
     """
     begin = pull(solid, rise.w0, terms, i) + solid.viscosity * rise.rise0
     if begin <= 0:
@@ -230,7 +235,7 @@ def release(solid: Foundation, lapse: Lapse, rise: Rise, terms: FloatArray, i: i
 def free_after(
     solid: Foundation, lapse: Lapse, u0: float, part: float, leaves: float, terms: FloatArray, i: int
 ) -> float:
-    """Return the displacement at the end if an element is pressed to `leaves` for a part of a time and then free."""
+    """Return the final displacement of an element that is pressed to `leaves` for a part of a duration, then free."""
     workspace = lapse.workspace
     for m in range(solid.times.size):
         workspace.terms[0, m] = terms[i, m]
@@ -252,9 +257,9 @@ def advance(
     terms: FloatArray,
     i: int,
 ) -> tuple[float, bool, float, float]:
-    """Move one element through a time; return displacement, contact, work and dissipation. `terms` is overwritten.
+    """Move one element through a duration; return displacement, contact, work and dissipation; overwrite its `terms`.
 
-    `w` is the height of the line at begin and end, `element` displacement and contact at the begin.
+    `w` is the height of the line at the start and at the end, `element` displacement and contact at the start.
     """
     (w0, w1), (u0, touching), step, workspace = w, element, lapse.time, lapse.workspace
     before = stored(solid, u0, terms, i)

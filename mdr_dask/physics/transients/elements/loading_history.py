@@ -1,7 +1,7 @@
-"""Friction under any loading history: every element is followed in time, at second order in the step.
+"""Friction under any loading history, from the motion of every element, of second order in the step.
 
 Times are in the unit of the solid, travel is in lengths of the line, loads are F_N / (4 G_inf L) in the unit of height.
-A single jump of a Kelvin solid on a periodic line is solved much faster by `velocity_jump`.
+A single velocity jump of a Kelvin solid on a periodic line is solved much faster by `velocity_jump`.
 """
 
 from __future__ import annotations
@@ -39,29 +39,29 @@ from mdr_dask.physics.transients.elements.steps import (
     note_edges,
 )
 
-PERIODS = 3000  # most periods of the line until an element repeats its state
-STEADY = 1e-14  # part of the depth at the start: accuracy of the search
-LOAD_MISSED = 1e-6  # part of the load that the steady state at the start may miss
+PERIODS = 3000  # largest number of periods of the line until the state of an element repeats
+STEADY = 1e-14  # part of the depth: accuracy of the depth at the start
+LOAD_MISSED = 1e-6  # part of the load that may be missing in the steady state at the start
 
 
 class Response(NamedTuple):
-    """State at every moment of a protocol, energies in height squared.
+    """State at every moment of a loading history, energies in height squared.
 
     Parameters
     ----------
     drag, depth, rate, contact : array, shape (moments,)
         F_x / (4 G L) in the unit of height squared over length; depth; its derivative by t / tau; fraction in contact.
     stored : array, shape (moments,)
-        Energy stored over 4 G L.
+        Stored energy over 4 G L.
     work, dissipated : array, shape (moments,)
         Work done on the elements and energy dissipated since the first moment, over 4 G L. Their difference is the
-        increase of the stored energy, within rounding. An element that leaves a line that is not periodic counts with
-        all that it will dissipate.
+        increase of the stored energy, within rounding. All energy stored in an element that leaves the end of a line
+        that is not periodic counts as dissipated.
     displacement : array, shape (n,)
-        Of every element at the end.
+        Displacement of every element at the end.
     status : Outcome
     state : State
-        Of every element at the end, for going on from there.
+        State of every element at the end, from which another history can continue.
     """
 
     drag: FloatArray
@@ -77,7 +77,7 @@ class Response(NamedTuple):
 
 
 def untouched(elements: int, terms: int) -> State:
-    """Return elements that have never been in contact."""
+    """Return the state of elements that have never been in contact."""
     edges = Edges(np.full(elements, -1.0), np.zeros(elements))
     strains = np.zeros((2, elements, terms))
     touching = np.zeros(elements, np.bool_)
@@ -100,8 +100,8 @@ def steady_start(line: CubicLine, solid: Foundation, deborah: float, load: float
     """Return the steady state of the elements at the nodes, sliding at constant speed under a constant load.
 
     One element is carried around the line until its state repeats, in steps of half a cell by the method of
-    :func:`follow_line`. The depth is the root of the mean displacement, which increases with it. At ``deborah = 0`` the
-    elements have rested under the load for ever.
+    :func:`follow_line`. The depth is found from the mean displacement, which increases with the depth. At ``deborah =
+    0`` the elements are in equilibrium at rest under the load.
 
     Returns
     -------
@@ -143,7 +143,7 @@ def _halved(line: CubicLine) -> CubicLine:
 
 
 def _resting(line: CubicLine, state: State, depth: float) -> float:
-    """Write the state of all elements of a body at rest; return the load."""
+    """Write the state of all elements of a body in equilibrium at rest; return the load."""
     w = depth + line.height[:-1]
     state.displacement[:] = np.maximum(w, 0)
     state.terms[:] = state.displacement[:, None]
@@ -154,7 +154,7 @@ def _resting(line: CubicLine, state: State, depth: float) -> float:
 
 
 def _sliding(line: CubicLine, solid: Foundation, state: State, deborah: float, depth: float) -> float:
-    """Write the steady state of all elements at a depth; return the load that has their mean displacement."""
+    """Write the steady state of all elements at a depth; return the load that causes their mean displacement."""
     if depth + line.height[:-1].max() <= 0:
         return 0.0
     n = state.displacement.size
@@ -225,22 +225,22 @@ def follow_line(
     state: State,
     depth: float,
 ) -> Response:
-    """Follow every element of any linear foundation under any line through a loading history.
+    """Compute the motion of every element of a linear foundation under a line during a loading history.
 
-    Within a step an element in contact moves at constant speed, and a free one recovers by the modes of the solid.
-    Contact begins or ends inside the step, where gap or force vanish. The load decides the mean displacement, whatever
-    is in contact, so that the depth is the root of a convex sum.
+    During a step an element in contact moves at constant speed, and a free element recovers by the modes of the solid.
+    Contact begins or ends inside the step, where the gap or the force vanishes. The load decides the mean displacement,
+    whichever elements are in contact, so that the depth is the root of a convex sum.
 
     Parameters
     ----------
     line : CubicLine
-        Elements enter a line that is not periodic undeformed. Forces are linear between elements: a line
-        :func:`~mdr_dask.physics.surfaces.cubic_line.without_kinks` is followed with the smallest error.
+        Elements enter a line that is not periodic undeformed. Forces are linear between elements: the error is smallest
+        for a line :func:`~mdr_dask.physics.surfaces.cubic_line.without_kinks`.
     solid : Foundation
     schedule : Schedule
         Travel, velocity and load at every moment.
     state, depth
-        At the first moment, as :func:`steady_start` or an earlier `Response` gives them; left as they are.
+        State and depth at the first moment, from :func:`steady_start` or an earlier `Response`; they are not changed.
 
     Returns
     -------
@@ -253,25 +253,25 @@ def follow_line(
     return Response(drag, depths, rate, contact, stored, work, dissipated, now.displacement, Outcome(status), now)
 
 
-MOST_STEPS = 400_000  # of one piece, beyond which it is given up
-# Of steps at 12 in a decade; with more steps in a decade they are shorter in proportion
-CELLS = 0.5  # cells of the line in a step, at most
-PART = 0.01  # of a ramp or a period in a step, at most
-FIRST = 1e-3  # of the longest step or of the unit of time: the first step
+MOST_STEPS = 400_000  # largest number of steps in one piece of a history
+# The next three are for 12 steps per decade; with more, the steps are shorter in proportion
+CELLS = 0.5  # cells of the line per step, at most
+PART = 0.01  # part of a ramp or of a period per step, at most
+FIRST = 1e-3  # first step, relative to the longest step or to the unit of time, whichever is smaller
 STEPS_PER_DECADE = 12.0
-NEARLY = 1e-2  # of a step: a moment so near to a requested time is replaced by it
-ROUNDING = 1e-12  # part of a time
+NEARLY = 1e-2  # part of a step: a moment that is so near to a requested time is replaced by it
+ROUNDING = 1e-12  # relative to a time
 
 
 @dataclass(frozen=True)
 class Piece:
-    """Smooth velocity and load between two times: linear, and perhaps a sine from `start` on."""
+    """Smooth velocity and load between two times: linear in time, perhaps with a sine added from `start` on."""
 
     start: float
     end: float
     velocity: tuple[float, float]
     force: tuple[float, float]
-    swing: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of the velocity, of the load, angular frequency
+    swing: tuple[float, float, float] = (0.0, 0.0, 0.0)  # amplitude of the velocity and of the load, angular frequency
 
     def scaled(self, time: float, velocity: float, force: float) -> Piece:
         """Return the piece in other units."""
@@ -300,16 +300,16 @@ class Piece:
 
     @property
     def changes_in(self) -> float:
-        """Duration of its changes: the period or the length of a ramp, infinite if it is constant."""
+        """Characteristic time: period of the sine or length of the ramp, infinite for constant values."""
         if self.swing[2]:
             return 2 * np.pi / self.swing[2]
         same = self.velocity[0] == self.velocity[1] and self.force[0] == self.force[1]
         return np.inf if same else self.end - self.start
 
     def moments(self, begin: float, end: float, nodes: int, per_decade: float) -> FloatArray | None:
-        """Return moments whose steps begin small and grow in a constant ratio up to a part of a cell.
+        """Return moments whose steps start small and grow in a constant ratio up to the longest step.
 
-        None if there would be too many.
+        Return None if there would be too many moments.
         """
         finer = STEPS_PER_DECADE / per_decade
         fastest = max(abs(self.velocity[0]), abs(self.velocity[1])) + self.swing[0]
@@ -327,19 +327,20 @@ class Piece:
         if end <= begin:
             return np.array([begin])
         moments: FloatArray = begin + np.concatenate([[0.0], grown, rest])
-        moments[-1] = end  # without a rounding error: the next piece begins there, and a time may be requested there
+        moments[-1] = end  # exactly, because the next piece begins here, and this time may be requested
         return moments
 
 
 class Trace(NamedTuple):
-    """Friction along a history: drag F_x / (4 G L) over the load, in units of height over length; depths in height.
+    """Friction during a history: drag F_x / (4 G L) over the load, in height over length; depths in units of height.
 
     Parameters
     ----------
     before, at, after : float
-        Steady before t = 0, at t = 0+, and in the steady state in which the history ends, NaN if it ends in none.
+        Friction in the steady state before t = 0, at t = 0+, and in the final steady state; NaN if there is no final
+        steady state.
     friction, depth : array, shape (times,)
-        At the requested times; at a jump the value after it.
+        Friction and depth at the requested times; at a jump, the value after it.
     contact : float
         Largest fraction of the line in contact from t = 0 to the last requested time.
     outcome : Outcome
@@ -370,21 +371,21 @@ def trace(
     times: FloatArray,
     per_decade: float,
 ) -> Trace:
-    """Follow every element of a body through a history.
+    """Compute the friction of a body during a history, from the motion of every element.
 
     Parameters
     ----------
     line, solid
         As in :func:`~mdr_dask.physics.transients.elements.loading_history.follow_line`.
     before : tuple of float
-        Velocity and load until t = 0: the body slides steadily, or rests where the velocity is 0. Both may jump at
-        t = 0.
+        Velocity and load until t = 0: the body slides steadily, or is at rest if the velocity is 0. Both may jump at t
+        = 0.
     pieces : sequence of Piece
-        From t = 0 on for ever.
+        Velocity and load from t = 0 on, without an end.
     times : array, shape (m,)
         Requested times, increasing.
     per_decade : float
-        Steps in a factor ten of the time after every change.
+        Steps per factor of ten in time after every change.
     """
     times = _snapped(times, np.array([piece.start for piece in pieces]))
     velocity, load_before = before
@@ -433,7 +434,7 @@ def _still(line: CubicLine, solid: Foundation, velocity: float, load: float, sta
 
 
 def _end(line: CubicLine, solid: Foundation, piece: Piece) -> float:
-    """Return the friction of the steady state in which a history ends; NaN if it ends in none or at rest."""
+    """Return the friction of the steady state in which a history ends; NaN if it has no steady end or ends at rest."""
     velocity, load = piece.velocity[1], piece.force[1]
     if piece.swing[2] or velocity <= 0:
         return np.nan
@@ -444,14 +445,14 @@ def _end(line: CubicLine, solid: Foundation, piece: Piece) -> float:
 
 
 def _snapped(times: FloatArray, starts: FloatArray) -> FloatArray:
-    """Return times with those that miss the start of a piece by rounding moved to it."""
+    """Return the times; those that differ from the start of a piece by rounding only are replaced by this start."""
     nearest = starts[np.abs(times[:, None] - starts).argmin(axis=1)]
     found: FloatArray = np.where(np.abs(times - nearest) <= ROUNDING * nearest, nearest, times)
     return found
 
 
 def _with_times(moments: FloatArray, times: FloatArray) -> FloatArray:
-    """Return moments that include the requested times, without other moments very near to these."""
+    """Return the moments and the requested times, without moments that are very near to a requested time."""
     inside = times[(times > moments[0]) & (times < moments[-1])]
     if inside.size == 0:
         return moments
@@ -465,6 +466,6 @@ def _with_times(moments: FloatArray, times: FloatArray) -> FloatArray:
 
 
 def _at(times: FloatArray, moments: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the values at times that are among the moments; at a jump the value after it."""
+    """Return the values at times that are among the moments; at a jump, the value after it."""
     found: FloatArray = values[np.searchsorted(moments, times, side="right") - 1]
     return found

@@ -1,6 +1,6 @@
-"""All elements of a viscoelastic foundation through the moments of a loading history.
+"""Motion of all elements of a viscoelastic foundation through the moments of a loading history.
 
-Units: the static modulus is 1, heights are in any unit, lengths in that of the line, times in one time of the material.
+Units: the static modulus is 1, heights are in any unit, lengths in the unit of the line, times in one unit for all.
 """
 
 from __future__ import annotations
@@ -32,7 +32,11 @@ from mdr_dask.physics.transients.elements.foundation import (
 
 
 class Edges(NamedTuple):
-    """Place in the cell before each element where the force last put an edge, -1 for none, and the gap outside then."""
+    """Edges of contact in the cell before each element, at the last step in which the force decided their place.
+
+    `place` is the distance of the edge from the element in contact as a part of the cell, -1 for none; `gap` is the gap
+    at the element out of contact at that time.
+    """
 
     place: FloatArray
     gap: FloatArray
@@ -44,9 +48,10 @@ class Contact(NamedTuple):
     Parameters
     ----------
     gaps, slope : array
-        From the line to the displacement that an element would have without contact, and the slope of the line.
+        Height of the line over the displacement that an element would have without contact, and the slope of the line.
     pulls, force, power : array
-        Force of springs and Prony terms of elements at the line; the whole force, and that times the slope (written).
+        Force of springs and Prony terms of elements pressed to the line; the total force, and its product with the
+        slope (both written).
     touching : bool array
     edges : Edges
     """
@@ -61,7 +66,7 @@ class Contact(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """Deborah number and load of a moment, and the element at the start of a line that does not close, else -1."""
+    """Deborah number and load at one moment, and the first element of a line that is not periodic (-1 if it is)."""
 
     deborah: float
     load: float
@@ -70,7 +75,10 @@ class Drive(NamedTuple):
 
 @jit
 def under_elements(line: CubicLine, travel: float, under: FloatArray, slope_under: FloatArray) -> int:
-    """Write height and slope over the line's length above every element after a travel; return its whole cells."""
+    """Write height and slope of the line at every element after a travel; return the number of whole cells travelled.
+
+    Slopes are over the length of the line.
+    """
     n = under.size
     cells = travel * n
     shift = int(np.floor(cells))
@@ -89,7 +97,10 @@ def under_elements(line: CubicLine, travel: float, under: FloatArray, slope_unde
 
 @jit
 def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) -> tuple[float, bool]:
-    """Find the depth at which the mean displacement max(d + p, free) has its value; convex and increasing in d."""
+    """Return the depth d at which the mean of max(d + p, free) has a given value, and success.
+
+    The mean is convex and increases with d.
+    """
     n = under.size
     for _ in range(200):
         total, touching = 0.0, 0
@@ -124,7 +135,7 @@ def _whole(values: FloatArray, j: int) -> float:
 
 @jit_inline
 def _limit(inner: float, outer: float, place: float, gap: float) -> float:
-    """Return the part of a cell up to the edge, seen from the element in contact."""
+    """Return the distance of the edge from the element in contact, as a part of the cell."""
     if place < 0:
         inner = max(inner, 0.0)
         return inner / (inner - outer) if outer < 0 else 1.0
@@ -135,7 +146,7 @@ def _limit(inner: float, outer: float, place: float, gap: float) -> float:
 def _cell(
     j: int, gaps: FloatArray, force: FloatArray, touching: BoolArray, edges: Edges, keep: bool
 ) -> tuple[float, float]:
-    """Return begin and end of contact in the cell before element j, as parts of the cell."""
+    """Return start and end of contact in the cell before element j, as parts of the cell."""
     f0, f1 = force[j - 1], force[j]
     before, after = touching[j - 1], touching[j]
     if keep and before == after:
@@ -160,7 +171,10 @@ def _cell(
 
 @jit
 def _forces(contact: Contact, first: int, keep: bool) -> tuple[float, float, float]:
-    """Return mean load, drag and fraction in contact; `first` has no element before it. Write the edges if `keep`."""
+    """Return mean load, drag and fraction in contact; write the edges if `keep`.
+
+    There is no cell before the element `first`.
+    """
     force, power, slope, touching, edges = contact.force, contact.power, contact.slope, contact.touching, contact.edges
     n = force.size
     load, drag, length = 0.0, 0.0, 0.0
@@ -185,7 +199,7 @@ def _forces(contact: Contact, first: int, keep: bool) -> tuple[float, float, flo
 
 @jit
 def _pressing_rate(contact: Contact, weight: float, deborah: float) -> float:
-    """Return the least rate at which the force on every element in contact is positive."""
+    """Return the smallest rate at which no element in contact has a negative force."""
     rate = -np.inf
     for j in range(contact.force.size):
         if contact.touching[j]:
@@ -197,8 +211,9 @@ def _pressing_rate(contact: Contact, weight: float, deborah: float) -> float:
 def carrying_rate(contact: Contact, weight: float, rate: float, drive: Drive) -> tuple[float, float, float]:
     """Return the rate of the depth at which the load is carried, drag and fraction in contact; write the edges.
 
-    The force of an element pressed to the line is `pulls` and `weight` times ``rate + deborah * slope``: with a dashpot
-    its viscosity and the rate of the depth, without one the glass modulus and a correction of the depth, deborah 0.
+    The force of an element pressed to the line is `pulls` plus `weight` times ``rate + deborah * slope``. With a
+    dashpot, `weight` is its viscosity and `rate` the rate of the depth. Without one, `weight` is the glass modulus,
+    `rate` a correction of the depth, and `deborah` 0.
     """
     force, power, slope = contact.force, contact.power, contact.slope
     drag, length = 0.0, 0.0
@@ -219,20 +234,20 @@ def carrying_rate(contact: Contact, weight: float, rate: float, drive: Drive) ->
 
 DRAG, DEPTH, RATE, CONTACT, STORED, WORK, DISSIPATED = range(7)
 ROWS = 7
-CORRECTIONS = 2  # of the times of separation and the depth within a step
+CORRECTIONS = 2  # number of corrections of the times of separation and of the depth in a step
 
 
 class State(NamedTuple):
-    """All elements at one moment.
+    """State of all elements at one moment.
 
     Parameters
     ----------
     displacement, terms : array, shape (n,) and (n, terms)
-        u, and the strain of the terms.
+        u, and the strains of the dashpots of the Prony terms.
     free, free_terms : array, shape (n,) and (n, terms)
-        The same without contact; `free_terms` is valid only for elements in contact.
+        The same for elements without contact; `free_terms` is valid only for elements in contact.
     touching : array, shape (n,)
-        Whether in contact.
+        Whether an element is in contact.
     edges : Edges
     """
 
@@ -246,7 +261,7 @@ class State(NamedTuple):
 
 @jit
 def mean_after(solid: Foundation, state: State, load: float, next_load: float, step: float, modes: FloatArray) -> float:
-    """Return the mean displacement after a step: the load decides it, whatever is in contact."""
+    """Return the mean displacement after a step; it depends on the load, but not on which elements are in contact."""
     n, extra = state.displacement.size, 1 if solid.viscosity > 0 else 0
     count, terms = solid.rates.size, solid.times.size
     inward, strain, mean = solid.inward, state.terms, state.displacement.sum() / n
@@ -279,7 +294,7 @@ def mean_after(solid: Foundation, state: State, load: float, next_load: float, s
 def _instant(
     solid: Foundation, state: State, under: FloatArray, load: float, depth: float
 ) -> tuple[float, float, bool]:
-    """Load elements without a dashpot at once; return the depth, the work, all of which is stored, and success."""
+    """Load elements without a dashpot instantly; return the depth, the work (all of which is stored), and success."""
     n = under.size
     mean, work, glass = 0.0, 0.0, 1.0 + solid.moduli.sum()
     for j in range(n):
@@ -297,7 +312,7 @@ def _instant(
 
 @jit
 def _forget(solid: Foundation, state: State, old: int, new: int) -> float:
-    """Replace elements that have left the line by undeformed ones; return the energy that they will dissipate."""
+    """Replace elements that have left the line by undeformed ones; return the energy that was stored in them."""
     n, dissipated = state.displacement.size, 0.0
     for j in range(n):
         if (j + old) // n != (j + new) // n:
@@ -317,7 +332,7 @@ class Schedule(NamedTuple):
     moments : array
         Times, increasing, in the unit of the solid. Velocity and load may jump at the first one.
     travels, deborahs : array
-        Distance travelled over L, and its derivative, of either sign.
+        Travelled distance over L, and its derivative by time; both may be negative.
     loads : array
         F_N / (4 G_inf L), positive; linear between the moments.
     """
@@ -338,8 +353,10 @@ class Step(NamedTuple):
 
 
 class StepWorkspace(NamedTuple):
-    """Arrays of one step: heights and slopes over the elements at its end and start, displacements at the end without
-    contact, times and places of separation, gaps and forces, and the decay over the whole step.
+    """Work arrays of one step.
+
+    They contain heights and slopes of the line at the elements at the end and at the start, displacements without
+    contact at the end, times and displacements of separation, gaps and forces, and the decay over the whole step.
     """
 
     under: FloatArray
@@ -383,7 +400,7 @@ def _workspace_for(solid: Foundation, n: int) -> StepWorkspace:
 
 @jit
 def _separate(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> None:
-    """Write which elements separate within a step that ends at a depth, and their displacements at its end."""
+    """Write which elements separate during a step that ends at a given depth, and their displacements at its end."""
     plain, damping, fall = solid.times.size == 0, solid.viscosity, (depth - step.depth) / step.time
     lapse = Lapse(step.time, workspace.decay, workspace.fades, workspace.element)
     for j in range(workspace.under.size):
@@ -402,7 +419,7 @@ def _separate(solid: Foundation, state: State, workspace: StepWorkspace, step: S
 
 @jit
 def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> tuple[float, float]:
-    """Move all elements through a step; return mean work and dissipation."""
+    """Move all elements through a step; return mean work and mean dissipation."""
     n, plain, damping = workspace.under.size, solid.times.size == 0, solid.viscosity
     u, touching, after = state.displacement, state.touching, workspace.after
     lapse = Lapse(step.time, workspace.decay, workspace.fades, workspace.element)
@@ -450,7 +467,7 @@ def _step(
     mean: float,
     guess: float,
 ) -> tuple[float, float, float, bool]:
-    """Move all elements through a step to a mean displacement; return depth, work, dissipation, and success."""
+    """Move all elements through a step to a mean displacement; return depth, work, dissipation and success."""
     plain = solid.times.size == 0
     for j in range(workspace.under.size):
         workspace.parts[j] = 1.0 if state.touching[j] else 0.0
@@ -493,8 +510,8 @@ def forces_now(
 ) -> tuple[float, float, float, float]:
     """Return the depth and its rate at which the load is carried, drag and fraction in contact; write the edges.
 
-    Without a dashpot the depth follows from the load here, because the depth from the mean displacement is only as
-    exact as a sum over the elements.
+    Without a dashpot the depth is corrected so that the load is met. The depth from the mean displacement is less
+    accurate, because it follows from a sum over the elements.
     """
     plain = solid.times.size == 0
     for j in range(workspace.under.size):
@@ -527,7 +544,7 @@ def follow_elements(
     depth: float,
     out: FloatArray,
 ) -> int:
-    """March all elements through the moments and write `out`, shape (ROWS, moments)."""
+    """March all elements through the moments and write `out`, shape (ROWS, moments); return an `Outcome`."""
     moments, travels, deborahs, loads = schedule
     n = line.height.size - 1
     workspace, modes = _workspace_for(solid, n), np.empty(solid.rates.size)
@@ -560,7 +577,7 @@ def follow_elements(
             return Outcome.OUTSIDE_LINE
         drive = Drive(deborahs[now], loads[now], first)
         exact, rate, drag, length = forces_now(solid, state, workspace, depth, rate, drive)
-        if length <= 0 and now > 0 and drive.load > 0:  # elements with a dashpot carry load at once
+        if length <= 0 and now > 0 and drive.load > 0:  # a loaded body must be in contact
             return Outcome.DEPTH_NOT_FOUND
         out[DRAG, now], out[DEPTH, now], out[RATE, now], out[CONTACT, now] = drag, exact, rate, length
         out[STORED, now], out[WORK, now], out[DISSIPATED, now] = _state_energy(solid, state), work, dissipated
