@@ -1,6 +1,6 @@
 """The transforms of the method of dimensionality reduction for bodies of revolution.
 
-Read `transforms` first (the integrals, with an error estimate), then `half_integrals` (the same as matrices on graded
-panels) and `uniform_grid` (the same on a uniform grid). `revolution` holds the profiles of bodies,
-`power_law_contact` their contacts in closed form.
+Read `transforms` first: the integrals, with an error estimate. `half_integrals` computes them as matrices on graded
+panels, `uniform_grid` as matrices on a uniform grid. `revolution` contains the profiles of bodies, `power_law_contact`
+the contacts of power-law bodies in closed form.
 """

@@ -1,7 +1,8 @@
-"""Half-integrals of piecewise polynomials on graded panels: the two transforms as matrices, exact for the polynomials.
+"""Half-integrals of piecewise polynomials on graded panels: matrices of both transforms, exact for the polynomials.
 
-In the square of the radius both transforms are half-integrals (Abel's), so that after z -> z - t^2 the weights are
-integrals of polynomials. One set of matrices, on [0, 1], serves every contact that is mapped onto it.
+As functions of the square of the radius, both transforms are Abel's half-integrals. After the substitution z -> z - t^2
+their weights are integrals of polynomials. One set of matrices on [0, 1] is used for all contacts, which are scaled to
+this interval.
 """
 
 from __future__ import annotations
@@ -20,18 +21,18 @@ from mdr_dask.physics.mdr.transforms import gauss
 
 
 class Mesh(NamedTuple):
-    """Panels that carry a piecewise polynomial from 0 on; node 0 is left out (functions may jump there).
+    """Panels from 0 on for a piecewise polynomial; there is no node at 0, where functions may jump.
 
     Parameters
     ----------
     edges : array, shape (panels + 1,)
-        Borders of the panels.
+        Edges of the panels.
     order : int
-        Nodes that each panel adds: the interior Lobatto points and its right end.
+        Nodes per panel: the interior Lobatto points and the right end.
     nodes : array, shape (n,)
         All nodes, increasing.
     barycentric : array, shape (panels, order + 1)
-        Weights of the interpolation inside each panel (the first uses the last `order` of them).
+        Weights of the interpolation inside each panel (the first panel uses only the last `order` of them).
     """
 
     edges: FloatArray
@@ -40,7 +41,7 @@ class Mesh(NamedTuple):
     barycentric: FloatArray
 
     def extended(self, end: float) -> Mesh:
-        """Return the mesh with one more panel, up to an end."""
+        """Return the mesh with one more panel, which ends at `end`."""
         last = self.edges[-1]
         local = (self.nodes[-self.order :] - self.edges[-2]) / (last - self.edges[-2])
         nodes = np.append(self.nodes, last + (end - last) * local)
@@ -49,7 +50,7 @@ class Mesh(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Panels:
-    """Nodes and matrices on [0, 1]; node 1 is the last.
+    """Nodes and matrices on [0, 1]; the last node is at 1.
 
     Parameters
     ----------
@@ -62,7 +63,7 @@ class Panels:
     outer : array, shape (n, n)
         (1/pi) int_z^1 u'(z') / sqrt(z' - z) dz'.
     slope : array, shape (n, n)
-        u'(z) at the nodes, each from the panel that ends at or holds it.
+        u'(z) at the nodes; at the edge of two panels, the slope in the left one.
     weights : array, shape (n,)
         int_0^1 u dz.
     """
@@ -82,14 +83,14 @@ class Panels:
 
 @lru_cache(maxsize=64)
 def graded_panels(left: int, right: int, order: int) -> Panels:
-    """Return panels that halve towards both ends.
+    """Return panels whose widths are halved repeatedly towards both ends.
 
     Parameters
     ----------
     left, right : int
-        How often the panel at each end is halved.
+        How many times the panel at each end is halved.
     order : int
-        Nodes a panel, at least 2.
+        Nodes per panel, at least 2.
 
     Returns
     -------
@@ -117,7 +118,7 @@ def graded_panels(left: int, right: int, order: int) -> Panels:
 
 
 def panel_members(panel: int, order: int) -> NDArray[np.intp]:
-    """Return the numbers of the nodes that carry the polynomial of a panel: its own, and the last of its neighbour."""
+    """Return the indices of the nodes of a panel's polynomial: its own, and the last node of the previous panel."""
     return np.arange(max(panel * order - 1, 0), (panel + 1) * order)
 
 
@@ -129,7 +130,7 @@ def _add_panel(
     matrices: tuple[FloatArray, ...],
     weights: FloatArray,
 ) -> None:
-    """Add one panel's exact weights to the matrices and the rule for the whole integral."""
+    """Add the exact weights of one panel to the matrices, and to the weights of the integral over [0, 1]."""
     inner, full, outer, derivative = matrices
     size = members.size
     scale, middle = 2.0 / (high - low), 0.5 * (low + high)
@@ -160,14 +161,14 @@ def _add_panel(
 
 
 def interpolate(mesh: Mesh, values: FloatArray, places: FloatArray) -> FloatArray:
-    """Return the piecewise polynomial through `values`, shape (n,), at places on the mesh, and zero beyond."""
+    """Return the piecewise polynomial through `values`, shape (n,), at places on the mesh, and zero beyond it."""
     result = np.zeros_like(places)
     _interpolate(mesh, values, places, result)
     return result
 
 
 def interpolate_weighted(mesh: Mesh, rows: FloatArray, shares: FloatArray, stretch: FloatArray) -> FloatArray:
-    """Return the sum of shares[k] times the polynomial through rows[k] at all the nodes times stretch[k]."""
+    """Return the sum over k of shares[k] p_k(stretch[k] z) at all nodes z, where p_k interpolates rows[k]."""
     result = np.zeros(mesh.nodes.size)
     _weighted(mesh, rows, shares, stretch, result)
     return result
@@ -188,7 +189,7 @@ def _interpolate(mesh: Mesh, values: FloatArray, places: FloatArray, result: Flo
 
 @jit_inline
 def value_at(mesh: Mesh, values: FloatArray, place: float) -> float:
-    """Return the piecewise polynomial through `values` at a place on the mesh, and zero beyond."""
+    """Return the piecewise polynomial through `values` at a place on the mesh, and zero beyond it."""
     if place >= mesh.edges[-1]:
         return 0.0
     order = mesh.order

@@ -1,7 +1,7 @@
-"""Contacts of power-law bodies of revolution in closed form: Hertz, cone, punch-like powers, and their stick radius.
+"""Contacts of power-law bodies of revolution in closed form (sphere, cone, other powers), with their stick radius.
 
-The profile is f = A r^n with the image g = B |x|^n, B = kappa_n A. E_star and G_star are the effective moduli;
-normal and tangential contact are independent (elastically similar bodies).
+The profile is f = A r^n, its image g = B |x|^n with B = kappa_n A. E_star and G_star are the effective moduli. Normal
+and tangential contact are independent, because the bodies are elastically similar.
 """
 
 from __future__ import annotations
@@ -14,22 +14,22 @@ from mdr_dask.physics.mdr.transforms import power_factor, power_pressure
 
 
 def contact_radius(depth: ArrayLike, amplitude: ArrayLike, exponent: ArrayLike) -> FloatArray:
-    """Return a from g(a) = d (thesis eq. 2.8): (d / (kappa_n A))^(1/n)."""
+    """Return the contact radius a = (d / (kappa_n A))^(1/n), which solves g(a) = d (thesis eq. 2.8)."""
     ratio = np.asarray(depth, dtype=float) / (power_factor(exponent) * np.asarray(amplitude))
     return np.asarray(ratio ** (1.0 / np.asarray(exponent, dtype=float)))
 
 
 def depth(radius: ArrayLike, amplitude: ArrayLike, exponent: ArrayLike) -> FloatArray:
-    """Return the indentation depth d = kappa_n A a^n of the contact radius a."""
+    """Return the indentation depth d = kappa_n A a^n for the contact radius a."""
     return np.asarray(power_factor(exponent) * np.asarray(amplitude) * np.asarray(radius, dtype=float) ** exponent)
 
 
 def normal_force(radius: ArrayLike, amplitude: ArrayLike, exponent: ArrayLike, E_star: ArrayLike) -> FloatArray:
-    """Return F_N = 2 E* d a n / (n + 1) of the contact radius a (thesis eq. 2.10).
+    """Return the normal force F_N = 2 E* d a n / (n + 1) for the contact radius a (thesis eq. 2.10).
 
     Examples
     --------
-    A contact of the radius 1 mm on a sphere of 50 mm, E* = 115 GPa:
+    A contact radius of 1 mm on a sphere with a radius of 50 mm, E* = 115 GPa:
 
     >>> print(f"{normal_force(1e-3, 0.5 / 0.05, 2.0, 115e9):.1f}")
     3066.7
@@ -39,23 +39,23 @@ def normal_force(radius: ArrayLike, amplitude: ArrayLike, exponent: ArrayLike, E
 
 
 def radius_from_force(force: ArrayLike, amplitude: ArrayLike, exponent: ArrayLike, E_star: ArrayLike) -> FloatArray:
-    """Return the contact radius under a normal force: the inverse of `normal_force`."""
+    """Return the contact radius for a normal force, the inverse of `normal_force`."""
     n = np.asarray(exponent, dtype=float)
     factor = 2.0 * np.asarray(E_star) * power_factor(n) * np.asarray(amplitude) * n / (n + 1.0)
     return np.asarray((np.asarray(force, dtype=float) / factor) ** (1.0 / (n + 1.0)))
 
 
 def stress(r: ArrayLike, radius: float, amplitude: float, exponent: float, E_star: float) -> FloatArray:
-    """Return the pressure p(r) in the contact of radius a, zero outside (thesis eq. 2.11)."""
+    """Return the pressure p(r) in a contact of radius a; it is zero outside (thesis eq. 2.11)."""
     return E_star * float(power_factor(exponent)) * amplitude * power_pressure(exponent, r, radius)
 
 
 def stiffness(radius: ArrayLike, E_star: ArrayLike) -> FloatArray:
-    """Return the normal stiffness dF_N/dd = 2 E* a; the tangential one is the same with G*."""
+    """Return the normal stiffness dF_N/dd = 2 E* a; for the tangential stiffness pass G* instead of E*."""
     return np.asarray(2.0 * np.asarray(E_star) * np.asarray(radius, dtype=float))
 
 
 def stick_radius(slip_share: ArrayLike, exponent: ArrayLike) -> FloatArray:
-    """Return c / a0 from eta = G* U0 / (mu E* d0) < 1 (thesis eq. 6.7): (1 - eta)^(1/n); NaN in gross slip."""
+    """Return c / a0 = (1 - eta)^(1/n) for eta = G* U0 / (mu E* d0) < 1 (thesis eq. 6.7), NaN in gross slip."""
     rest = 1.0 - np.asarray(slip_share, dtype=float)
     return np.where(rest > 0.0, np.maximum(rest, 0.0) ** (1.0 / np.asarray(exponent, dtype=float)), np.nan)

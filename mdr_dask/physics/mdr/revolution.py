@@ -1,4 +1,4 @@
-"""Virgin profiles of revolution in the units of their first contact: radius a0 = 1, depth d0 = 1, so that g(1) = 1."""
+"""Virgin profiles of revolution in units of their first contact: radius a0 = 1 and depth d0 = 1, so that g(1) = 1."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from mdr_dask.physics.mdr.transforms import forward_transform, gauss, power_fact
 
 
 class Image(NamedTuple):
-    """The image of a body for compiled code: a power law, or a piecewise cubic where there are knots.
+    """The image of a body for compiled code: a piecewise cubic if there are knots, otherwise a power law.
 
     Parameters
     ----------
     exponent : float
         n of g0 = x^n.
     knots : array, shape (k + 1,)
-        Ends of the pieces, or none.
+        Ends of the pieces; empty for a power law.
     coefficients : array, shape (4, k)
-        Of the powers 3 to 0 of the distance from the left end.
+        Coefficients of the powers 3 to 0 of the distance from the left end.
     """
 
     exponent: float
@@ -39,11 +39,11 @@ class Image(NamedTuple):
 
 
 class Profile(Protocol):
-    """A convex-enough body: f and its image g rise with the radius."""
+    """A body whose profile f and image g increase with the radius."""
 
     @property
     def largest_radius(self) -> float:
-        """Radius up to which the profile is known."""
+        """Largest radius of the profile."""
 
     def height(self, radius: FloatArray) -> FloatArray:
         """Return f0(r)."""
@@ -66,7 +66,7 @@ class Profile(Protocol):
 
 @dataclass(frozen=True)
 class PowerProfile:
-    """g0 = x^n, f0 = r^n / kappa_n: parabola for n = 2, cone for n = 1.
+    """Power law g0 = x^n, f0 = r^n / kappa_n: a parabola for n = 2, a cone for n = 1.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class PowerProfile:
         return np.asarray(self.exponent * position ** (self.exponent - 1.0))
 
     def rise(self, gap: FloatArray, start: float) -> FloatArray:
-        """Return (c + gap)^n - c^n, exact to the last digits however small the gap is."""
+        """Return (c + gap)^n - c^n without cancellation, even for a very small gap; c is `start`."""
         if start == 0.0:
             return self.image(gap)
         return np.asarray(start**self.exponent * np.expm1(self.exponent * np.log1p(gap / start)))
@@ -110,14 +110,14 @@ class PowerProfile:
 
 @dataclass(frozen=True, eq=False)
 class TableProfile:
-    """A measured profile, interpolated monotonically; built by `from_table`.
+    """A body as two piecewise cubics; built by `from_table` from a table, or by `from_body` from a closed form.
 
     Parameters
     ----------
     curve, image_curve : PPoly
         f0(r) and g0(x), in units of d0 and a0.
     length, height_unit : float
-        a0 and d0 in the table's own units.
+        a0 and d0 in the original units of the body.
     """
 
     curve: PPoly
@@ -127,7 +127,7 @@ class TableProfile:
 
     @property
     def largest_radius(self) -> float:
-        """End of the table."""
+        """Largest radius of the profile."""
         return float(self.curve.x[-1])
 
     @cached_property
@@ -136,11 +136,11 @@ class TableProfile:
         return self.image_curve.derivative()
 
     def height(self, radius: FloatArray) -> FloatArray:
-        """Return f0(r); NaN beyond the table."""
+        """Return f0(r); NaN beyond the largest radius."""
         return np.where(radius <= self.largest_radius * (1 + 1e-12), self.curve(np.asarray(radius)), np.nan)
 
     def image(self, position: FloatArray) -> FloatArray:
-        """Return g0(x); NaN beyond the table."""
+        """Return g0(x); NaN beyond the largest radius."""
         return np.where(position <= self.largest_radius * (1 + 1e-12), self.image_curve(np.asarray(position)), np.nan)
 
     def image_slope(self, position: FloatArray) -> FloatArray:
@@ -148,7 +148,7 @@ class TableProfile:
         return self.image_slope_curve(np.asarray(position))
 
     def rise(self, gap: FloatArray, start: float) -> FloatArray:
-        """Return g0(start + gap) - g0(start), by its slope over short distances."""
+        """Return g0(start + gap) - g0(start), for a short gap by the integral of the slope."""
         gap = np.asarray(gap, dtype=float)
         abscissa, weight = gauss(8)
         short = gap * (self.image_slope_curve(start + gap[..., None] * abscissa) @ weight)
@@ -168,7 +168,7 @@ _ABSCISSA, _WEIGHT = gauss(8)
 
 @jit_inline
 def image_rise(image: Image, start: float, level: float, gap: float) -> float:
-    """Return g0(start + gap) - level, with level = g0(start), without cancellation."""
+    """Return g0(start + gap) - level without cancellation, where level = g0(start)."""
     if image.knots.size == 0:
         n = image.exponent
         if n == 2.0:
@@ -177,7 +177,7 @@ def image_rise(image: Image, start: float, level: float, gap: float) -> float:
             return gap
         if gap <= -start:
             return -level
-        if gap > 0.25 * start:  # nothing cancels
+        if gap > 0.25 * start:  # no cancellation
             return math.pow(start + gap, n) - level
         return level * math.expm1(n * math.log1p(gap / start))
     if abs(gap) >= 0.02:
@@ -190,7 +190,7 @@ def image_rise(image: Image, start: float, level: float, gap: float) -> float:
 
 @jit
 def _piece(image: Image, place: float, derivative: int) -> float:
-    """Return the piecewise cubic at a place, or its slope."""
+    """Return the value (derivative 0) or the slope (derivative 1) of the piecewise cubic at a place."""
     cell = last_until(image.knots, place, 0, image.coefficients.shape[1])
     local, k = place - image.knots[cell], image.coefficients
     if derivative == 0:
@@ -199,12 +199,12 @@ def _piece(image: Image, place: float, derivative: int) -> float:
 
 
 def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfile:
-    """Build the profile of a table pressed to a depth.
+    """Build the profile of a body that is given by a table and pressed to a depth.
 
     Parameters
     ----------
     radius, height : array_like, shape (m,)
-        r from 0 upwards and f(r), in one length unit; f(0) is taken as the origin of heights.
+        r from 0 upwards and f(r), in one length unit; heights are measured from f(0).
     depth : float
         Indentation depth d0 > 0, in the same unit.
 
@@ -237,25 +237,28 @@ def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfi
 
 
 class ClosedForm(Protocol):
-    """A body of revolution in closed form, in its own units."""
+    """A body of revolution in closed form, in units of its own."""
 
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the image, negative, and its slopes on the left and on the right."""
+        """Return minus the image, and the slopes of this function on the left and on the right of each position."""
 
     def body(self, r: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return height and slope of the body."""
 
     @property
     def breaks(self) -> tuple[float, ...]:
-        """Radii at which it is not smooth."""
+        """Radii at which the body is not smooth."""
 
 
-#: Of a body in closed form: last radius over the first contact radius, knots for each half of a smooth piece.
+#: For a body in closed form: largest radius over a0, and half the number of knots in each smooth piece.
 FARTHEST, KNOTS = 8.0, 80
 
 
 def from_body(body: ClosedForm, depth: float) -> TableProfile:
-    """Build the profile of a body in closed form pressed to a depth: cubic pieces that crowd at its breaks."""
+    """Build the profile of a body in closed form that is pressed to a depth.
+
+    The pieces are cubic and become shorter towards the breaks of the body.
+    """
 
     def sunk(x: float) -> float:
         return -float(body.at(np.array([x]))[0][0])
@@ -274,7 +277,7 @@ def from_body(body: ClosedForm, depth: float) -> TableProfile:
 
 
 def check_table(radius: FloatArray, height: FloatArray) -> None:
-    """Raise ValueError unless a table of a profile starts at the axis, is finite and rises."""
+    """Raise ValueError unless the table of a profile starts at the axis, is finite and rises with the radius."""
     if radius.ndim != 1 or radius.shape != height.shape or radius.size < 4:
         raise ValueError(
             f"a profile needs two columns of at least 4 rows, got shapes {radius.shape!r} and {height.shape!r}"
@@ -300,7 +303,7 @@ def _scaled(curve: PPoly, length: float, height: float) -> PPoly:
 
 
 def bisect(function: Callable[[float], float], low: float, high: float) -> float:
-    """Return the root of an increasing function, to the last digit."""
+    """Return the root of an increasing function to machine precision, by bisection."""
     for _ in range(200):
         middle = 0.5 * (low + high)
         if middle in (low, high):
@@ -310,7 +313,7 @@ def bisect(function: Callable[[float], float], low: float, high: float) -> float
 
 
 def _monotone(x: FloatArray, y: FloatArray) -> CubicSpline | PchipInterpolator:
-    """Return a cubic spline if it rises everywhere, else the monotone interpolant of lower order."""
+    """Return a cubic spline if it increases everywhere, otherwise the monotone cubic interpolant."""
     spline = CubicSpline(x, y)
     fine = (x[:-1, None] + np.diff(x)[:, None] * np.linspace(0.0, 1.0, 9)).ravel()
     falls = np.any(spline(fine, 1) < -1e-9 * np.max(np.abs(spline(fine, 1))))
@@ -318,6 +321,6 @@ def _monotone(x: FloatArray, y: FloatArray) -> CubicSpline | PchipInterpolator:
 
 
 def _refine(radius: FloatArray) -> FloatArray:
-    """Return the table's radii with seven Chebyshev points in every gap."""
+    """Return the radii of the table, with seven Chebyshev points in every interval."""
     local = 0.5 * (1.0 + chebyshev.chebpts2(9)[1:])
     return np.concatenate([[0.0], (radius[:-1, None] + np.diff(radius)[:, None] * local).ravel()])

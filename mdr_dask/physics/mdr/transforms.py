@@ -1,7 +1,8 @@
 """The transforms of the method of dimensionality reduction for bodies of revolution, with an error estimate.
 
-Every integral is rewritten in the angle or hyperbolic angle that removes its square-root singularity, cut at the kinks
-and jumps of the profile, and summed by Gauss-Legendre rules whose number of nodes doubles until two results agree.
+Every integral is transformed to an angle or hyperbolic angle, which removes its square-root singularity, and is split
+at the kinks and jumps of the profile. It is computed by Gauss-Legendre rules whose number of nodes is doubled until two
+results agree.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ MOST_NODES = 1024
 
 
 class Estimate(NamedTuple):
-    """A computed array and the error expected of it, absolute, of the same shape."""
+    """A computed array and its estimated absolute error, of the same shape."""
 
     value: FloatArray
     error: FloatArray
@@ -31,13 +32,13 @@ class Estimate(NamedTuple):
 
 @lru_cache(maxsize=32)
 def gauss(nodes: int) -> tuple[FloatArray, FloatArray]:
-    """Return abscissae and weights of the Gauss-Legendre rule on [0, 1]."""
+    """Return the nodes and weights of the Gauss-Legendre rule on [0, 1]."""
     abscissa, weight = np.polynomial.legendre.leggauss(nodes)
     return 0.5 * (1.0 + abscissa), 0.5 * weight
 
 
 def power_factor(exponent: ArrayLike) -> FloatArray:
-    """Return kappa of the pair f = c r^n, g = kappa c |x|^n.
+    """Return kappa, the factor between a profile f = c r^n and its image g = kappa c |x|^n.
 
     Parameters
     ----------
@@ -65,15 +66,15 @@ def inverse_transform(
     radius : array_like, shape (m,)
         Radii r >= 0.
     breaks : sequence of float
-        Places where g or a derivative of it jumps.
+        Places where g or one of its derivatives jumps.
     tolerance : float
         Error wanted, relative to the largest value met.
 
     Returns
     -------
     Estimate
-        f(r) = (2/pi) int_0^r g(x) / sqrt(r^2 - x^2) dx, measured as g is; its error stays above the tolerance if 1024
-        nodes a piece are not enough.
+        f(r) = (2/pi) int_0^r g(x) / sqrt(r^2 - x^2) dx, from the same zero as g; its error is above the tolerance if
+        1024 nodes per piece are not enough.
 
     Examples
     --------
@@ -100,7 +101,7 @@ def forward_transform(
     jumps: Sequence[tuple[float, float]] = (),
     tolerance: float = 1e-10,
 ) -> Estimate:
-    """Transform the profile f(r) into its image g(x) (thesis eq. 2.4, with the height of the apex kept).
+    """Transform the profile f(r) into its image g(x) (thesis eq. 2.4, plus the height of the apex).
 
     Parameters
     ----------
@@ -151,14 +152,14 @@ def pressure(
     jumps: Sequence[tuple[float, float]] = (),
     tolerance: float = 1e-10,
 ) -> Estimate:
-    """Return the contact pressure over the effective modulus (thesis eq. 2.11, with the jumps of the line load).
+    """Return the contact pressure over the effective modulus (thesis eq. 2.11, extended to jumps of the line load).
 
     Parameters
     ----------
     image_slope : callable, array -> array
         g'(x), without the jumps.
     radius : array_like, shape (m,)
-        Radii; the pressure is zero beyond the contact and infinite at the axis under a cone.
+        Radii; the pressure is zero outside the contact and infinite on the axis under a cone.
     contact_radius : float
         Half-width a of the one-dimensional contact.
     edge_gap : float
@@ -173,7 +174,7 @@ def pressure(
     Returns
     -------
     Estimate
-        p / E*, in heights per length.
+        p / E*, in the unit of height over the unit of length.
     """
     r = np.atleast_1d(np.asarray(radius, dtype=float))
     inside = r < contact_radius
@@ -206,21 +207,21 @@ def volume(image: Function, radius: float, *, breaks: Sequence[float] = (), tole
 
 
 def power_pressure(exponent: float, radius: ArrayLike, contact_radius: float) -> FloatArray:
-    """Return p / E* under the image g = |x|^n pressed to the contact radius a, in closed form.
+    """Return p / E* for the image g = |x|^n pressed to the contact radius a, in closed form.
 
     Parameters
     ----------
     exponent : float
         n > 0.
     radius : array_like
-        Radii; zero pressure beyond the contact.
+        Radii; the pressure is zero outside the contact.
     contact_radius : float
         a > 0.
 
     Returns
     -------
     array
-        (n/pi) a^(n-2) w 2F1(1, 1 - n/2; 3/2; w^2/a^2) with w^2 = a^2 - r^2: Hertz' ellipse for n = 2.
+        (n/pi) a^(n-2) w 2F1(1, 1 - n/2; 3/2; w^2/a^2) with w^2 = a^2 - r^2; for n = 2 this is Hertz's pressure.
     """
     r = np.asarray(radius, dtype=float)
     a = contact_radius
@@ -231,7 +232,7 @@ def power_pressure(exponent: float, radius: ArrayLike, contact_radius: float) ->
 
 
 def _angles(outer: FloatArray, breaks: Sequence[float]) -> FloatArray:
-    """Return the edges of the pieces in the angle t of x = r sin t, shape (m, pieces + 1)."""
+    """Return the edges of the pieces as angles t with x = r sin t, shape (m, pieces + 1)."""
     columns = [np.zeros_like(outer)]
     for place in sorted(b for b in breaks if b > 0.0):
         gap = np.clip(outer - place, 0.0, None) * (outer + place)
@@ -241,7 +242,7 @@ def _angles(outer: FloatArray, breaks: Sequence[float]) -> FloatArray:
 
 
 def _integrate(integrand: Function, edges: FloatArray, tolerance: float) -> Estimate:
-    """Integrate over all pieces, doubling the nodes until two rules agree; the finer one is returned."""
+    """Return the integral over all pieces; the number of nodes is doubled until two rules agree."""
     nodes = FIRST_NODES
     coarse = _gauss_sum(integrand, edges, nodes)
     while True:

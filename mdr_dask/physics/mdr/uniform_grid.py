@@ -1,7 +1,8 @@
 """The transforms on a uniform grid by product integration: piecewise-linear functions, exact singular weights.
 
-Second order (inverse) and order 1.5 (forward, pressure), with the contact edge placed inside its cell. Slower to
-converge than `panels`, but any profile, any history and any number of kinks may live on it.
+The inverse transform is of second order, the forward transform and the pressure of order 1.5. The contact edge is
+located inside its cell. The convergence is slower than with `half_integrals`, but profiles, histories and the number of
+kinks are arbitrary.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ class UniformGrid:
     forward : array, shape (n, n)
         g = forward @ f.
     stress : array, shape (n, n)
-        p = stress @ q for the line load q = d - g, which is zero from the edge on.
+        p = stress @ q for the line load q = d - g, which is zero outside the contact.
     """
 
     nodes: FloatArray
@@ -37,11 +38,11 @@ class UniformGrid:
 
     @property
     def spacing(self) -> float:
-        """Distance of two nodes."""
+        """Distance between neighbouring nodes."""
         return float(self.nodes[1])
 
     def edge(self, image: FloatArray, depth: float) -> float:
-        """Return the radius at which the image first reaches the depth, inside its cell."""
+        """Return the radius at which the image first reaches the depth, by linear interpolation in the cell."""
         beyond = np.flatnonzero(image >= depth)
         if beyond.size == 0:
             return float(self.nodes[-1])
@@ -51,7 +52,7 @@ class UniformGrid:
         return float(self.nodes[k] - self.spacing * (image[k] - depth) / (image[k] - image[k - 1]))
 
     def pressure(self, image: FloatArray, depth: float) -> FloatArray:
-        """Return p(r) at the nodes, the last cell of the contact cut at the edge."""
+        """Return p(r) at the nodes; the last cell of the contact is cut at the contact edge."""
         load = np.maximum(depth - image, 0.0)
         k = int(np.argmax(image >= depth))
         result = self.stress @ load
@@ -68,7 +69,7 @@ class UniformGrid:
         return result
 
     def force(self, image: FloatArray, depth: float) -> float:
-        """Return F_N = 2 int (d - g)_+ dx, the last cell of the contact cut at the edge."""
+        """Return F_N = 2 int (d - g)_+ dx; the last cell of the contact is cut at the contact edge."""
         load = np.maximum(depth - image, 0.0)
         k = int(np.argmax(image >= depth))
         if k == 0:
@@ -77,7 +78,7 @@ class UniformGrid:
         return float(2.0 * np.trapezoid(load[:k], self.nodes[:k]) + last)
 
     def depth(self, image: FloatArray, force: float, guess: float | None = None) -> float:
-        """Return the depth under which the image carries a force, by Newton steps on a convex function."""
+        """Return the depth at which the image carries a force, by Newton steps on a convex function."""
         depth = float(np.max(image[: max(int(self.nodes.size * 0.4), 2)])) if guess is None else guess
         for _ in range(60):
             slope = 2.0 * max(self.edge(image, depth), self.spacing)
@@ -90,14 +91,14 @@ class UniformGrid:
 
 @lru_cache(maxsize=8)
 def uniform_grid(cells: int, length: float) -> UniformGrid:
-    """Return the grid of that many cells on [0, length]; cached.
+    """Return the grid with the given number of cells on [0, length]; cached.
 
     Parameters
     ----------
     cells : int
         Number of cells.
     length : float
-        Last node.
+        Position of the last node.
     """
     x = np.linspace(0.0, length, cells + 1)
     h = x[1]
@@ -125,5 +126,5 @@ def _arccosh_row(x: FloatArray, i: int) -> FloatArray:
 
 
 def _arccosh(x: float, radius: FloatArray) -> FloatArray:
-    """Return arccosh(x / r), measured from the first node where r = 0."""
+    """Return arccosh(x / r); where r = 0, return 0."""
     return np.asarray(np.arccosh(np.maximum(x / np.where(radius == 0.0, x, radius), 1.0)))
