@@ -1,7 +1,7 @@
 """Compilation of numerical kernels by numba: `jit` for kernels, `jit_inline` for small functions inside them.
 
 Numba recompiles a kernel when its own file changes. After a change of a function that kernels of other files call,
-empty the cache or set NUMBA_CACHE_DIR to a new folder; the tests do so by themselves.
+empty the cache or set NUMBA_CACHE_DIR to a new folder; the tests do this automatically.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ import numba
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
-UNCOUNTED = OPTIONS | {"_nrt": False}  # numba counts no references to arrays in a function without its runtime
+UNCOUNTED = OPTIONS | {"_nrt": False}  # without its runtime, numba does not count references to arrays
 
 
 def jit(function: Kernel) -> Kernel:
-    """Compile a function of numbers and arrays, and keep its machine code in numba's cache.
+    """Compile a function of numbers and arrays, and store its machine code in numba's cache.
 
-    A cache that cannot be written or read costs compile time only: the function is then compiled in this process.
+    If the cache cannot be written or read, the function is compiled in this process, which only costs time.
     """
     return _cached(function, OPTIONS)
 
 
 def jit_uncounted(function: Kernel) -> Kernel:
-    """Compile a function that creates no arrays, without counting references to arrays.
+    """Compile a function that creates no arrays, without reference counting for arrays.
 
-    Functions that read arrays from named tuples inside their loops, and pass such tuples on, take several times as long
-    with the counts.
+    Functions that read arrays from named tuples inside loops, and pass these tuples on, are several times slower with
+    reference counting.
     """
     return _cached(function, UNCOUNTED)
 
@@ -42,16 +42,16 @@ def jit_inline(function: Kernel) -> Kernel:
 
 
 def jit_inline_uncounted(function: Kernel) -> Kernel:
-    """Compile a function that creates no arrays into each kernel that calls it, without counting references."""
+    """Compile a function that creates no arrays into each kernel that calls it, without reference counting."""
     return cast(Kernel, numba.njit(forceinline=True, **UNCOUNTED)(function))
 
 
 def _cached(function: Kernel, options: dict[str, Any]) -> Kernel:
     kernel: Any = numba.njit(**options)(function)
-    if hasattr(kernel, "enable_caching"):  # not so where NUMBA_DISABLE_JIT is set
+    if hasattr(kernel, "enable_caching"):  # false if NUMBA_DISABLE_JIT is set
         try:
             kernel.enable_caching()
-        except RuntimeError:  # neither the package's folder nor the home folder can be written
+        except RuntimeError:  # neither the package folder nor the home folder is writable
             _warn_once("numba finds no folder for compiled kernels")
         else:
             _survive_faults(kernel._cache)
@@ -59,13 +59,13 @@ def _cached(function: Kernel, options: dict[str, Any]) -> Kernel:
 
 
 def _survive_faults(stored: Any) -> None:
-    """Compile again if a file of the cache is torn, unreadable or cannot be written."""
+    """Compile again if a file of the cache is incomplete or unreadable; continue if it cannot be written."""
     load, save = stored.load_overload, stored.save_overload
 
     def load_overload(signature: Any, context: Any) -> Any:
         try:
             return load(signature, context)
-        except Exception as fault:  # a torn pickle raises almost anything
+        except Exception as fault:  # an incomplete pickle can raise almost any exception
             _warn_once(f"numba's cache of compiled kernels cannot be read ({type(fault).__name__})")
             return None
 
@@ -86,7 +86,7 @@ def _warn_once(problem: str) -> None:
 
 @jit_inline
 def last_until(values: Any, x: float, low: int, high: int) -> int:
-    """Return the index of the last of the ascending values from `low` to before `high` that is x at most, or `low`."""
+    """Return the largest index in [low, high) whose value is at most x, or `low`; the values ascend."""
     while high - low > 1:
         middle = (low + high) // 2
         if values[middle] <= x:

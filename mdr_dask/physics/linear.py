@@ -1,6 +1,6 @@
-"""Dense linear systems: LAPACK's factors, kept for many right-hand sides.
+"""Dense linear systems: LU factors from LAPACK, kept for many right-hand sides.
 
-A worker runs LAPACK with one thread, so that a result does not depend on how many threads a library may use.
+A worker runs LAPACK with one thread, so that results do not depend on the number of threads that a library may use.
 """
 
 from __future__ import annotations
@@ -26,7 +26,10 @@ class Factors(NamedTuple):
 
 
 def factorise(matrix: FloatArray) -> Factors | None:
-    """Return the factors of a square matrix in C order, which is spent; None if it is singular or not finite."""
+    """Return the factors of a square matrix in C order, or None if it is singular or not finite.
+
+    The matrix is overwritten.
+    """
     triangles, pivots, status = dgetrf(matrix.T, overwrite_a=True)
     diagonal = np.diagonal(triangles)
     return Factors(triangles, pivots) if status == 0 and np.all(np.isfinite(diagonal)) else None

@@ -1,4 +1,4 @@
-"""How a solution ended: one enumeration for every solver, each outcome with a sentence for users."""
+"""How a solver ended: one enumeration for all solvers, with a sentence for users for each outcome."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from enum import IntEnum
 
 
 class Outcome(IntEnum):
-    """How a solver ended; kernels return the number, users read the `sentence`.
+    """How a solver ended; kernels return the number, and messages to users contain the `sentence`.
 
-    Kernels compare with members as with integers: numba treats them as constants.
+    Kernels compare members with integers, because numba treats members as constants.
     """
 
     CONVERGED = 0
@@ -24,12 +24,12 @@ class Outcome(IntEnum):
 
     @property
     def sentence(self) -> str:
-        """The reason, for a user."""
+        """Description of the outcome for users."""
         return _SENTENCES[self]
 
     @property
     def is_impossible(self) -> bool:
-        """Whether the case itself is the reason, so that no finer grid can help."""
+        """Whether the case itself is the reason of the failure, so that no finer grid can help."""
         return self in (Outcome.OUTSIDE_LINE, Outcome.INVALID)
 
 

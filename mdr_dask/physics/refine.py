@@ -1,14 +1,14 @@
-"""Grid refinement: solve on a grid, solve on the next finer one, and estimate the error from their difference.
+"""Grid refinement: solve on a grid and on the next finer one, and estimate the error from the difference.
 
-Every solver that works on a grid uses this driver. A solver of order p on grids whose cells are halved from one level
-to the next reduces its error by r = 2^p per level. If c is the relative change of the results from the last grid but
-one to the last grid, and b the change before that, the relative error left on the last grid is estimated as
+Every solver that works on a grid uses this function. If the number of cells doubles from one level to the next, the
+error of a solver of order p decreases by r = 2^p per level. Let c be the relative change of the results between the
+last two levels, and b the change before that. The relative error on the last level is estimated as
 
     error = safety max( c / (r - 1),  b / (r (r - 1)) ).
 
 The first term is Richardson's estimate, with the safety factor of the grid convergence index (Roache, J. Fluids Eng.
-116, 405, 1994). The second term is what the first would be if c had fallen by r since b. It is there because two grids
-may agree by chance; it exists from the third grid on.
+116, 405, 1994). The second term is the first one for a change b / r, which follows from b if the change decreases by r.
+It is needed because the results on two grids may agree by chance, and is available from the third level on.
 """
 
 from __future__ import annotations
@@ -50,12 +50,12 @@ class Refined(NamedTuple):
     values : list of array, shape (cases, ...)
         One array per output; NaN where a case has no solution.
     errors : array, shape (outputs, cases)
-        Estimated absolute errors in the unit of the output; for a profile the largest error along it. Infinite where
-        nothing can be said.
+        Estimated absolute errors in the unit of the output; for a profile the largest error along it. Infinite where no
+        estimate is possible.
     met : bool array, shape (cases,)
         Whether every output meets the accuracy.
     level : int array, shape (cases,)
-        The level of the grid of the result.
+        Level of the grid on which the result was computed.
     outcome : int8 array, shape (cases,)
         Values of `Outcome`; ``Outcome(number).sentence`` gives the reason of a failure.
     """
@@ -83,35 +83,35 @@ def refine(
     Parameters
     ----------
     solve : callable, (level, cases) -> Solution
-        Solves the cases with these indices on the grid of a level. It does not raise for a case that fails. All
-        outputs that it returns have to meet the accuracy.
+        Solves the cases with these indices on the grid of a level. It must not raise an exception for a case that
+        fails. All outputs that it returns have to meet the accuracy.
     cases : int
         Number of cases.
     levels : sequence of int
-        Increasing levels, such as numbers of cells. Cells are halved from each level to the next. All cases are solved
-        on the first two levels; with one level alone the errors are infinite.
+        Increasing levels, such as numbers of cells. The cell size is halved from each level to the next. All cases are
+        solved on the first two levels; with only one level the errors are infinite.
     accuracy : float
-        Error allowed for every output, relative to its largest absolute value or to its floor if that is larger.
-        Infinity if errors on the second level are wanted, whatever they are.
+        Allowed error of every output, relative to its largest absolute value, or to its floor if the floor is larger.
+        Infinity to stop at the second level and obtain the errors there.
     order : float
-        Order of convergence p of the solver, at least where most of the error arises.
+        Order of convergence p of the solver, or at least of the dominant part of its error.
     safety : float
         Safety factor of the estimate.
     floors : float or array, shape (outputs,)
-        Absolute size, for all outputs or for each, below which an error is not measured relative to the value. It is
-        needed by outputs of which zero is a normal value, such as a probability.
+        Absolute value, for all outputs or for each, below which an error is taken relative to the floor instead of the
+        output. It is needed for outputs that can be zero, such as a probability.
     shared : bool
-        Whether all outputs of a case have the same relative error, that of the output with the largest change. Two
-        grids may agree by chance in one number but hardly in all. Choose False for outputs that converge differently.
+        Whether all outputs of a case get the relative error of the output with the largest change. Two grids may agree
+        by chance in one output but hardly in all. Choose False for outputs that converge at different rates.
 
     Returns
     -------
     Refined
-        A case without a solution on the last grids keeps the solution of a coarser one, if there was any.
+        If a case has no solution on the last grids, its solution on a coarser grid is returned, if there is one.
 
     Notes
     -----
-    A case that fails for a reason that no grid can mend (`Outcome.is_impossible`) is not refined.
+    A case that fails for a reason that no finer grid can remove (`Outcome.is_impossible`) is not refined.
 
     Examples
     --------
@@ -144,7 +144,7 @@ def refine(
         change = relative_changes(coarse, fine, floor)
         if shared:
             change = np.broadcast_to(change.max(axis=0, initial=0.0), change.shape)
-        # before is infinite where the grid before had no solution: that says nothing about the last change
+        # `before` is infinite where a previous grid had no solution; it is then ignored
         earlier = np.where(np.isfinite(before), before, 0.0) / reduction
         relative = safety / (reduction - 1) * np.maximum(change, earlier)
         solved = fine.outcome == Outcome.CONVERGED
@@ -165,7 +165,7 @@ def refine(
 def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> FloatArray:
     """Return the change of every output from one grid to the next relative to its size, shape (outputs, cases).
 
-    Of a profile it is the largest change over the largest value. It is infinite where either grid has no solution.
+    For a profile this is the largest change divided by the largest value. It is infinite where a grid has no solution.
     """
     solved = (coarse.outcome == Outcome.CONVERGED) & (fine.outcome == Outcome.CONVERGED)
     changes = np.empty((len(fine.values), solved.size))
@@ -179,12 +179,12 @@ def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> Fl
 
 
 def _sizes(values: Sequence[FloatArray] | FloatArray, floors: FloatArray) -> FloatArray:
-    """Return the largest absolute value of every output and case, or the floor, shape (outputs, cases)."""
+    """Return the largest absolute value of every output and case, or its floor if larger; shape (outputs, cases)."""
     return np.maximum([_largest(np.fmax(np.abs(value), 0.0)) for value in values], floors[:, None])
 
 
 def _largest(sizes: FloatArray) -> FloatArray:
-    """Return the largest of the positive numbers of every case."""
+    """Return the largest number of every case; none is negative."""
     return sizes if sizes.ndim == 1 else sizes.reshape(len(sizes), -1).max(axis=1, initial=0.0)
 
 
