@@ -1,9 +1,9 @@
-"""The method of the papers: the steady state of a Kelvin foundation by backward Euler, many cases on a line at once.
+"""The method of the papers: steady state of a Kelvin foundation by backward Euler, many cases on a line at once.
 
-u_i = max(w_i, lambda u_(i-1)) with w = depth + height and lambda = 1 / (1 + dt / tau). Because u is periodic,
-F_N / (4 G dx) is the sum of u, and F_x / (4 G) that of (u_i - lambda u_(i-1)) / (1 - lambda) (w_i - w_(i-1)).
-Blocks of nodes that are wholly in contact or wholly free are closed sums; in the others the inner loops run over cases,
-as vector instructions. The arithmetic of a case does not depend on the other cases.
+u_i = max(w_i, lambda u_(i-1)) with w = depth + height and lambda = 1 / (1 + dt / tau). Because u is periodic, F_N / (4
+G dx) is the sum of u_i, and F_x / (4 G) the sum of (u_i - lambda u_(i-1)) / (1 - lambda) (w_i - w_(i-1)). Blocks of
+nodes that are entirely in contact or entirely free are summed in closed form. In the other blocks the inner loops run
+over cases, as vector instructions. The results of a case do not depend on the other cases.
 """
 
 from __future__ import annotations
@@ -21,35 +21,35 @@ from mdr_dask.physics.sliding.cases import Cases
 ITERATIONS = 200
 COARSENING = 8
 COARSEST = 64  # nodes of the grid on which the search for the depth starts
-CONVERGED = 1e-9  # product of the last two relative steps, which bounds the error of a secant
-EXACT_STEP = 1e-13  # relative change of the depth that is rounding
+CONVERGED = 1e-9  # product of the last two relative steps of the depth, which bounds the error of a secant
+EXACT_STEP = 1e-13  # relative change of the depth that is due to rounding
 COARSE = 1e-3
 
 BLOCK = 256  # nodes
-LANES = 8  # cases that share a vector instruction
+LANES = 8  # cases in one vector instruction
 
 # The results of a sweep for every case, in this order
 CARRIED, STIFFNESS, DRAG = range(3)
 SUMS = 3
-# Bounds and sums of a block of nodes, in this order: bounds of height and rise, the height before, sums
+# Bounds and sums of a block of nodes, in this order: bounds of height and rise, the previous height, sums
 PEAK, LOWEST, STEEPEST, BEFORE, HEIGHTS, RISES, WORK, SQUARES = range(8)
 KNOWN = 8
-# The state of a case in a sweep, in this order; the last three are sums from node to node
+# The state of a case in a sweep, in this order; the last three are sums over the nodes of a block
 U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS = range(7)
 ROWS = 7
 
 
 class Nodal(NamedTuple):
-    """Heights of a line at its nodes, beginning after the highest one.
+    """Heights of a line at its nodes, starting after the highest node.
 
     Parameters
     ----------
     height, rise : array, shape (n,)
-        Heights, and the rise from the node before.
+        Heights, and their increase from the previous node.
     blocks : array, shape (n // BLOCK, KNOWN)
         From `_blocks`.
     periodic : bool
-        Whether the line closes on itself; its highest node then comes last.
+        Whether the line is periodic; its highest node is then the last one.
     """
 
     height: FloatArray
@@ -59,7 +59,7 @@ class Nodal(NamedTuple):
 
 
 class Moving(NamedTuple):
-    """Cases: v tau in cells, lambda, and the penetration of the highest node."""
+    """Sliding cases: v tau in cells, lambda, and the penetration of the highest node."""
 
     deborah: FloatArray
     decay: FloatArray
@@ -67,18 +67,18 @@ class Moving(NamedTuple):
 
 
 class Lanes(NamedTuple):
-    """Workspace of a sweep over cases.
+    """Work arrays of a sweep over cases.
 
     Parameters
     ----------
     state : array, shape (ROWS, cases)
-        `U` and `FADE` end as u and its derivative at the end of the line.
+        `U` and `FADE` are, after the sweep, u and its derivative by the depth at the end of the line.
     packed : array, shape (ROWS + 2, cases + LANES)
-        The state of the cases of the queue, with their decay and depth.
+        State, decay and depth of the cases in the queue.
     queue : array, shape (cases,)
         Cases in which contact begins or ends in a block.
     sums : array, shape (SUMS, cases)
-        Written: sum of u, its derivative by the depth, F_x / (4 G) times 1 - lambda.
+        Written: sum of u, its derivative by the depth, and F_x / (4 G) times 1 - lambda.
     """
 
     state: FloatArray
@@ -96,7 +96,7 @@ def lanes_for(cases: int) -> Lanes:
 
 @jit
 def _step(h: float, t: float, decay: float, depth: float, u: float, fade: float) -> tuple[float, float, float]:
-    """Go on by one node: return u, its derivative by the depth, and the drag times 1 - lambda."""
+    """Move to the next node: return u, its derivative by the depth, and the drag times 1 - lambda."""
     free = decay * u
     w = h + depth
     is_pressed = w > free
@@ -121,7 +121,7 @@ def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
             work += h * t
             squares += t * t
         blocks[j, PEAK], blocks[j, LOWEST], blocks[j, STEEPEST] = peak, lowest, steepest
-        # an element enters a line that does not close without contact
+        # elements enter a line that is not periodic out of contact
         blocks[j, BEFORE] = height[first - 1] if j > 0 or periodic else -np.inf
         blocks[j, HEIGHTS], blocks[j, RISES], blocks[j, WORK], blocks[j, SQUARES] = heights, rises, work, squares
     return blocks
@@ -129,7 +129,7 @@ def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
 
 @jit
 def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) -> int:
-    """Pass a block by closed sums; queue the cases in which contact begins or ends in it, and return their number."""
+    """Sum a block in closed form; queue the cases in which contact begins or ends in it, and return their number."""
     peak, lowest, steepest, before = block[PEAK], block[LOWEST], block[STEEPEST], block[BEFORE]
     heights, rises, work, squares = block[HEIGHTS], block[RISES], block[WORK], block[SQUARES]
     deborah, decay, depth = moving
@@ -155,7 +155,7 @@ def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) ->
 
 @jit
 def _walk(height: FloatArray, rise: FloatArray, decay: FloatArray, depth: FloatArray, workspace: FloatArray) -> None:
-    """Follow all cases from node to node, and add to their `LOAD`, `RATE` and `LOSS`."""
+    """Move all cases from node to node, and add to their `LOAD`, `RATE` and `LOSS`."""
     whole = height.size // 4 * 4
     for i in range(0, whole, 4):
         h0, h1, h2, h3 = height[i], height[i + 1], height[i + 2], height[i + 3]
@@ -182,7 +182,7 @@ def _walk(height: FloatArray, rise: FloatArray, decay: FloatArray, depth: FloatA
 
 @jit
 def _walk_some(height: FloatArray, rise: FloatArray, moving: Moving, lanes: Lanes, queued: int) -> None:
-    """Follow the cases of the queue from node to node together."""
+    """Move the cases of the queue from node to node together."""
     decay, depth = moving.decay, moving.depth
     workspace, packed, queue, sums = lanes
     for q in range(queued):
@@ -190,7 +190,7 @@ def _walk_some(height: FloatArray, rise: FloatArray, moving: Moving, lanes: Lane
         packed[U, q], packed[FADE, q] = workspace[U, k], workspace[FADE, k]
         packed[ROWS, q], packed[ROWS + 1, q] = decay[k], depth[k]
         packed[LOAD, q] = packed[RATE, q] = packed[LOSS, q] = 0.0
-    # full vectors are faster than a remainder
+    # fill the last vector, because full vectors are faster
     full = -(-queued // LANES) * LANES
     packed[:, queued:full] = 0.0
     _walk(height, rise, packed[ROWS, :full], packed[ROWS + 1, :full], packed)
@@ -204,9 +204,10 @@ def _walk_some(height: FloatArray, rise: FloatArray, moving: Moving, lanes: Lane
 
 @jit
 def _sweep(line: Nodal, moving: Moving, lanes: Lanes) -> None:
-    """Follow one element of every case along the line: from its highest node back to it, or undeformed from its start.
+    """Move one element of every case along the line and write the sums.
 
-    The queue has the cases that a block cannot pass by closed sums.
+    On a periodic line it starts and ends at the highest node; otherwise it starts undeformed at the first node. The
+    queue contains the cases for which a block cannot be summed in closed form.
     """
     height, rise, blocks, periodic = line
     deborah, depth = moving.deborah, moving.depth
@@ -237,11 +238,11 @@ def _newton(
     drags: FloatArray,
     outside: NDArray[np.bool_],
 ) -> None:
-    """Find the depth of every case; `depths` holds the guesses on entry, `drags` is NaN where none was found.
+    """Find the depth of every case; `depths` contains guesses at first, and `drags` is NaN where no depth is found.
 
     The load is a convex, increasing, piecewise linear function of the depth, so that Newton's method approaches the
-    root from above after its first step. The last step needs no further sweep: the drag is
-    extrapolated along the secant.
+    root from above after its first step. The last step needs no further sweep, because the drag is extrapolated along
+    the secant.
     """
     count = depths.size
     active, lanes, before = np.arange(count), lanes_for(count), np.full((2, count), np.nan)
@@ -255,7 +256,7 @@ def _newton(
         kept = 0
         for k in range(count):
             case = active[k]
-            # behind a line that is not periodic, u and its derivative decay freely
+            # behind the end of a line that is not periodic, u and its derivative decay freely
             carried = sums[CARRIED, k] + ends * deborah[k] * workspace[U, k]
             step = (load[k] - carried) / (sums[STIFFNESS, k] + ends * deborah[k] * workspace[FADE, k])
             drag = sums[DRAG, k] * (1 + deborah[k])
@@ -284,7 +285,7 @@ def contact(
     touched: FloatArray,
     slope: FloatArray,
 ) -> None:
-    """Write the number of nodes in contact and the rms rise over them, for line and cases as in :func:`solve`."""
+    """Write the number of nodes in contact and the rms rise over them; line and cases as in :func:`steady_by_steps`."""
     for k in range(depths.size):
         decay, count, square = deborah[k] / (1 + deborah[k]), 0, 0.0
         u = depths[k] if periodic else 0.0
@@ -306,15 +307,15 @@ def steady_by_steps(
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
     """Return the depth of the highest node, F_x / (4 G) and whether the contact leaves the line, for every case.
 
-    The first guess comes from every `COARSENING`-th node, and so on: it depends on the case alone, and so does
-    every bit of the result.
+    The depth is first found on every `COARSENING`-th node, repeatedly if the line is long. The guesses, and so the
+    results, depend on the case alone.
 
     Parameters
     ----------
     height : array, shape (n,)
-        Heights from the highest node, which comes last if the line is periodic.
+        Heights; if the line is periodic, they start after the highest node, which comes last.
     periodic : bool
-        Whether the line closes on itself; if not, elements enter undeformed at the first node.
+        Whether the line is periodic; if not, elements enter undeformed at the first node.
     deborah, loads : array, shape (cases,)
         v tau in cells, and F_N / (4 G dx) in the unit of height; both positive and finite.
     """

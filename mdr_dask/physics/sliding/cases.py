@@ -1,4 +1,4 @@
-"""Cases of steady sliding on one line, and their steady states: the input and output of every solver."""
+"""Cases of steady sliding on one line (the input of every solver), and their steady states (the output)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mdr_dask.physics.outcome import Outcome
 Scheme = Literal["hermite", "piecewise_linear", "backward_euler"]
 
 COLUMNS = ("drag", "depth", "contact_fraction", "contact_slope")
-"""The results of a case, in this order wherever they are rows of one array."""
+"""The results of a case, in the order of the rows of an array of results."""
 
 
 class Cases(NamedTuple):
@@ -50,12 +50,12 @@ class Steady:
 
     @property
     def columns(self) -> FloatArray:
-        """The results as rows of one array, shape (4, cases)."""
+        """The results as the rows of one array, shape (4, cases)."""
         return np.array([self.drag, self.depth, self.contact_fraction, self.contact_slope])
 
     @classmethod
     def of(cls, columns: FloatArray, status: NDArray[np.int8]) -> Steady:
-        """Return steady states from the rows of an array, NaN where a case has not converged."""
+        """Return steady states from the rows of an array; NaN where a case has not converged."""
         drag, depth, fraction, slope = np.where(status == Outcome.CONVERGED, columns, np.nan)
         return cls(drag, depth, fraction, slope, status)
 

@@ -1,9 +1,9 @@
 """Full contact of any linear solid with a rough plane: the harmonics are independent.
 
-The displacement is u = d + h, and every wave c_k takes the pressure G*(q_k v) c_k (thesis eq. 3.14 for the Kelvin
-solid). So the drag is a sum over the spectrum and does not depend on the phases. This holds where the pressure is
-positive everywhere, which is checked at nodes: between m nodes a sum of waves of up to k periods is at most
-1 / cos(pi k / m) times its largest value on them (Ehlich and Zeller, 1964).
+The displacement is u = d + h, and every wave c_k has the pressure G*(q_k v) c_k (thesis eq. 3.14 for the Kelvin solid).
+The drag is therefore a sum over the spectrum and does not depend on the phases. This is valid if the pressure is
+positive everywhere, which is checked at nodes: between m nodes, a sum of waves of up to k periods is at most 1 / cos(pi
+k / m) times its largest value at the nodes (Ehlich and Zeller, 1964).
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.cases import Steady
 from mdr_dask.physics.surfaces.waves import Waves, series
 
-OVERSAMPLING = 2  # nodes per Nyquist point: the pressure between them is bounded to 41 %
-DEEP = 4.0  # load over the rms pressure of the waves; below it full contact is too rare for a check to pay
+OVERSAMPLING = 2  # nodes per Nyquist point: the pressure between nodes is at most 41 % larger
+DEEP = 4.0  # load over the rms pressure of the waves; below this ratio full contact is too rare to be worth a check
 ROUNDING = 1e-12  # relative error of sums over a spectrum
 
 
@@ -29,16 +29,16 @@ def steady_full_contact(
     deborah: FloatArray,
     loads: FloatArray,
 ) -> Steady | None:
-    """Return the steady states of cases in full contact, NaN with `Outcome.INVALID` of the others; None without any.
+    """Return the steady states of cases in full contact, and `Outcome.INVALID` for other cases; None if there are none.
 
     Parameters
     ----------
     waves : Waves
         The line, of length 1.
     terms : sequence of (float, float)
-        G_m / G_inf and tau_m v / L of the Prony terms; none for a Kelvin solid.
+        G_m / G_inf and tau_m v / L of the Prony terms; empty for a Kelvin solid.
     nodes : pair of array, shape (nodes,)
-        Heights and slopes of the line on a grid of more than two nodes for the shortest wave.
+        Heights and slopes of the line on a grid of more than two nodes per shortest wave.
     deborah : array, shape (cases,)
         eta v / (G_inf L) of the dashpot.
     loads : array, shape (cases,)
@@ -52,7 +52,7 @@ def steady_full_contact(
     [19.7392] [5.]
     """
     height, slope = nodes
-    # sums over the nodes are those over the spectrum; terms only add to the pressure of a wave
+    # sums over the nodes equal sums over the spectrum; Prony terms can only increase the pressure of a wave
     pressure, heaviest = height, np.max(loads, initial=0.0)
     if not heaviest > DEEP * np.sqrt(height @ height / height.size):
         return None

@@ -1,9 +1,10 @@
 """One sweep along a line of cubic cells: the steady state of a Kelvin foundation at a given depth.
 
-Everything here is measured in cells: a cell has length 1, a slope is the rise over one cell, ``deborah`` is v tau / dx.
-Heights are positive towards the elastomer and are measured from the highest point of the line, so that the penetration
-is w = depth + height with depth > 0. In contact u = w; a free element recovers as exp(-s / deborah). The derivative
-du/d(depth) is 1 in contact and decays with u behind it: that contact begins and ends elsewhere is of second order.
+All lengths are in cells: a cell has length 1, a slope is the rise over one cell, ``deborah`` is v tau / dx. Heights are
+positive towards the elastomer and are measured from the highest point of the line, so that the penetration is w = depth
++ height with depth > 0. In contact u = w; a free element recovers as exp(-s / deborah). The derivative du/d(depth) is 1
+in contact and decays with u behind a contact. The shift of the places where contact begins and ends has an effect of
+second order only.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, summit
 
-BLOCK = 16  # cells that are skipped together if all are in contact, or all are free
+BLOCK = 16  # cells that are skipped together if all of them are in contact or all of them are free
 TINY = 1e-290
-CLOSE = 1e-8  # cells: after a Newton step of this size the next one is below rounding
+CLOSE = 1e-8  # cells: a Newton step of this size is the last one, because the next one would be below rounding
 ITERATIONS = 80
 
 # The results of a sweep, in this order
@@ -37,7 +38,7 @@ class Blocks(NamedTuple):
 
 @jit_inline
 def _four(column: FloatArray, i: int) -> float:
-    """Return the sum over two neighbouring cells and over the two half a block after them."""
+    """Return the sum over cells i and i + 1, and over the two cells half a block after them."""
     half = BLOCK // 2
     here, after = column[np.uintp(i)] + column[np.uintp(i + half)], column[np.uintp(i + 1)]
     return float(here + (after + column[np.uintp(i + 1 + half)]))
@@ -45,7 +46,7 @@ def _four(column: FloatArray, i: int) -> float:
 
 @jit
 def blocks_of(cells: Cells) -> Blocks:
-    """Return the blocks of a line; cells after the last whole block are in none."""
+    """Return the blocks of a line; the cells after the last whole block belong to no block."""
     blocks = (cells.mean.size - 1) // BLOCK
     peak, mean, stretch = np.empty(blocks), np.empty(blocks), np.empty(blocks)
     for block in range(blocks):
@@ -60,10 +61,10 @@ def blocks_of(cells: Cells) -> Blocks:
 
 
 class Barriers(NamedTuple):
-    """Depths of cells and blocks at a Deborah number; the blocks are NaN until they are needed.
+    """Limits of the depth for cells and blocks at a Deborah number; limits of blocks are NaN until they are needed.
 
-    At a depth above `cell` or `block` the force on an element in contact is positive everywhere in the cell or block.
-    At a depth up to `idle` it is positive nowhere in the cell.
+    At a depth above `cell` or `block`, the force on elements in contact is positive everywhere in the cell or block. At
+    a depth up to `idle`, it is positive nowhere in the cell.
     """
 
     cell: FloatArray
@@ -73,7 +74,7 @@ class Barriers(NamedTuple):
 
 @jit
 def barriers_for(cells: int) -> Barriers:
-    """Return the barriers of a line, all of them to be computed."""
+    """Return arrays for the barriers of a line, none of which is computed yet."""
     return Barriers(np.empty(cells), np.full(cells // BLOCK + 1, np.nan), np.empty(cells))
 
 
@@ -86,7 +87,7 @@ class Places(NamedTuple):
 
 @jit
 def places_for(patches: int) -> Places:
-    """Return arrays with a capacity of some patches."""
+    """Return arrays with a capacity for a number of patches."""
     return Places(np.empty(patches), np.empty(patches))
 
 
@@ -94,9 +95,9 @@ def places_for(patches: int) -> Places:
 def write_barriers(
     height: FloatArray, enter: FloatArray, leave: FloatArray, deborah: float, block: int, barriers: Barriers
 ) -> None:
-    """Write the barriers of the cells of a block, from the force w + deborah w', and that of the block, their maximum.
+    """Write the barriers of the cells of a block from the force w + deborah w', and their maximum, the block's barrier.
 
-    `idle` follows from the control points of the force, which bound it.
+    `idle` follows from the Bernstein control points of the force, which bound it.
     """
     every, written, idle = -np.inf, barriers.cell, barriers.idle
     for i in range(block * BLOCK, min((block + 1) * BLOCK, written.size)):
@@ -104,7 +105,7 @@ def write_barriers(
         first = -(h0 + deborah * a)
         last = -(height[i + 1] + deborah * leave[i])
         highest = first if first > last else last
-        # the force less the depth, p + q x + r x^2 + c x^3, may be least inside
+        # the force minus the depth, p + q x + r x^2 + c x^3, may have its minimum inside the cell
         q, r = a + 2 * deborah * b, b + 3 * deborah * c
         near, far = first - q / 3, last + (q + 2 * r + 3 * c) / 3
         x = summit(-q, -r, -c) if max(near, far) > highest else NONE
@@ -119,7 +120,7 @@ def write_barriers(
 
 @jit
 def _decayed(x: float) -> float:
-    """Return 1 - exp(-x) for x >= 0; for small x by its series, which is faster and exact to rounding."""
+    """Return 1 - exp(-x) for x >= 0; for small x by a series, which is faster and exact to rounding."""
     if x > 1 / 32:
         return -math.expm1(-x)
     # products instead of divisions, which would take a tenth of the time of a sweep
@@ -129,8 +130,11 @@ def _decayed(x: float) -> float:
 
 @jit
 def contact_end(w0: float, a: float, b: float, c: float, deborah: float, start: float) -> float:
-    """Return where the force w + deborah w', not negative at the start, first falls to 0 up to 1, or `NONE`."""
-    # the force is a cubic: its monotone pieces are searched; at the start its sign may be lost to rounding
+    """Return the first place from `start` to 1 where the force w + deborah w' falls to 0, or `NONE`.
+
+    The force is not negative at the start.
+    """
+    # search the monotone pieces of the cubic force; its sign at the start may be lost to rounding
     p, q, r = w0 + deborah * a, a + 2 * deborah * b, b + 3 * deborah * c
     low, positive = start, True
     discriminant = r * r - 3 * c * q
@@ -151,7 +155,7 @@ def contact_end(w0: float, a: float, b: float, c: float, deborah: float, start: 
 
 @jit
 def _falling(p: float, q: float, r: float, c: float, low: float, high: float) -> float:
-    """Return the root of a cubic that decreases from low to high."""
+    """Return the root of a cubic that decreases from `low` to `high`."""
     x = low + (high - low) * 0.5
     for _ in range(ITERATIONS):
         force = p + x * (q + x * (r + x * c))
@@ -168,7 +172,7 @@ def _falling(p: float, q: float, r: float, c: float, low: float, high: float) ->
 
 
 class FreeElement(NamedTuple):
-    """A free element in a cell: the cubic w of the cell, its displacement u at a place, and that place."""
+    """A free element in a cell: the cubic w of the cell, and the displacement u of the element at the place `start`."""
 
     w0: float
     a: float
@@ -180,7 +184,7 @@ class FreeElement(NamedTuple):
 
 @jit
 def _contact_begin_between(element: FreeElement, deborah: float, low: float, high: float) -> float:
-    """Return where w rises to u exp(-(x - start) / deborah) between low and high, where it is known to be above."""
+    """Return where w rises to u exp(-(x - start) / deborah) between `low` and `high`; at `high` it is above this."""
     w0, a, b, c, u, start = element
     if w0 + low * (a + low * (b + low * c)) >= u - u * _decayed((low - start) / deborah):
         return low
@@ -202,7 +206,7 @@ def _contact_begin_between(element: FreeElement, deborah: float, low: float, hig
 
 @jit
 def _contact_begin(element: FreeElement, deborah: float, low: float, stop: float) -> float:
-    """Return where contact with a free element begins first between low and stop, or `NONE`.
+    """Return the first place from `low` to `stop` where contact with a free element begins, or `NONE`.
 
     The product (w - u_free) exp(x / deborah) increases while the force w + deborah w' is positive.
     """
@@ -223,7 +227,7 @@ def _contact_begin(element: FreeElement, deborah: float, low: float, stop: float
 
 @jit
 def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) -> tuple[float, float]:
-    """Return the integrals of w and w'^2 from start to end, by Gauss's rule, which is exact for these polynomials."""
+    """Return the integrals of w and w'^2 from `start` to `end`, by Gauss's rule, which is exact here."""
     half, middle = 0.5 * (end - start), 0.5 * (end + start)
     x, y = middle - half * 0.7745966692414834, middle + half * 0.7745966692414834
     before, centre, after = (
@@ -238,10 +242,10 @@ def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) 
 
 @jit
 def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> tuple[float, float, float, float]:
-    """Return the integral of u over a free recovery from u, its derivative by the depth, the drag and its derivative.
+    """Return the integral of u over a free recovery, its derivative by the depth, the drag and its derivative.
 
-    The integral of u is deborah times the decrease of u, and the drag is half of the decrease of u^2. The derivative of
-    the drag has a part from the place where contact begins, where the line has the given slope.
+    The integral of u is deborah times the decrease of u, and the drag is half the decrease of u^2. The derivative of
+    the drag includes the shift of the place where contact begins, where the line has the given slope.
     """
     lost = _decayed(travelled / deborah) if u > 0 else 1.0
     memory = deborah * lost
@@ -252,7 +256,7 @@ def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> 
 def _skip_free(
     peak: FloatArray, block_peak: FloatArray, depth: float, decay: float, block_decay: float, i: int, free: float
 ) -> tuple[int, float]:
-    """Skip cells that a free element passes without contact; return the next cell, and the displacement there."""
+    """Skip cells in which a free element stays out of contact; return the next cell and the displacement there."""
     n, blocks = peak.size - 1, block_peak.size
     while i < n and peak[i] + depth <= free * decay:
         if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_peak[i // BLOCK] + depth <= free * block_decay:
@@ -261,7 +265,7 @@ def _skip_free(
         else:
             free *= decay
             i += 1
-        # arithmetic with subnormal numbers takes a hundred times as long
+        # arithmetic with subnormal numbers is a hundred times slower
         free = free if free > TINY else 0.0
     return i, free
 
@@ -270,7 +274,7 @@ def _skip_free(
 def sweep_cells(
     cells: Cells, every: Blocks, barriers: Barriers, deborah: float, depth: float, sums: FloatArray, places: Places
 ) -> int:
-    """Follow an element once along the line; return the number of its contact patches.
+    """Move an element once along the line; return the number of contact patches.
 
     Parameters
     ----------
@@ -284,12 +288,12 @@ def sweep_cells(
         Penetration of the highest point.
     sums : array, shape (SUMS,)
         Written: the integral of u (F_N / (4 G dx)), its derivative by the depth, F_x / (4 G), its derivative by the
-        depth, the length in contact, the integral of w'^2 over it, and 1 if the contact ends a line
-        that is not periodic.
+        depth, the length in contact, the integral of w'^2 over it, and 1 if an end of a line that is not periodic is in
+        contact.
     places : Places
         Written up to its capacity: where each patch begins and ends.
     """
-    # local names, because reading an array from a tuple takes longer than a cell
+    # local names, because reading an array from a tuple takes more time than computing a cell
     height, enter, leave, peak, mean, stretches = (
         cells.height,
         cells.enter,
@@ -307,9 +311,9 @@ def sweep_cells(
     i, x, contact, patches = 0, start, cells.periodic, 0
     if contact and begins.size > 0:
         begins[0] = start
-    # displacement where contact ended and at the start of this cell; place where it ended
+    # u: displacement where contact ended; free: at the start of this cell; left: place where contact ended
     u = free = left = 0.0
-    # the period ends at the highest point again, in a part of a cell that repeats the first one
+    # the period ends at the highest point, in a cell that repeats the first one in part
     last = n if cells.periodic and start > 0 else n - 1
     while i <= last:
         if contact and x == 0:
@@ -353,7 +357,7 @@ def sweep_cells(
                     ends[patches] = left
                 patches += 1
                 free = u = w0 + place * (c1 + place * (c2 + place * c3))
-            # a cubic force falls through 0 at most twice
+            # a cubic falls through 0 at most twice
             low = x + CLOSE if visits > 0 else x
             may_begin = visits < 2 and low < stop
             begin = _contact_begin(FreeElement(w0, c1, c2, c3, free, x), deborah, low, stop) if may_begin else NONE
@@ -367,7 +371,7 @@ def sweep_cells(
                 begins[patches] = i + begin
         x = 0.0
         i += 1
-    # the last free recovery: to the highest point, or for ever
+    # the last free recovery extends to the highest point, or to infinity
     if not contact:
         travelled = n + start - left if cells.periodic else np.inf
         slope = enter[n] if cells.periodic and start == 0 else 0.0
@@ -382,7 +386,7 @@ def sweep_cells(
     sums[OUTSIDE] = 0.0 if cells.periodic or not (contact or depth + height[0] > 0) else 1.0
     if not (cells.periodic or contact):
         return patches
-    # a period ends at the highest point, where contact begins for an element that is still free
+    # a period ends at the highest point, where a free element comes into contact
     if patches < ends.size:
         begins[patches], ends[patches] = begins[patches] if contact else n + start, n + start
     return patches + 1
@@ -392,7 +396,7 @@ def sweep_cells(
 def patches_at(
     cells: Cells, every: Blocks, barriers: Barriers, deborah: float, depth: float, sums: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return where each patch of the steady state at a depth begins and ends; sums are as in `sweep_cells`."""
+    """Return where each patch of the steady state at a depth begins and ends; `sums` as in `sweep_cells`."""
     n = cells.mean.size - 1
     places = places_for(n // 8 + 2)
     count = sweep_cells(cells, every, barriers, deborah, depth, sums, places)

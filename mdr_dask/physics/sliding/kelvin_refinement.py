@@ -1,8 +1,8 @@
-"""Steady states of a Kelvin solid to an accuracy: the grids on which each case is solved.
+"""Steady states of a Kelvin solid to a given accuracy: the choice of the grid for each case.
 
-Cases on a plane go from node to node first (`node_to_node`), because that is the fastest. Cubic cells (`steady`) take
-the cases that this leaves, all cases under an indenter, and accuracies below what the arithmetic from node to node
-allows. Both are refined by :func:`mdr_dask.physics.refine.refine`, which estimates the errors.
+Cases on a plane are solved by `node_to_node` first, which is fastest. Sweeps over cubic cells (`steady`) solve all
+cases under an indenter, the cases for which `node_to_node` does not reach the accuracy, and all cases if the accuracy
+is below the error of its arithmetic. Both use :func:`mdr_dask.physics.refine.refine`, which estimates the errors.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from mdr_dask.physics.sliding.node_to_node import NodeToNode
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 FLOORS = (0.0, 1.0, 0.0, 0.0)
-"""Errors of the depth are relative to the unit of height (the rms height) where the depth itself is smaller."""
-ORDER = 3.0  # from node to node: cubic cells are of fourth order, edges of contacts of lower order; measured 3.3
-ORDER_OF_CELLS = 2.0  # of sweeps, which also take contacts within one cell: their curvature is of second order
-ORDER_OF_STEPS = 1.0  # backward Euler, and edges of contacts on straight cells
-SEARCH = 0.1  # error that the search for the depth may leave, relative to the accuracy: small beside it
-NODE_ERROR = 5e-5  # error of the arithmetic from node to node, whatever the grid
-NODE_LEVELS = tuple(2**k for k in range(12))  # nodes per Nyquist point, beyond 2 only where the line is in contact
+"""Errors of the depth are relative to the unit of height (the rms height) if the depth is smaller."""
+ORDER = 3.0  # of `node_to_node`: fourth order in cubic cells, lower at contact edges; measured 3.3
+ORDER_OF_CELLS = 2.0  # of sweeps: second order for contacts that are shorter than a cell
+ORDER_OF_STEPS = 1.0  # of backward Euler, and of contact edges on straight cells
+SEARCH = 0.1  # part of the accuracy: allowed error of the search for the depth
+NODE_ERROR = 5e-5  # relative error of the arithmetic of `node_to_node` on any grid
+NODE_LEVELS = tuple(2**k for k in range(12))  # nodes per Nyquist point; above 2 only where contact begins or ends
 CELL_LEVELS = tuple(2**k for k in range(1, 7))
-REFERENCE = 0.01  # accuracy of the results that time steps on a given grid are compared with
+REFERENCE = 0.01  # accuracy of the reference for errors of time steps on a given grid
 
 
 @dataclass(frozen=True)
@@ -43,11 +43,11 @@ class KelvinCases:
     line : RoughLine
         The line.
     scheme : {"hermite", "piecewise_linear", "backward_euler"}
-        Cubic cells, straight cells, or the papers' time steps.
+        Cubic cells, straight cells, or the time steps of the papers.
     deborah, loads : array, shape (cases,)
         v tau / L and F_N / (4 G L), in the unit of height.
     contact : bool
-        Whether fraction and slope of the contact are wanted. They cost extra with time steps only.
+        Whether fraction and slope of the contact are requested. They take extra time with time steps only.
     """
 
     line: RoughLine
@@ -61,11 +61,11 @@ class KelvinCases:
         return replace(self, deborah=self.deborah[cases], loads=self.loads[cases])
 
     def on_grid(self, oversampling: int) -> Steady:
-        """Solve the cases on a grid of so many nodes per Nyquist point, without an estimate of their errors."""
+        """Solve the cases on a grid with the given number of nodes per Nyquist point, without estimated errors."""
         return self._on_grid(oversampling, None)
 
     def _on_grid(self, oversampling: int, depths: FloatArray | None) -> Steady:
-        """Solve the cases, starting the search from depths on another grid."""
+        """Solve the cases on a grid; the search starts from depths on another grid, if there are any."""
         nodes = self.line.points * oversampling
         if self.scheme == "hermite":
             return sliding.steady_sliding(self.line.cubic(nodes), self.deborah, self.loads, depths)
@@ -77,8 +77,9 @@ class KelvinCases:
     def with_errors(self, oversampling: int) -> tuple[Steady, FloatArray]:
         """Solve the cases on a grid and estimate their errors.
 
-        Cells are compared with cells of twice the length. Time steps, and the coarsest grid, are compared with the
-        default scheme to an accuracy of 1 %: their own convergence is too slow to estimate an error from.
+        The errors of cells are estimated from cells of twice the length. Results of time steps, and results on the
+        coarsest grid, are compared with the default scheme at an accuracy of 1 %, because time steps converge too
+        slowly for an estimate from two grids.
 
         Returns
         -------
@@ -97,13 +98,13 @@ class KelvinCases:
     def to_accuracy(self, accuracy: float) -> tuple[Steady, FloatArray]:
         """Solve every case on the coarsest grid that meets a relative accuracy.
 
-        The accuracy holds for drag, contact fraction and contact slope together: two grids may agree by chance in one
-        of them. That of the depth is relative to the rms height.
+        The accuracy is required for drag, contact fraction and contact slope together, because two grids may agree by
+        chance in one of them. The error of the depth is relative to the rms height if the depth is smaller.
 
         Returns
         -------
         Steady, array
-            As of `with_errors`. A case that misses the accuracy on the finest grid keeps its results and errors.
+            As in `with_errors`. A case that misses the accuracy on the finest grid keeps its results and errors.
         """
         cases = self.loads.size
         columns, errors = np.full((4, cases), np.nan), np.full((4, cases), np.inf)
@@ -130,7 +131,7 @@ class KelvinCases:
         return Steady.of(columns, status), errors
 
     def _swept(self, levels: tuple[int, ...], accuracy: float) -> Refined:
-        """Solve the cases by sweeps over whole lines, each search for a depth starting from the grid before."""
+        """Solve the cases by sweeps over whole lines; each search for a depth starts from the previous grid."""
         depths = np.full(self.loads.size, np.nan)
 
         def solve(level: int, cases: IntArray) -> Solution:
@@ -138,7 +139,7 @@ class KelvinCases:
             depths[cases] = found.depth
             return Solution(found.columns, found.status)
 
-        # one node per Nyquist point is too coarse to show the order of cubic cells
+        # with one node per Nyquist point cubic cells do not reach their order
         order = ORDER_OF_CELLS if self.scheme == "hermite" and levels[0] > 1 else ORDER_OF_STEPS
         return refine(solve, self.loads.size, levels, accuracy, order, floors=FLOORS)
 
@@ -146,7 +147,7 @@ class KelvinCases:
 def _write(
     results: tuple[FloatArray, FloatArray, NDArray[np.int8]], cases: IntArray, found: Refined, least: float
 ) -> None:
-    """Write refined results of some cases, unless what is there has smaller errors."""
+    """Write refined results of some cases, unless existing results have smaller errors."""
     columns, errors, status = results
     values = np.array(found.values)
     known = found.errors + least * np.maximum(np.abs(values), np.array(FLOORS)[:, None])
@@ -157,6 +158,6 @@ def _write(
 
 
 def nodes_of(line: RoughLine) -> tuple[FloatArray, FloatArray]:
-    """Return heights and slopes at two nodes per Nyquist point, as full contact and `NodeToNode` take them."""
+    """Return heights and slopes at two nodes per Nyquist point, the input of full contact and `NodeToNode`."""
     nodes = full_contact.OVERSAMPLING * line.points
     return line.heights(nodes), line.slopes(nodes)

@@ -1,6 +1,7 @@
 """Closed-form laws of sliding friction (thesis chapter 3) and their dimensionless numbers.
 
-Arguments may be numbers, numpy arrays or xarray arrays that broadcast. "Slope" is the spectral rms slope of the line.
+Arguments may be numbers, numpy arrays or xarray arrays that broadcast. "Slope" means the spectral rms slope of the
+line.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 
 INDENTER_EXPONENT = 1.5  # alpha of eq. 3.40
-BETA = 1.6  # beta of eq. 3.11, all Hurst exponents: measured 1.61 to 1.67 (docs/evidence/friction.md, Laws)
+BETA = 1.6  # beta of eq. 3.11 for all Hurst exponents; computed: 1.61 to 1.67 (docs/evidence/friction.md, Laws)
 
 
 def force_number(force: Any, shear_modulus: Any, rms: Any, length: Any) -> Any:
@@ -20,12 +21,12 @@ def force_number(force: Any, shear_modulus: Any, rms: Any, length: Any) -> Any:
 
 
 def velocity_number(velocity: Any, relaxation_time: Any, slope: Any, rms: Any) -> Any:
-    """Return v tau slope / (sqrt 2 h) (eq. 3.19): near 1 the contacts become one-sided."""
+    """Return v tau slope / (sqrt 2 h) (eq. 3.19); near 1 the contacts become one-sided."""
     return velocity * relaxation_time * slope / (math.sqrt(2) * rms)
 
 
 def alpha(hurst: Any) -> Any:
-    """Return the exponent of zone 1, H / (1 + H) (eq. 3.13)."""
+    """Return the exponent H / (1 + H) of zone 1 (eq. 3.13)."""
     return hurst / (1 + hurst)
 
 
@@ -43,32 +44,32 @@ def zone_one(force: Any, velocity: Any, exponent: Any, beta: Any) -> Any:
 
 
 def full_contact(force: Any, velocity: Any) -> Any:
-    """Return mu / slope in full contact, 4 eta v L slope / F_N (eq. 3.14): exact."""
+    """Return mu / slope in full contact, 4 eta v L slope / F_N, which is exact (eq. 3.14)."""
     return 4 * math.sqrt(2) * velocity / force
 
 
 def interpolation(force: Any, velocity: Any, exponent: Any, beta: Any) -> Any:
     """Return mu / (sqrt 2 slope) in regions I to III and both zones (eq. 3.17, 3.18); arguments as in `zone_one`.
 
-    The squares of the reciprocals of three laws are added: that of the plateau, `full_contact` and `zone_one`.
+    1 / mu^2 is the sum of 1 / mu^2 of three laws: the plateau, `full_contact` and `zone_one`.
     """
     return (1 + (crossover(force, exponent, beta) / velocity) ** 2) ** -0.5
 
 
 def crossover(force: Any, exponent: Any, beta: Any) -> Any:
-    """Return the `velocity_number` at which the law of low velocities meets the plateau."""
+    """Return the `velocity_number` at which the law for low velocities reaches the plateau."""
     return np.hypot(force / 4, force**exponent / beta)
 
 
 def regions(force: Any, exponent: Any, beta: Any, share: float = 0.9) -> tuple[Any, Any]:
-    """Return the velocity numbers that end region I and begin region III of eq. 3.18.
+    """Return the velocity numbers at the end of region I and at the start of region III of eq. 3.18.
 
     Parameters
     ----------
     force, exponent, beta : array_like
         As in `zone_one`.
     share : float
-        Region I ends where mu is that share of the linear law, region III begins where it is that share of the plateau.
+        Region I ends where mu is this share of the linear law; region III begins where mu is this share of the plateau.
     """
     width = math.sqrt(share**-2 - 1)
     middle = crossover(force, exponent, beta)
@@ -88,7 +89,7 @@ def indenter(xi: Any, exponent: Any = INDENTER_EXPONENT) -> Any:
     Parameters
     ----------
     xi : array_like
-        mu at low velocity over sqrt 2 slope.
+        mu / (sqrt 2 slope) from the law for low velocity.
     exponent : array_like
         alpha of the law.
     """
@@ -98,8 +99,8 @@ def indenter(xi: Any, exponent: Any = INDENTER_EXPONENT) -> Any:
 def single_tip(curvature: Any, force: Any, viscosity: Any, velocity: Any) -> Any:
     """Return mu of a viscous foundation at very high velocity, (2/3) sqrt(kappa F_N / (2 eta v)).
 
-    One parabolic tip is in contact, from a = sqrt(F_N / (2 eta v kappa)) ahead of its summit to the summit; the rms
-    slope in contact is kappa a / sqrt 3, sqrt(3)/2 of mu. Derived in docs/high-speed.md.
+    One parabolic tip is in contact from its summit to a = sqrt(F_N / (2 eta v kappa)) ahead of it. The rms slope in
+    contact is kappa a / sqrt 3 = mu sqrt(3) / 2. The derivation is in docs/high-speed.md.
 
     Parameters
     ----------
