@@ -130,7 +130,7 @@ def groups(lookup: Callable[[str], Any]) -> tuple[Any, Any, Any]:
     Parameters
     ----------
     lookup : callable, str -> array or None
-            Returns the values of a parameter, or None if it is not given.
+        Returns the values of a parameter, or None if it is not given.
     """
     modulus = 2 * lookup("contact_modulus")
     W, U, G = lookup("load_parameter"), lookup("speed_parameter"), lookup("material_parameter")

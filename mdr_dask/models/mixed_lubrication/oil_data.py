@@ -120,7 +120,7 @@ def _fitted(file: DataFile, density: float, density_temperature: float) -> _Fit:
     Raises
     ------
     DataError
-            If columns are missing, or the viscosities are not those of an oil.
+        If columns are missing, or the viscosities are not those of an oil.
     """
     text = file.read_text()
     is_dynamic = any(_is_dynamic(unit) for unit in read_sheet(text, file.name).units)

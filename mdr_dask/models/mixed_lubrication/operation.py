@@ -105,7 +105,7 @@ def operation_of(case: MixedLubrication, accuracy: float | None = None) -> Opera
     Raises
     ------
     NoFilmError
-            If the EHL solution is requested but has not been found.
+        If the EHL solution is requested but has not been found.
     """
     data, source = case.oil_data(), case.source()
     viscosity = float(data.dynamic(case.temperature))

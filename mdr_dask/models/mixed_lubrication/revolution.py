@@ -53,15 +53,15 @@ class Revolution:
     Parameters
     ----------
     contact : int array, shape (windows,)
-            Length in intimate contact at equal time steps, in the unit of `breakthrough.contact_lengths`.
+        Length in intimate contact at equal time steps, in the unit of `breakthrough.contact_lengths`.
     spacing : float
-            Distance between nodes of the lines in m.
+        Distance between nodes of the lines in m.
     per_wave : float
-            Nodes per shortest wave.
+        Nodes per shortest wave.
     apart : int
-            Number of time steps after which the window no longer overlaps the first one.
+        Number of time steps after which the window no longer overlaps the first one.
     parts : int
-            Number of parts in which contact is counted; each is at least two windows long.
+        Number of parts in which contact is counted; each is at least two windows long.
     overlaps : bool
         Whether the lines overlap anywhere.
     """

@@ -1,4 +1,4 @@
-"""Positions and row numbers beside heights: how they are recognised, and the grid that they lie on."""
+"""Positions and row numbers in tables of heights: their recognition, and the regular grid on which they lie."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from mdr_dask.errors import DataError
 from mdr_dask.units import shown
 
 OFF_GRID = 0.5
-"""Steps by which a position may be off a regular grid: farther, it would belong to the next point."""
+"""Largest deviation of a position from a regular grid, in steps; beyond it, the next grid point would be closer."""
 OUTER = 3
-"""Rows or columns on each side that may hold positions or numbers."""
+"""Number of rows or columns on each side that may hold positions or numbers."""
 BREAK = 3.0
-"""Change of slope between a line of positions and its neighbours, over the largest between lines of heights."""
+"""Bend between a line of positions and the lines beside it, over the largest bend between lines of heights."""
 FAR_ALONE = 10.0
-"""Ranges of all other heights by which a number that occurs once must be away from them to be no height."""
+"""A number that occurs once is not a height if it is farther from all others than this many of their ranges."""
 FEW_LEVELS = 10
-"""Different heights of a profile that was designed, not measured."""
+"""Largest number of different heights of a profile that was designed, not measured."""
 
 
 class Outer(NamedTuple):
-    """Heights without the lines around them, the steps of positions along x and y, and what was left out."""
+    """Heights without lines of positions, the steps of the positions along x and y, and remarks on omitted lines."""
 
     rows: FloatArray
     steps: tuple[float | None, float | None]
@@ -32,7 +32,7 @@ class Outer(NamedTuple):
 
 
 def rising(lines: FloatArray) -> NDArray[np.bool_]:
-    """Return which lines rise all along, or fall all along, as positions and numbers do but no rough line."""
+    """Return which lines only rise or only fall; positions and row numbers do, rough lines do not."""
     steps = np.diff(lines, axis=1)
     known = np.isfinite(steps)
     one_way = np.all((steps >= 0) | ~known, axis=1) | np.all((steps <= 0) | ~known, axis=1)
@@ -40,12 +40,12 @@ def rising(lines: FloatArray) -> NDArray[np.bool_]:
 
 
 def without_positions(rows: FloatArray) -> Outer:
-    """Leave out the outermost rows and columns that hold positions or numbers.
+    """Remove the outermost rows and columns that hold positions or numbers.
 
     Raises
     ------
     DataError
-        If positions are not equidistant, or if there are two of them that differ.
+        If positions are not equidistant, or if there are several different lines of them.
     """
     if min(rows.shape) < 4 * OUTER:
         return Outer(rows, (None, None), ())
@@ -62,10 +62,10 @@ def without_positions(rows: FloatArray) -> Outer:
 
 
 def _leading(lines: FloatArray) -> int:
-    """Return how many of the first lines hold positions or numbers.
+    """Return the number of first lines that hold positions or numbers.
 
-    They rise all along. Where lines of heights do so too, as on a tilted or curved surface, positions differ from the
-    lines beside them by much more than heights do.
+    Such lines only rise or only fall. On a tilted or curved surface, lines of heights may do so as well; but positions
+    differ from the lines beside them much more than heights do.
     """
     inner = lines[:, OUTER:-OUTER]
     rises = rising(inner)
@@ -78,12 +78,12 @@ def _leading(lines: FloatArray) -> int:
 
 
 def is_numbered(line: FloatArray) -> bool:
-    """Return whether a line holds the numbers of its points: whole ones, each one more than the last."""
+    """Return whether a line holds the numbers of its points: integers, each larger by one than the previous."""
     return bool(np.all(np.diff(line) == 1) and np.all(line == np.rint(line)))
 
 
 def _common_step(lines: list[FloatArray], name: str) -> float | None:
-    """Return the distance of the positions in some lines, or None if there are none but numbers."""
+    """Return the common step of all lines of positions, or None if there are none except point numbers."""
     steps = [regular(line)[1] for line in lines if not is_numbered(line)]
     if any(abs(step - steps[0]) > 0.01 * steps[0] for step in steps):
         apart = " and ".join(f"{step:.4g}" for step in steps)
@@ -92,9 +92,9 @@ def _common_step(lines: list[FloatArray], name: str) -> float | None:
 
 
 def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
-    """Return the place on a regular grid of each position, from 0 on, and the step of the grid.
+    """Return the index of each position on a regular grid, from 0 on, and the step of the grid.
 
-    Positions of one place may differ a little, and places may be empty.
+    Positions with the same index may differ slightly, and indices may be missing.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
     """
     known = np.sort(positions[np.isfinite(positions)])
     gaps = np.diff(known)
-    lines = np.split(known, np.flatnonzero(gaps > 0.25 * gaps.max(initial=0.0)) + 1)  # a gap may be 2 or 3 steps
+    lines = np.split(known, np.flatnonzero(gaps > 0.25 * gaps.max(initial=0.0)) + 1)  # the largest gap may be 3 steps
     middles = np.array([line.mean() for line in lines])
     if middles.size < 2 or len(known) != len(positions):
         raise DataError("expected positions on a regular grid")
@@ -117,12 +117,12 @@ def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
 
 
 def scattered(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, tuple[float, float]]:
-    """Return rows of heights, NaN where there is no point, and the steps along x and y, from points in any order.
+    """Return rows of heights, NaN if a point is missing, and the steps along x and y, from points in any order.
 
     Raises
     ------
     DataError
-        If the points do not lie on a regular grid, or if there are two at one place.
+        If the points do not lie on a regular grid, or if two points have the same position.
     """
     (column, step_x), (row, step_y) = regular(x), regular(y)
     shape = row.max() + 1, column.max() + 1
@@ -134,11 +134,11 @@ def scattered(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, 
 
 
 def without_codes(height: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
-    """Replace numbers that cannot be heights, m, by NaN, such as a code 9999 for missing points.
+    """Replace numbers that cannot be heights, m, by NaN, such as the code 9999 for missing points.
 
-    Such a number is the highest or the lowest, and is farther from all other heights than these are from each other;
-    `FAR_ALONE` times as far if it occurs once, because a single deep groove is possible. Where the other heights are
-    `FEW_LEVELS` numbers or fewer, as of a grating, there is no code.
+    Such a number is the largest or the smallest, and its distance from all other heights exceeds the range of these. If
+    it occurs only once, the distance must exceed `FAR_ALONE` times the range, because a single deep groove is possible.
+    There is no code if the other heights have at most `FEW_LEVELS` different values, as on a grating.
     """
     height = np.where(np.isfinite(height), height, np.nan)
     found: list[str] = []

@@ -1,4 +1,4 @@
-"""A measured surface as a campaign names it: by its spectrum, by maps or scans of it, or by a line taken as it is."""
+"""A measured surface in a campaign: given by its spectrum, by maps or scans, or by a line that is used unchanged."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Surface(Parameters):
 
     @model_validator(mode="after")
     def _one_kind(self, info: ValidationInfo) -> Surface:
-        """Refuse a bad file where a campaign names it, before any case fails of it."""
+        """Raise an error for an unusable file when the campaign is read, before any case is computed."""
         self.require_one_alternative()
         ends = self.longest_wavelength, self.shortest_wavelength
         if self.profile is not None and (self.extrapolate or any(ends)):
@@ -60,13 +60,13 @@ class Surface(Parameters):
         return self
 
     def without_spectrum(self) -> tuple[str, ...]:
-        """Return why files have no isotropic spectrum, one sentence each."""
+        """Return the reasons why files have no isotropic spectrum, one sentence for each file."""
         if self.map is None:
             return ()
         return tuple(reason for file in self.map.files if (reason := anisotropic(self.map, file)))
 
     def notes(self) -> tuple[str, ...]:
-        """Return range, rms height and rms gradient of the spectra."""
+        """Return notes on range, rms height and rms gradient of the spectra."""
         if self.profile is not None:
             return ()
         spectra = zip(self.measured.files, self.measured.found(), spectra_of(self), strict=False)
@@ -74,7 +74,7 @@ class Surface(Parameters):
 
     @property
     def measured(self) -> Files:
-        """What the spectrum comes from."""
+        """The files from which the spectrum is computed."""
         found: Files | None = self.spectrum or self.map or self.scan
         assert found is not None
         return found
@@ -105,19 +105,19 @@ def _notes(surface: Surface, file: DataFile, found: Found, spectrum: Spectrum) -
 
 
 def without_exponent(value: Any, surface: str) -> Any:
-    """Return the data of a parameter set; a measured surface has no Hurst exponent."""
+    """Return the data of a parameter set, without a Hurst exponent if the surface is measured."""
     measured = isinstance(value, dict) and value.get(surface) is not None
     return {"hurst": None, **value} if measured else value
 
 
 @lru_cache(maxsize=64)
 def spectra_of(surface: Surface) -> tuple[Spectrum, ...]:
-    """Return the spectra C2D of a surface between its cut-offs, one of each file.
+    """Return the spectra C2D of a surface between its cut-offs, one for each file.
 
     Raises
     ------
     DataError
-        If a file does not hold one, or the cut-offs lie outside of it.
+        If a file has no spectrum, or if the cut-offs are outside its range.
     """
     return tuple(
         _within(surface, found, file)
@@ -126,7 +126,7 @@ def spectra_of(surface: Surface) -> tuple[Spectrum, ...]:
 
 
 def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
-    """Return a spectrum between the cut-offs; where none is named it ends where the noise begins."""
+    """Return a spectrum between the cut-offs; without a short cut-off, it ends where noise begins."""
     spectrum = found.spectrum
     ends = surface.longest_wavelength or 0.0, surface.shortest_wavelength or 0.0
     if surface.extrapolate:
@@ -152,12 +152,12 @@ def _beyond(name: str, wavelength: float, which: str, end: float) -> str:
 
 @lru_cache(maxsize=64)
 def lines_of(surface: Surface, length: float, modes: int) -> tuple[FloatArray, ...]:
-    """Return the amplitudes, m, of the lines that the method puts in the place of a surface, one of each file.
+    """Return the amplitudes, m, of the lines that represent a surface in the method, one line for each file.
 
     Raises
     ------
     DataError
-        If the spectrum has no wave that fits the line.
+        If no wave of the spectrum fits the line.
     """
     import numpy as np
 

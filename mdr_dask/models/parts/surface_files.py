@@ -1,4 +1,4 @@
-"""Files of a measured surface, and the spectrum of each: tables, maps and scans."""
+"""Files of a measured surface, and the computation of a spectrum from each: tables, maps and scans."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.scans import Cut
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
-CUT_ERROR = 0.05  # relative, of every point of a tabulated cut
-MOST_ANISOTROPY = 0.25  # the slopes in two directions then differ by more than a fifth
-STRIPES = 10.0  # times the power of an isotropic surface, in waves along an axis
-FORM = 0.9  # share of the mean square that a parabola explains; roughness as long as the file has less
-MOST_OUTLIERS = 0.05  # share of the points; more are part of the surface
+CUT_ERROR = 0.05  # relative error of every point of a tabulated spectrum of straight profiles
+MOST_ANISOTROPY = 0.25  # beyond it, the slopes in two directions differ by more than a fifth
+STRIPES = 10.0  # smallest power of waves along an axis that means stripes, over that of an isotropic surface
+FORM = 0.9  # least fraction of the mean square explained by a parabola that means form; for roughness it is less
+MOST_OUTLIERS = 0.05  # largest fraction of outliers; if there are more, they belong to the surface
 
 Window = Literal["hann", "none"]
 
@@ -36,11 +36,11 @@ class Found(NamedTuple):
     Parameters
     ----------
     spectrum : Spectrum
-        C2D, as far as the points go.
+        C2D, over the range of the data.
     resolution : float
-        Wavelength, m, below which there is noise and no roughness; 0 if none was found.
+        Wavelength, m, below which there is only noise; 0 if no noise was found.
     remarks : tuple of str
-        What was found and done: missing points, outliers, stripes.
+        Observations and changes: missing points, outliers, stripes.
     """
 
     spectrum: Spectrum
@@ -49,14 +49,14 @@ class Found(NamedTuple):
 
 
 class Files(NamedByFile):
-    """Files of one surface; a bare file name stands for them with all options at their defaults."""
+    """Files of one surface; a bare file name means the file with all options at their defaults."""
 
     files: tuple[NamedFile, ...] = Field(
         strict=False, min_length=1, description="one file, or several of the same surface: each realisation takes one"
     )
 
     def found(self) -> tuple[Found, ...]:
-        """Return the spectrum of every file; DataError if one has none."""
+        """Return the spectrum of every file; raise DataError if a file has none."""
         raise NotImplementedError
 
 
@@ -78,7 +78,7 @@ class ScanFiles(Files):
     window: Window = Field(default="hann", description="window of each scan; none only if it closes")
 
     def found(self) -> tuple[Found, ...]:
-        """Return the spectrum of the surface that each scan cuts."""
+        """Return the spectrum of the surface from each scan."""
         return tuple(scanned(self, file) for file in self.files)
 
 
@@ -160,7 +160,7 @@ def line_of_scan(scans: ScanFiles, file: DataFile) -> MeasuredLine:
 
 
 def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
-    """Return sentences about a line that may have the form of a part, or heights in a wrong unit."""
+    """Return warnings if a line may contain the form of a part, or have heights in a wrong unit."""
     import numpy as np
 
     place = np.linspace(-1, 1, line.height.size)
@@ -170,7 +170,7 @@ def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
 
 
 def _form(level: FloatArray, curved: FloatArray) -> tuple[str, ...]:
-    """Return a sentence if a parabola explains most of the levelled heights, which is the form of a part."""
+    """Return a warning if a parabola explains most of the levelled heights: this is the form of a part."""
     import numpy as np
 
     square, rest = (float(np.nanmean((height - np.nanmean(height)) ** 2)) for height in (level, curved))
@@ -183,7 +183,7 @@ def _form(level: FloatArray, curved: FloatArray) -> tuple[str, ...]:
 
 
 def _steepness(slope: float) -> tuple[str, ...]:
-    """Return a question about the units of a surface that is steeper than 45 degrees."""
+    """Return a warning about units if the surface is steeper than 45 degrees."""
     if not slope > 1:
         return ()
     return (f"rms slope {slope:.3g}, steeper than 45 degrees: are the units of heights and positions right?",)
@@ -191,10 +191,10 @@ def _steepness(slope: float) -> tuple[str, ...]:
 
 @lru_cache(maxsize=64)
 def scanned(scans: ScanFiles, file: DataFile) -> Found:
-    """Return the spectrum of the surface that a scan cuts."""
+    """Return the spectrum of the surface from one scan."""
     from mdr_dask.physics.surfaces.scans import cut_of_lines
 
-    line = line_of_scan(scans, file)  # names the file itself
+    line = line_of_scan(scans, file)  # outside `try`: its errors contain the file name already
     try:
         found = of_surface_cut(cut_of_lines([line], scans.window == "hann"))
         return found._replace(remarks=(*_scan(scans, file).remarks, *doubts_of_line(line, scans.detrend)))
@@ -203,7 +203,7 @@ def scanned(scans: ScanFiles, file: DataFile) -> Found:
 
 
 def of_surface_cut(cut: Cut) -> Found:
-    """Return the spectrum of the surface whose cut this is, as far as it is no noise."""
+    """Return the spectrum of the surface from that of a straight profile, without the noise at its end."""
     import numpy as np
 
     from mdr_dask.physics.surfaces.scans import NOISE_SLOPE, NOISE_TAIL, of_cut
@@ -215,7 +215,7 @@ def of_surface_cut(cut: Cut) -> Found:
 
 @lru_cache(maxsize=16)
 def mapped(maps: MapFiles, file: DataFile) -> Found:
-    """Return the spectrum of one map: in rings, or of the cut along the direction that is named."""
+    """Return the spectrum of one map: averaged in rings, or from the profiles along the given direction."""
     import numpy as np
 
     from mdr_dask.physics.surfaces.scans import NOISE_SLOPE, averaged
@@ -232,7 +232,7 @@ def mapped(maps: MapFiles, file: DataFile) -> Found:
 
 
 def anisotropic(maps: MapFiles, file: DataFile) -> str:
-    """Return why a map has no isotropic spectrum, or nothing if it has one or if a direction of sliding is named."""
+    """Return the reason why a map has no isotropic spectrum; empty if it has one or if a sliding direction is given."""
     import numpy as np
 
     rings = levelled_map(maps, file).spectrum
@@ -251,11 +251,11 @@ class LevelledMap(NamedTuple):
     Parameters
     ----------
     height_rms, height_mean : float
-        Sq and Sa of the points that were measured, m: the rms and the mean absolute height.
+        Sq and Sa of the measured points, m: the rms and the mean absolute height.
     spectrum : MapSpectrum
-        Of the windowed map, missing points filled.
+        Spectrum of the windowed map, with missing points filled.
     remarks : tuple of str
-        What was done to the points.
+        Changes made to the points.
     """
 
     height_rms: float
@@ -271,7 +271,7 @@ def levelled_map(maps: MapFiles, file: DataFile) -> LevelledMap:
     Raises
     ------
     DataError
-        If the file holds no map, or too many points are missing.
+        If the file holds no map, or if too many points are missing.
     """
     import numpy as np
 

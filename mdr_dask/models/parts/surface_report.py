@@ -1,4 +1,4 @@
-"""Report on the files of a measured surface: heights, slopes, spectra, the power law with its cut-offs, resolution."""
+"""Report on the files of a measured surface: heights, slopes, spectra, power law with cut-offs, resolution."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ UNITS = {
     "resolution": "m",
     "length": "m",
 }
-"""Columns of a report and their units; NaN where a file does not determine them.
+"""Columns of a report and their units; NaN if a file does not determine the quantity.
 
-Sq and Sa are the rms and the mean absolute height of the levelled map, Pq the rms height of the levelled profile, all
-without a window. Gradient, slopes and anisotropy are those of the windowed heights.
+Sq and Sa are the rms and the mean absolute height of the levelled map, and Pq the rms height of the levelled profile,
+all without a window. Gradient, slopes and anisotropy are computed from the windowed heights.
 """
 
 
@@ -53,13 +53,13 @@ class FileReport(NamedTuple):
     ----------
     file : DataFile
     row : dict of str to number or str
-        The columns of `UNITS`.
+        Values of the columns of `UNITS`.
     found : Found
-        Its spectrum C2D, where noise begins, remarks.
+        The spectrum C2D, the wavelength below which there is noise, and remarks.
     bins : Cut
         C2D in logarithmic bins with relative errors.
     cuts : dict of str to (array, array)
-        Wave numbers and C_cut, m^3, by the direction of the cut; empty of a table.
+        Wave numbers and C_cut, m^3, for each direction of straight profiles; empty for a table.
     law : SelfAffine or None
     """
 
@@ -128,9 +128,9 @@ def _of_scan(
 
 
 def mean_spectrum(spectra: tuple[Spectrum, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return wave numbers of the first spectrum, the mean C2D of all there, and its relative standard error.
+    """Return the wave numbers of the first spectrum, the mean C2D of all spectra, and its relative standard error.
 
-    The error is NaN of one spectrum; where a spectrum has ended it counts no more.
+    The error is NaN for a single spectrum. At wave numbers beyond its range, a spectrum is left out of the mean.
     """
     q = spectra[0].wavenumber
     each = np.array([spectrum.at(q) for spectrum in spectra])

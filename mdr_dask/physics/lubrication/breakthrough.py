@@ -157,7 +157,7 @@ def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> ND
     Parameters
     ----------
     clusters : Clusters
-            The clusters of the whole line.
+        The clusters of the whole line.
     window : float
         Width of the window in spacings, at most that of the line.
     rule : str
@@ -166,8 +166,8 @@ def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> ND
     Returns
     -------
     int array, shape (points,)
-            In units of 1/`PARTS` of a spacing, so that sums are exact. Entries are above zero only with contact; their
-            fraction is the breakthrough probability.
+        In units of 1/`PARTS` of a spacing, so that sums are exact. Entries are above zero only with contact; their
+        fraction is the breakthrough probability.
     """
     trace = np.zeros(clusters.points + 1, dtype=np.int32)
     if clusters.start.size:
@@ -187,7 +187,7 @@ class Pair(NamedTuple):
     spacing : float
         Distance dx of the nodes in m.
     strength : float
-            Layer strength from `layer_strength`, in 1/m.
+        Layer strength from `layer_strength`, in 1/m.
     """
 
     line_1: FloatArray
@@ -282,14 +282,14 @@ def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray
     window : float
         Width of the window in spacings, at most that of the line.
     positions : tuple of two int arrays, shape (n,)
-            Node of each line at the left edge of the window; see `creep_positions`.
+        Node of each line at the left edge of the window; see `creep_positions`.
     rule : str
         One of `EDGE_RULES`.
 
     Returns
     -------
     int array, shape (n,)
-            Length in intimate contact of each window, in units of 1/`PARTS` of a spacing.
+        Length in intimate contact of each window, in units of 1/`PARTS` of a spacing.
     """
     contact = np.zeros(positions[0].size, dtype=np.int64)
     if pair.line_1.max() + pair.line_2.max() > pair.level:
@@ -304,12 +304,12 @@ def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> 
     Parameters
     ----------
     travel : array_like, shape (n,)
-            Travel in points. For mean values, steps of an eighth of the window are small enough.
+        Travel in points. For mean values, steps of an eighth of the window are small enough.
     points : int
         Points of each line.
     slide_roll_ratio : float
-            ``S = (v1 - v2)/u`` with the mean velocity u: the lines move by ``1 + S/2`` and ``1 - S/2`` times the
-            travel.
+        ``S = (v1 - v2)/u`` with the mean velocity u: the lines move by ``1 + S/2`` and ``1 - S/2`` times the
+        travel.
 
     Returns
     -------
@@ -343,9 +343,9 @@ class Occupied(NamedTuple):
     windows : int array
         Number of windows in contact.
     lengths : int array
-            Sum of their lengths in contact, in the units of the input.
+        Sum of their lengths in contact, in the units of the input.
     ends : int array
-            Number of times that contact begins or ends.
+        Number of times that contact begins or ends.
     """
 
     windows: IntArray
@@ -359,9 +359,9 @@ def occupied(contact: NDArray[np.int32] | IntArray, parts: int = 1) -> Occupied:
     Parameters
     ----------
     contact : int array, shape (positions,)
-            Lengths in contact of successive windows in time.
+        Lengths in contact of successive windows in time.
     parts : int
-            Number of parts; part k begins at position ``k positions // parts``.
+        Number of parts; part k begins at position ``k positions // parts``.
     """
     found = Occupied(*np.zeros((3, parts), dtype=np.int64))
     _occupied(contact, *found)
@@ -374,7 +374,7 @@ def contact_resistance(resistivity: ArrayLike, contact_length: ArrayLike) -> Flo
     Parameters
     ----------
     resistivity : array_like
-            Resistivity of the contacting materials in ohm m.
+        Resistivity of the contacting materials in ohm m.
     contact_length : array_like
         Sum of the diameters of the spots in m.
     """

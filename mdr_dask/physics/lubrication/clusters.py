@@ -18,15 +18,15 @@ class Clusters(NamedTuple):
     Parameters
     ----------
     start, end : array, shape (n,)
-            Beginning and end in spacings; the end of a cluster across the seam lies beyond the last node.
+        Beginning and end in spacings; the end of a cluster across the seam lies beyond the last node.
     total : array, shape (n,)
-            Integral of ``z - h0`` over each cluster, in m times spacings.
+        Integral of ``z - h0`` over each cluster, in m times spacings.
     overlap : array, shape (points + 3,)
-            Spline of ``z - h0`` in m: its last coefficient, all coefficients, and the first two again.
+        Spline of ``z - h0`` in m: its last coefficient, all coefficients, and the first two again.
     limit : float
         ``s dx^2`` in m: the layer breaks where ``total > limit (end - start)^3``.
     closed : bool
-            Whether one cluster covers the whole line, without an end.
+        Whether one cluster covers the whole line, without an end.
     """
 
     start: FloatArray
@@ -102,7 +102,7 @@ def find_clusters(line: FloatArray, level: float, spacing: float, strength: floa
     spacing : float
         Distance dx of the nodes in m.
     strength : float
-            Layer strength from `layer_strength`, in 1/m.
+        Layer strength from `layer_strength`, in 1/m.
     """
     points = line.size
     overlap = np.concatenate((line[-1:], line, line[:2])) - level

@@ -78,7 +78,7 @@ def film(points: FloatArray, nodes: FloatArray, pressure: FloatArray, central_fi
     points : array, shape (m,)
         Positions in half widths.
     nodes, pressure : array, shape (n,)
-            Ascending nodes, and the pressures at them in units of p0, zero at both ends.
+        Ascending nodes, and the pressures at them in units of p0, zero at both ends.
     central_film : float
         Film at ``X = 0`` in units of ``a^2/R``.
 

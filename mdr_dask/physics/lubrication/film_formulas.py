@@ -64,7 +64,7 @@ def fluid_friction(
     Parameters
     ----------
     contact : HertzLine
-            Half width in m and maximum pressure in Pa.
+        Half width in m and maximum pressure in Pa.
     film : float
         Film thickness in m.
     sliding_velocity : float
@@ -72,15 +72,15 @@ def fluid_friction(
     log_viscosity : callable
         Natural logarithm of the viscosity in Pa s at pressures in Pa.
     eyring_stress : float
-            Stress tau_E in Pa of ``tau = tau_E asinh(eta v/(h tau_E))``; for large values the liquid is Newtonian.
+        Stress tau_E in Pa of ``tau = tau_E asinh(eta v/(h tau_E))``; for large values the liquid is Newtonian.
     film_share : float
-            Fraction of the load, and so of the pressure, that the film carries.
+        Fraction of the load, and so of the pressure, that the film carries.
 
     Returns
     -------
     float
-            Mean shear stress over mean pressure of the whole load, by 64 Gauss points in the angle of ``x = a
-            sin(angle)``, without rolling friction.
+        Mean shear stress over mean pressure of the whole load, by 64 Gauss points in the angle of ``x = a
+        sin(angle)``, without rolling friction.
     """
     nodes, weights = np.polynomial.legendre.leggauss(64)
     cosine = np.cos(np.pi / 2 * nodes)
@@ -155,11 +155,11 @@ class FilmFormula:
     Parameters
     ----------
     name : str
-            Authors, and whether it gives the central or the minimum film.
+        Authors, and whether it gives the central or the minimum film.
     factor, load, speed, material : float
-            Factor and exponents.
+        Factor and exponents.
     load_range, speed_range, material_range : tuple of float
-            Lowest and highest W, U, G of the fitted points; outside these ranges, the formula is an extrapolation.
+        Lowest and highest W, U, G of the fitted points; outside these ranges, the formula is an extrapolation.
     """
 
     name: str

@@ -30,9 +30,9 @@ def sample(positions: FloatArray, density: FloatArray, count: int) -> FloatArray
     Parameters
     ----------
     positions, density : array, shape (m,)
-            Ascending positions and the positive density at them; only its shape matters.
+        Ascending positions and the positive density at them; only its shape matters.
     count : int
-            Number of nodes, including both ends.
+        Number of nodes, including both ends.
 
     Returns
     -------
@@ -75,18 +75,18 @@ def aligned(
     Parameters
     ----------
     positions, density : array, shape (m,)
-            Ascending positions and the positive density at them; only its shape matters.
+        Ascending positions and the positive density at them; only its shape matters.
     count : int
-            Number of nodes; the result may differ by one or two.
+        Number of nodes; the result may differ by one or two.
     rupture : float
-            Position of the end of the film, estimated from coarser grids.
+        Position of the end of the film, estimated from coarser grids.
     front : float
-            Position where the pressure falls behind its spike, before the film ends; NaN if there is none.
+        Position where the pressure falls behind its spike, before the film ends; NaN if there is none.
 
     Returns
     -------
     tuple of array and float
-            Ascending nodes, the last one at or behind the last position; and the spacing in cells of the density.
+        Ascending nodes, the last one at or behind the last position; and the spacing in cells of the density.
     """
     number = _cells(positions, density)
     reached = _cells_before(rupture, positions, density, number)
@@ -122,7 +122,7 @@ def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:
     central_film : float
         Expected film at ``X = 0`` in ``a^2/R``.
     inlet : float
-            Position where the film begins, in half widths.
+        Position where the film begins, in half widths.
     count : int
         Number of nodes.
     """

@@ -44,13 +44,13 @@ class Attempt(NamedTuple):
     Parameters
     ----------
     factor : float
-            Guess of the film over the film expected from the limiting regimes.
+        Guess of the film over the film expected from the limiting regimes.
     starved : float
-            Upper limit of the guess, over the square of the distance to the inlet.
+        Upper limit of the guess, over the square of the distance to the inlet.
     nodes : int
         Number of nodes.
     pace : Pace
-            Step limits of Newton's method.
+        Step limits of Newton's method.
     """
 
     factor: float
@@ -92,11 +92,11 @@ class LineContact(NamedTuple):
     M, L : float
         Moes' load and lubricant parameters.
     pole, exponent : float
-            Roelands' pressure p_r over p0, and his exponent z; zeros for Barus.
+        Roelands' pressure p_r over p0, and his exponent z; zeros for Barus.
     density_rise, density_saturation : float
         Constants of the density law times p0; zeros for an incompressible liquid.
     inlet : float or None
-            Beginning of the oil in half widths (negative); None for a fully flooded inlet.
+        Beginning of the oil in half widths (negative); None for a fully flooded inlet.
     """
 
     M: float
@@ -140,7 +140,7 @@ def line_contact(
     groups : tuple of float
         Load, speed and material parameters W, U and G with ``E' = 2 E*`` and the mean velocity.
     E_star : float
-            Contact modulus in Pa; it gives the pressures for the density law and Roelands' law.
+        Contact modulus in Pa; it gives the pressures for the density law and Roelands' law.
     viscosity_law : str
         ``"barus"`` or ``"roelands"``.
     viscosity : float, optional
@@ -148,13 +148,13 @@ def line_contact(
     compressible : bool
         Whether the density follows the law of Dowson and Higginson.
     inlet : float, optional
-            Beginning of the oil in half widths, negative; None for a fully flooded inlet.
+        Beginning of the oil in half widths, negative; None for a fully flooded inlet.
 
     Raises
     ------
     ValueError
-            If a number is not positive (G may be zero), the law is unknown, Roelands' law has no viscosity above
-            ``exp(-9.67)`` Pa s, or the inlet is not upstream.
+        If a number is not positive (G may be zero), the law is unknown, Roelands' law has no viscosity above
+        ``exp(-9.67)`` Pa s, or the inlet is not upstream.
     """
     W, U, G = groups
     for name, value in (("W", W), ("U", U), ("G", G), ("E_star", E_star)):
@@ -183,7 +183,7 @@ class LineSolution:
     Parameters
     ----------
     case : LineContact
-            The solved case.
+        The solved case.
     outcome : Outcome
         CONVERGED, or why there is no film.
     reason : str
@@ -227,7 +227,7 @@ class LineSolution:
         Parameters
         ----------
         read : callable, (grid, positions) -> array
-                Evaluates the profile of one grid at given positions.
+            Evaluates the profile of one grid at given positions.
         positions : array, shape (m,)
             Ascending positions in half widths.
 
@@ -363,18 +363,18 @@ def solve_film(
     case : LineContact
         The case; see :func:`line_contact`.
     accuracy : float
-            Allowed relative error of the central film, the minimum film and the readings. Grids are refined until the
-            estimated errors meet it, or up to the finest grid.
+        Allowed relative error of the central film, the minimum film and the readings. Grids are refined until the
+        estimated errors meet it, or up to the finest grid.
     readings : sequence of callable, GridSolution -> float or array
-            Further quantities, or profiles at fixed positions, that must meet the accuracy.
+        Further quantities, or profiles at fixed positions, that must meet the accuracy.
     floors : sequence of float
-            For each reading, the magnitude below which its error is absolute; 0 by default.
+        For each reading, the magnitude below which its error is absolute; 0 by default.
 
     Returns
     -------
     LineSolution
-            If no film was found, the outcome is not CONVERGED and there is a reason. The `error` may exceed the
-            accuracy if the finest grid is reached, or the finest one that converges.
+        If no film was found, the outcome is not CONVERGED and there is a reason. The `error` may exceed the
+        accuracy if the finest grid is reached, or the finest one that converges.
 
     Examples
     --------

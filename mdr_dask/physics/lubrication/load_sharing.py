@@ -62,9 +62,9 @@ class Asperities(NamedTuple):
     Parameters
     ----------
     rms : float
-            Rms height of both lines together, in m.
+        Rms height of both lines together, in m.
     wavelength : float
-            Longest wavelength of the lines in m.
+        Longest wavelength of the lines in m.
     E_star : float
         Contact modulus in Pa.
     """
@@ -94,17 +94,17 @@ def share_load(
     Parameters
     ----------
     film_at : callable, float -> float
-            Film thickness for a load share of the film between 0 and 1; it falls with this share. It may be 0 where the
-            film is too thin to be computed.
+        Film thickness for a load share of the film between 0 and 1; it falls with this share. It may be 0 where the
+        film is too thin to be computed.
     asperity_share : callable, float -> float
-            Load share of the asperities for a film thickness; it falls with the film.
+        Load share of the asperities for a film thickness; it falls with the film.
     tolerance : float
-            Relative error of the film's load share; the relative error of the film is about a quarter of it.
+        Relative error of the film's load share; the relative error of the film is about a quarter of it.
 
     Returns
     -------
     SharedLoad
-            The film and the shares; if no film is found, film and film share are 0.
+        The film and the shares; if no film is found, film and film share are 0.
     """
 
     def excess(logarithm: float) -> float:

@@ -59,12 +59,12 @@ class Pace(NamedTuple):
     Parameters
     ----------
     clip : float
-            Largest change of a pressure in one step, over the largest pressure.
+        Largest change of a pressure in one step, over the largest pressure.
     most : int
-            Largest number of steps.
+        Largest number of steps.
     tolerance : float
-            Relative size of the last step; the remaining error is about its square. A step with a reused Jacobian
-            leaves a larger error, so that it has to be a hundred times smaller.
+        Relative size of the last step; the remaining error is about its square. A step with a reused Jacobian
+        leaves a larger error, so that it has to be a hundred times smaller.
     """
 
     clip: float
@@ -349,17 +349,17 @@ def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: flo
     Parameters
     ----------
     grid : Grid
-            Nodes, with the influence of their pressures on the film.
+        Nodes, with the influence of their pressures on the film.
     liquid : Liquid
-            Viscosity and density of the liquid.
+        Viscosity and density of the liquid.
     K : float
         ``(3 pi^2/4) U/W^2``.
     guess : array, shape (n,)
         Guess of the pressure; zero at both ends, never negative.
     central : float
-            Guess of the film at ``X = 0``, large enough for a positive film at all nodes.
+        Guess of the film at ``X = 0``, large enough for a positive film at all nodes.
     pace : Pace
-            Limits of the step and of the number of steps.
+        Limits of the step and of the number of steps.
 
     Returns
     -------

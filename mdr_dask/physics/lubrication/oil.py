@@ -39,15 +39,15 @@ def walther_fit(temperature: FloatArray, viscosity: FloatArray) -> tuple[float, 
     Parameters
     ----------
     temperature : array, shape (n,)
-            Temperatures in K; at least two are different.
+        Temperatures in K; at least two are different.
     viscosity : array, shape (n,)
-            Kinematic viscosities at these temperatures in m^2/s.
+        Kinematic viscosities at these temperatures in m^2/s.
 
     Raises
     ------
     ValueError
-            If there are fewer than two temperatures, a viscosity is below 2 mm^2/s, or they do not fall with
-            temperature.
+        If there are fewer than two temperatures, a viscosity is below 2 mm^2/s, or they do not fall with
+        temperature.
 
     Examples
     --------
@@ -80,7 +80,7 @@ def walther_constants(T1: float, nu1: float, T2: float, nu2: float) -> tuple[flo
     T1, T2 : float
         Two different temperatures in K.
     nu1, nu2 : float
-            Kinematic viscosities at T1 and T2 in m^2/s, lower at the higher temperature.
+        Kinematic viscosities at T1 and T2 in m^2/s, lower at the higher temperature.
 
     Returns
     -------
@@ -120,17 +120,17 @@ def density_at(temperature: ArrayLike, density: float, reference_temperature: fl
     Parameters
     ----------
     temperature : array_like
-            Temperature in K.
+        Temperature in K.
     density : float
-            Density in kg/m^3 at the reference temperature.
+        Density in kg/m^3 at the reference temperature.
     reference_temperature : float
-            Reference temperature in K.
+        Reference temperature in K.
 
     Returns
     -------
     array
-            ``rho_ref exp(-b dT (1 + 0.8 b dT))``, ``b = 0.6278/rho_ref`` (ASTM D1250, table 54D, with 60 F as
-            reference).
+        ``rho_ref exp(-b dT (1 + 0.8 b dT))``, ``b = 0.6278/rho_ref`` (ASTM D1250, table 54D, with 60 F as
+        reference).
     """
     expansion = _LUBRICANT_EXPANSION / density * (np.asarray(temperature, dtype=np.float64) - reference_temperature)
     return np.asarray(density * np.exp(-expansion * (1 + 0.8 * expansion)))
@@ -142,15 +142,15 @@ def pressure_viscosity(correlation: str, kinematic: ArrayLike, dynamic: ArrayLik
     Parameters
     ----------
     correlation : str
-            One of `CORRELATIONS`: Gold's power laws of the kinematic viscosity for each kind of oil, or Wooster's
-            ``alpha = (0.6 + 0.965 log10(eta0)) 1e-8`` with eta0 in mPa s (mineral oils).
+        One of `CORRELATIONS`: Gold's power laws of the kinematic viscosity for each kind of oil, or Wooster's
+        ``alpha = (0.6 + 0.965 log10(eta0)) 1e-8`` with eta0 in mPa s (mineral oils).
     kinematic, dynamic : array_like
         Viscosities at ambient pressure in m^2/s and Pa s.
 
     Raises
     ------
     ValueError
-            If the correlation is unknown.
+        If the correlation is unknown.
     """
     if correlation == "wooster":
         return np.asarray((0.6 + 0.965 * np.log10(np.asarray(dynamic, dtype=np.float64) * 1e3)) * 1e-8)
@@ -167,13 +167,13 @@ class Oil:
     Parameters
     ----------
     T1, nu1, T2, nu2 : float
-            Two temperatures in K and the kinematic viscosities at them in m^2/s.
+        Two temperatures in K and the kinematic viscosities at them in m^2/s.
     density, density_temperature : float
         Density in kg/m^3 and its temperature in K.
     correlation : str
         Pressure-viscosity correlation, one of `CORRELATIONS`.
     lowest, highest : float
-            Range of temperatures in K in which the data are valid.
+        Range of temperatures in K in which the data are valid.
     source : str
         Source of the numbers.
 
@@ -247,14 +247,14 @@ def log_viscosity(law: str, pressure: ArrayLike, viscosity: ArrayLike, alpha: Ar
         ``barus``: ``ln eta0 + alpha p`` (thesis eq. B.4); ``roelands``: ``ln eta0 + s ((1 + p/p_r)^z - 1)`` with
         ``s = ln eta0 + 9.67``, ``z = alpha p_r/s`` and p_r = 196.09 MPa, which has the slope alpha at ambient pressure.
     pressure : array_like
-            Pressure in Pa.
+        Pressure in Pa.
     viscosity, alpha : array_like
         Viscosity in Pa s and pressure-viscosity coefficient in 1/Pa at ambient pressure.
 
     Raises
     ------
     ValueError
-            If the law is unknown.
+        If the law is unknown.
     """
     p, logarithm = np.asarray(pressure, dtype=np.float64), np.log(np.asarray(viscosity, dtype=np.float64))
     if law == "barus":

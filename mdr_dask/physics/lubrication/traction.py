@@ -25,9 +25,9 @@ def shear_stress(
     Parameters
     ----------
     case : LineContact
-            The dimensionless numbers of the case.
+        The dimensionless numbers of the case.
     grid : GridSolution
-            Pressure and film of the case.
+        Pressure and film of the case.
     W : float
         Load parameter; ``a/R = sqrt(8 W/pi)`` sets the slope of the surfaces.
     slide_roll_ratio : float
@@ -38,8 +38,8 @@ def shear_stress(
     Returns
     -------
     array, shape (n,)
-            Stress in p0 at the nodes: ``eta (u1 - u2)/h``, or ``tau_E asinh`` of it over tau_E; zero where the film has
-            ended.
+        Stress in p0 at the nodes: ``eta (u1 - u2)/h``, or ``tau_E asinh`` of it over tau_E; zero where the film has
+        ended.
     """
     slope = case.film_number * np.sqrt(2 * W / np.pi) / 6 * slide_roll_ratio
     exponent = np.minimum(log_viscosities(grid.pressure, case.liquid), _LARGEST_EXPONENT)

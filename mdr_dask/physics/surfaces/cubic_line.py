@@ -27,12 +27,12 @@ class CubicLine(NamedTuple):
     height : array, shape (n + 1,)
         Heights at the nodes; a periodic line repeats the first at the end.
     enter, leave : array, shape (n,)
-            Slopes at the start and the end of each cell; at a kink of the line, those of adjacent cells differ.
+        Slopes at the start and the end of each cell; at a kink of the line, those of adjacent cells differ.
     periodic : bool
-            Whether the line is periodic; if not, elements are undeformed at its first node.
+        Whether the line is periodic; if not, elements are undeformed at its first node.
     smooth : bool
-            Whether the slopes of a periodic line are continuous, so that the integral of their square can be computed
-            with the Euler-Maclaurin formula: exact over the whole line if the nodes resolve it.
+        Whether the slopes of a periodic line are continuous, so that the integral of their square can be computed
+        with the Euler-Maclaurin formula: exact over the whole line if the nodes resolve it.
     """
 
     height: FloatArray
@@ -68,8 +68,8 @@ def indented_line(height: FloatArray, slope: FloatArray | None, body: shapes.Sha
     height, slope
         The roughness, periodic, as in :func:`periodic_line`.
     body : Shape
-            The shape under the roughness, with its tip at node n // 2, in units of the line's length and of the
-            heights.
+        The shape under the roughness, with its tip at node n // 2, in units of the line's length and of the
+        heights.
     """
     n = height.size
     smooth, left, right = body.at((np.arange(n + 1) - n // 2) / n)
@@ -93,8 +93,8 @@ class Cells(NamedTuple):
     Parameters
     ----------
     height : array, shape (n + 2,)
-            Heights at the nodes relative to the highest point of the line; they are never positive, which keeps all
-            digits in light contact.
+        Heights at the nodes relative to the highest point of the line; they are never positive, which keeps all
+        digits in light contact.
     enter, leave : array, shape (n + 1,)
         Slopes at the start and the end of each cell.
     peak : array, shape (n + 1,)
@@ -102,11 +102,11 @@ class Cells(NamedTuple):
     mean, stretch : array, shape (n + 1,)
         Integrals of the height and of the slope squared over each cell.
     start : float
-            Position in cell 0 (and cell n) at which a period begins and ends: the highest point of the line.
+        Position in cell 0 (and cell n) at which a period begins and ends: the highest point of the line.
     top : float
-            Height of the highest point.
+        Height of the highest point.
     periodic : bool
-            Whether the line is periodic; if not, elements are undeformed at cell 0.
+        Whether the line is periodic; if not, elements are undeformed at cell 0.
     """
 
     height: FloatArray

@@ -33,9 +33,9 @@ class SurfaceMap(NamedTuple):
     Parameters
     ----------
     height : array, shape (points along x, points along y)
-            Heights, m, positive towards the elastomer; NaN for missing points.
+        Heights, m, positive towards the elastomer; NaN for missing points.
     size : tuple of float
-            Lengths along x and y, m: number of points times spacing.
+        Lengths along x and y, m: number of points times spacing.
     """
 
     height: FloatArray
@@ -166,14 +166,14 @@ class MapSpectrum:
     Parameters
     ----------
     wavenumber : array, shape (rings,)
-            q = k dq, k = 1, 2, ..., with dq = 2 pi over the shorter side, up to the Nyquist wave number of the wider
-            spacing.
+        q = k dq, k = 1, 2, ..., with dq = 2 pi over the shorter side, up to the Nyquist wave number of the wider
+        spacing.
     density : array, shape (rings,)
-            C2D, m^4: the power of a ring over its area; so rms height and gradient are preserved.
+        C2D, m^4: the power of a ring over its area; so rms height and gradient are preserved.
     count : array, shape (rings,)
-            Number of waves in each ring, both signs.
+        Number of waves in each ring, both signs.
     independent : float
-            Number of independent waves per wave.
+        Number of independent waves per wave.
     rms_height : float
         rms height of the windowed map, m.
     slopes : tuple of float
@@ -181,9 +181,9 @@ class MapSpectrum:
     angular : complex array, shape (2, rings)
         Mean of exp(2 i angle) and exp(4 i angle), weighted by power, in each ring; 0 if isotropic.
     cuts : tuple of (array, array)
-            Wave numbers and C_cut, m^3, of straight profiles along x and along y.
+        Wave numbers and C_cut, m^3, of straight profiles along x and along y.
     axes : tuple of float
-            Power of waves along x, and along y, over the mean power of their ring, median over rings; 1 if isotropic.
+        Power of waves along x, and along y, over the mean power of their ring, median over rings; 1 if isotropic.
     """
 
     wavenumber: FloatArray

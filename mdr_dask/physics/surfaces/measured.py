@@ -28,7 +28,7 @@ class MeasuredLine:
     Parameters
     ----------
     height : array, shape (points,)
-            Heights, m, positive towards the elastomer.
+        Heights, m, positive towards the elastomer.
     length : float
         Period L = points * spacing, m.
     """
@@ -55,15 +55,15 @@ def measured_line(
     Parameters
     ----------
     position, height : array_like, shape (points,)
-            x and z, m; x ascending or descending, not necessarily uniform. The samples form one period: L = points *
-            spacing.
+        x and z, m; x ascending or descending, not necessarily uniform. The samples form one period: L = points *
+        spacing.
     detrend : {"none", "mean", "line", "parabola"}
-            Least-squares polynomial to be subtracted.
+        Least-squares polynomial to be subtracted.
     taper : float
-            Fraction of the line, both ends together, in which a cosine window brings the heights to their mean, so that
-            the line is periodic without a step; 0 to 1.
+        Fraction of the line, both ends together, in which a cosine window brings the heights to their mean, so that
+        the line is periodic without a step; 0 to 1.
     shortest, longest : float
-            Limits of the wavelengths, m, that are kept; 0 for no limit.
+        Limits of the wavelengths, m, that are kept; 0 for no limit.
 
     Raises
     ------

@@ -19,9 +19,9 @@ class RoughLine:
     Parameters
     ----------
     roughness : Waves
-            The roughness.
+        The roughness.
     body : Shape or None
-            The shape under the roughness; None for a plane, which gives a periodic line.
+        The shape under the roughness; None for a plane, which gives a periodic line.
     """
 
     roughness: Waves

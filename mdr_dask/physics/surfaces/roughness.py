@@ -128,7 +128,7 @@ def line(amplitude: FloatArray, phase: FloatArray, nodes: int, derivative: int =
     nodes : int
         Number of nodes, at least twice the number of modes.
     derivative : int
-            Order of the derivative with respect to x, for a line of unit length; exact at the nodes.
+        Order of the derivative with respect to x, for a line of unit length; exact at the nodes.
 
     Raises
     ------

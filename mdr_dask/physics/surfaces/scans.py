@@ -54,14 +54,14 @@ def cut_of_lines(lines: Sequence[MeasuredLine], hann: bool = True) -> Cut:
     Parameters
     ----------
     lines : sequence of MeasuredLine
-            Detrended scans of equal length and spacing.
+        Detrended scans of equal length and spacing.
     hann : bool
-            Whether to apply Hann's window, normalised so that <h^2> is preserved.
+        Whether to apply Hann's window, normalised so that <h^2> is preserved.
 
     Raises
     ------
     DataError
-            If lengths or numbers of points are different.
+        If lengths or numbers of points are different.
     """
     points, length = lines[0].height.size, lines[0].length
     if any(line.height.size != points or not math.isclose(line.length, length, rel_tol=1e-3) for line in lines):
@@ -83,11 +83,11 @@ def averaged(wavenumber: FloatArray, density: FloatArray, independent: float, co
     Parameters
     ----------
     wavenumber, density : array, shape (waves,)
-            Ascending wave numbers, and the spectrum at them.
+        Ascending wave numbers, and the spectrum at them.
     independent : float
-            Number of independent squared amplitudes per wave.
+        Number of independent squared amplitudes per wave.
     count : array, shape (waves,), optional
-            Number of waves at each wave number; 1 by default.
+        Number of waves at each wave number; 1 by default.
     """
     count = np.ones(wavenumber.size) if count is None else count
     bins = np.floor(np.log10(wavenumber / wavenumber[0] + 0.5) * BINS).astype(int)

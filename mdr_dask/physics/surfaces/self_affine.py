@@ -41,9 +41,9 @@ def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> 
     Parameters
     ----------
     bins : Cut
-            C2D, or the spectrum of straight profiles, in logarithmic bins.
+        C2D, or the spectrum of straight profiles, in logarithmic bins.
     flattest : float
-            Slope d log C / d log q above which a tail is noise: -1 for C2D, -0.5 for a straight profile.
+        Slope d log C / d log q above which a tail is noise: -1 for C2D, -0.5 for a straight profile.
     decades : float
         Length of the tail.
     """
@@ -81,8 +81,8 @@ def fit_self_affine(bins: Cut) -> SelfAffine | None:
     Returns
     -------
     SelfAffine or None
-            Cut-offs are chosen among the bins by Schwarz's information criterion. Intervals follow from the likelihood
-            and are widened by the misfit.
+        Cut-offs are chosen among the bins by Schwarz's information criterion. Intervals follow from the likelihood
+        and are widened by the misfit.
     """
     wavenumber, density, error = bins
     if wavenumber.size < LEAST_BINS:

@@ -93,7 +93,7 @@ class RoundedCone:
     steepness : float
         s, the slope of the cone.
     blend : float
-            b, the radius at which the rounded tip ends and the cone begins, without a kink.
+        b, the radius at which the rounded tip ends and the cone begins, without a kink.
     """
 
     steepness: float
@@ -134,7 +134,7 @@ def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatAr
     load : array
         F_N / (4 G), so that ``load = 2 n c a^(n+1) / (n + 1)`` (thesis 3.3.2).
     coefficient, exponent : float
-            c_n > 0 and n of the line after the MDR rule.
+        c_n > 0 and n of the line after the MDR rule.
     """
     width: FloatArray = ((exponent + 1) * load / (2 * exponent * coefficient)) ** (1 / (exponent + 1))
     return width
@@ -183,10 +183,10 @@ def smooth(
     loads, deborah : array, shape (cases,)
         F_N / (4 G) and v tau, positive and finite.
     coefficients, exponents : array, shape (cases,)
-            c_n > 0 and n >= 1 of the lines after the MDR rule.
+        c_n > 0 and n >= 1 of the lines after the MDR rule.
     results : array, shape (cases, COLUMNS)
-            Written: depth, F_x / (4 G), a, b, and the integral of the squared slope over the contact; NaN if no depth
-            is found.
+        Written: depth, F_x / (4 G), a, b, and the integral of the squared slope over the contact; NaN if no depth
+        is found.
     """
     results[:] = np.nan
     for k in range(loads.size):

@@ -28,14 +28,14 @@ class Spectrum:
     Parameters
     ----------
     wavenumber : array, shape (points,)
-            Angular wave numbers q, rad/m, ascending; at least two points.
+        Angular wave numbers q, rad/m, ascending; at least two points.
     density : array, shape (points,)
         C2D, m^4, positive.
 
     Raises
     ------
     DataError
-            If there are fewer than two points, they do not ascend, or values are not positive and finite.
+        If there are fewer than two points, they do not ascend, or values are not positive and finite.
     """
 
     wavenumber: FloatArray
@@ -81,8 +81,8 @@ class Spectrum:
         Returns
         -------
         array, shape (modes,)
-                A_k = 2 sqrt(C1D(q_k) 2 pi / L), m, with C1D = pi q C2D (thesis 2.19, 2.20). The line has the rms height
-                and the full rms gradient of the surface.
+            A_k = 2 sqrt(C1D(q_k) 2 pi / L), m, with C1D = pi q C2D (thesis 2.19, 2.20). The line has the rms height
+            and the full rms gradient of the surface.
         """
         q = 2 * np.pi / length * np.arange(1, modes + 1)
         amplitude: FloatArray = 2 * np.sqrt(np.pi * q * self.at(q) * (2 * np.pi / length))
@@ -94,7 +94,7 @@ class Spectrum:
         Raises
         ------
         DataError
-                If no waves are left.
+            If no waves are left.
         """
         low = max(2 * np.pi / longest if longest else 0.0, float(self.wavenumber[0]))
         high = min(2 * np.pi / shortest if shortest else math.inf, float(self.wavenumber[-1]))
@@ -159,11 +159,11 @@ def self_affine(hurst: float, longest: float, shortest: float, rms: float = 1.0,
     hurst : float
         Hurst exponent H.
     longest, shortest : float
-            Limits of the wavelengths, m.
+        Limits of the wavelengths, m.
     rms : float
         Rms height of the surface, m.
     rolloff : float
-            Roll-off wavelength, m; 0 for none.
+        Roll-off wavelength, m; 0 for none.
     """
     corners = sorted({2 * np.pi / end for end in (longest, shortest, rolloff) if end and shortest <= end <= longest})
     q = np.array(corners)

@@ -26,15 +26,15 @@ def closest(waves: NDArray[np.complex128], nodes: int) -> FloatArray:
     Parameters
     ----------
     waves : complex array, shape (modes,)
-            Half the complex amplitude of each wave, as in `waves.Waves`.
+        Half the complex amplitude of each wave, as in `waves.Waves`.
     nodes : int
-            Number of nodes, at least two per shortest wave.
+        Number of nodes, at least two per shortest wave.
 
     Returns
     -------
     array, shape (nodes,)
-            Coefficients in the unit of the waves. Each wave is multiplied by the transform of the B-spline and divided
-            by the squared transform, summed over all aliases (Unser, IEEE Signal Process. Mag. 16 (1999) 22).
+        Coefficients in the unit of the waves. Each wave is multiplied by the transform of the B-spline and divided
+        by the squared transform, summed over all aliases (Unser, IEEE Signal Process. Mag. 16 (1999) 22).
     """
     return series(waves * _closest(waves.size, nodes), nodes)
 

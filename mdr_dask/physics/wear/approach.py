@@ -42,8 +42,8 @@ def nearly_limit(profile: Profile, stick_radius: float, cycles: Sequence[float],
     cycles : sequence of float
         N >= 0.
     accuracy : float
-            Largest relative error of volume and force; the error of f, relative to the largest possible wear, is
-            smaller.
+        Largest relative error of volume and force; the error of f, relative to the largest possible wear, is
+        smaller.
     """
     c = stick_radius
     soonest = -math.pi * math.sqrt((1.0 - c) * (1.0 + c)) * math.log(accuracy) / (1.0 - LAYER)

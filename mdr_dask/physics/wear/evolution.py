@@ -29,22 +29,22 @@ class Settings(NamedTuple):
     Parameters
     ----------
     most_steps, most_iterations : int
-            Number of steps after which a march fails, and of Newton iterations after which a step fails.
+        Number of steps after which a march fails, and of Newton iterations after which a step fails.
     growth : float
-            Largest ratio of a step to the previous one.
+        Largest ratio of a step to the previous one.
     slow : float
-            Ratio of successive Newton corrections above which the Jacobian is renewed.
+        Ratio of successive Newton corrections above which the Jacobian is renewed.
     theta_ratio : float
-            Largest ratio of the present theta to the theta of the Jacobian, or of the inverse, for which it is reused.
+        Largest ratio of the present theta to the theta of the Jacobian, or of the inverse, for which it is reused.
     difference : float
-            Step of the finite differences for the edge and the unknowns after it.
+        Step of the finite differences for the edge and the unknowns after it.
     first : float
-            Longest first step, relative to the time scale of the contact; with it, small amounts of wear are right to 2
-            %.
+        Longest first step, relative to the time scale of the contact; with it, small amounts of wear are right to 2
+        %.
     shortest, beginning : float
-            The march fails if a step becomes shorter than `shortest` times the longest step so far (or times the first
-            step, if that is shorter), and shorter than `beginning` times the first step. In marches that succeeded, no
-            later step was below 0.13 of its reference, but some first steps had to be reduced to 1e-5.
+        The march fails if a step becomes shorter than `shortest` times the longest step so far (or times the first
+        step, if that is shorter), and shorter than `beginning` times the first step. In marches that succeeded, no
+        later step was below 0.13 of its reference, but some first steps had to be reduced to 1e-5.
     """
 
     most_steps: int = 20000
@@ -67,23 +67,23 @@ class Resolution(NamedTuple):
     Parameters
     ----------
     accuracy : float
-            The accuracy for which the panels are chosen.
+        The accuracy for which the panels are chosen.
     wider : float
-            Factor on the error that is allowed in a step.
+        Factor on the error that is allowed in a step.
     fewer : int
-            Number by which the nodes of each panel, and the halvings at each end, are reduced.
+        Number by which the nodes of each panel, and the halvings at each end, are reduced.
     thinned : int
-            Largest reduction of the nodes of a panel.
+        Largest reduction of the nodes of a panel.
     order : int, optional
-            Nodes of a panel; by default four, or six for accuracies of 3e-5 and below.
+        Nodes of a panel; by default four, or six for accuracies of 3e-5 and below.
     rough : tuple of float
-            Factors on the step tolerance of the two rougher solutions from which the error is estimated.
+        Factors on the step tolerance of the two rougher solutions from which the error is estimated.
     slowness : float
-            Factor on the distances from the rougher solutions, if the error falls more slowly than usual.
+        Factor on the distances from the rougher solutions, if the error falls more slowly than usual.
     second : float
-            Weight of the distance from the second rougher solution, which matters where the first agrees by chance.
+        Weight of the distance from the second rougher solution, which matters where the first agrees by chance.
     newton : float
-            Under constant force: tolerance of Newton's method as a fraction of the step tolerance.
+        Under constant force: tolerance of Newton's method as a fraction of the step tolerance.
     """
 
     accuracy: float
@@ -152,11 +152,11 @@ class Moment:
     time : float
         Cycles N in partial slip, sliding path s in gross slip.
     unknowns : array, shape (n,)
-            The unknowns of the problem: values of the image at all nodes but the last, the squared width of the panels
-            over the squared width of the virgin contact, and in some problems further ones. All are of the order of
-            one.
+        The unknowns of the problem: values of the image at all nodes but the last, the squared width of the panels
+        over the squared width of the virgin contact, and in some problems further ones. All are of the order of
+        one.
     accumulated : array, shape (n,)
-            The quantity accumulated at the radii of the nodes; zero at the edge.
+        The quantity accumulated at the radii of the nodes; zero at the edge.
     """
 
     time: float
@@ -220,9 +220,9 @@ def march(
     first : float
         Length of the first step.
     start : Moment, optional
-            The first moment; by default the virgin contact.
+        The first moment; by default the virgin contact.
     stops : callable, Moment -> bool
-            Returns True for a moment after which the march stops before `end`.
+        Returns True for a moment after which the march stops before `end`.
 
     Returns
     -------
@@ -232,7 +232,7 @@ def march(
     Raises
     ------
     NotConvergedError
-            If a step fails even if it is very short.
+        If a step fails even if it is very short.
     """
     newton = _Newton(problem, tolerance)
     history = [settled(problem) if start is None else start]

@@ -58,16 +58,16 @@ def exact(
     profile : Profile
         The virgin body, pressed to the depth 1.
     stick_radius : float
-            c of the virgin contact, between 0 and 1; 0 is gross slip in one direction, df/ds = p in the whole contact.
+        c of the virgin contact, between 0 and 1; 0 is gross slip in one direction, df/ds = p in the whole contact.
     amounts : sequence of float
         Cycles N >= 0 in units of N0, or sliding paths s = k E* l / (sigma0 a0); any order.
     accuracy : float
-            Wanted error of f, relative to eta d0, the scale of the wear; below 1e-5, round-off accumulates over the
-            steps.
+        Wanted error of f, relative to eta d0, the scale of the wear; below 1e-5, round-off accumulates over the
+        steps.
     constant_force : bool
         Keep the force of the virgin contact instead of its depth.
     errors : bool
-            Whether to estimate the errors; this takes about as long again.
+        Whether to estimate the errors; this takes about as long again.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def exact(
     Raises
     ------
     ValueError
-            If the scar would reach beyond the table of the profile.
+        If the scar would reach beyond the table of the profile.
     NotConvergedError
         If the evolution cannot be advanced.
 

@@ -26,29 +26,29 @@ class Settings(NamedTuple):
     Parameters
     ----------
     jump : float
-            The border stops when y exceeds this value in the panel next to it, or a tenth of it if the border moves
-            back.
+        The border stops when y exceeds this value in the panel next to it, or a tenth of it if the border moves
+        back.
     nearest : float
-            Stick radius below which the panels are not refined further, because the border soon moves away.
+        Stick radius below which the panels are not refined further, because the border soon moves away.
     finer : int
-            Number of halvings at the border in addition to those at constant depth.
+        Number of halvings at the border in addition to those at constant depth.
     latest_jump : float
-            A number of cycles N much larger than the N at which the image jumps at the border.
+        A number of cycles N much larger than the N at which the image jumps at the border.
     lowest : float
-            A step with y below minus this value is rejected, and the border stops at the moment before.
+        A step with y below minus this value is rejected, and the border stops at the moment before.
     coarsest : float
-            Larger accuracies are computed with this value: longer steps do not follow the border, fail, and take more
-            time.
+        Larger accuracies are computed with this value: longer steps do not follow the border, fail, and take more
+        time.
     rougher : tuple of float
-            Factors on the step tolerance of the two rougher solutions.
+        Factors on the step tolerance of the two rougher solutions.
     thinned : int
-            Largest reduction of the nodes of their panels: the border must be resolved even in the roughest solution.
+        Largest reduction of the nodes of their panels: the border must be resolved even in the roughest solution.
     slowness : float
-            Factor on the distances from the rougher solutions, because the error falls more slowly than usual.
+        Factor on the distances from the rougher solutions, because the error falls more slowly than usual.
     least_edge_error : float
-            Least error of the radii, relative to the accuracy times the width 1 - c of the virgin slip zone. Near full
-            stick the border stops at the same place in all three solutions, so their difference does not show the
-            error.
+        Least error of the radii, relative to the accuracy times the width 1 - c of the virgin slip zone. Near full
+        stick the border stops at the same place in all three solutions, so their difference does not show the
+        error.
     """
 
     jump: float = 0.1

@@ -63,14 +63,14 @@ class Past(NamedTuple):
     Parameters
     ----------
     shares, borders, widths : array, shape (m,)
-            One entry for each moment: its weight, border and width.
+        One entry for each moment: its weight, border and width.
     worn : array, shape (m, n)
-            Worn depth over eta at the nodes; if the border no longer moves, minus `frozen` and divided by the root of
-            z.
+        Worn depth over eta at the nodes; if the border no longer moves, minus `frozen` and divided by the root of
+        z.
     frozen : float
         The worn depth at the border if it no longer moves, else NaN.
     moved : array, shape (n + order,)
-            `plateau_rise` along the path, at the nodes of the last moment and in one panel beyond the edge.
+        `plateau_rise` along the path, at the nodes of the last moment and in one panel beyond the edge.
     path : array, shape (2, k)
         Border and depth up to where the border moved last.
     carried : float
@@ -94,12 +94,12 @@ class Pressed(Moment):
     Parameters
     ----------
     path : array, shape (2, k)
-            All pairs of border and depth up to and including this moment, joined by straight lines.
+        All pairs of border and depth up to and including this moment, joined by straight lines.
     moved : array, shape (n + order,)
-            `plateau_rise` along the part of the path on which the border moved, at the nodes and in one panel beyond
-            the edge.
+        `plateau_rise` along the part of the path on which the border moved, at the nodes and in one panel beyond
+        the edge.
     carried : float
-            int (1 - d) db along the path, with d counted from 1 and in units of eta.
+        int (1 - d) db along the path, with d counted from 1 and in units of eta.
     """
 
     path: FloatArray

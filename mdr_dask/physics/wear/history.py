@@ -26,11 +26,11 @@ class Settings(NamedTuple):
     Parameters
     ----------
     step_share : float
-            Time step as a fraction of the largest stable explicit step, 1.7 h, with the grid spacing h.
+        Time step as a fraction of the largest stable explicit step, 1.7 h, with the grid spacing h.
     slowness : float
-            Factor on the distances from the solutions on coarser grids, because the error falls more slowly than usual.
+        Factor on the distances from the solutions on coarser grids, because the error falls more slowly than usual.
     least_edge_error : float
-            Least error of the radii, in cells: borders between nodes are uncertain, and grids may agree by chance.
+        Least error of the radii, in cells: borders between nodes are uncertain, and grids may agree by chance.
     """
 
     step_share: float = 0.45
@@ -50,10 +50,10 @@ class LoadBlock:
     cycles : float
         N in units of N0 of this block's own amplitude: the sliding path 4 U0 n k E* / (sigma0 a0).
     slip_share : float
-            eta = G* U0 / (mu E* d0) > 0 with the first depth d0; gross slip if it exceeds the depth, infinite for
-            sliding.
+        eta = G* U0 / (mu E* d0) > 0 with the first depth d0; gross slip if it exceeds the depth, infinite for
+        sliding.
     depth, force : float, optional
-            The quantity that is constant during the block, in units of d0 or E* d0 a0; give exactly one of them.
+        The quantity that is constant during the block, in units of d0 or E* d0 a0; give exactly one of them.
     """
 
     cycles: float
@@ -82,18 +82,18 @@ def history(
     profile : Profile
         The virgin body; its first contact under depth 1 has radius 1.
     blocks : sequence of LoadBlock
-            The blocks in their order in time.
+        The blocks in their order in time.
     cells : int
-            Cells of the grid; the error is about proportional to their width, or to its root once the image has jumped.
+        Cells of the grid; the error is about proportional to their width, or to its root once the image has jumped.
     reach : float
         Radius that the grid covers.
     errors : bool
-            Whether to estimate the errors by further solutions on grids of half and a quarter as many cells.
+        Whether to estimate the errors by further solutions on grids of half and a quarter as many cells.
 
     Returns
     -------
     list of Worn
-            The contact at the end of every block.
+        The contact at the end of every block.
 
     Raises
     ------

@@ -39,15 +39,15 @@ class Settings(NamedTuple):
     nodes : int
         Gauss nodes in each of four pieces.
     layer_growth : float
-            Ratio of the widths of successive pieces at the stick border; the first is as wide as the layer left by the
-            rule.
+        Ratio of the widths of successive pieces at the stick border; the first is as wide as the layer left by the
+        rule.
     least : float
-            Smallest remaining fraction, so that the layer at the stick border does not become thinner than round-off.
+        Smallest remaining fraction, so that the layer at the stick border does not become thinner than round-off.
     scar, end : float
-            Tolerance of the integral that vanishes at the radius of the scar, over eta: in the fast rule, and in the
-            limit.
+        Tolerance of the integral that vanishes at the radius of the scar, over eta: in the fast rule, and in the
+        limit.
     error : float
-            Numerical error of every output over its largest value; it excludes the approximation of the fast rule.
+        Numerical error of every output over its largest value; it excludes the approximation of the fast rule.
     """
 
     nodes: int = 16
@@ -96,7 +96,7 @@ def limit_radius(profile: Profile, stick_radius: float) -> float:
     Raises
     ------
     ValueError
-            If c is not between 0 and 1, or if the scar would reach beyond the table of the profile.
+        If c is not between 0 and 1, or if the scar would reach beyond the table of the profile.
     """
     check_stick_radius(stick_radius)
     radius = float(_limit_radius(_rule(profile, stick_radius, 0.0), profile.largest_radius, _quadrature()))
@@ -174,7 +174,7 @@ def fast_cases(
     Returns
     -------
     contact_radius, wear_volume, normal_force : array
-            The same as in the result of :func:`fast`.
+        The same as in the result of :func:`fast`.
     """
     parts = np.broadcast_arrays(exponent, stick_radius, cycles, xi, limit_radius)
     cases = np.array([np.array(part, dtype=float).ravel() for part in parts])

@@ -37,17 +37,17 @@ class Settings(NamedTuple):
     Parameters
     ----------
     safety : float
-            Ratio of the stated error to the distance from the rougher solutions.
+        Ratio of the stated error to the distance from the rougher solutions.
     step : float
-            Least error of the contact radius, as a fraction of its change in the last step.
+        Least error of the contact radius, as a fraction of its change in the last step.
     shape : float
-            Least error of force and worn depth at constant depth, as a fraction of the profile's largest error.
+        Least error of force and worn depth at constant depth, as a fraction of the profile's largest error.
     volumes : float
-            For volumes: the fraction of the distances of wear volume and energy that is added to their difference.
+        For volumes: the fraction of the distances of wear volume and energy that is added to their difference.
     reach : int
-            Number of neighbours on each side, among positions dense at the borders, whose largest distance is used.
+        Number of neighbours on each side, among positions dense at the borders, whose largest distance is used.
     floor : float
-            Least error of a function, as a fraction of its largest error.
+        Least error of a function, as a fraction of its largest error.
     """
 
     safety: float = 1.5
@@ -76,23 +76,23 @@ class Worn:
     wear_volume, worn_depth : float
         V, and the largest f - f0.
     height, image, pressure : callable, array -> array
-            f(r), g(x) and p(r), for any position.
+        f(r), g(x) and p(r), for any position.
     energy_volume : float
-            The dissipated energy over mu, in units in which it equals the wear volume; NaN if it is unknown.
+        The dissipated energy over mu, in units in which it equals the wear volume; NaN if it is unknown.
     steps : int
         Time steps taken.
     rougher : tuple of Worn
         Two rougher solutions of the same contact, from which its error is estimated.
     slowness : float
-            Factor on the distances from the rougher solutions, if the error falls more slowly than usual.
+        Factor on the distances from the rougher solutions, if the error falls more slowly than usual.
     second : float
-            Weight of the distance from the second rougher solution, which matters where the first agrees by chance.
+        Weight of the distance from the second rougher solution, which matters where the first agrees by chance.
     least_edge_error : float
-            Least error of the radii of scar and stick zone, because rougher solutions may agree on them by chance.
+        Least error of the radii of scar and stick zone, because rougher solutions may agree on them by chance.
     edge_step : float
-            Distance by which the contact radius moved in the last time step; its error is of the same order.
+        Distance by which the contact radius moved in the last time step; its error is of the same order.
     relative_error : float
-            Error of every output over its largest value, used if there is no rougher solution.
+        Error of every output over its largest value, used if there is no rougher solution.
     """
 
     contact_radius: float
@@ -188,13 +188,13 @@ class Scar(NamedTuple):
     Parameters
     ----------
     border : float
-            The first stick border c; inside it the body is unworn.
+        The first stick border c; inside it the body is unworn.
     radius : float
-            The radius of the scar.
+        The radius of the scar.
     change, slope : callable, array -> array
         g - g0 and its derivative.
     breaks : tuple of float
-            Positions between border and radius at which the change is not smooth.
+        Positions between border and radius at which the change is not smooth.
     """
 
     border: float
