@@ -103,7 +103,7 @@ def _mean_and_ends(
         return middle, *np.moveaxis(_interval(values, count), -1, 0)
     grid = _mean(errors)
     low, high = np.moveaxis(_interval(np.concatenate([values, grid[..., None]], axis=-1), count), -1, 0)
-    with np.errstate(invalid="ignore"):  # an infinite mean with an infinite error, as of a resistance, has no ends
+    with np.errstate(invalid="ignore"):  # an infinite mean minus an infinite error is NaN
         return middle, np.where(np.isnan(low), middle - grid, low), np.where(np.isnan(high), middle + grid, high)
 
 

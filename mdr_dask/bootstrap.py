@@ -94,14 +94,20 @@ def logarithms(stack: FloatArray) -> FloatArray:
 
 
 def _reach(shifts: FloatArray) -> FloatArray:
-    """Return the sum over groups of the larger upward shift of both signs of the errors; NaN counts as 0."""
+    """Return the sum of the upward shifts of all groups; of the two signs of an error, the larger shift counts.
+
+    A shift that is NaN counts as 0.
+    """
     known = np.where(np.isnan(shifts), 0.0, shifts)
     reach: FloatArray = np.maximum(np.maximum(known[0::2], known[1::2]), 0.0).sum(axis=0)
     return reach
 
 
 def regrouped(stack: FloatArray) -> FloatArray:
-    """Return a stack in which errors of neighbouring cases have one sign, from one in which each error is separate."""
+    """Return a stack in which the errors of neighbouring cases are shifted together, with the same sign.
+
+    In the given stack, each error has rows of its own.
+    """
     shifts = stack[1 + RESAMPLES :] - stack[0]
     own = np.maximum(_reach(shifts), _reach(-shifts))
     return np.concatenate([stack[: 1 + RESAMPLES], moved(stack[0], own)]) if np.any(own > 0) else stack[: 1 + RESAMPLES]
@@ -153,11 +159,12 @@ def chance(residuals: FloatArray, count: int, draws: int = RESAMPLES) -> float:
     Parameters
     ----------
     residuals : array, shape (1 + RESAMPLES + 2 groups, ...)
-        Stack of data minus law. If the law holds, the first row differs from zero as the resamples differ from it.
+        Stack of data minus law. If the law holds, the first row differs from zero by about as much as the resamples
+        differ from the first row.
     count : int
-        Realisations that were resampled.
+        Number of realisations that were resampled.
     draws : int
-        Number of resamples among the rows.
+        Number of rows with resamples.
     """
     caused = _caused(residuals, count, draws)
     return float(np.mean(caused >= np.sqrt(np.mean(residuals[0] ** 2)))) if caused.size else np.nan
@@ -176,7 +183,7 @@ def scatter(residuals: FloatArray, count: int) -> float:
 
 
 def _caused(residuals: FloatArray, count: int, draws: int) -> FloatArray:
-    """Return the rms residuals that scatter and errors alone cause, one per resample; none if there are too few.
+    """Return the rms residuals that scatter and errors alone cause, one per resample; none for too few resamples.
 
     The errors of different groups move different cases, so the squares of the residuals that they cause are added.
     """

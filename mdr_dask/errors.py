@@ -56,7 +56,7 @@ def _rounded(number: float, digits: int) -> str:
 def distinguishable(
     value: float, *limits: float, digits: int = 3, write: Callable[[float, int], str] = _rounded
 ) -> tuple[str, ...]:
-    """Return a number and its limits with at least `digits` digits, and as many as distinguish different ones."""
+    """Return a number and its limits as texts, with `digits` digits or more if different numbers need them."""
     for more in range(digits, _ALL_DIGITS):
         first, *others = (write(number, more) for number in (value, *limits))
         if all(text != first for text, limit in zip(others, limits, strict=True) if limit != value):
@@ -64,7 +64,7 @@ def distinguishable(
     return tuple(write(number, _ALL_DIGITS) for number in (value, *limits))
 
 
-#: Parameters and outputs by other common names.
+#: Names of parameters and outputs, by other common names for them.
 _SYNONYMS = {
     "load": ("normal_force", "line_load"),
     "speed": ("velocity", "mean_velocity", "rotation_speed"),

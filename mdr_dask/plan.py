@@ -1,4 +1,4 @@
-"""From a campaign to templates (what the store will hold) and blocks (what has to be computed)."""
+"""Turn a campaign into templates, which describe the arrays of the store, and blocks, which are computed."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from mdr_dask.errors import CampaignError, ModelError, distinguishable
 from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, with_value
 from mdr_dask.models.numbers import numbers_of
 
-#: Work that a block should hold; a task costs about 3 ms of scheduling and a chunk about 1 ms of writing.
+#: Estimated seconds that a block should take; scheduling a task takes about 3 ms, and writing a chunk about 1 ms.
 BLOCK_SECONDS = 1.0
-#: Small studies are cut into about so many blocks, so that there is something to share among workers ...
+#: Approximate number of blocks of a small study, so that several workers can share it.
 FEW_BLOCKS = 16
-#: ... but never into blocks of less work than this.
+#: Smallest estimated seconds that a block of a small study should take.
 LEAST_SECONDS = 0.1
-#: Blocks whose cases share work are cut freely when they are longer than this,
+#: Blocks whose cases share work are always halved if they take more seconds than this.
 SHARED_SECONDS = 30.0
-#: and below it where halving them makes the work of a study this much larger at most.
+#: Shorter blocks are halved only if the total work grows by less than this factor.
 REPEATED_WORK = 1.15
-#: Most blocks of a series whose work is estimated.
+#: Largest number of blocks of a series for which the model estimates the time.
 SAMPLED = 1000
-#: Records of blocks that are merged into one file.
+#: Largest number of records that are merged into one file.
 RECORDS_TOGETHER = 1000
-#: Largest chunk of one array.
+#: Largest chunk of one array, in bytes.
 CHUNK_BYTES = 64 * 2**20
-#: More cases than this are a mistake in the file.
+#: Largest number of cases; more are taken to be a mistake in the file.
 MOST_CASES = 10**9
 
 BlockIndex = tuple[int, ...]
@@ -49,13 +49,13 @@ class Template:
     Parameters
     ----------
     campaign : Campaign
-        Where it comes from.
+        The campaign.
     series : Series
         Parameters and axes of the group.
     sizes : mapping of str to int
         Length of each case dimension, then of ``realisation``.
     chunks : mapping of str to int
-        Length of a block along each of them.
+        Length of a block along each dimension.
     outputs : tuple of Output
         The arrays, without ``status``.
     extra : mapping of str to Coordinate
@@ -95,7 +95,7 @@ class Template:
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """What parts and model say of the parameters, each sentence once, every axis by itself."""
+        """Notes of the model and of parts of its parameters, each once, with one axis varied at a time."""
         base = self.series.parameters
         sets = [base, *(with_value(base, axis.path, value) for axis in self.series.axes for value in axis.some)]
         of_parts = [note for parameters in sets for note in notes_of(parameters)]
@@ -116,7 +116,7 @@ class Template:
         return blocks * arrays + math.ceil(blocks / RECORDS_TOGETHER) + 2 * (len(coordinates) + 1) + arrays + 2
 
     def block_indices(self) -> Iterator[BlockIndex]:
-        """Yield every block, first realisations of all cases first: a look at a running store sees all cases."""
+        """Yield all blocks; the first realisations of all cases come first, so that all cases soon have results."""
         *cases, realisations = (range(count) for count in self.grid)
         for last in realisations:
             for index in itertools.product(*cases):
@@ -130,18 +130,18 @@ class Template:
         )
 
     def block(self, index: BlockIndex) -> Block[Any]:
-        """Return the work of a block: its cases in C order of their dimensions."""
+        """Return a block to compute, with its cases in C order of their dimensions."""
         return self._block(dict(zip(self.dims, self.region(index), strict=True)))
 
     def seconds(self, index: BlockIndex) -> float:
-        """Return the model's estimate of a block; those of all realisations but the last few are the same."""
+        """Return the estimated time of a block, scaled from the block of the same cases with the first realisations."""
         *cases, last = index
         rest = self.sizes["realisation"] - last * self.chunks["realisation"]
         part = min(rest / self._first_realisations, 1.0)
         return part * self._first_seconds((*cases, 0))
 
     def _first_seconds(self, index: BlockIndex) -> float:
-        """Estimate a block of the first realisations, once."""
+        """Return the time that the model estimates for a block of the first realisations; it is cached."""
         known = self._estimates
         if index not in known:
             known[index] = models.load(self.campaign.model).seconds(self.block(index))
@@ -188,7 +188,7 @@ class Template:
         return {dim: round(position * (size - chunks[dim])) for dim, size in self.sizes.items()}
 
     def mean_seconds(self, chunks: Mapping[str, int]) -> float:
-        """Return the model's estimate of blocks of the given lengths, first, middle and last; equal ones are one."""
+        """Return the mean of the estimated times of the first, middle and last block of the given lengths."""
         known, model, found = self._means, models.load(self.campaign.model), []
         for position in (0.0, 0.5, 1.0):
             key = tuple(self._starts(chunks, position).values()), tuple(chunks.values())
@@ -212,9 +212,9 @@ def _as_array(axis: Axis) -> NDArray[Any]:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a campaign will cost, as ``run --dry-run`` prints it: its first round, all others apart.
+    """The costs of the first round of a campaign, as ``run --dry-run`` prints them.
 
-    `growth` is how many times as many cases there are at most, where axes are refined.
+    `growth` is the largest factor by which adaptive axes can increase the number of cases.
     """
 
     cases: int
@@ -232,7 +232,7 @@ class Estimate:
 
     @property
     def rounds(self) -> float:
-        """Work of every round there may be, in units of the first."""
+        """Largest possible work of all rounds together, relative to the first round."""
         return self.growth * self.at_most / self.realisations
 
 
@@ -248,7 +248,7 @@ def templates(
     realisations : int
         Number of realisations to lay out.
     stored_chunks : mapping of series name to chunk lengths, optional
-        Layout of the groups that exist already.
+        Chunk lengths of the groups that already exist.
 
     Raises
     ------
@@ -309,7 +309,7 @@ def _memory_problems(template: Template, model: Model[Any]) -> list[str]:
 
 
 def available_memory() -> float:
-    """Return the memory of this machine, or of the limit that its control group was given, in bytes."""
+    """Return the memory of this machine in bytes, or the limit of its control group if that is smaller."""
     import psutil
 
     limits = [psutil.virtual_memory().total]
@@ -320,7 +320,11 @@ def available_memory() -> float:
 
 
 def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
-    """Fill a block with work: shared axes whole, then realisations, then the other axes, then those of later rounds."""
+    """Return the lengths of a block along each dimension.
+
+    A block first holds whole axes along which cases share work. If its estimated time allows more, it gets more
+    realisations, then more values of the other axes, and finally the realisations of later rounds.
+    """
     whole = _whole_dims(template, model)
     chunks = {dim: size if dim in whole else 1 for dim, size in template.sizes.items()}
     limit = max(1, CHUNK_BYTES // _bytes_per_result(template))
@@ -344,7 +348,7 @@ def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
 
 
 def _whole_dims(template: Template, model: Model[Any]) -> list[str]:
-    """Return the dimensions that cases share work along, in the order in which the model names their parameters."""
+    """Return the dimensions along which cases share work, in the order of `Model.whole`."""
     dims = [axis.dim for path in model.whole for axis in template.series.axes if _is_whole(axis, path)]
     return list(dict.fromkeys(dims))
 
@@ -352,7 +356,7 @@ def _whole_dims(template: Template, model: Model[Any]) -> list[str]:
 def _is_cut(template: Template, chunks: Mapping[str, int], dim: str, most: float) -> bool:
     """Return whether blocks of more than `most` seconds are halved along a dimension.
 
-    Not where the halves would repeat much of each other's work, unless a block lasts very long.
+    They are not if the halves would repeat much of the shared work, unless a block takes more than `SHARED_SECONDS`.
     """
     now = template.mean_seconds(chunks)
     if now <= most or now > SHARED_SECONDS:
@@ -375,7 +379,7 @@ def _is_whole(axis: Axis, path: str) -> bool:
 def _part(template: Template, dim: str, most: int) -> int:
     """Return the length of the parts when a dimension is cut into the fewest nearly equal parts of at most `most`.
 
-    Where rounds add realisations, parts divide the first one. Where a block holds all of it, the next ones go on in it.
+    If rounds add realisations, the length instead divides the number of realisations of the first round.
     """
     size = template.sizes[dim]
     replication = template.campaign.replication
@@ -389,12 +393,12 @@ def _bytes_per_result(template: Template) -> int:
 
 
 def estimate(campaign: Campaign) -> Estimate:
-    """Return what a campaign will cost, without running it.
+    """Return the costs of a campaign without running it.
 
     Raises
     ------
     CampaignError
-        If it is too large to be run.
+        If the campaign is too large to be run.
     """
     model = models.load(campaign.model)
     realisations = campaign.replication.at_least
@@ -416,14 +420,14 @@ def estimate(campaign: Campaign) -> Estimate:
 
 
 def _growth(series: Series) -> float:
-    """Return how many times as many cases a series has when its adaptive axes are full."""
+    """Return the factor by which a series grows if its adaptive axes reach their largest numbers of values."""
     return math.prod(
         max(axis.refinement.at_most / len(axis.values), 1.0) for axis in series.axes if axis.refinement is not None
     )
 
 
 def _estimate_series(template: Template, model: Model[Any]) -> Estimate:
-    """Estimate the blocks of the first realisations, or `SAMPLED` of them; the others are alike."""
+    """Estimate a series from its blocks of the first realisations, or from `SAMPLED` of them."""
     blocks, lengths = math.prod(template.grid[:-1]), template.grid[:-1]
     sample = np.linspace(0, blocks - 1, min(blocks, SAMPLED)).round().astype(int)
     seconds, solves = 0.0, 0.0

@@ -1,8 +1,8 @@
-"""Which values an adaptive axis needs: in whole stages, until interpolation meets every tolerance.
+"""Choose the values of an adaptive axis, stage after stage, until interpolation meets every tolerance.
 
-Interpolation is by monotone cubics on the natural scale of the axis. The values form one lattice, each halfway between
-two earlier ones, so that neighbouring cases need the same values. An interval is good enough when the value that was
-added last at one of its ends was predicted, from earlier values alone, within the tolerance. Otherwise it is halved.
+Outputs are interpolated by monotone cubics on the linear or logarithmic scale of the axis. Every new value lies halfway
+between two older ones, so that neighbouring cases use the same values. An interval is accepted if the values that are
+older than its newer end predict the output in the interval within the tolerance. Otherwise it is halved.
 """
 
 from __future__ import annotations
@@ -23,27 +23,28 @@ from mdr_dask.campaign import Campaign, Refinement, Series, Tolerance
 GROUPS = 20
 #: Probability that an interval is halved because of scatter alone.
 CHASED = 0.05
-#: Smallest part of the axis: jumps are not resolved beyond it.
+#: Smallest width of an interval, relative to the axis; discontinuities are not resolved more finely.
 FINEST = 2.0**-10
-#: Fewest values for an interpolation.
+#: Smallest number of values for an interpolation.
 FEWEST = 3
-#: Level of the first values whose prediction tests an interval: eighths of the axis. Quarters are predicted from three
-#: values, which agree with a curve of another shape by chance.
+#: Lowest level of values whose prediction is a test of an interval: eighths of the axis. Quarters are predicted from
+#: only three values, and such a prediction may be right by chance.
 TESTED = 3
-#: Where predictions are compared in an interval, from its later end on.
+#: Positions in an interval at which predictions are compared: 0 is the newer end, 1 the older end.
 COMPARED = (0.0, 0.25, 0.5, 0.75)
 
 
 @dataclass(frozen=True)
 class Mean:
-    """Means of an output over realisations, and what is known of their errors.
+    """Means of an output over realisations, with the data for their errors.
 
     Parameters
     ----------
     groups : array, shape (1 + groups, cases...)
-        The mean, and behind it the means without one group of realisations each; NaN where a case has no value.
+        First the mean over all realisations, then the means that leave out one group of realisations each; NaN where a
+        case has no value.
     error : array, shape (cases...)
-        Discretisation error; 0 where none is known.
+        Discretisation error; 0 where it is unknown.
     """
 
     groups: FloatArray
@@ -51,7 +52,7 @@ class Mean:
 
     @classmethod
     def of(cls, values: FloatArray, done: BoolArray, error: FloatArray | None) -> Mean:
-        """Take means of results along the last axis, realisations, of which some are done."""
+        """Return the means over the last axis (realisations) of the results that are done."""
         number = np.arange(values.shape[-1]) % min(GROUPS, values.shape[-1])
         kept = [done, *(done & (number != group) for group in range(number.max() + 1))]
         mean = _mean(values, done)
@@ -61,7 +62,7 @@ class Mean:
         return cls(known, np.nan_to_num(size, nan=0.0))
 
     def at(self, place: tuple[NDArray[np.intp], ...]) -> Mean:
-        """Return a part of the cases, as `numpy.ix_` chooses it."""
+        """Return the means of some cases, selected by the result of `numpy.ix_`."""
         return Mean(np.stack([group[place] for group in self.groups]), self.error[place])
 
 
@@ -73,16 +74,16 @@ def _mean(values: FloatArray, some: BoolArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Mesh:
-    """The cases of a series: every axis with the values that it has so far, and which of them are needed.
+    """The cases of a series: the values that every axis has so far, and a mask of the cases that are needed.
 
     Parameters
     ----------
     series : Series
-        With the values of adaptive axes in the order in which they arrived.
+        The series, with the values of adaptive axes in the order in which they were added.
     shares : mapping of int to array, shape (values,)
-        For each adaptive axis, by its number, where its values lie in its interval.
+        For each adaptive axis, by its index, the positions of its values in its interval, as fractions from 0 to 1.
     used : mapping of int to bool array, shape (values of the other axes that are not adaptive..., values)
-        Which of them each other case needs.
+        For each adaptive axis, the values that are needed at each combination of the non-adaptive axes.
     """
 
     series: Series
@@ -91,7 +92,7 @@ class Mesh:
 
     @classmethod
     def first(cls, series: Series) -> Mesh:
-        """Return a series as it begins: all values of all axes."""
+        """Return the mesh of the first stage: all initial values of all axes are needed."""
         adaptive = [k for k, axis in enumerate(series.axes) if axis.refinement]
         others = [len(axis.values) for axis in series.axes if not axis.refinement]
         sizes = {k: len(series.axes[k].values) for k in adaptive}
@@ -99,14 +100,14 @@ class Mesh:
         return cls(series, shares, {k: np.ones((*others, size), dtype=bool) for k, size in sizes.items()})
 
     def refinement(self, number: int) -> Refinement:
-        """Return how an adaptive axis is refined, by its number."""
+        """Return the refinement of the adaptive axis with index `number`."""
         found = self.series.axes[number].refinement
         assert found
         return found
 
     @property
     def cases(self) -> BoolArray:
-        """Which cases are needed, shape of the series."""
+        """Mask of the cases that are needed, with the shape of the series."""
         dims = len(self.series.sizes)
         others = [k for k in range(dims) if k not in self.used]
         each = (
@@ -123,11 +124,11 @@ class Stage:
     Parameters
     ----------
     campaign : Campaign
-        With these values.
+        The campaign with these values.
     meshes : tuple of Mesh
         The cases of each series.
     new : tuple of bool array
-        Those of them that no stage before had.
+        For each series, a mask of the cases that no earlier stage had.
     """
 
     campaign: Campaign
@@ -136,7 +137,7 @@ class Stage:
 
     @classmethod
     def first(cls, campaign: Campaign) -> Stage:
-        """Return a campaign as it begins."""
+        """Return the first stage of a campaign."""
         meshes = tuple(Mesh.first(series) for series in campaign.series)
         return cls(campaign, meshes, tuple(mesh.cases for mesh in meshes))
 
@@ -146,7 +147,7 @@ class Stage:
         return any(mesh.used for mesh in self.meshes)
 
     def after(self, meshes: tuple[Mesh, ...]) -> Stage | None:
-        """Return the next stage, None where there is nothing new."""
+        """Return the next stage with these meshes, or None if they have no new cases."""
         new = tuple(_beyond(mesh.cases, before.cases) for mesh, before in zip(meshes, self.meshes, strict=True))
         if not any(cases.any() for cases in new):
             return None
@@ -162,7 +163,7 @@ def _beyond(cases: BoolArray, before: BoolArray) -> BoolArray:
 
 @dataclass(frozen=True)
 class _Interval:
-    """An interval between two values that misses its tolerance, in one of the cases of the other axes."""
+    """An interval between two values that misses its tolerance, for one combination of the non-adaptive axes."""
 
     case: tuple[int, ...]
     share: float
@@ -171,19 +172,19 @@ class _Interval:
 
 
 def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]]:
-    """Add values in the intervals whose interpolation is not known to be good enough.
+    """Add values in intervals in which interpolation was not shown to meet the tolerance.
 
     Parameters
     ----------
     mesh : Mesh
-        A series, all of whose cases are computed.
+        A series whose needed cases are all computed.
     means : mapping of str to Mean, over the cases of the series
-        Each output that an adaptive axis has a tolerance for.
+        Means of each output for which an adaptive axis has a tolerance.
 
     Returns
     -------
     Mesh
-        With more values; the same if none is wanted, or allowed.
+        The mesh with more values; unchanged if no value is needed or allowed.
     dict of str to int
         For each adaptive axis, the number of cases of the other axes that miss a tolerance and cannot be refined.
     """
@@ -200,7 +201,7 @@ def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]
 
 
 def _chosen(used: BoolArray, intervals: list[_Interval], at_most: int) -> list[_Interval]:
-    """Return the intervals to halve: in each case the widest first, so that one jump does not use up all values."""
+    """Return the intervals to halve: the widest first, so that one discontinuity does not use up all values."""
     ordered = sorted(intervals, key=lambda interval: (-interval.width, -interval.excess, interval.share))
     count = np.array(used.sum(axis=-1))
     chosen = []
@@ -226,7 +227,7 @@ def _halved(mesh: Mesh, number: int, intervals: list[_Interval]) -> Mesh:
 
 
 def _intervals(mesh: Mesh, number: int, means: Mapping[str, Mean]) -> Iterator[_Interval]:
-    """Yield the intervals of an adaptive axis that are not known to meet every tolerance."""
+    """Yield the intervals of an adaptive axis that were not shown to meet every tolerance."""
     refinement = mesh.refinement(number)
     for case in np.ndindex(mesh.used[number].shape[:-1]):
         used = {k: np.flatnonzero(mask[case]) for k, mask in mesh.used.items()}
@@ -245,14 +246,14 @@ def _intervals(mesh: Mesh, number: int, means: Mapping[str, Mean]) -> Iterator[_
         ends = refinement.spread.at(shares)
         for k, middle in enumerate(middles.tolist()):
             if refinement.spread.whole and refinement.spread.at(np.array([middle]))[0] in (ends[k], ends[k + 1]):
-                continue  # no whole number lies between
+                continue  # there is no whole number between the ends
             is_untested = max(levels[k], levels[k + 1]) < TESTED and not np.isneginf(excess[k])
             if is_untested or excess[k] > 1.0:
                 yield _Interval(case, middle, float(shares[k + 1] - shares[k]), float(max(excess[k], 1.0)))
 
 
 def _lines(mean: Mean, number: int) -> Mean:
-    """Return the lines along an axis, one behind the other."""
+    """Return the means as an array with one row for each line of cases along an axis."""
     groups = np.moveaxis(mean.groups, number + 1, -1)
     error = np.moveaxis(mean.error, number, -1)
     rows = math.prod(error.shape[:-1])
@@ -260,9 +261,10 @@ def _lines(mean: Mean, number: int) -> Mean:
 
 
 def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolerance) -> FloatArray:
-    """Return the error of interpolation in each interval over the tolerance: that of the worst line.
+    """Return the largest ratio of interpolation error and tolerance over all lines, for each interval.
 
-    Cases that failed are left out of their line. Beside them, and where no line has a value, it is minus infinity.
+    Failed cases are left out of their line. Next to failed cases, and where no line has a value, the ratio is minus
+    infinity.
     """
     worst = np.full(places.size - 1, -np.inf)
     known = np.isfinite(lines.groups[0])
@@ -280,27 +282,28 @@ def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolera
 
 
 def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray, error: FloatArray) -> FloatArray:
-    """Return by how much each interval was mispredicted before the later of its two ends was there.
+    """Return the error of predicting the output in each interval from values that are older than its newer end.
 
-    A value of level n lies halfway between two values of lower levels. The interval beside it is predicted from all
-    values of lower levels, by a monotone cubic and by a cubic spline. Predictions are compared with the monotone cubic
-    through all values at the later end, and at the quarters of the interval because one value may agree by chance.
+    A value of level n lies halfway between two values of lower levels. The intervals next to it are predicted from all
+    values of lower levels, by a monotone cubic and by a cubic spline. These predictions are compared with the monotone
+    cubic through all values. They are compared at the newer end and at the quarters of the interval, because a
+    prediction may be right by chance at one point.
 
     Parameters
     ----------
     places : array, shape (values,)
-        Ascending.
+        Positions of the values along the axis, ascending.
     levels : int array, shape (values,)
         The ends of the axis have level 0, its middle 1, the quarters 2, ...
     groups : array, shape (1 + groups, lines, values)
-        As `Mean` has them.
+        Means as in `Mean.groups`.
     error : array, shape (lines, values)
         Discretisation errors.
 
     Returns
     -------
     array, shape (lines, values - 1)
-        The largest difference, less what the scatter of the realisations and the error of the grid explain.
+        The largest difference, minus the part that scatter of realisations and discretisation errors can explain.
     """
     from scipy.interpolate import CubicSpline, PchipInterpolator
     from scipy.special import ndtri
@@ -318,7 +321,7 @@ def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray
                 missed[kind][..., here] = predicted - now[..., here]
     count = max(len(groups) - 1, 1)
     around = missed[:, 1:] - missed[:, :1]
-    scatter = np.sqrt((count - 1) / count * (around**2).sum(axis=1))  # jackknife; none for one realisation
+    scatter = np.sqrt((count - 1) / count * (around**2).sum(axis=1))  # jackknife; zero for one realisation
     widely = ndtri(1 - CHASED / (2 * groups.shape[1]))
     largest = (np.abs(missed[:, 0]) - widely * scatter).max(axis=(0, 2))
     return np.asarray(largest - error[:, last])

@@ -1,4 +1,4 @@
-"""How many realisations each case needs: in whole rounds, until its standard error meets every tolerance."""
+"""Find the number of realisations of each case: rounds are added until its standard errors meet all tolerances."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.models.base import Model, Status
 
-#: A round goes to the number that is probably enough for half of its cases, within these multiples of the last one.
+#: The number of realisations grows to what is probably enough for half of the cases, by a factor within these limits.
 LEAST_GROWTH, MOST_GROWTH = 1.25, 4.0
-#: Growth of a round for a fitted constant, of which the number needed is not known.
+#: Growth factor in rounds for a fitted constant, because the number of realisations that it needs is unknown.
 GROWTH = 1.5
-#: With `FEWEST` or more results, the estimated standard error is used as it is. Fewer results estimate their scatter
-#: badly: stopping by it, 95 % intervals would cover as little as 89 %. So from `FEW` results on, a case may stop if a
-#: variance `DOUBT` times as large would meet the tolerance as well. Measured: ``python -m benchmarks campaigns``.
+#: With `FEWEST` or more results, the estimated standard error is used as it is. With fewer results this estimate is
+#: poor: if cases stopped by it, 95 % intervals could have a coverage of only 89 %. So a case with fewer results stops
+#: only if it has at least `FEW` results, and if `DOUBT` times the variance would also meet the tolerance. The coverage
+#: was measured with ``python -m benchmarks campaigns``.
 FEWEST, FEW, DOUBT = 12, 7, 2.0
-#: Part of the tolerance that the standard error of fewer results must meet: all realisations give the same.
+#: With even fewer results, the standard error must be below this fraction of the tolerance: all results are then equal.
 NEGLIGIBLE = 1e-3
 
 
@@ -34,7 +35,7 @@ def next_round(replication: Replication, count: int, growth: NDArray[np.float64]
     count : int
         Number of realisations so far.
     growth : float array, shape (cases,)
-        How many times as many each case needs; cases of at most 1 have enough.
+        Factor by which the number of realisations of each case must grow; at most 1 if it has enough.
     """
     more = np.minimum(growth[growth > 1], MOST_GROWTH)
     if not more.size:
@@ -49,7 +50,7 @@ def growth_needed(
     until: Mapping[str, Tolerance],
     scatter: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> NDArray[np.float64]:
-    """Return how many times as many results each case needs as it has.
+    """Return the factor by which the number of results of each case must grow.
 
     Parameters
     ----------
@@ -60,14 +61,15 @@ def growth_needed(
     until : mapping of str to Tolerance
         Largest standard error of the mean, by output.
     scatter : mapping of str to array, shape (..., realisations), optional
-        Standard errors that single realisations estimate themselves, of outputs that have them.
+        Standard errors that are estimated from each single realisation, for outputs with such an estimate.
 
     Returns
     -------
     float array, shape (...)
-        At most 1 if every standard error meets its tolerance with `FEWEST` results, or with `FEW` results and a
-        variance `DOUBT` times as large; with fewer results if it meets a small part of the tolerance, or if each result
-        estimates its own scatter and that meets the tolerance as well. It is 0 for a case without any success.
+        At most 1 if the case has enough results for every tolerance, 0 for a case without a successful result. One of
+        these conditions is sufficient for a tolerance: the standard error meets it with at least `FEWEST` results; it
+        would meet it with at least `FEW` results and `DOUBT` times the variance; it is below the fraction `NEGLIGIBLE`
+        of it; or both the standard error and the estimates in `scatter` meet it.
     """
     done = status == Status.DONE
     count = np.maximum(done.sum(axis=-1), 1)
@@ -89,13 +91,13 @@ def growth_needed(
 
 
 def known_scatter(model: Model[Any], until: Collection[str], outputs: Collection[str]) -> dict[str, str]:
-    """Return the outputs that estimate the scatter of outputs with a tolerance from single realisations."""
+    """Return, for each output with a tolerance, the computed output that estimates its scatter from one realisation."""
     scatter = {output: model.output(output).scatter for output in until}
     return {output: own for output, own in scatter.items() if own in outputs}
 
 
 def _times(error: NDArray[np.float64], allowed: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how many times as many results reduce an error to the allowed one; infinite if it is not known."""
+    """Return the factor by which the number of results must grow to reach the allowed error; infinite for NaN."""
     known = np.where(error > 0, error, 0.0)
     with np.errstate(divide="ignore", over="ignore"):
         found = np.divide(known, allowed, out=np.zeros(known.shape), where=known > 0) ** 2
@@ -103,7 +105,7 @@ def _times(error: NDArray[np.float64], allowed: NDArray[np.float64]) -> NDArray[
 
 
 def _error_from_within(scatter: NDArray[np.float64], done: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return the standard error of the mean of independent realisations, from that of each of them."""
+    """Return the standard error of the mean of independent realisations from the standard error of each realisation."""
     count = np.maximum(done.sum(axis=-1), 1)
     return np.asarray(np.sqrt((np.where(done, scatter, 0.0) ** 2).sum(axis=-1)) / count)
 

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 #: A campaign: the keys of a campaign file, or its path.
 Source = Mapping[str, Any] | str | Path | Campaign
-#: A study: the result of `run` or `open_study`, or the path or URL of a store.
+#: A study: the return value of `run` or `open_study`, or the path or URL of a store.
 Study = xr.Dataset | xr.DataTree | str | Path
 #: One name or condition, or several.
 Words = str | Sequence[str]
@@ -389,7 +389,7 @@ class StudyAccessor:
 
 
 def _place(found: Campaign, is_temporary: bool) -> str:
-    """Return the store of a campaign; the name of a temporary one depends on the whole text of the campaign."""
+    """Return the path of the store of a campaign; a temporary store is named by a digest of the campaign's text."""
     if not is_temporary:
         return found.store
     digest = hashlib.sha256(found.text.encode()).hexdigest()[:16]
@@ -423,7 +423,7 @@ def _groups(study: Study) -> dict[str, xr.Dataset]:
 
 
 def _several(words: Words) -> tuple[str, ...]:
-    """Return one or several words as a tuple."""
+    """Return a text or a sequence of texts as a tuple."""
     return (words,) if isinstance(words, str) else tuple(words)
 
 

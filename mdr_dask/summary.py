@@ -142,7 +142,7 @@ def human_bytes(size: float) -> str:
 
 
 def costs_row(costs: Estimate) -> dict[str, Any]:
-    """Return counts, bytes and seconds of a study under stable keys: of the first round, and of all rounds."""
+    """Return counts, bytes and seconds of a study under stable keys, for the first round and for all rounds."""
     first = {name: getattr(costs, name) for name in ("results", "solves", "blocks", "bytes", "files")}
     return {
         "cases": costs.cases,

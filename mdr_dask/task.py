@@ -25,7 +25,7 @@ from mdr_dask.store import Place
 from mdr_dask.version import __version__
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
-MAPPED, TRIMMED = 32 * 2**20, 128 * 2**20  # bytes: the largest that glibc allows on the heap, and a few of them
+MAPPED, TRIMMED = 32 * 2**20, 128 * 2**20  # bytes: largest allocation that glibc makes on the heap, and 4 times that
 
 
 @dataclass(frozen=True)
@@ -35,19 +35,19 @@ class Work:
     Parameters
     ----------
     place : Place
-        Its place in the store.
+        Place of the block in the store.
     model : str
         Name of the model.
     versions : tuple
-        The versions that the driver runs, as `versions` returns them.
+        Versions of the program and of the model on the driver, as `versions` returns them.
     block : Block
-        Its cases and realisations.
+        Cases and realisations of the block.
     wanted, spared : bool array, shape of the block
-        Results to compute, and results to write down as not needed.
+        Results to compute, and results to mark as not needed.
     attempt : int
-        How often the block has been begun, this time included.
+        How often the computation of the block has been begun, including this time.
     estimate : float
-        Work by the model's estimate, in seconds.
+        Time that the model estimates, in seconds.
     """
 
     place: Place
@@ -65,7 +65,7 @@ class Work:
         return f"{self.place.series or '-'} {'.'.join(map(str, self.place.index))}"
 
     def halves(self) -> tuple[Work, ...]:
-        """Return the same work as two tasks, to be run one after the other; none for a single result."""
+        """Return two tasks with half of the results each, to be run one after the other; none for a single result."""
         cells = np.flatnonzero(self.wanted)
         if cells.size < 2:
             return ()
@@ -79,10 +79,10 @@ class Work:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a task returns to the driver: counts and times, never results.
+    """The return value of a task: counts and times, but no results.
 
-    `compile_seconds` is the part of `compute_seconds` in which this process compiled kernels. `warned` counts results
-    that are done and have a message all the same.
+    `compile_seconds` is the part of `compute_seconds` in which this process compiled kernels. `warned` is the number of
+    results that are done but have a warning.
     """
 
     counts: tuple[int, ...]
@@ -100,7 +100,7 @@ def versions(model: str) -> tuple[str, int]:
 
 
 def run_block(work: Work) -> Outcome:
-    """Compute a block and write it. Doing it twice changes nothing.
+    """Compute a block and write it. Running the same task again gives the same results.
 
     Raises
     ------
@@ -136,9 +136,9 @@ def run_block(work: Work) -> Outcome:
 
 
 def finished(work: Work) -> Outcome | None:
-    """Return the outcome of a task that was finished by a worker which died afterwards; None if it is not finished.
+    """Return the outcome of a task that another worker finished before it died, or None if it is not finished.
 
-    The record of an attempt is written before the ledger, and holds the digest of the ledger.
+    The task is finished if the stored ledger has the digest that is in the record of this attempt.
     """
     record = store.record(work.place.url, work.place.series, work.place.index, work.attempt)
     if record is None or not store.is_written(work.place, record):
@@ -163,16 +163,16 @@ def _warned(record: Mapping[str, Any]) -> int:
     return sum(message["status"] == Status.DONE.name.lower() for message in record["messages"])
 
 
-#: Faults of the machine rather than of a case: the files of the compiler's cache, a full disk, a missing library.
+#: Errors that a fault of the machine causes, not a case: a broken cache of the compiler, a full disk, no library.
 MACHINE_FAULTS = (OSError, EOFError, ImportError, pickle.UnpicklingError)
-#: Longest message that is kept of a case.
+#: Largest number of characters that are stored of a message.
 LONGEST_MESSAGE = 1000
 
 
 def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
-    """Call the model. If it raises for the block, compute every result by itself: only those that raise have failed.
+    """Call the model. If it raises an exception for the block, compute every result separately to find those that fail.
 
-    `is_own` says that the model is the user's own. Then any exception is a failed case, and results are checked.
+    `is_own` means that the user wrote the model. Then every exception is a failed case, and results are checked.
     """
     is_single = block.cases == len(block.realisations) == 1
     try:
@@ -197,7 +197,7 @@ def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
 
 
 def _checked(model: Model[Any], block: Block[Any], result: Result) -> Result:
-    """Return the result of a user's own model, where a case without a proper value has failed.
+    """Return the checked result of a model that the user wrote; results with invalid values are marked as failed.
 
     Raises
     ------
@@ -242,14 +242,14 @@ def _checked(model: Model[Any], block: Block[Any], result: Result) -> Result:
 
 
 def _unknown(model: Model[Any], block: Block[Any], shape: tuple[int, ...]) -> dict[str, NDArray[np.float64]]:
-    """Return the outputs of cases without results: NaN in the declared shapes."""
+    """Return arrays of NaN in the shapes of the outputs, for cases without results."""
     extra = model.coordinates(block.parameters)
     sizes = {name: tuple(extra[dim].values.size for dim in model.output(name).dims) for name in block.outputs}
     return {name: np.full((*shape, *size), np.nan) for name, size in sizes.items()}
 
 
 def _nothing(model: Model[Any], work: Work) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int8]]:
-    """Return a block without results."""
+    """Return outputs of NaN, and a ledger in which all results are missing."""
     shape = work.wanted.shape
     return _unknown(model, work.block, shape), np.full(shape, Status.MISSING, dtype=np.int8)
 
@@ -283,7 +283,7 @@ def _compute_part(
     values: dict[str, NDArray[np.float64]],
     status: NDArray[np.int8],
 ) -> Result:
-    """Compute the wanted results of a block into arrays that hold the others already."""
+    """Compute the wanted results of a block, and put them into arrays that already hold its other results."""
     flat_status = status.reshape(wanted.shape)
     cases, numbers = np.flatnonzero(wanted.any(axis=1)), np.flatnonzero(wanted.any(axis=0))
     if cases.size == 0:
@@ -336,7 +336,7 @@ def _record(work: Work, result: Result, status: NDArray[np.int8], seconds: float
 
 
 def _place(work: Work, case: int, number: int) -> list[int]:
-    """Return the place of a result in the ledger."""
+    """Return the indices of a result in the ledger."""
     region = work.place.region
     shape = [part.stop - part.start for part in region]
     inside = [int(offset) for offset in np.unravel_index(case, shape[:-1])] if len(shape) > 1 else []
@@ -350,7 +350,7 @@ def _describe(block: Block[Any], case: int) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def kind() -> str:
-    """Return what the last digits of results may depend on: the processor and the numerical libraries."""
+    """Return processor and numerical libraries as text, because the last digits of results may depend on them."""
     from importlib.metadata import version
 
     import scipy.linalg  # noqa: F401  (brings its own BLAS)
@@ -364,7 +364,10 @@ def kind() -> str:
 
 
 def one_blas_thread() -> AbstractContextManager[object]:
-    """Keep linear algebra to one thread, now and until the context ends: the same bytes, and one thread per block."""
+    """Limit linear algebra to one thread from now until the context ends.
+
+    Results then do not depend on the number of threads, and each block uses one thread.
+    """
     import scipy.linalg  # noqa: F401  (brings a BLAS of its own, which must be there to be limited)
     from threadpoolctl import threadpool_limits
 
@@ -382,7 +385,7 @@ def keep_freed_memory() -> None:
 
 
 def write_off(work: Work, message: str) -> Outcome:
-    """Write the results of a block down as failed without computing them, because they crash the process."""
+    """Mark the results of a task as failed without computing them, because they crash the process."""
     _, status = store.read_block(work.place, ())
     status[work.spared] = Status.NOT_NEEDED
     status[work.wanted] = Status.FAILED

@@ -105,7 +105,7 @@ _MEANINGS = {
     "W": ("a power", "1 W"),
 }
 
-#: Longer texts and exponents of more than two digits are refused, because pint could take for ever to parse them.
+#: Longer texts and exponents of more than two digits are refused, because pint may need extremely long to parse them.
 _MOST_LETTERS = 60
 _BAD_POWER = re.compile(r"(\*\*|\^)\s*(?!\(?[-+]?\d{1,2}\)?(?![\d.]|\s*(\*\*|\^)))")
 
@@ -164,7 +164,7 @@ def to_si(value: str, unit: str) -> float:
 
 
 def unit_behind(value: str) -> str:
-    """Return the unit after a number, empty if there is none."""
+    """Return the unit after a number in a text, or an empty text if there is none."""
     match = _QUANTITY.match(value)
     return match[2] if match and match[2] and is_unit(match[2]) else ""
 
@@ -240,19 +240,19 @@ def seconds(duration: float) -> str:
     return f"{minutes // 60} h {minutes % 60} min"
 
 
-#: Distance from the usual value, in decades, from which a bare number is questioned.
+#: ``check`` asks about a number without a unit that is more decades than this from the usual value.
 _FAR, _FAR_TEMPERATURE = 3.0, 0.3
 
 
 def is_far(value: float, unit: str, usual: str) -> bool:
-    """Return whether a number in SI units is more than three decades from a usual value such as ``10 MPa``."""
+    """Return whether a number in SI is more than 3 decades (0.3 for a temperature) from a usual value, ``10 MPa``."""
     return value != 0 and _decades(value, to_si(usual, unit)) > (_FAR_TEMPERATURE if unit == "K" else _FAR) + 1e-9
 
 
 def likely(value: float, unit: str, usual: str) -> str:
-    """Return a bare number with the unit of the usual value if that brings it near, otherwise an empty text."""
+    """Return a number with the unit of the usual value if it is then near that value, otherwise an empty text."""
     meant = f"{value:g} {unit_behind(usual)}"
-    with suppress(ValueError):  # beyond the largest number
+    with suppress(ValueError):  # the converted number is too large
         return "" if is_far(to_si(meant, unit), unit, usual) else meant
     return ""
 
@@ -331,12 +331,12 @@ _COHERENT = {"length": "m", "mass": "kg", "time": "s", "temperature": "K", "curr
 
 @lru_cache(maxsize=1024)
 def dimension_of(unit: str) -> tuple[Any, str]:
-    """Return the dimension of a unit, as pint writes it, and the coherent SI unit of that dimension.
+    """Return the dimension of a unit as a pint object, and the coherent SI unit of that dimension.
 
     Raises
     ------
     ValueError
-        If it is not a known unit.
+        If the unit is unknown.
     """
     if unit not in ("", "1") and not is_unit(unit):
         raise ValueError(f"unknown unit {unit!r}{_nearest(unit)}")
@@ -351,8 +351,8 @@ def _spelling(unit: str) -> str:
 
 
 def _nearest(word: str, unit: str = "") -> str:
-    """Return a hint for an unknown unit: the nearest known one, of the dimension of `unit` if that is known."""
-    if word in ("C", "F"):  # nobody means coulomb or farad here
+    """Return a hint for an unknown unit: the nearest known one, with the dimension of `unit` if `unit` is given."""
+    if word in ("C", "F"):  # probably temperatures, not coulomb and farad
         return ", temperatures are in 'degC', '°C' or 'K'"
     power = re.fullmatch(r"([a-zA-Zµ]+)(\d)", word)
     if power and is_unit(power[1]):

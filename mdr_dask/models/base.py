@@ -33,7 +33,7 @@ _WHOLE = re.compile(r"[+-]?\d{1,18}")
 
 
 def unquoted(value: Any) -> Any:
-    """Return a whole number in quotes as the number, anything else as it is."""
+    """Convert a whole number in quotes to a number; return anything else unchanged."""
     return int(value) if isinstance(value, str) and _WHOLE.fullmatch(value) else value
 
 
@@ -42,11 +42,11 @@ class Parameters(BaseModel):
 
     A subclass may declare more about its parameters:
 
-    * `renamed`: parameters and outputs of earlier versions, each with what to write instead.
+    * `renamed`: names of parameters and outputs of earlier versions, each with its replacement for a message.
     * `alternatives`: groups of which exactly one member is given. Each member is a tuple of parameters that are given
       together; a dot separates the names of nested parameters.
     * `overrides`: parameters that replace another one, each with the one it replaces.
-    * `settings`: parameters of the solver, and of what is stored.
+    * `settings`: parameters that set the resolution of the solver or the points to store, not the physical problem.
     * `requires`: parameters that have an effect only if another parameter has a certain value.
     """
 
@@ -60,7 +60,7 @@ class Parameters(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _whole_numbers_in_quotes(cls, data: Any) -> Any:
-        """Read a whole number in quotes as the number, for a number with a unit is a string too."""
+        """Convert whole numbers in quotes, because numbers with a unit are strings, too."""
         if not isinstance(data, dict):
             return data
         return {**data, **{key: unquoted(data[key]) for key in data.keys() & _whole_fields(cls)}}
@@ -74,7 +74,7 @@ class Parameters(BaseModel):
 
     @property
     def inactive(self) -> dict[str, str]:
-        """The parameters that have no effect because another one overrides them, each with that other one."""
+        """The parameters that have no effect, each with the parameter that overrides it."""
         return {other: name for name, other in self.overrides.items() if getattr(self, name) not in (None, ())}
 
 
@@ -166,7 +166,7 @@ def notes_of(parameters: Any) -> tuple[str, ...]:
     return notes
 
 
-#: Bits of dimensionless numbers: numbers that agree to 6e-14 are the same case.
+#: Bits to which dimensionless numbers are rounded; numbers that agree to about 6e-14 belong to the same case.
 CANONICAL_BITS = 44
 
 
@@ -339,9 +339,9 @@ class Result:
     status : int8 array, shape (cases, realisations)
         Values of `Status`.
     messages : dict of (case, realisation position) to str
-        The reason or the warning of a case that failed or needs one.
+        For a failed result the reason, for any other result a warning.
     solves : int
-        Number of solutions computed; other cases shared one of them.
+        Number of solutions computed; several cases may share one solution.
     """
 
     values: dict[str, FloatArray]
@@ -362,15 +362,15 @@ class Model(Generic[P]):
     Parameters
     ----------
     name : str
-        As in ``model:`` of a campaign file.
+        Name for the key ``model`` of a campaign file.
     version : int
-        Raised when a change of code changes a number; part of the identity of a store.
+        Increased when a change of the code changes results; a store can only be extended by the same version.
     summary : str
         One line for ``mdr-dask models``.
     parameters : type
-        Its parameter set.
+        The parameter set.
     outputs : tuple of Output
-        All arrays it can compute, without ``status`` and the companions with errors.
+        All arrays that the model can compute, without ``status`` and the companions with errors.
     compute : callable, Block -> Result
         A pure function: the value of a case depends on its parameters, the seed and its realisation, not on the other
         cases of the block. It does not raise an exception for a case that fails.
@@ -391,9 +391,9 @@ class Model(Generic[P]):
         Notes for ``check`` about a study, from its parameter sets with one axis varied at a time. Notes about a single
         part of a parameter set come from the method `notes` of that part.
     compiling : float
-        Seconds to compile its kernels, the first time on a machine.
+        Seconds to compile the kernels of the model, the first time on a machine.
     numbers : tuple of Number
-        Dimensionless numbers of its cases.
+        Dimensionless numbers of the cases.
     """
 
     name: str
@@ -414,15 +414,15 @@ class Model(Generic[P]):
 
     @property
     def companions(self) -> dict[str, Output]:
-        """The errors of outputs that have one, by the name of their output."""
+        """The companions with errors, by the names of their outputs."""
         return {output.name: output.error for output in self.outputs if output.has_error}
 
     def output(self, name: str) -> Output:
-        """Return the output of that name, declared or a companion; KeyError if there is none."""
+        """Return a declared output or a companion by its name; raise KeyError if there is none."""
         return {output.name: output for output in (*self.outputs, *self.companions.values())}[name]
 
     def with_companions(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Return names of outputs with their scatter outputs, each followed by its companion if it has one."""
+        """Return the given names and those of scatter outputs, each followed by its companion if it has one."""
         companions = self.companions
         asked = {*names, *(self.output(name).scatter for name in names)}
         kept = [output.name for output in self.outputs if output.name in asked]

@@ -12,12 +12,12 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.tables import decoded, described
 
-#: Bytes of a file above which no notes on its columns are made.
+#: Size of a file in bytes from which no notes on its columns are made.
 LARGEST_TABLE = 10**7
 
 
 class DataFile(BaseModel):
-    """A file named by a campaign. It is found when the campaign is read, and its digest is compared when it is used."""
+    """A file that a campaign names. Its digest is stored when the campaign is read, and compared when it is used."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     name: str
@@ -26,11 +26,11 @@ class DataFile(BaseModel):
 
     @classmethod
     def of(cls, path: Path) -> DataFile:
-        """Return the file at a path as it is now."""
+        """Return the file at a path, with the digest of its present content."""
         return cls(name=path.name, path=str(path), sha256=hashlib.sha256(path.read_bytes()).hexdigest())
 
     def read_bytes(self) -> bytes:
-        """Return the file's content; DataError if it has changed since the campaign was read."""
+        """Return the content of the file; raise DataError if it has changed since the campaign was read."""
         content = Path(self.path).read_bytes()
         if hashlib.sha256(content).hexdigest() != self.sha256:
             raise DataError(f"{self.path}: changed since the campaign was read")
@@ -42,7 +42,7 @@ class DataFile(BaseModel):
         Raises
         ------
         DataError
-            If the file has changed since the campaign was read, or is no text.
+            If the file has changed since the campaign was read, or is not text.
         """
         return decoded(self.read_bytes(), self.path)
 

@@ -1,4 +1,4 @@
-"""The numbers among the parameters of a case, by the name of their coordinate in a store."""
+"""Find the parameters of a case that are numbers, by the names of their coordinates in a store."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from mdr_dask.models.data_file import DataFile
 
 
 def numbers_of(parameters: BaseModel, prefix: str = "") -> dict[str, tuple[float, str, str]]:
-    """Return value, unit and meaning of each number of a parameter set that is in use, nested names joined by ``_``."""
+    """Return value, unit and meaning of each number that has an effect; nested names are joined by ``_``."""
     found: dict[str, tuple[float, str, str]] = {}
     idle = parameters.inactive if isinstance(parameters, Parameters) else {}
     for name, field in type(parameters).model_fields.items():

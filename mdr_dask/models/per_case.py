@@ -1,4 +1,4 @@
-"""Make the `compute` of a model from a function that solves one case: the short way to your own model."""
+"""Make the function `compute` of a model from a function that solves one case: the shortest way to your own model."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.models.base import Block, Result, Status
 
-#: Seconds after which a case raises TimeoutError, in a process that has set an alarm for it.
+#: Seconds after which a case raises TimeoutError, in a process that handles the alarm signal.
 time_limit: float | None = None
 
 Solve = Callable[[Any, np.random.Generator], Mapping[str, ArrayLike]]
@@ -77,16 +77,16 @@ def _limited(solve: Solve, parameters: Any, random: np.random.Generator) -> Any:
 
 
 def is_interrupt(error: BaseException) -> bool:
-    """Return whether an exception is Ctrl-C of the user: it reaches the main thread alone, if that handles it."""
+    """Return whether an exception comes from Ctrl-C, which only the main thread receives, if it handles SIGINT."""
     is_main = threading.current_thread() is threading.main_thread()
     return isinstance(error, KeyboardInterrupt) and is_main and signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
 
 
 def reason(error: BaseException) -> str:
-    """Return an exception as the reason why a case failed."""
+    """Return the text of an exception, the reason why a case failed."""
     try:
         text = str(error)
-    except Exception:  # an exception class of the user may have a fault of its own
+    except Exception:  # the exception class itself may have a fault
         text = ""
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
@@ -107,7 +107,7 @@ def real_numbers(name: str, value: Any) -> NDArray[np.float64]:
     Raises
     ------
     ValueError
-        If it is anything but a real number or an array of them: True, text, a masked value, a quantity with a unit.
+        If it is not a real number or an array of real numbers, but for example True, text or a quantity with a unit.
     """
     if type(value) is float:
         return np.asarray(value)
