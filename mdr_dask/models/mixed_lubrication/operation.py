@@ -72,9 +72,7 @@ class Operation:
 
     @property
     def coarseness(self) -> float:
-        """Spacing of the points over the length ``slope/s`` of pieces of clusters that break the layer at a window
-        edge.
-        """
+        """Spacing of the points over the length ``slope/s`` of cut pieces of clusters that break the layer."""
         return self.spacing * self.strength / self.source.slope(self.case.perimeter)
 
     def on(self, source: Source) -> Operation:

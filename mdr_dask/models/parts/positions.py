@@ -18,7 +18,7 @@ OUTER = 3
 BREAK = 3.0
 """Bend between a line of positions and the lines beside it, over the largest bend between lines of heights."""
 FAR_ALONE = 10.0
-"""A number that occurs once is not a height if it is farther from all others than this many of their ranges."""
+"""A single number is not a height if it is farther from all others than this many times the range of these."""
 FEW_LEVELS = 10
 """Largest number of different heights of a profile that was designed, not measured."""
 

@@ -207,8 +207,7 @@ def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
 
 @jit
 def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work: FloatArray) -> tuple[float, float]:
-    """Follow a cluster beyond the edge of a window, for at most the distance `most`; to the right if `most` is
-    positive.
+    """Follow a cluster beyond an edge of the window, by at most `most`; to the right if `most` is positive.
 
     Return the additional length and force.
     """

@@ -74,7 +74,7 @@ def total(overlap: FloatArray, start: float, end: float) -> float:
 
 @jit
 def crossings(overlap: FloatArray, found: FloatArray) -> int:
-    """Write the positions where the spline changes sign to `found`; return their number. It has size - 3 nodes."""
+    """Write the positions where a spline of ``size - 3`` nodes changes sign to `found`; return their number."""
     count = 0
     above = 4 * (overlap[0] > 0) + 2 * (overlap[1] > 0) + (overlap[2] > 0)
     for k in range(overlap.size - 3):

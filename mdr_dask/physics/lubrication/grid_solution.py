@@ -25,9 +25,9 @@ _TOO_EARLY = 0.035
 
 @dataclass(frozen=True)
 class GridSolution:
-    """Pressure (in p0) and film (in ``a^2/R``) at the nodes of one grid, the film at ``X = 0``, the number of steps,
-    and the ratio of the node spacing to the spacing given by the density that places the nodes.
+    """Pressure (in p0) and film (in ``a^2/R``) at the nodes of one grid, with the number of Newton steps.
 
+    `central` is the film at ``X = 0``, and `spacing` the node spacing over the spacing given by the density of nodes.
     The method takes the pressure as linear between two nodes, so that its film sags there; :meth:`film_between` uses a
     polynomial through the nodes instead.
     """
@@ -52,8 +52,7 @@ class GridSolution:
         return np.where(inside, np.maximum(_between(self.nodes, self.pressure, positions, _CUBIC), 0.0), 0.0)
 
     def pressure_carried(self, nodes: FloatArray, front: float) -> FloatArray:
-        """Return the pressure at the nodes of another grid, with the front behind the spike shifted to `front` (or
-        NaN).
+        """Return the pressure at the nodes of another grid, with the front behind the spike moved to `front`.
 
         The nodes on either side of the front get the pressures at half a cell from the front of this grid; these are
         nearly equal on finer grids.
@@ -108,8 +107,7 @@ class GridSolution:
 
     @cached_property
     def front(self) -> float:
-        """Position behind the spike at which the pressure has fallen to the minimum before it; NaN if there is no
-        spike.
+        """Position at which the pressure behind the spike equals the minimum before it; NaN if there is no spike.
 
         On any grid, the pressure falls there within one or two cells; only the height of the spike depends on the
         nodes.

@@ -114,8 +114,7 @@ def _cells_before(position: float, positions: FloatArray, density: FloatArray, n
 
 
 def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:
-    """Return a grid for an expected film: fine where a dry contact ends, or, for a thick film, around the rigid
-    parabola.
+    """Return a grid for an expected film: fine at both ends of a dry contact, or around the parabola of a thick film.
 
     Parameters
     ----------

@@ -225,9 +225,7 @@ def _fill_jacobian_row(
 
 @jit
 def _fill_active(influence: FloatArray, P: FloatArray, found: Imbalance, active: NDArray[np.int64]) -> int:
-    """List the inner nodes with pressure, ``P + R/d > 0``, where d is the size of dR/dP at the node; return their
-    number.
-    """
+    """List the inner nodes with pressure, ``P + R/d > 0`` with the size d of dR/dP there; return their number."""
     R, by_pressure, by_film = found
     count = 0
     for i in range(1, P.size - 1):

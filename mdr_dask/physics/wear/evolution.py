@@ -116,9 +116,7 @@ class Resolution(NamedTuple):
         return graded_panels(round(sharpness * left), right, order - min(self.fewer, self.thinned))
 
     def panels_of_a_punch(self, sharpness: float) -> Panels:
-        """Return panels for a pressure that tends to a jump at the edge, and a body whose profile is a power law at its
-        axis.
-        """
+        """Return panels for a pressure that tends to a jump at the edge, and for a power-law profile at the axis."""
         digits = max(-np.log10(self.accuracy), 2.0)
         halvings = round(2.0 * digits) - self.fewer
         # the error at the tip is the height in the innermost panel; under a cone, a halving divides it by sqrt(2)

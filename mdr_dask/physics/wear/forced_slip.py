@@ -36,7 +36,7 @@ BEYOND = 1.25
 
 #: Lower limit of (r^2 - c^2) / (1 - c^2), to take its logarithm.
 SMALLEST = 1e-30
-#: If half the difference of the roots at both ends of a piece, over their mean, is less, a series is used.
+#: A series is used if (r1 - r2) / (r1 + r2) is below this value, with the roots r1 and r2 at both ends of a piece.
 SHORT = 0.02
 _ABSCISSA, _WEIGHT = gauss(3)
 
@@ -269,7 +269,7 @@ class ForcedSlip:
         return shares
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return s - known - theta (p / eta) s at the nodes (continuity at the edge); then force, and y = 0 at b if it
+        """Return s - known - theta (p / eta) s at the nodes; then the error of the force, and y at the border if it
         moves.
         """
         size, y, place = self.size, self.image(unknowns), self.place(unknowns)

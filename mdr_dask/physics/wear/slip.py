@@ -105,9 +105,7 @@ def _look_up(table: LogTable, squares: FloatArray, result: FloatArray) -> None:
 
 
 class _Step(NamedTuple):
-    """One step of `PartialSlip`: theta over the root of the width, r^2 - c^2 of the nodes, contribution of past
-    moments.
-    """
+    """One step of `PartialSlip`: theta over the root of the width, r^2 - c^2 at the nodes, past contributions."""
 
     share: float
     squares: FloatArray
@@ -126,8 +124,7 @@ def _slip_rows(table: LogTable, step: _Step, stress: FloatArray, slip: FloatArra
 
 @dataclass(frozen=True, eq=False)
 class PartialSlip(FixedBorder):
-    """Slip outside the stick radius c at constant depth; the unknowns are y = (g - g_c) / eta at the nodes, and the
-    edge.
+    """Slip outside the stick radius c at constant depth; unknowns are y = (g - g_c) / eta at nodes, and the edge.
 
     The slip is s = (f - f_star) / eta, where f_star is the profile whose image is the plateau g = g_c beyond c. The
     accumulated quantity is ln(s / s0) = int p dN / eta, where s0 is the slip of the virgin body.
@@ -246,8 +243,8 @@ class GrossSlip(FixedBorder):
     wear_rate = normal_force
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return f - f0 - known - theta p with continuity at the edge in the last row; then the error of the force, if
-        given.
+        """Return f - f0 - known - theta p, with continuity at the edge in the last row; then the error of a given
+        force.
         """
         accumulated = known + theta * self.rate(unknowns)
         accumulated[-1] = 0.0

@@ -43,9 +43,10 @@ class Settings(NamedTuple):
     shape : float
         Least error of force and worn depth at constant depth, as a fraction of the profile's largest error.
     volumes : float
-        For volumes: the fraction of the distances of wear volume and energy that is added to their difference.
+        For volumes: this fraction of the distances of both volumes is added to the difference of wear volume and
+        energy.
     reach : int
-        Number of neighbours on each side, among positions dense at the borders, whose largest distance is used.
+        A distance is replaced by the largest one among this many neighbouring positions on each side.
     floor : float
         Least error of a function, as a fraction of its largest error.
     """
