@@ -1,7 +1,7 @@
 """Linear viscoelastic solids: a spring, Prony terms and a dashpot in parallel; their moduli, fits and temperature laws.
 
-The stress under a shear strain u is ``G_inf u + sum G_m (u - a_m) + eta du/dt`` with ``da_m/dt = (u - a_m) / tau_m``. A
-solid without Prony terms is a Kelvin solid, one with a term and no dashpot a standard solid.
+The stress due to a shear strain u is ``G_inf u + sum G_m (u - a_m) + eta du/dt`` with ``da_m/dt = (u - a_m) / tau_m``.
+A solid without Prony terms is a Kelvin solid, a solid with one Prony term and no dashpot a standard solid.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class LinearSolid:
     times : array, shape (terms,)
         Relaxation time tau_m of each term, s, ascending and distinct.
     viscosity : float
-        Viscosity eta of the dashpot beside them, Pa s.
+        Viscosity eta of the parallel dashpot, Pa s.
     """
 
     static_modulus: float
@@ -60,7 +60,7 @@ def standard_solid(static_modulus: float, glass_modulus: float, relaxation_time:
     static_modulus, glass_modulus : float
         Shear modulus at slow and at sudden deformation, Pa.
     relaxation_time : float
-        Of the Prony term, s.
+        Relaxation time of the Prony term, s.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def standard_solid(static_modulus: float, glass_modulus: float, relaxation_time:
 
 
 def prony(static_modulus: float, moduli: ArrayLike, times: ArrayLike, viscosity: float = 0.0) -> LinearSolid:
-    """Return a solid with any number of Prony terms: sorted by time, equal times merged, terms of modulus 0 left out.
+    """Return a solid with Prony terms sorted by time; equal times are merged, terms of modulus 0 are left out.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def complex_modulus(solid: LinearSolid, angular_frequency: ArrayLike) -> NDArray
 
 
 def relaxation_modulus(solid: LinearSolid, time: ArrayLike) -> FloatArray:
-    """Return G(t), Pa, the stress at times t > 0, s, after a unit step of strain; without the impulse of a dashpot."""
+    """Return G(t), Pa, the stress at times t > 0, s, after a unit step of strain, without the impulse of a dashpot."""
     elapsed = np.asarray(time, dtype=np.float64)
     terms = solid.moduli * np.exp(-elapsed[..., None] / solid.times)
     return np.asarray(solid.static_modulus + terms.sum(axis=-1), dtype=np.float64)
@@ -138,9 +138,9 @@ class SeriesFit:
     solid : LinearSolid
         The series.
     storage_error, loss_error : float
-        Root mean square of the relative error of G' and G''; NaN for a modulus without data.
+        Root mean square of the relative error of G' and of G''; NaN for a modulus without data.
     largest_error : float
-        Largest relative error of either.
+        Largest relative error of G' or G''.
     worst_frequency : float
         Angular frequency of the largest error, rad/s.
     range : tuple of float
@@ -169,18 +169,18 @@ def power_law_series(
     highest: float,
     terms_per_decade: int = 2,
 ) -> SeriesFit:
-    """Return a Prony series with G'' = loss_modulus (omega / frequency)^exponent (thesis eq. 3.45) over a range.
+    """Return a Prony series for G'' = loss_modulus (omega / frequency)^exponent (thesis eq. 3.45) in a range.
 
     Parameters
     ----------
     static_modulus, loss_modulus : float
-        G_inf and G'' at `frequency`, Pa.
+        G_inf, and G'' at `frequency`, Pa.
     frequency : float
-        Angular frequency at which `loss_modulus` holds, rad/s.
+        Angular frequency of `loss_modulus`, rad/s.
     exponent : float
-        beta, above 0 and below 1.
+        beta, between 0 and 1.
     lowest, highest : float
-        Range of angular frequency of the law, rad/s. Relaxation times extend a decade beyond.
+        Range of angular frequency of the law, rad/s. The relaxation times extend one decade further on each side.
     terms_per_decade : int
         With two, G'' is within 1 % of the law inside the range.
 
@@ -216,13 +216,13 @@ def fit_series(
     Parameters
     ----------
     angular_frequency : array_like, shape (points,)
-        omega, rad/s, at least one decade wide; order does not matter.
+        omega, rad/s, over at least one decade, in any order.
     storage, loss : array_like, shape (points,)
-        G' and G'', Pa, positive. For moduli in tension divide by 2 (1 + Poisson's ratio) before.
+        G' and G'', Pa, positive. Moduli in tension must first be divided by 2 (1 + Poisson's ratio).
     terms_per_decade : float
-        Relaxation times per decade; they cover the range of 1 / omega and half a decade on each side.
+        Relaxation times per decade; they cover the range of 1 / omega plus half a decade on each side.
     dashpot : bool
-        Whether to fit a dashpot too.
+        Whether the solid has a dashpot.
 
     Raises
     ------
@@ -288,12 +288,12 @@ def wlf_factor(temperature: ArrayLike, reference: float, c1: float, c2: float) -
     c1 : float
         Dimensionless constant.
     c2 : float
-        Constant, K; the law ends at T = T_ref - c2.
+        Constant, K; the law is valid for T > T_ref - c2 only.
 
     Raises
     ------
     ValueError
-        If a temperature lies at or below T_ref - c2.
+        If a temperature is not above T_ref - c2.
     """
     difference = np.asarray(temperature, dtype=np.float64) - reference
     if np.any(c2 + difference <= 0):
@@ -317,24 +317,24 @@ def arrhenius_factor(temperature: ArrayLike, reference: float, activation_energy
 
 
 def at_temperature(solid: LinearSolid, factor: float) -> LinearSolid:
-    """Return the solid with every relaxation time, and the dashpot's viscosity, multiplied by a_T."""
+    """Return the solid with all relaxation times and the viscosity of the dashpot multiplied by a_T."""
     return replace(solid, times=solid.times * factor, viscosity=solid.viscosity * factor)
 
 
 @dataclass(frozen=True)
 class Recovery:
-    """Free recovery (zero stress) of a solid as a sum of decaying modes, all of the sign of the strain.
+    """Free recovery (zero stress) of a solid as a sum of decaying modes; the modes have the sign of the strain.
 
     In mode k the strain is u = c_k exp(-t / lambda_k), and the stretch of term m is u - a_m = stretch[m, k] u.
 
     Parameters
     ----------
     times : array, shape (terms,)
-        lambda_k, s, ascending: each lies between the relaxation time of its term and the next.
+        lambda_k, s, ascending: lambda_k is between tau_k and tau_(k+1); the last one is above the last tau.
     stretch : array, shape (terms, terms)
         tau_m / (tau_m - lambda_k).
     amplitude : array, shape (terms, terms)
-        Rows that give c_k = amplitude[k] @ (u - a) for a state of zero stress.
+        Its rows give c_k = amplitude[k] @ (u - a) for a state of zero stress.
     """
 
     times: FloatArray
@@ -354,8 +354,8 @@ def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
 
     Notes
     -----
-    -1 / lambda are the zeros of the modulus, see :func:`recovery_times`; the modes are orthogonal under the weights
-    G_m / tau_m, which makes the inverse of `stretch` explicit.
+    -1 / lambda_k are the zeros of the modulus, see :func:`recovery_times`. The modes are orthogonal with the weights
+    G_m / tau_m, so that the inverse of `stretch` is explicit.
     """
     zeros, distance = recovery_times(moduli * times, times)
     stretch = times[:, None] / distance
@@ -382,17 +382,17 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
     Parameters
     ----------
     weight : array, shape (modes,)
-        G_m tau_m / G_inf of a Prony term, eta / G_inf of a dashpot; positive.
+        G_m tau_m / G_inf for a Prony term, eta / G_inf for a dashpot; positive.
     times : array, shape (modes,)
-        tau_m, ascending and distinct; 0 for a dashpot.
+        tau_m for a Prony term, 0 for a dashpot; ascending and distinct.
 
     Returns
     -------
     times : array, shape (modes,)
-        lambda_k, ascending: each lies between tau_k and the next.
+        lambda_k, ascending: lambda_k is between tau_k and tau_(k+1); the last one is above the last tau.
     distance : array, shape (modes, modes)
-        tau_m - lambda_k. Each zero is computed as its distance from the nearer pole, so that the relative precision
-        of these differences does not suffer over many decades.
+        tau_m - lambda_k. Each zero is computed as its distance from the nearer pole. This keeps the relative precision
+        of these differences even for times over many decades.
     """
     terms = times.size
     zeros, distance = np.empty(terms), np.empty((terms, terms))
@@ -410,7 +410,7 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
 
 @jit
 def _distance_to_zero(pole: int, sign: float, gap: float, weight: FloatArray, times: FloatArray) -> float:
-    """Return the distance of a zero from the pole beside it, by bisection of its logarithm and Newton's method."""
+    """Return the distance of a zero from the pole next to it, by bisection of its logarithm and Newton's method."""
     high = np.log(gap)
     low = high - 80.0
     place = 0.5 * (low + high)

@@ -1,15 +1,15 @@
 """Steady sliding of a Kelvin foundation from node to node of a periodic line, for many cases at once.
 
 In a cell the line is a cubic through heights and slopes at its ends, w = d + h + s x + ..., and De is the Deborah
-number v tau in cells. Contact ends where the force w + De w' falls to 0, and begins where the gap closes.
-A cell that is partly in contact adds positive terms only, so that no digits are lost in slow sliding: the integrals of
-w and De w'^2 over the part in contact, and of u and u^2 / De over the free part. Cells wholly in contact are integrated
+number v tau in cells. Contact ends where the force w + De w' falls to 0, and begins where the gap closes. A cell that
+is partly in contact adds only positive terms, which avoids cancellation in slow sliding: the integrals of w and De w'^2
+over the part in contact, and of u and u^2 / De over the free part. Cells that are entirely in contact are integrated
 exactly, so that full contact is exact on any grid. Lengths are in cells, as in `kelvin`.
 
-All cases are followed along the line together, block by block. Whether a block is wholly in contact or wholly free is
-decided for all cases at once by vector instructions, and its integrals are closed sums. In the other blocks each case
-is followed from cell to cell. The arithmetic of a case does not depend on the other cases. The depth that carries
-the load is found by Newton's method on finer and finer grids, each of which starts from the depth on the grid before.
+All cases are moved along the line together, block by block. Vector instructions decide for all cases whether a block is
+entirely in contact or entirely free; its integrals are then sums in closed form. In the other blocks each case is moved
+from cell to cell. The results of a case do not depend on the other cases. The depth that carries the load is found by
+Newton's method on finer and finer grids, each time starting from the depth on the previous grid.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ from mdr_dask.physics.sliding.cases import Cases
 from mdr_dask.physics.surfaces.cubic_line import highest_point
 
 BLOCK = 32  # cells
-WING = 4  # nodes on either side from which a finer grid is interpolated
-BEFORE, AFTER = WING + 1, WING + 2  # nodes added from the periods before and after, as many as `refine` reads
-ABOVE = 4 / 27  # times the slopes at both ends: most by which a cubic cell rises above its ends
-SUMMIT = 64  # nodes in the cell of the highest point, of which the highest is taken
+WING = 4  # nodes on each side from which the nodes of a finer grid are interpolated
+BEFORE, AFTER = WING + 1, WING + 2  # nodes added from the previous and the next period, as many as `refine` needs
+ABOVE = 4 / 27  # times the slopes at both ends: a cubic cell rises above its ends by this at most
+SUMMIT = 64  # nodes in the cell of the highest point; the highest of them is used as the summit
 
 NO_ENDS: FloatArray = np.empty((2, 0))
 # Bounds and sums of a block of cells, in this order
 PEAK, LOWEST, STEEPEST, HEIGHTS, SQUARES = range(5)
 KNOWN = 5
-# Rows of a tile: at nodes, beginning with the one before it, then of cells
+# Rows of a tile: two at nodes, from the node before the tile on, then three at cells
 HEIGHT, SLOPE, MEAN, SQUARE, TOP = range(5)
 IN_A_TILE = 5
 
@@ -50,16 +50,15 @@ class Nodes(NamedTuple):
     Parameters
     ----------
     height, slope : array, shape (BEFORE + n + AFTER,)
-        With nodes of the periods before and after. Heights are measured from the first node; slopes are rises over a
-        cell.
+        Heights relative to the first node, and rises per cell, with nodes of the previous and the next period.
     ends : array, shape (2, BEFORE + n + AFTER) or (2, 0)
         From `ends_of`, with the same additional nodes.
     blocks : array, shape (n // BLOCK, KNOWN)
         Bounds and sums over the cells of a block.
     top : float
-        The height of the first node.
+        Height of the first node.
     rise : float
-        Height of the highest point in the cell before, above the first node; 0 on coarse grids.
+        Height of the highest point above the first node, in the cell before this node; 0 on coarse grids.
     """
 
     height: FloatArray
@@ -72,7 +71,7 @@ class Nodes(NamedTuple):
 
 @jit
 def _take(given: FloatArray, first: int, stride: int, period: FloatArray) -> None:
-    """Write every stride-th number of a period from `first` on, and those needed of the periods before and after."""
+    """Write every stride-th number of a period from `first` on, with numbers of the previous and the next period."""
     n = period.size - BEFORE - AFTER
     left = -(-(given.size - first) // stride)
     filled = left if left < n else n  # up to the end of the given array
@@ -97,9 +96,9 @@ def _end_factors(n: int) -> NDArray[np.complex128]:
 def ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
     """Return corrections of the trapezium rule for the integrals of height and slope squared, shape (2, n).
 
-    The integral from one node to another is the trapezium sum plus the correction at the first node minus that at the
-    last one. This is exact, for slopes as rises over a cell. Corrections from local derivatives would miss the shortest
-    waves, which decide the integrals over small contacts.
+    The integral from one node to another is the trapezium sum plus the correction at the first node minus the
+    correction at the last one. This is exact; slopes are rises per cell. Corrections from local derivatives would miss
+    the shortest waves, which are important for the integrals over small contacts.
     """
     n = height.size
     parts = fft.rfft([height, (slope / n) ** 2])
@@ -108,16 +107,18 @@ def ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
 
 
 def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolved: bool, ends: FloatArray) -> Nodes:
-    """Take every stride-th node of a line; slopes are differences of heights if it is not resolved.
+    """Take every stride-th node of a line; slopes are differences of heights unless the line is resolved.
 
     Parameters
     ----------
     height, slope : array, shape (n,)
-        Heights and derivatives by position over the length of the line.
+        Heights, and derivatives by position over the length of the line.
     first : int
-        First node; heights are measured from it.
+        First node; heights are relative to it.
+    resolved : bool
+        Whether the nodes resolve the slopes.
     ends : array, shape (2, n) or (2, 0)
-        From `ends_of`; without it, integrals over cells follow from the neighbouring nodes.
+        From `ends_of`; if it is empty, integrals over cells follow from the neighbouring nodes.
     """
     n = height.size // stride
     h, s = np.empty((2, BEFORE + n + AFTER))
@@ -157,7 +158,7 @@ def _take_line(
     mean, square, above = cells[0], cells[1], cells[2]
     for j in range(blocks.shape[0]):
         before, begin, last = BEFORE + j * BLOCK - 1, BEFORE + j * BLOCK, BEFORE + (j + 1) * BLOCK
-        # first cell by cell, in vector instructions, and then the sums
+        # first values of each cell, by vector instructions, then the sums
         _integrals(h[before:], s[before:], of_height[before:], of_square[before:], BLOCK, mean, square)
         for k in range(BLOCK):
             i = begin + k
@@ -185,10 +186,10 @@ def _integrals(
     mean: FloatArray,
     square: FloatArray,
 ) -> None:
-    """Write the integrals of the height and of the slope squared over cells; `square` is one longer.
+    """Write the integrals of height and slope squared over cells; `square` must have one more element than cells.
 
-    The arrays begin with the node before the first cell. Without exact corrections those of Euler and Maclaurin are
-    used, with derivatives from heights and slopes at the neighbouring nodes; over a whole line they cancel.
+    The arrays begin with the node before the first cell. If there are no exact corrections, Euler-Maclaurin corrections
+    are used, with derivatives from heights and slopes at the neighbouring nodes. They cancel over a whole line.
     """
     if of_height.size > 0:
         for k in range(cells):
@@ -207,14 +208,14 @@ def _integrals(
 
 @jit
 def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
-    """Write the highest points of cells; the first cell begins at the second node."""
+    """Write the largest height in each cell; the first cell begins at the second node."""
     for k in range(cells):
         h0, h1, s0, s1 = h[k + 1], h[k + 2], s[k + 1], s[k + 2]
         rise = h1 - h0
         a, b = 3 * rise - 2 * s0 - s1, s0 + s1 - 2 * rise
         inside = a * a - 3 * s0 * b
         root = math.sqrt(inside) if inside > 0 else 0.0
-        above, below = (s0, root - a) if a <= 0 else (a + root, -3 * b)  # the form without cancellation
+        above, below = (s0, root - a) if a <= 0 else (a + root, -3 * b)  # the form of the root without cancellation
         x = above / below if below > 0 else 0.0
         x = x if (x > 0) & (x < 1) else 0.0
         top, ends = h0 + x * (s0 + x * (a + x * b)), max(h0, h1)
@@ -223,21 +224,21 @@ def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
 
 @jit_inline
 def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatArray) -> int:
-    """Write a tile of a line on the finer grid of the weights, and return the number of its cells.
+    """Write a tile, a part of a line on a finer grid, and return the number of its cells.
 
     Parameters
     ----------
     line : Nodes
     first, cells : int
-        First node, and number of the cells of the line.
+        First node, and number of cells of the line.
     weights : array, shape (2, refinement, 4 WING)
         From :func:`weights`.
     tile : array, shape (IN_A_TILE, cells refinement + 3)
-        Written. Rows: heights and slopes, also at the node before the first and after the last one; integrals of height
-        and slope squared over each cell; its highest point.
+        Written. Rows: heights and slopes, from the node before the tile to the node after it; integrals of height and
+        of slope squared over each cell; largest height in each cell.
     """
     refinement, h, s = weights.shape[1], tile[HEIGHT], tile[SLOPE]
-    # exact corrections exist only at the nodes of the line
+    # exact corrections are available only at the nodes of the line
     here = first - 1 if refinement == 1 else line.ends.shape[1]
     if refinement == 1:
         h[: cells + 3] = line.height[first - 1 : first + cells + 2]
@@ -252,11 +253,11 @@ def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatAr
 
 @lru_cache
 def weights(refinement: int) -> FloatArray:
-    """Return the weights of `WING` nodes on either side for the nodes of a finer grid, shape (2, refinement, 4 WING).
+    """Return weights of `WING` nodes on each side for the nodes of a finer grid, shape (2, refinement, 4 WING).
 
-    The first index is 0 for the height and 1 for the slope, the second the node of the finer grid in a cell, the third
-    the heights and then the slopes at the 2 WING nodes: the Hermite polynomial through them has degree 15. With two
-    nodes per Nyquist point its error is below 1e-7 of the shortest wave.
+    The first index is 0 for the height and 1 for the slope. The second one is the node of the finer grid in a cell. The
+    third one is for the heights and then the slopes at the 2 WING nodes: the Hermite polynomial through them has degree
+    15. With two nodes per Nyquist point its error is below 1e-7 of the shortest wave.
     """
     places, x = np.arange(1.0 - WING, 1.0 + WING), np.arange(refinement) / refinement
     table = np.empty((2, refinement, 4 * WING))
@@ -274,7 +275,7 @@ def weights(refinement: int) -> FloatArray:
 
 @jit
 def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: FloatArray, slope: FloatArray) -> None:
-    """Write heights and slopes of the finer grid over cells of a line, from the node before to the second one after."""
+    """Write heights and slopes on the finer grid over cells of a line, with one node before and two after them."""
     refinement = weights.shape[1]
     h, s = line.height, line.slope
     for place in range(-1, cells * refinement + 2):
@@ -288,28 +289,28 @@ def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: Flo
 
 
 def with_summit(line: Nodes) -> Nodes:
-    """Return a line whose highest point is in the cell before its first node, with its `rise`."""
+    """Return the line with its `rise`; the highest point must be in the cell before its first node."""
     table = weights(SUMMIT)
     height, slope = np.empty((2, SUMMIT + 3))
     refine(line, BEFORE - 1, 1, table, height, slope)
     return line._replace(rise=max(float(np.max(height[1:-1])), 0.0))
 
 
-LANES = 64  # cases that are followed together
+LANES = 64  # cases that are computed together
 SMALL, LARGE = 1e-300, 1e12
-CLOSED = 1e-9  # relative difference of the displacement before and after a period that counts as a closed period
-RESOLVED = 10  # cells in contact below which a grid does not resolve the contact
+CLOSED = 1e-9  # a period is closed if the displacements before and after it differ by at most this, relative
+RESOLVED = 10  # a grid with fewer cells in contact does not resolve the contact
 
 ITERATIONS = 25
-COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most so many times so many nodes
-LAST_STEP = 0.03  # relative step of the depth that may be the last: its results are extrapolated along their secants
-SECANT_ERROR = 0.1  # relative error of such an extrapolation
-FIRST_STEP, FIRST_ERROR = 0.1, 0.03  # the last step on a grid that only starts the next one, and its error of the drag
-ROUNDING = 1e-12  # relative step of the depth that is rounding
-AHEAD = 1 / 16  # of the last change of the depth between grids, expected of the next one: fourth order
+COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most COARSENING * COARSEST nodes
+LAST_STEP = 0.03  # largest relative last step of the depth; the results are extrapolated along their secants
+SECANT_ERROR = 0.1  # relative error of this extrapolation
+FIRST_STEP, FIRST_ERROR = 0.1, 0.03  # last step, and error of the drag, on a grid that only provides a first guess
+ROUNDING = 1e-12  # relative step of the depth that is due to rounding
+AHEAD = 1 / 16  # expected ratio of successive changes of the depth between grids: fourth order
 
 ROWS = 15
-# Where each quantity of the cases begins in the workspace of a sweep: state, sums, and constants of a case
+# Start of each quantity of the cases in the workspace of a sweep: state, sums, constants of a case
 U, FADE, CONTACT, LOAD, RATE, LOSS, LENGTH, STRETCH = range(0, 8 * LANES, LANES)
 DEPTH, DEBORAH, DECAY, INVERSE, THROUGH, BEGAN, CALM = range(8 * LANES, ROWS * LANES, LANES)
 # Results of a case that are extrapolated along secants
@@ -319,7 +320,7 @@ SECANTS = 3
 
 @jit_inline
 def _fading(time: float) -> float:
-    """Return exp(-time) for time >= 0, with an error of 1e-4 at most up to time 1."""
+    """Return exp(-time) for time >= 0, with an error of at most 1e-4 up to time 1."""
     y = time * 0.125
     y = y if y < 1.0 else 1.0
     e = 1.0 + y * (-1.0 + y * (0.5 - y * (1 / 6)))
@@ -329,7 +330,7 @@ def _fading(time: float) -> float:
 
 
 class Cell(NamedTuple):
-    """The penetration w = w0 + s0 x + a x^2 + b x^3 of a case in a cell, and its value and slope at the end."""
+    """Penetration w = w0 + s0 x + a x^2 + b x^3 in a cell, for one case, and its value and slope at the end."""
 
     w0: float
     s0: float
@@ -341,7 +342,7 @@ class Cell(NamedTuple):
 
 @jit_inline
 def _cell(tile: FloatArray, i: int, depth: float) -> Cell:
-    """Return a case in cell i of a tile."""
+    """Return the penetration in cell i of a tile for a depth."""
     h0, h1, s0, s1 = tile[HEIGHT, i + 1], tile[HEIGHT, i + 2], tile[SLOPE, i + 1], tile[SLOPE, i + 2]
     rise = h1 - h0
     return Cell(depth + h0, s0, 3 * rise - 2 * s0 - s1, s0 + s1 - 2 * rise, depth + h1, s1)
@@ -349,13 +350,13 @@ def _cell(tile: FloatArray, i: int, depth: float) -> Cell:
 
 @jit_inline
 def _at(cell: Cell, x: float) -> float:
-    """Return w at a place."""
+    """Return w at x."""
     return cell.w0 + x * (cell.s0 + x * (cell.a + x * cell.b))
 
 
 @jit_inline
 def _tilt(cell: Cell, x: float) -> float:
-    """Return w' at a place."""
+    """Return w' at x."""
     return cell.s0 + x * (2 * cell.a + x * 3 * cell.b)
 
 
@@ -363,9 +364,9 @@ def _tilt(cell: Cell, x: float) -> float:
 def _contact_end(
     cell: Cell, r: float, begins: float, force: float, force_end: float, inverse: float
 ) -> tuple[float, float, float]:
-    """Return where the force falls to 0 in a cell, w there, and the part of it that is left at the end of the cell.
+    """Return where the force falls to 0 in a cell, w there, and the part of w that remains at the end of the cell.
 
-    The place is found by a secant from where the force begins to fall, and one step of Newton's method.
+    The place is found by a secant from the place where the force begins to fall, and one Newton step.
     """
     fall = (1 - begins) / (force - force_end)
     x = begins + force * fall
@@ -382,9 +383,9 @@ def _contact_end(
 
 @jit_inline
 def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: float) -> tuple[float, float]:
-    """Return where the gap closes before a place where it is closed, and the part of u that is left there.
+    """Return the place before `last` where the gap closes, and the part of u that remains there.
 
-    The place is found by a parabola through the gap at both ends, and one step of Newton's method.
+    The gap is closed at `last`. The place is found by a parabola through the gap at both ends, and one Newton step.
     """
     gap, closing = u - cell.w0, cell.s0 + u * inverse
     bow = (gap - closing * last - gap_last) / (last * last + SMALL)
@@ -404,16 +405,16 @@ def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: 
 def _contact_in_cell(
     cell: Cell, r: float, u: float, kept: float, inverse: float
 ) -> tuple[bool, float, float, float, float]:
-    """Return whether contact begins in a cell for a free element, and where that contact ends.
+    """Return whether a free element comes into contact in a cell, and where this contact ends.
 
-    Also w there, the part of it that is left at the end of the cell, and the gap there without that contact.
+    Also return w there, the part of w that remains at the end of the cell, and the gap there without this contact.
     """
     force, gap = cell.w1 + r * cell.s1, kept - cell.w1
     if force > 0:
         return gap <= 0, 1.0, cell.w1, 1.0, gap
     begins, falls = 0.0, cell.w0 + r * cell.s0
     if falls <= 0 and cell.s0 > 0 and cell.s1 < 0:
-        # before the summit of the cell
+        # about at the summit of the cell
         begins = cell.s0 / (cell.s0 - cell.s1)
         falls = _at(cell, begins)
     if falls <= 0:
@@ -425,7 +426,7 @@ def _contact_in_cell(
 
 @jit
 def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
-    """Follow a case along the cells of a tile."""
+    """Move a case along the cells of a tile, and add to its sums."""
     d, r = workspace[DEPTH + k], workspace[DEBORAH + k]
     decay, inverse = workspace[DECAY + k], workspace[INVERSE + k]
     u, fade = workspace[U + k], workspace[FADE + k]
@@ -491,7 +492,7 @@ def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
 def _pass_block(
     block: FloatArray, last: float, refinement: int, workspace: FloatArray, count: int, queue: NDArray[np.int64]
 ) -> int:
-    """Pass a block by closed sums; queue the cases in which contact begins or ends in it, and return their number."""
+    """Sum a block in closed form; queue the cases in which contact begins or ends in it, and return their number."""
     peak, lowest, steepest = block[PEAK], block[LOWEST], block[STEEPEST]
     steepest /= refinement
     cells, heights, squares = BLOCK * refinement, block[HEIGHTS] * refinement, block[SQUARES] / refinement
@@ -533,9 +534,9 @@ def sweep(
     queue: NDArray[np.int64],
     count: int,
 ) -> None:
-    """Follow one element of every case along the line, from its summit back to it.
+    """Move one element of every case along the line, from the summit of the line back to it.
 
-    Blocks in which contact begins or ends are followed on the finer grid of the weights.
+    Blocks in which contact begins or ends are computed on the finer grid of the weights.
     """
     refinement, blocks = weights.shape[1], line.blocks
     n = line.height.size - BEFORE - AFTER
@@ -544,7 +545,7 @@ def sweep(
         force = w + workspace[DEBORAH + k] / refinement * line.slope[BEFORE - 1]
         workspace[U + k], workspace[FADE + k] = max(w, 0.0), 1.0
         workspace[CONTACT + k] = 1.0 if w > 0 and force > 0 else 0.0
-    # first the cell of the summit, where every case is in contact, then the blocks, then the remaining cells
+    # the cell of the summit, where every case is in contact, then the blocks, then the remaining cells
     first, cells = BEFORE - 1, 1
     for j in range(blocks.shape[0] + 2):
         if 0 < j <= blocks.shape[0]:
@@ -576,7 +577,7 @@ def load_case(workspace: FloatArray, k: int, depth: float, deborah: float, cells
 
 
 class _Workspace(NamedTuple):
-    """Arrays of a search: a tile of the line, the state of the cases, and the results of the last sweep."""
+    """Work arrays of a search: a tile of the line, the state of the cases, and the results of the last sweep."""
 
     tile: FloatArray
     states: FloatArray
@@ -607,7 +608,7 @@ def _search(
     results: FloatArray,
     place: _Workspace,
 ) -> None:
-    """Find the depths of cases on a grid by Newton's method; the last step is taken without another sweep.
+    """Find the depths of cases on a grid by Newton's method; the last step is made without another sweep.
 
     Parameters
     ----------
@@ -618,15 +619,15 @@ def _search(
     cases : Cases
         v tau / L, and F_N / (4 G L) in the unit of height.
     last_step, error : float
-        Largest relative last step of the depth, and the error of the drag that it may leave.
+        Largest relative last step of the depth, and largest relative error of the drag due to it.
     depths : array, shape (cases,)
-        Penetration of the summit: the start on entry, the solution on return.
+        Penetration of the summit: first guesses, replaced by the solutions.
     rates : array, shape (cases, SECANTS)
-        Relative changes of the results with the depth, NaN where they are not known; updated.
+        Derivatives of the results by the depth, relative to the results; NaN where unknown; updated.
     results : array, shape (cases, SECANTS)
         Written where a depth is found.
     place : _Workspace
-        On this grid.
+        Work arrays for this grid.
     """
     (deborah, loads), rise = cases, line.rise
     refinement = weights.shape[1]
@@ -675,29 +676,29 @@ def _search(
 
 
 class NodeToNode:
-    """Cases on one line, solved on one grid after the other.
+    """Cases on one line, which are solved on one grid after another.
 
     Parameters
     ----------
     height, slope : array, shape (nodes,)
-        Heights of a periodic line and their derivative by position over its length, at two nodes per Nyquist point.
+        Heights of a periodic line, and their derivative by position over its length, at two nodes per Nyquist point.
     cases : Cases
         v tau / L and F_N / (4 G L), positive and finite.
     error : float
-        Relative error of the drag that the search for the depth may leave.
+        Largest relative error of the drag due to the search for the depth.
     """
 
     def __init__(self, height: FloatArray, slope: FloatArray, cases: Cases, error: float) -> None:
         self._height, self._slope, self._cases, self._error = height, slope, cases, error
         loads = cases.loads
         self._rates = np.full((loads.size, SECANTS), np.nan)
-        self._depth, self._change = np.full((2, loads.size), np.nan)  # of the mean line, and from the grid before
+        self._depth, self._change = np.full((2, loads.size), np.nan)  # of the mean line, from the previous grid
 
     def solve(self, level: int, cases: IntArray) -> Solution:
-        """Solve cases on a grid of so many nodes per Nyquist point: 1 for all, then 2, 4, 8, ... for any.
+        """Solve cases on a grid of `level` nodes per Nyquist point: 1 for all cases, then 2, 4, 8, ... for any cases.
 
-        Beyond 2 the grid is finer only in blocks where contact begins or ends; it follows from the heights and slopes
-        of the grid of 2.
+        Above 2 nodes, the grid is finer only in blocks where contact begins or ends; it is interpolated from heights
+        and slopes at 2 nodes per Nyquist point.
         """
         if level == 1:
             return self._start()
@@ -720,7 +721,7 @@ class NodeToNode:
         return self._solution(results, start - top, level)
 
     def _start(self) -> Solution:
-        """Solve all cases on coarser and coarser grids from the coarsest on; return the results on the last."""
+        """Solve all cases on finer and finer grids up to one node per Nyquist point; return the results there."""
         height, loads = self._height, self._cases.loads
         strides = [2]
         while height.size > COARSENING * COARSEST * strides[-1]:
@@ -745,5 +746,5 @@ class NodeToNode:
 
 
 def _shallow(loads: FloatArray) -> FloatArray:
-    """Return a penetration of the summit from which a search can start."""
+    """Return a first guess of the penetration of the summit."""
     return np.maximum(loads, loads ** (2 / 3))

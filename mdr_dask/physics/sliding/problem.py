@@ -1,7 +1,7 @@
-"""Steady sliding without units: a solid, a line and cases of speed and load. The solid decides the solver.
+"""Steady sliding in dimensionless quantities: a solid, a line, and cases of speed and load.
 
-A Kelvin solid goes to `kelvin_refinement`, a smooth indenter of a Kelvin solid to its closed form, any other solid to
-`viscoelastic`.
+A smooth indenter or a smooth plane on a Kelvin solid is solved in closed form, other lines on a Kelvin solid by
+`kelvin_refinement`, and any other solid by `viscoelastic`.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.shapes import COLUMNS as CLOSED_COLUMNS
 from mdr_dask.physics.surfaces.shapes import PowerLaw, smooth
 
-GENERAL_LEVELS = tuple(2**k for k in range(1, 9))  # nodes per Nyquist point of a general solid
-CLOSED_FORM = 1e-12  # relative error of a smooth indenter: rounding
+GENERAL_LEVELS = tuple(2**k for k in range(1, 9))  # numbers of nodes per Nyquist point for a general solid
+CLOSED_FORM = 1e-12  # relative error of the closed form of a smooth indenter, due to rounding
 
 
 @dataclass(frozen=True)
 class PronyTerms:
-    """The Prony terms of a solid in units of the line: G_m / G_inf and tau_m v / L."""
+    """Prony terms of a solid in units of the line: G_m / G_inf and tau_m v / L."""
 
     moduli: tuple[float, ...] = ()
     deborah: tuple[float, ...] = ()
@@ -35,21 +35,21 @@ class PronyTerms:
 
 @dataclass(frozen=True)
 class Request:
-    """The accuracy, or the grid, that a caller asks for.
+    """The requested accuracy, or the grid.
 
     Parameters
     ----------
     accuracy : float
-        Relative error allowed for drag, contact fraction and contact slope; that of the depth is relative to the rms
-        height where the depth is smaller.
+        Allowed relative error of drag, contact fraction and contact slope; the error of the depth is relative to the
+        rms height if the depth is smaller.
     oversampling : int or "auto"
-        Nodes per Nyquist point; "auto" for the fewest that meet the accuracy.
+        Nodes per Nyquist point; "auto" for the smallest number that meets the accuracy.
     scheme : {"hermite", "piecewise_linear", "backward_euler"}
-        Scheme of a Kelvin solid.
+        Scheme for a Kelvin solid.
     with_errors : bool
-        Whether errors are wanted on a grid that is given.
+        Whether errors are requested if the grid is given.
     contact : bool
-        Whether fraction and slope of the contact are wanted.
+        Whether fraction and slope of the contact are requested.
     """
 
     accuracy: float = 0.01
@@ -100,7 +100,7 @@ def _general(
     line: RoughLine, terms: PronyTerms, deborah: FloatArray, loads: FloatArray, request: Request
 ) -> tuple[Steady, FloatArray]:
     """Solve cases of any linear solid."""
-    from mdr_dask.physics.sliding import viscoelastic  # kernels that few studies need
+    from mdr_dask.physics.sliding import viscoelastic  # imported here, because few studies need its kernels
     from mdr_dask.physics.solids import prony
 
     columns, errors = np.full((4, loads.size), np.nan), np.full((4, loads.size), np.inf)
@@ -116,7 +116,7 @@ def _general(
     if not left.size:
         return Steady.of(columns, status), errors
     turned = line.from_summit()
-    # cells of the coarsest grid; the results on each grid are extrapolated with the grid before
+    # cells of the coarsest grid; results on each later grid are extrapolated from it and the previous grid
     coarsest = line.points if request.oversampling == "auto" else -(-line.points * request.oversampling // 4)
     levels = GENERAL_LEVELS if request.oversampling == "auto" else GENERAL_LEVELS[:2]
     accuracy = request.accuracy if request.oversampling == "auto" else np.inf
@@ -133,14 +133,14 @@ def _general(
         on_grid(1, None)
         found = refine(on_grid, 1, levels, accuracy, viscoelastic.ORDER, floors=FLOORS)
         status[k], columns[:, k], errors[:, k] = found.outcome[0], np.concatenate(found.values), found.errors[:, 0]
-    # stresses are known to the tolerance of the depth, and the drag of very fast or slow sliding is their small sum
+    # stresses have the tolerance of the depth; in very fast or slow sliding they nearly cancel in the drag
     rounding = viscoelastic.TOLERANCE * loads[left] * columns[3, left]
     errors[0, left] += np.where(np.isnan(rounding), 0.0, rounding)
     return Steady.of(columns, status), errors
 
 
 def _closed_form(body: PowerLaw | None, deborah: FloatArray, loads: FloatArray) -> tuple[Steady, FloatArray]:
-    """Solve a Kelvin solid without roughness: a plane has no friction, an indenter has a closed form."""
+    """Solve a Kelvin solid without roughness: a plane has no friction, and an indenter has a closed form."""
     good = valid(deborah, loads)
     status = np.where(good, np.int8(Outcome.CONVERGED), np.int8(Outcome.INVALID))
     columns = np.full((4, loads.size), np.nan)

@@ -36,24 +36,24 @@ from mdr_dask.physics.sliding.kelvin import (
 from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 
 ITERATIONS = 200
-PATIENCE = 20  # sweeps after which the bracket is halved
-OUTLINES, OUTLINED = 12, 0.02  # most iterations for a guess of the depth from the peaks of blocks, and their last step
-OUTLINED_FROM = 64.0  # least Deborah number in cells for such a guess: at less the line between the peaks matters
-LOST = 1e-13  # rise of a line where contact begins, relative to its heights there, below which it is rounding
-TRAIL = 5  # numbers of a trail: log depth, log load, slope of these and its change, Deborah number
+PATIENCE = 20  # sweeps after which the interval of the depth is bisected
+OUTLINES, OUTLINED = 12, 0.02  # most iterations of a guess from the peaks of blocks, and size of the last step
+OUTLINED_FROM = 64.0  # smallest Deborah number in cells for this guess: below it the line between the peaks matters
+LOST = 1e-13  # relative rise of the line where contact begins, below which the case is lost to rounding
+TRAIL = 5  # entries of a trail: log depth, log load, slope between them, its change, Deborah number
 LATTICE_BITS = 20  # depths are searched on a lattice of relative spacing 2**-LATTICE_BITS: see `_solve`
 
 
 @jit
 def _floor(depth: float) -> float:
-    """Return the lattice depth at or below a positive depth."""
+    """Return the largest lattice depth that does not exceed a positive depth."""
     mantissa, exponent = math.frexp(depth)
     return math.ldexp(math.floor(math.ldexp(mantissa, LATTICE_BITS)), exponent - LATTICE_BITS)
 
 
 @jit
 def _next(depth: float) -> float:
-    """Return the lattice depth above one."""
+    """Return the next larger lattice depth."""
     mantissa, exponent = math.frexp(depth)
     return math.ldexp(math.ldexp(mantissa, LATTICE_BITS) + 1, exponent - LATTICE_BITS)
 
@@ -66,10 +66,10 @@ def _begin(trail: FloatArray, depth: float, load: float) -> None:
 
 @jit
 def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tuple[float, float]:
-    """Guess log depth at a load, and its derivative by log load, from the peaks of blocks alone.
+    """Return a guess of log depth for a load, and its derivative by log load, from the peaks of the blocks alone.
 
-    The depth of full contact is an upper bound, and so is each tangent of the load. If the load is lost to rounding,
-    the start is returned.
+    The depth of full contact is an upper bound, and so is every tangent of the load. If the load is lost to rounding,
+    `start` is returned.
     """
     fade, memory = np.exp(-BLOCK / deborah), -deborah * math.expm1(-BLOCK / deborah)
     depth, most, slope = math.exp(start), load / (memory * peak.size) - peak.mean(), 1.0
@@ -82,7 +82,7 @@ def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tu
             carried += free
             stiffness += gain
             free, gain = free * fade, gain * fade
-        if not carried > 0:  # the highest point is in no whole block
+        if not carried > 0:  # no whole block contains the highest point
             depth *= 2
             continue
         most = min(most, depth + (load / memory - carried) / stiffness)
@@ -96,9 +96,9 @@ def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tu
 
 @jit
 def _follow(sums: FloatArray, depth: float, deborah: float, trail: FloatArray) -> None:
-    """Write log depth, log load, their slope and its change to `trail`, from the last sweep and the one before.
+    """Write log depth, log load, their slope and its change to `trail`, from the last two sweeps.
 
-    The change of the slope is kept from another Deborah number, where it is nearly the same.
+    At a new Deborah number the change of the slope is kept, because it is nearly the same.
     """
     carried = sums[DISPLACEMENT]
     load, slope = np.log(carried), carried / (sums[STIFFNESS] * depth)
@@ -109,7 +109,7 @@ def _follow(sums: FloatArray, depth: float, deborah: float, trail: FloatArray) -
 
 @jit
 def _guess(trail: FloatArray, load: float) -> float:
-    """Extrapolate log depth over log load to a load."""
+    """Return a guess of the depth for a load, by extrapolation of log depth over log load."""
     ahead = np.log(load) - trail[1]
     bend = 0.5 * trail[3] * ahead
     limit = 0.5 * trail[2]
@@ -117,7 +117,7 @@ def _guess(trail: FloatArray, load: float) -> float:
 
 
 class _Swept(NamedTuple):
-    """A line with its blocks and thresholds at one Deborah number, and its mean height from the highest point."""
+    """A line with its blocks and barriers at one Deborah number, and its mean height relative to the highest point."""
 
     cells: Cells
     blocks: Blocks
@@ -129,11 +129,11 @@ class _Swept(NamedTuple):
 def _solve(
     line: _Swept, deborah: float, load: float, trail: FloatArray, sums: FloatArray, places: Places
 ) -> tuple[float, bool]:
-    """Return the last lattice depth that carries less than the load, and whether it was found; write its sums.
+    """Return the last lattice depth that carries less than the load, and success; write its sums.
 
-    The load is a convex, increasing function of the depth, so that its tangents bound the root from above, as full
-    contact does. The depth is found when the tangent at a lattice depth below the root reaches the load before the next
-    lattice depth. There is only one such depth, so the result does not depend on the `trail` of the search.
+    The load is a convex, increasing function of the depth, so that its tangents are upper bounds of the root, and so is
+    the depth of full contact. The search ends at a lattice depth below the root whose tangent reaches the load before
+    the next lattice depth. There is only one such depth, so that the result does not depend on the `trail`.
     """
     cells, blocks, barriers, mean = line
     low, high = 0.0, np.inf
@@ -146,7 +146,7 @@ def _solve(
         if not (carried > 0 and sums[STIFFNESS] > 0):
             return depth, False
         tangent = depth + (load - carried) / sums[STIFFNESS]
-        if tangent > low:  # sums that overflow have none
+        if tangent > low:  # not finite if the sums overflow
             most = min(most, tangent)
         _follow(sums, depth, deborah, trail)
         if carried <= load:
@@ -180,10 +180,10 @@ def _states(
     results: FloatArray,
     status: NDArray[np.int8],
 ) -> None:
-    """Solve cases of one line and Deborah number, ordered by load; see `Steady` for the columns of the results.
+    """Solve cases on one line at one Deborah number, in order of load; the columns of the results are as in `Steady`.
 
-    The search for a depth starts from its guess if that is a number, otherwise from the case before. The first search
-    starts from the trail `first`, which is then replaced by that of the first case.
+    The search for a depth starts from its guess if this is a number, otherwise from the previous case. The first search
+    starts from the trail `first`, which is then replaced by the trail of the first case.
     """
     (cells, _, _, _), (deborahs, loads) = line, cases
     n, places = cells.mean.size - 1, places_for(0)
@@ -231,8 +231,8 @@ def steady_sliding(
     Returns
     -------
     Steady
-        With ``mu = drag / (load L)``, height and length L in the same unit; `Outcome.OUTSIDE_LINE` where an end of a
-        line that is not periodic is in contact.
+        With ``mu = drag / (load L)`` if heights and the length L have the same unit; `Outcome.OUTSIDE_LINE` if an end
+        of a line that is not periodic is in contact.
 
     Examples
     --------
@@ -255,7 +255,7 @@ def steady_on_cells(
     loads: FloatArray,
     guesses: FloatArray | None = None,
 ) -> Steady:
-    """Return what :func:`steady_sliding` does, on a line that is already cut into cells and blocks."""
+    """Return the results of :func:`steady_sliding` for a line that is already cut into cells and blocks."""
     start = np.full(loads.size, np.nan) if guesses is None else guesses
     return _solved(cells, deborah, loads, lambda good, cases: _swept(cells, blocks, cases, start[good] + cells.top))
 
@@ -268,7 +268,7 @@ def stepped_sliding(line: CubicLine, deborah: FloatArray, loads: FloatArray, con
     line, deborah, loads
         As in :func:`steady_sliding`.
     contact : bool
-        Whether fraction and slope of the contact are wanted, which cost extra.
+        Whether fraction and slope of the contact are requested; they take extra time.
     """
     return _solved(line, deborah, loads, lambda _, cases: _stepped(line, cases, contact))
 
@@ -279,7 +279,7 @@ def _solved(
     loads: FloatArray,
     solve: Callable[..., tuple[FloatArray, NDArray[np.int8]]],
 ) -> Steady:
-    """Solve the cases with finite, positive numbers, measured in cells."""
+    """Solve the cases whose numbers are finite and positive; lengths are converted to cells."""
     n = line.enter.size if isinstance(line, CubicLine) else line.mean.size - 1
     with np.errstate(over="ignore"):
         good = valid(deborah * n, loads * n)
@@ -293,7 +293,10 @@ def _solved(
 
 
 def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> tuple[FloatArray, NDArray[np.int8]]:
-    """Solve by sweeps over cells; Deborah numbers in cells, loads over 4 G dx, guesses for the highest point."""
+    """Solve cases by sweeps over cells.
+
+    Deborah numbers are in cells, loads are over 4 G dx, guesses are depths of the highest point.
+    """
     order = np.lexsort((cases.loads, cases.deborah))
     ordered, ordered_status = np.full((order.size, 4), np.nan), np.zeros(order.size, np.int8)
     deborah, loads, starts, first = (
@@ -308,7 +311,7 @@ def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> t
     barriers = barriers_for(n)
     edges = np.flatnonzero(np.diff(deborah, prepend=-1.0, append=-1.0))
     for some in (slice(*ends) for ends in pairwise(edges)):
-        barriers.block.fill(np.nan)  # they hold for one speed
+        barriers.block.fill(np.nan)  # barriers are valid for one speed only
         speed, load = deborah[some.start], loads[some.start]
         outlines = blocks.peak.size > 0 and speed > OUTLINED_FROM and not starts[some.start] > 0
         if outlines:
@@ -317,7 +320,7 @@ def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> t
         line, alike = _Swept(cells, blocks, barriers, mean), Cases(deborah[some], loads[some])
         _states(line, alike, starts[some], first, ordered[some], ordered_status[some])
         outlined = outlined if outlines else first[0]
-        beyond = first[0] - outlined  # changes slowly with the speed
+        beyond = first[0] - outlined  # this difference changes slowly with the speed
     results, status = np.empty_like(ordered), np.empty_like(ordered_status)
     results[order], status[order] = ordered, ordered_status
     highest = int(np.argmax(cells.peak[:-1]))
@@ -327,9 +330,10 @@ def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> t
 
 
 def _is_lost(cases: Cases, near: FloatArray, depth: FloatArray) -> NDArray[np.bool_]:
-    """Return the cases in which the line rises by no more than rounding where elements come into contact.
+    """Return the cases in which the line rises no more than rounding errors where elements come into contact.
 
-    It rises by F_N / (4 G dx) over the Deborah number in cells. `near` are heights beside the highest point, below it.
+    The rise is F_N / (4 G dx) over the Deborah number in cells. `near` contains the heights next to the highest point,
+    relative to it.
     """
     fall = -np.min(near)
     with np.errstate(over="ignore"):
@@ -338,7 +342,7 @@ def _is_lost(cases: Cases, near: FloatArray, depth: FloatArray) -> NDArray[np.bo
 
 
 def _stepped(line: CubicLine, cases: Cases, contact: bool) -> tuple[FloatArray, NDArray[np.int8]]:
-    """Solve by time steps of one cell; Deborah numbers in cells, loads over 4 G dx."""
+    """Solve cases by time steps of one cell; Deborah numbers are in cells, loads are over 4 G dx."""
     n = line.enter.size
     nodes = line.height[:n] if line.periodic else line.height
     highest = int(np.argmax(nodes))

@@ -1,4 +1,4 @@
-"""Steady sliding of any linear viscoelastic foundation along a rough line or under an indenter, solved directly."""
+"""Steady sliding of any linear viscoelastic foundation along a rough line or under an indenter."""
 
 from __future__ import annotations
 
@@ -14,30 +14,30 @@ from mdr_dask.physics.sliding.viscoelastic_sweep import Travelling
 from mdr_dask.physics.solids import LinearSolid, recovery
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
-TOLERANCE = 1e-11  # last step of Newton's method relative to the depth: above rounding
-SHORTEST = 1e-9  # cells: faster Prony terms are added to the dashpot, which is a term of a tenth of this time
-BALANCE = 1e-3  # largest relative difference between the load carried and the load given; it counts as an error
-RESOLVED = 0.5  # largest relative change between two grids from which a result is extrapolated
-ORDER = 2.0  # of straight cells; extrapolation raises it, but less where few cells are in contact
+TOLERANCE = 1e-11  # last step of Newton's method relative to the depth, larger than rounding errors
+SHORTEST = 1e-9  # cells: shorter Prony terms are added to the dashpot, which is a term of a tenth of this time
+BALANCE = 1e-3  # largest relative error of the carried load
+RESOLVED = 0.5  # largest relative change between two grids at which a result is extrapolated
+ORDER = 2.0  # order of straight cells; extrapolation raises it, but less if few cells are in contact
 
 DRAG, DEPTH, FRACTION, SLOPE = range(4)
 
 
 @dataclass(frozen=True)
 class ViscoelasticSteady:
-    """A steady state; every number is NaN unless it converged.
+    """A steady state; all values are NaN if it did not converge.
 
     Parameters
     ----------
     values : array, shape (4,)
-        F_x / (4 G_inf) in the unit of height squared, penetration of the mean line (of z = 0 under an indenter), length
-        in contact over length of the line, rms slope of the line over the contact: the columns of a `Steady`.
+        The columns of a `Steady`: F_x / (4 G_inf) in the unit of height squared, penetration of the mean line (of z = 0
+        under an indenter), length in contact over length of the line, rms slope of the line in contact.
     errors : array, shape (4,)
-        Their estimated absolute discretisation errors.
+        Estimated absolute discretisation errors of the values.
     status : Outcome
-        How it ended.
+        How the solver ended.
     sweeps : int
-        Sweeps of the finest line.
+        Number of sweeps on the finest line.
     """
 
     values: FloatArray
@@ -55,22 +55,22 @@ def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float
     Parameters
     ----------
     line : CubicLine
-        Its nodes: the line is straight between them here. The number of cells is a multiple of four, so that every
-        fourth node spans the same line.
+        Only its nodes are used, with straight lines between them. The number of cells must be a multiple of four, so
+        that every fourth node describes the same line.
     solid : LinearSolid
-        The material, its times in units of L / v: the Deborah numbers of its Prony terms.
+        The material. Its times are in units of L / v, which makes them the Deborah numbers of its Prony terms.
     load : float
         F_N / (4 G_inf L), in the unit of height.
 
     Raises
     ------
     ValueError
-        If a number is not finite or not positive, or the number of cells is not allowed.
+        If a height or the load is not valid, or if the number of cells is not allowed.
 
     Notes
     -----
-    The line is swept exactly. The result is extrapolated from the line with every second node, and its error is
-    estimated from the same result on half as many nodes.
+    The sweep of a line with straight cells is exact. The result is extrapolated from the results on all nodes and on
+    every second node. Its error is estimated from the extrapolated result on half as many nodes.
     """
     cells = line.enter.size
     if not np.all(np.isfinite(line.height)):
@@ -92,7 +92,7 @@ def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float
 
 
 class ViscoelasticCase:
-    """One case on a line of more and more nodes, each of which is twice as many as the one before.
+    """One case, solved on finer and finer lines; each line has twice as many cells as the previous one.
 
     Parameters
     ----------
@@ -104,19 +104,19 @@ class ViscoelasticCase:
         if not (np.isfinite(load) and load > 0):
             raise ValueError(f"the load must be positive and finite, got {load!r}")
         self._solid, self._load = solid, load
-        self._state: FloatArray | None = None  # stretches of the terms at the first node and penetration of the summit
-        self._before: FloatArray | None = None  # results on the grid before
+        self._state: FloatArray | None = None  # stretches of the terms at the first node, penetration of the summit
+        self._before: FloatArray | None = None  # results on the previous grid
         self.sweeps = 0
 
     def on(self, height: FloatArray, periodic: bool) -> Solution:
-        """Solve the case on the next finer grid; extrapolate from the grid before, if there was one.
+        """Solve the case on the next finer grid; extrapolate from the previous grid, if there is one.
 
         Parameters
         ----------
         height : array, shape (nodes,)
             Heights; a periodic line begins at its highest node, which all grids share, and repeats it at the end.
         periodic : bool
-            Whether the line closes.
+            Whether the line is periodic.
 
         Returns
         -------
@@ -147,7 +147,10 @@ class ViscoelasticCase:
     def _solve(
         self, below: FloatArray, load: float, solid: Travelling, periodic: bool, start: FloatArray | None
     ) -> tuple[Outcome, FloatArray, FloatArray]:
-        """Solve on one grid, from the statics or from the state on the grid before; the depth is that of the summit."""
+        """Solve the case on one grid, starting from a static contact or from `start`, the state on the previous grid.
+
+        The computed depth is the penetration of the summit.
+        """
         terms, cells = solid.moduli.size, below.size - 1
         if start is None or start.size != terms + 1:
             inner = below[:-1] if periodic else below
@@ -164,7 +167,10 @@ class ViscoelasticCase:
 
 
 def _travelling(solid: LinearSolid, cell: float) -> Travelling:
-    """Measure a solid in cells and static moduli; terms much shorter than a cell and the dashpot are one term."""
+    """Return a solid in units of cells and static moduli.
+
+    Prony terms that are much shorter than a cell and the dashpot are replaced by one term.
+    """
     static = solid.static_modulus
     fast = solid.times < SHORTEST * cell
     moduli, deborah = solid.moduli[~fast] / static, solid.times[~fast] / cell

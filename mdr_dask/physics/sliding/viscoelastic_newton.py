@@ -14,7 +14,7 @@ DEEPEST_STEP = 0.7
 """Largest relative decrease of the depth in a step, on a line that is not periodic."""
 
 LINEAR = 1e-10
-"""Relative residual of the linear equations of a step: far below the reduction by the next step."""
+"""Relative residual of the linear equations of a step, which is much smaller than the error that the step leaves."""
 
 
 class Swept(NamedTuple):
@@ -23,7 +23,7 @@ class Swept(NamedTuple):
     Parameters
     ----------
     decayed : array, shape (pieces, terms)
-        1 - exp(-length / time) of every mode in free recovery and of every term in contact.
+        1 - exp(-length / time) of every mode in each free recovery and of every term in each contact.
     lengths : array, shape (pieces,)
         See `sweep_line`.
     solid : Travelling
@@ -39,21 +39,22 @@ class Swept(NamedTuple):
 def follow(
     direction: FloatArray, swept: Swept, periodic: bool, product: FloatArray, workspace: FloatArray
 ) -> None:  # pragma: no cover
-    """Write the derivatives of the integrals of e_m and of u over the line along one direction.
+    """Write the derivatives of the integrals of e_m and of u over the line in one direction.
 
-    Contacts and free recoveries of fixed lengths act linearly on the stretches. That they begin and end elsewhere is of
-    second order, because u is continuous there. A piece takes two products of a matrix and a vector.
+    Contacts and free recoveries of fixed lengths act linearly on the stretches. The shift of the places where contact
+    begins and ends has an effect of second order only, because u is continuous there. A free recovery takes two
+    products of a matrix and a vector more than a contact.
 
     Parameters
     ----------
     direction : array, shape (terms + 1,)
-        Change of e at the start and of the depth.
+        Changes of e at the start and of the depth.
     swept : Swept
-        The pieces.
+        Contacts and free recoveries.
     periodic : bool
-        Whether the line closes; otherwise the recovery beyond the line counts.
+        Whether the line is periodic; otherwise the recovery behind the line is included.
     product : array, shape (terms + 1,), output
-        Change of the integral of e_m, and of that of u.
+        Changes of the integrals of e_m, and of the integral of u.
     workspace : array, shape (3, terms)
     """
     decayed, lengths, solid = swept
@@ -87,7 +88,7 @@ def follow(
 
 @jit
 def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: float) -> None:  # pragma: no cover
-    """Change the strain at fixed memory until the derivative of the stress is 0, as in free recovery."""
+    """Change the strain without a change of memory so that the derivative of the stress is 0, as in free recovery."""
     if stretch.size == 0:
         return
     stress = depth
@@ -102,7 +103,7 @@ def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: f
 
 @jit
 def _decays(lengths: FloatArray, deborah: FloatArray, times: FloatArray) -> FloatArray:  # pragma: no cover
-    """Return the decrease of modes in every free recovery and of terms in every contact, shape (pieces, terms)."""
+    """Return the decay of modes in every free recovery and of terms in every contact, shape (pieces, terms)."""
     decayed = np.empty((lengths.size, deborah.size))
     for piece in range(lengths.size):
         scales = deborah if piece % 2 == 1 else times
@@ -112,7 +113,7 @@ def _decays(lengths: FloatArray, deborah: FloatArray, times: FloatArray) -> Floa
 
 
 class Krylov(NamedTuple):
-    """Workspace of a Newton step: directions, the triangle they lead to, its rotations, and that of `follow`.
+    """Work arrays of a Newton step: directions, triangular matrix, rotations, and the workspace of `follow`.
 
     Parameters
     ----------
@@ -135,19 +136,19 @@ def newton_step(
     krylov: Krylov,
     step: FloatArray,
 ) -> None:  # pragma: no cover
-    """Solve the linear system of a step by minimal residuals over a Krylov space (GMRES with Givens rotations).
+    """Solve the linear system of a step by GMRES with Givens rotations.
 
-    With rows divided by `scale`, the derivative is the identity plus a smooth operator over the relaxation times, whose
-    singular values decrease fast. So four to seven products suffice, for any number of terms.
+    If rows are divided by `scale`, the derivative is the identity plus a smooth operator over the relaxation times,
+    whose singular values decrease fast. Four to seven products are therefore enough for any number of terms.
 
     Parameters
     ----------
     residual, scale : array, shape (n,)
-        Wanted changes of the integrals of e_m and u, n = terms + 1, and the size of these changes per unit.
+        Required changes of the integrals of e_m and u (n = terms + 1), and the magnitude of their derivatives.
     swept : Swept
-        The pieces.
+        Contacts and free recoveries.
     krylov : Krylov
-        The workspace.
+        Work arrays.
     step : array, shape (n,), output
     """
     basis, triangle, rotations, workspace = krylov
@@ -155,7 +156,7 @@ def newton_step(
     right = rotations[2]
     step[:] = 0.0
     square = 0.0
-    for k in range(size):  # a loop compiles seconds faster than an expression of arrays
+    for k in range(size):  # a loop compiles some seconds faster than an array expression
         basis[0, k] = residual[k] / scale[k]
         square += basis[0, k] * basis[0, k]
     norm = np.sqrt(square)
@@ -185,7 +186,7 @@ def newton_step(
 
 @jit
 def _orthogonalise(basis: FloatArray, triangle: FloatArray, j: int) -> None:  # pragma: no cover
-    """Make row j + 1 orthogonal to the earlier rows, twice because of rounding; column j gets the coefficients."""
+    """Make row j + 1 orthogonal to the earlier rows, twice because of rounding; write the coefficients to column j."""
     column = basis[j + 1]
     for i in range(j + 1):
         triangle[i, j] = 0.0
@@ -209,7 +210,7 @@ def _orthogonalise(basis: FloatArray, triangle: FloatArray, j: int) -> None:  # 
 
 @jit
 def _rotate(triangle: FloatArray, rotations: FloatArray, j: int) -> None:  # pragma: no cover
-    """Rotate column j to that of a triangle, and the right side too; its last entry is the residual."""
+    """Rotate column j so that the matrix is triangular, and rotate the right side; its last entry is the residual."""
     cosine, sine, right = rotations[0], rotations[1], rotations[2]
     for i in range(j):
         upper, lower = triangle[i, j], triangle[i + 1, j]
@@ -257,19 +258,19 @@ def solve_sliding(
 ) -> tuple[bool, int, bool]:  # pragma: no cover
     """Find the depth that carries the load, and for a periodic line the stretches that repeat after one period.
 
-    In the steady state the integral of the stress equals that of u, which is therefore known from the load. The strain
-    is a convex, increasing function of the unknowns (in contact it is the larger of two such functions), so Newton's
-    method converges from any start, and from above after its first step.
+    In the steady state the integral of the stress is equal to the integral of u, which is therefore known from the
+    load. The strain is a convex, increasing function of the unknowns (in contact it is the larger of two convex,
+    increasing functions). Newton's method therefore converges from any start, and from above after its first step.
 
     Parameters
     ----------
     profile : array, shape (nodes,)
-        Heights, positive towards the elastomer; the highest is 0. A periodic line starts there and repeats it at the
-        end.
+        Heights, positive towards the elastomer; the highest is 0. A periodic line starts at the highest node and
+        repeats it at the end.
     strain_area : float
         F_N / (4 G_inf cell): the integral of u, in cells times height.
     periodic : bool
-        Whether the line closes; otherwise elements enter undeformed and recover beyond its end.
+        Whether the line is periodic; otherwise elements enter undeformed and recover behind its end.
     solid : Travelling
         The solid.
     tolerance : float
@@ -297,7 +298,7 @@ def solve_sliding(
     steepest = 0.0
     for i in range(nodes - 1):
         steepest = max(steepest, abs(profile[i + 1] - profile[i]))
-    rounding = 1e-15 * nodes * steepest  # of a place on the line, as a height
+    rounding = 1e-15 * nodes * steepest  # error of a height due to the rounding of a place
     for sweeps in range(1, 81):
         for i in range(nodes):
             penetration[i] = unknown[terms] + profile[i]
@@ -312,13 +313,13 @@ def solve_sliding(
             scale[terms] = totals[3]
             newton_step(residual, scale, swept, krylov, step)
         else:
-            residual[:] = 1.0  # a unit of depth while the memory stays: elements enter at rest
+            residual[:] = 1.0  # a unit change of the depth; elements enter undeformed
             follow(residual, swept, False, product, workspace)
             # contact at the end of the line would continue beyond it
             step[terms] = max((strain_area - totals[1]) / product[terms], -DEEPEST_STEP * unknown[terms])
         largest = 0.0
         for j in range(size):
-            weight = min(1.0, moduli[j]) if j < terms else 1.0  # a soft term has little influence
+            weight = min(1.0, moduli[j]) if j < terms else 1.0  # the stretch of a soft term has little influence
             largest = max(largest, weight * abs(step[j]))
             unknown[j] += step[j]
         if not np.isfinite(largest):

@@ -1,8 +1,9 @@
 """Sweep of a linear viscoelastic foundation along a line of straight cells, exact inside every cell.
 
-Lengths are in cells, stresses in static moduli. The penetration w is the displacement of an element in contact at each
-node. The stretch of Prony term m is e = u - a, with de/ds = du/ds - e / deborah and deborah = tau v / cell. In contact
-the stretches have closed forms; a free element recovers as a sum of modes. Contact begins and ends inside cells.
+Lengths are in cells, stresses in static moduli. The penetration w at a node is the displacement of an element in
+contact there. The stretch of Prony term m is e = u - a, with de/ds = du/ds - e / deborah and deborah = tau v / cell. In
+contact the stretches have closed forms; a free element recovers as a sum of modes. Contact begins and ends inside
+cells.
 """
 
 from __future__ import annotations
@@ -18,16 +19,16 @@ CLOSED, OPEN_END = 0, 1
 
 
 class Travelling(NamedTuple):
-    """A solid that slides along a line, in static moduli and cells, and its recovery modes.
+    """A solid that slides along a line, in units of static moduli and cells, and its recovery modes.
 
     Parameters
     ----------
     moduli, deborah : array, shape (terms,)
-        Prony terms, ascending in the Deborah number tau v / cell.
+        Prony terms, in ascending order of the Deborah number tau v / cell.
     times : array, shape (terms,)
-        Of the recovery modes, in cells.
+        Decay lengths of the recovery modes, in cells.
     stretch_of, amplitude_of : array, shape (terms, terms)
-        Stretches of every mode (one row per mode), and contribution of the stretch of every term to the modes (one row
+        Stretches in every mode (one row per mode), and contribution of the stretch of every term to the modes (one row
         per term).
     """
 
@@ -39,7 +40,7 @@ class Travelling(NamedTuple):
 
 
 SURFACE_LAYER = 1e-7
-"""Part of a cell that is searched first: much shorter terms relax within it."""
+"""Part of a cell that is tried first if there are terms so short that they relax within it."""
 
 
 @jit
@@ -56,7 +57,7 @@ def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> No
 def step_factors(
     length: float, deborah: FloatArray, decay: FloatArray, gain: FloatArray, area: FloatArray
 ) -> None:  # pragma: no cover
-    """Write the factors of a straight piece: e becomes decay e + gain slope, its integral is gain e + area slope."""
+    """Write the factors of a straight piece: e becomes decay e + gain slope, its integral gain e + area slope."""
     for m in range(deborah.size):
         x = length / deborah[m]
         if x < 0.02:
@@ -109,7 +110,7 @@ def separation_point(
 def contact_point(
     low: float, high: float, start: float, slope: float, modes: FloatArray, times: FloatArray
 ) -> float:  # pragma: no cover
-    """Return where the recovering strain meets the line start + slope (t - low); both are convex."""
+    """Return the place where the recovering strain meets the line start + slope (t - low); both are convex."""
     point = low
     for _ in range(60):
         gap, rate = -(start + slope * (point - low)), -slope
@@ -142,13 +143,13 @@ def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[f
 def _next_contact(
     place: float, node: int, modes: FloatArray, times: FloatArray, penetration: FloatArray, last: int
 ) -> float:  # pragma: no cover
-    """Return where the strain that recovers from `place` meets the profile again at `node` or later, or -1.
+    """Return where the strain that recovers from `place` meets the profile at `node` or later, or -1.
 
-    A strain that separates from a straight cell does not meet it again, because it is convex: `node` is the end of the
-    next cell.
+    `node` must be the end of the next cell, because a convex strain that separates from a straight cell does not meet
+    it again.
 
-    A sum of decaying exponentials is log-convex, so its tangent exponential is a lower bound: nodes below it are passed
-    without evaluating the sum.
+    A sum of decaying exponentials is log-convex, so that its tangent exponential is a lower bound. Nodes below this
+    bound are skipped without evaluation of the sum.
     """
     strain, rate = _strain_of(0.0, modes, times)
     bound = strain
@@ -175,12 +176,12 @@ class Passage(NamedTuple):
     Parameters
     ----------
     lengths : array, shape (>= 2 nodes + 2,)
-        Lengths of free recovery and contact in turn; the first one, of free recovery, may be 0.
+        Lengths of free recoveries and contacts alternately, from a free recovery on, whose length may be 0.
     imbalance : array, shape (terms,)
         Integral of e_m over the line.
     totals : array, shape (6,)
-        Integrals of u, of the stress, of stress times slope; contact length; integral of slope^2 in contact; tail of u
-        beyond the line.
+        Integrals of u, of the stress, of stress times slope; length in contact; integral of slope^2 in contact;
+        integral of u behind the line.
     """
 
     lengths: FloatArray
@@ -197,7 +198,7 @@ def sweep_line(
     passage: Passage,
     workspace: FloatArray,
 ) -> tuple[int, int]:  # pragma: no cover
-    """Follow an element once along the line and add the contributions of each contact and each free recovery.
+    """Move an element once along the line and add the contributions of each contact and each free recovery.
 
     Parameters
     ----------
@@ -208,7 +209,7 @@ def sweep_line(
     solid : Travelling
         The solid.
     undeformed : bool
-        Whether the elements enter free and at rest.
+        Whether the elements enter undeformed and out of contact.
     passage : Passage, output
     workspace : array, shape (10, max(terms, 1))
 
@@ -217,7 +218,7 @@ def sweep_line(
     pieces, end : int
         Number of lengths; CLOSED if the last node is free, OPEN_END if it is in contact.
     """
-    # local names, because reading an array from a tuple takes longer than a cell
+    # local names, because reading an array from a tuple takes more time than computing a cell
     moduli, deborah, times, stretch_of, amplitude_of = solid
     lengths, imbalance, totals = passage
     terms, last = moduli.size, penetration.size - 1
@@ -268,13 +269,13 @@ def _contact(
     totals: FloatArray,
     workspace: FloatArray,
 ) -> tuple[float, float, float, bool]:  # pragma: no cover
-    """Follow the profile from `begin` until the stress falls to zero or the line ends; see `sweep_line` for the arrays.
+    """Move along the profile from `begin` until the stress falls to zero or the line ends; arrays as in `sweep_line`.
 
     Returns
     -------
     place, strain, pressure, left
-        Where it ends, strain and remaining stress there, and whether contact ends there. The stretches are in
-        ``workspace[0]``, and ``workspace[2, 0]`` is the next node at which contact can begin.
+        End of the contact or of the line, strain and remaining stress there, and whether contact ends there. The
+        stretches are in ``workspace[0]``, and ``workspace[2, 0]`` is the next node at which contact can begin.
     """
     terms, last = moduli.size, penetration.size - 1
     e, following = workspace[0], workspace[9]
@@ -320,7 +321,7 @@ def _contact(
 def _stretch(
     strain: float, slope: float, e: FloatArray, following: FloatArray, moduli: FloatArray, factors: FloatArray
 ) -> float:  # pragma: no cover
-    """Carry the stretches along a straight piece and return the stress at its end, where the strain is `strain`."""
+    """Write the stretches at the end of a straight piece, and return the stress there; the strain there is `strain`."""
     pressure = strain
     for m in range(moduli.size):
         following[m] = factors[0, m] * e[m] + factors[1, m] * slope
@@ -332,7 +333,7 @@ def _stretch(
 def _begin_recovery(
     strain: float, excess: float, e: FloatArray, moduli: FloatArray, modes: FloatArray, amplitude_of: FloatArray
 ) -> None:  # pragma: no cover
-    """Convert stretches to modes after a release of the strain by `excess`; the shortest term makes the stress zero."""
+    """Write the modes after a decrease of the strain by `excess`; the shortest term makes the stress zero."""
     stress = strain - excess
     for m in range(moduli.size):
         e[m] -= excess
@@ -353,7 +354,7 @@ def _add_recovery(
     imbalance: FloatArray,
     totals: FloatArray,
 ) -> None:  # pragma: no cover
-    """Decay the modes over a free recovery, add its integrals of u and e, and write the stretches at its end to `e`."""
+    """Reduce the modes over a free recovery, add the integrals of u and e, and write the final stretches to `e`."""
     for m in range(e.size):
         e[m] = 0.0
     for k in range(times.size):
