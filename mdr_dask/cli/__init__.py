@@ -1,4 +1,4 @@
-"""The command line: the only room that prints or exits."""
+"""The command line. Only this package prints results and ends the process."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from mdr_dask.version import __version__
 
 BROKE = 3
 INTERRUPTED = 130
-#: Commands as ``--help`` lists them; those that are not named here are in the last group.
+#: Groups of commands in ``--help``; commands that are not in this table are listed last.
 GROUPS = {
     "study": ("check", "run", "status", "verify"),
     "answers": ("show", "fit", "master-curve", "plot", "report"),
@@ -40,7 +40,7 @@ class Commands(click.Group):
     """A group whose help lists its commands by purpose."""
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the commands of each group with a line of help, and the names of all others."""
+        """Write the commands of each group with a line of help, and the names of all other commands."""
         limit = formatter.width - 20
         for title, names in GROUPS.items():
             with formatter.section(title):
@@ -50,7 +50,7 @@ class Commands(click.Group):
             formatter.write_text(f"{', '.join(others)}; each with --help")
 
     def invoke(self, context: click.Context) -> Any:
-        """Run a command; a reader of the output that has stopped reading, such as ``head``, is not an error."""
+        """Run a command. It is no error if a program such as ``head`` stops reading the output."""
         try:
             result = super().invoke(context)
             sys.stdout.flush()
@@ -120,7 +120,7 @@ def main(arguments: list[str] | None = None) -> int:
         say("interrupted; finished results are kept, and the same command goes on with the others", err=True)
         return INTERRUPTED
     except MdrDaskError as error:
-        logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # tasks of Zarr that are cancelled with it
+        logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # hides messages of cancelled Zarr tasks
         say(str(error), err=True)
         return 2
     except OSError as error:
@@ -134,7 +134,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _open_streams() -> None:
-    """Give a process without standard streams some, and print what their encoding does not have in ASCII."""
+    """Replace missing standard streams, and print characters that their encoding lacks as ASCII escapes."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:  # closed by a service manager or with >&-
@@ -144,7 +144,7 @@ def _open_streams() -> None:
 
 
 def _discard_output() -> None:
-    """Write the rest of the output nowhere, so that Python does not fail once more when it exits."""
+    """Discard the rest of the output, so that Python does not raise another error when it exits."""
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
@@ -167,5 +167,5 @@ def _reported(arguments: list[str]) -> str:
 
 
 def _interrupt(*_: object) -> None:
-    """Treat SIGTERM, which batch systems send at the wall time, like Ctrl-C."""
+    """Raise KeyboardInterrupt on SIGTERM, which batch systems send at the wall time."""
     raise KeyboardInterrupt

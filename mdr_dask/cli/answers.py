@@ -1,4 +1,4 @@
-"""Print or write the answer to a question; rows are written as they are computed."""
+"""Print the answer to a question, or write it to a file; rows are written as they are computed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from mdr_dask.questions.table import Table
 
-#: Rows of one printed table; longer answers are printed as several.
+#: Largest number of rows of a printed table; longer answers are printed as several tables.
 AT_ONCE = 2**16
 FILES = (".csv", ".json", ".jsonl", ".parquet", ".nc", ".zarr")
 
@@ -60,7 +60,7 @@ def write_answer(answer: Table, path: Path) -> int:
 
 
 def check_target(path: Path) -> None:
-    """Raise an error for another suffix, the store of a study, or Parquet without pyarrow."""
+    """Raise an error for an unknown suffix, for the store of a study, and for Parquet without pyarrow."""
     from mdr_dask.store import is_study
 
     require_suffix(path, FILES)
@@ -105,7 +105,8 @@ def _print_frame(frame: pd.DataFrame, answer: Table, join: bool) -> None:
 def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
     """Join each mean with its errors, ``0.1234 +- 0.0005 +- 0.0001``, or its interval, ``0.1234 (0.1220, 0.1240)``.
 
-    An error that is unknown or zero (but for rounding) in all rows is left out; the text names those that are printed.
+    Errors that are unknown, or zero except for rounding, in all rows are left out. The returned text names the printed
+    errors.
     """
     known = {name for name, values in columns.items() if any(map(_is_known, values))}
     joined: dict[str, list[Any]] = {}
@@ -131,7 +132,7 @@ def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
 
 
 def _meaning(kinds: dict[str, tuple[str, ...]]) -> str:
-    """Return what the errors of means are, once if it is the same for all outputs that have both."""
+    """Return a text that names the printed errors, only once if they are the same for all outputs."""
     longest = max(kinds.values(), key=len, default=())
     if all(longest[: len(kind)] == kind for kind in kinds.values()):
         return f"mean{''.join(longest)}" if longest else ""

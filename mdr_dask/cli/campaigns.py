@@ -107,12 +107,12 @@ def _print_left(rows: list[dict[str, str]], form: str | None) -> None:
 
 
 def _indented(path: str) -> str:
-    """Return the last part of a dotted name, indented by the number of the others."""
+    """Return the last part of a dotted name, indented by two blanks for each part before it."""
     return "  " * path.count(".") + path.rpartition(".")[2]
 
 
 def _brief(cell: str) -> str:
-    """Return a cell without the entries of structures, which have their own rows, and without the middle of lists."""
+    """Shorten a cell: leave out the entries of structures, which have their own rows, and the middle of lists."""
     words = re.sub(r"\{[^{}]*\}", "{...}", cell).split(" or ")
     return re.sub(r"\[([^\]]{9})[^\]]{30,}, ([^,\]]*)\]", r"[\1..., \2]", " or ".join(dict.fromkeys(words)))
 

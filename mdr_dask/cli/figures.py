@@ -1,4 +1,4 @@
-"""Figures of a store: by name, and of any output against its parameters."""
+"""The command that draws figures of a store: named figures, and any output against its parameters."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
     from mdr_dask.plots.figure import Figure
     from mdr_dask.plots.page import Page
 
-#: Options for outputs; the axes of a named figure are fixed.
+#: Options for figures of outputs only; a named figure has fixed axes.
 OF_OUTPUTS = ("over", "by", "panels", "effects", "log")
 COMMAND = "mdr_dask.command"
 
 
 class Drawing(click.Command):
-    """A command that draws; every table beside a figure repeats the command line."""
+    """A command that draws figures; the table next to each figure contains the command line."""
 
     def parse_args(self, context: click.Context, arguments: list[str]) -> list[str]:
-        """Keep the arguments as they were typed."""
+        """Store the command line as it was typed, then parse it."""
         context.meta[COMMAND] = shlex.join(["mdr-dask", str(self.name), *arguments])
         return super().parse_args(context, arguments)
 
@@ -112,7 +112,7 @@ def plot(
 
 
 def _require_quantities(units: Mapping[str, str], groups: Mapping[str, xr.Dataset]) -> None:
-    """Refuse units of a name that is neither a parameter nor an output."""
+    """Raise DataError if a unit is given for a name that is neither a parameter nor an output."""
     from mdr_dask.errors import DataError, did_you_mean
 
     known = sorted({str(name) for data in groups.values() for name in data.variables})
@@ -122,7 +122,7 @@ def _require_quantities(units: Mapping[str, str], groups: Mapping[str, xr.Datase
 
 
 def _without(figure: Plot, where: str) -> Plot:
-    """Return a figure that states which cases it leaves out."""
+    """Return a figure with a note on the cases that it leaves out."""
 
     def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
         drawn = figure.draw(groups)
@@ -133,7 +133,7 @@ def _without(figure: Plot, where: str) -> Plot:
 
 
 def _warnings(urls: Sequence[str]) -> list[str]:
-    """Return the warnings of finished results, equal ones once with their count."""
+    """Return the warnings of finished results; equal warnings appear once, with their number."""
     from mdr_dask import store as stores
     from mdr_dask.questions import progress
 
@@ -150,12 +150,12 @@ def _warnings(urls: Sequence[str]) -> list[str]:
 
 
 def _warned(figure: Plot, warnings: list[str]) -> Plot:
-    """Return a figure that repeats the warnings of its results."""
+    """Return a figure that shows the warnings of its results."""
     return replace(figure, draw=lambda groups: replace(figure.draw(groups), warnings=warnings))
 
 
 def _split(words: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the stores among the words of a command, and the names behind them."""
+    """Return the stores among the arguments of a command, and the names that follow them."""
     from mdr_dask.store import is_study
 
     def is_place(word: str) -> bool:
@@ -166,7 +166,7 @@ def _split(words: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def _known_to_all(urls: Sequence[str]) -> dict[str, Plot]:
-    """Return the named figures that all stores have."""
+    """Return the named figures that exist for the models of all stores."""
     from mdr_dask import plots
 
     each = [plots.available(_model(url)) for url in urls]
@@ -189,7 +189,7 @@ def _outputs_of(urls: Sequence[str]) -> list[str]:
 def _requested(
     names: Sequence[str], everything: bool, known: Mapping[str, Plot], urls: Sequence[str], look: Mapping[str, Any]
 ) -> dict[str, Plot]:
-    """Return the requested figures, by the name of their files."""
+    """Return the requested figures, by the names for their files."""
     from mdr_dask.errors import did_you_mean
 
     outputs, model = _outputs_of(urls), _model(urls[0])
@@ -234,7 +234,7 @@ def _page(look: Mapping[str, Any]) -> Page:
 
 
 def _groups(url: str, urls: Sequence[str], series: Sequence[str]) -> dict[str, xr.Dataset]:
-    """Return the groups of a store, by names that distinguish several stores."""
+    """Return the groups of a store, by names that include the store if there are several."""
     from mdr_dask import store as stores
     from mdr_dask.questions import selection
 
@@ -244,7 +244,7 @@ def _groups(url: str, urls: Sequence[str], series: Sequence[str]) -> dict[str, x
 
 
 def _name_of(url: str, urls: Sequence[str], series: str) -> str:
-    """Return the name of a group in a legend: its series, and its store where there are several."""
+    """Return the name of a group in a legend: its series, after the name of its store if there are several stores."""
     if len(urls) == 1:
         return series
     stems = [Path(each).stem for each in urls]
@@ -253,7 +253,7 @@ def _name_of(url: str, urls: Sequence[str], series: str) -> str:
 
 
 def _draw(figure: Plot, groups: Mapping[str, xr.Dataset], path: Path, origin: dict[str, str], one_of: bool) -> None:
-    """Draw a figure into a file, its data beside it; with --all, report the reason if it cannot be drawn."""
+    """Draw a figure to a file, with its data in a table next to it; with --all, only report a figure that fails."""
     from mdr_dask.errors import DataError, FitError
 
     try:
@@ -268,7 +268,7 @@ def _draw(figure: Plot, groups: Mapping[str, xr.Dataset], path: Path, origin: di
 
 
 def save(description: Figure, path: Path, origin: Mapping[str, str]) -> None:
-    """Draw a figure, write its data beside it, and print what neither the picture nor its title shows."""
+    """Draw a figure, write its data to a table next to it, and print notes that the picture does not show."""
     from mdr_dask.plots import labels, page, render
 
     drawn = render.render(description)

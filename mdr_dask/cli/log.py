@@ -29,9 +29,9 @@ def telling(quiet: bool, log: Path | None, **about: Any) -> Iterator[Tell]:
     Parameters
     ----------
     quiet : bool
-        Nothing on stderr.
+        Whether to print nothing on stderr.
     log : Path or None
-        File that the log is appended to.
+        File to which the log is appended.
     about
         Contents of the first line of the log.
     """
@@ -65,7 +65,7 @@ def _printer(quiet: bool) -> Callable[[Event], None]:
 
 
 def _writer(stream: TextIO) -> Callable[[str, dict[str, Any]], None]:
-    """Return the function that writes one line, whole, from any thread."""
+    """Return a function that writes one complete line to the log; any thread may call it."""
     lock = threading.Lock()
 
     def write(name: str, facts: dict[str, Any]) -> None:

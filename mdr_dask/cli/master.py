@@ -1,4 +1,4 @@
-"""The command master-curve: a store, a table or a kept curve to shift factors, a merged curve and a figure."""
+"""The command master-curve: compute shift factors and a merged curve from a store, a table or a kept result."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 
 
 PARTS = ("factors", "curve", "points")
-"""What is printed: the factors, the merged curve with its error, or all points after shifting."""
+"""Parts of the result that can be printed: factors, the merged curve with its error, or all points after shifting."""
 
 LAWS = ("power", "arrhenius", "wlf")
 FAR, LEAST = 5.0, 0.002
-"""Distance of a point from the merged curve, in standard deviations of the scatter and in decades, that is reported."""
+"""A point is reported if its distance from the merged curve exceeds both: in standard deviations, and in decades."""
 
 KEPT = (".json", ".csv")
 
@@ -144,7 +144,7 @@ def _open(source: str, series: str | None, selections: tuple[str, ...]) -> xr.Da
 
 
 def _rows(frame: pd.DataFrame, selections: tuple[str, ...]) -> pd.DataFrame:
-    """Return the rows of a table whose columns have the values selected."""
+    """Return the rows of a table whose columns have the selected values."""
     import numpy as np
     import xarray as xr
 
@@ -158,7 +158,7 @@ def _rows(frame: pd.DataFrame, selections: tuple[str, ...]) -> pd.DataFrame:
 
 
 def _kept(source: str) -> xr.Dataset | None:
-    """Return a result that --keep wrote, or nothing if the source is something else."""
+    """Return a result that --keep wrote, or None if the source is something else."""
     path = Path(source)
     if not path.is_file():
         return None
@@ -177,7 +177,7 @@ def _kept(source: str) -> xr.Dataset | None:
 
 
 def _print_table(curve: xr.Dataset, part: str, form: str) -> None:
-    """Print a part of the result; two groups have a table of factors each."""
+    """Print a part of the result; shifts by two variables have one table of factors each."""
     shown = []
     if part != "factors":
         dims = (part.removesuffix("s"),)
@@ -235,7 +235,7 @@ def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
 
 
 def _print_outliers(curve: xr.Dataset) -> None:
-    """Say which point lies farthest off the curve, if any lies farther than scatter brings it."""
+    """Print the number of points farther from the curve than scatter explains, and the farthest point, if any."""
     import numpy as np
 
     x, y = np.log10(curve["point_abscissa"].to_numpy()), np.log10(curve["point_ordinate"].to_numpy())

@@ -1,4 +1,4 @@
-"""Results and messages for a terminal, a pipe, JSON or CSV."""
+"""Print results and messages for a terminal, a pipe, JSON or CSV."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Row = dict[str, Any]
-#: Errors below this part of their mean are rounding errors.
+#: Errors below this fraction of their mean are rounding errors.
 ROUNDING = 1e-13
-#: Columns between two columns of a table, and the narrowest terminal that tables are made for.
+#: Blanks between two columns of a table, and smallest width of a terminal for which tables are formatted.
 GAP, NARROWEST = 2, 40
-#: Columns in which a long text at the end of a row is wrapped.
+#: Smallest width in characters to which a long text in the last column is wrapped.
 WRAPPED = 30
-#: Sizes outside which numbers are printed with a power of ten.
+#: Numbers smaller or larger than these are printed with a power of ten.
 _SMALL, _LARGE = 1e-4, 1e6
 UNKNOWN = "-"
 #: A blank at which lines are not broken.
@@ -65,7 +65,7 @@ def print_rows(rows: Sequence[Row], units: dict[str, str], form: str, limit: int
     form : str
         ``table``, ``csv`` or ``json``.
     limit : int, optional
-        Largest number of rows of a table; the number of the others is printed on stderr.
+        Largest number of rows of a table; the number of rows left out is printed on stderr.
     """
     if form == "json":
         print_json({"units": units, "rows": [{key: _finite(value) for key, value in row.items()} for row in rows]})
@@ -144,7 +144,7 @@ def _print_table(titles: Sequence[str], cells: Sequence[Sequence[str]], keys: in
 
 
 def _parts(widths: Sequence[int], keys: int) -> list[list[int]]:
-    """Return the columns of each part of a table that is too wide; the keys come first in every part."""
+    """Return the columns of each part of a table that is too wide; every part begins with the key columns."""
     first, rest = list(range(keys)), list(range(keys, len(widths)))
     parts, part = [], list(first)
     for column in rest:
@@ -171,7 +171,7 @@ def _print_block(heads: Sequence[Sequence[str]], cells: Sequence[Sequence[str]],
 
 
 def _is_text(column: Sequence[str]) -> bool:
-    """Return whether a column has words rather than numbers, and is aligned to the left."""
+    """Return whether a column contains words, so that it is aligned to the left."""
     return any(re.search(r"[a-df-zA-Z]{2}", cell) for cell in column)
 
 
@@ -185,7 +185,7 @@ def hanging(before: str, text: str) -> str:
 
 
 def _heading(title: str, width: int) -> list[str]:
-    """Return the lines of a heading: its name, broken after ``_`` to the width of the cells, then its unit."""
+    """Return the lines of a heading: the name, broken after ``_`` or a blank to fit the cells, then the unit."""
     name, unit = _name(title), _unit(title).strip()
     pieces = re.findall(r"[^_ ]+[_ ]*", name) or [name]
     lines = [""]
@@ -206,7 +206,7 @@ def _unit(title: str) -> str:
 
 
 def print_left(count: int | None) -> None:
-    """Print on stderr how many rows a limit left out; None if their number is not known."""
+    """Print on stderr how many rows a limit left out; `count` is None if their number is unknown."""
     if count != 0:
         click.echo(f"... {'' if count is None else f'{count} '}more rows (--limit 0 prints all)", err=True)
 
@@ -224,7 +224,7 @@ def print_json(document: Any) -> None:
 def table(dataset: xr.Dataset) -> tuple[list[Row], dict[str, str]]:
     """Turn a Dataset into rows, one for each point of its dimensions, and the units of the columns.
 
-    Variables that lack a dimension are repeated along it; fixed coordinates are left out.
+    Variables that lack a dimension are repeated along it; scalar coordinates are left out.
     """
     dims = [str(dim) for dim in dataset.sizes]
     names = [str(name) for name in dataset.data_vars]
@@ -259,7 +259,7 @@ def with_intervals(rows: list[Row], units: dict[str, str]) -> tuple[list[Row], d
 
 
 def with_interval(value: float, low: float = math.nan, high: float = math.nan) -> str:
-    """Join a constant and the ends of its interval, if they are known."""
+    """Return a constant as text, followed by the ends of its interval if they are known."""
     if math.isnan(value):
         return "not determined"
     if not (math.isfinite(low) and math.isfinite(high)):
@@ -268,7 +268,7 @@ def with_interval(value: float, low: float = math.nan, high: float = math.nan) -
 
 
 def with_error(mean: float, *errors: float | None) -> str:
-    """Join a mean and its errors: ``?`` for an error that is not known, 0 for one below rounding."""
+    """Join a mean and its errors: ``?`` for an unknown error, 0 for an error below rounding."""
     if not math.isfinite(mean) or not any(error is not None and math.isfinite(error) for error in errors):
         return short(mean)
     shown = ["?" if error is None or not math.isfinite(error) else _error(error, abs(mean)) for error in errors]
@@ -276,7 +276,7 @@ def with_error(mean: float, *errors: float | None) -> str:
 
 
 def is_rounding(errors: Sequence[Any], means: Sequence[Any]) -> bool:
-    """Return whether all known errors of means are zero but for rounding."""
+    """Return whether all known errors of means are zero except for rounding."""
     pairs = [(error, mean) for error, mean in zip(errors, means, strict=True) if error is not None and mean is not None]
     return not any(abs(error) > ROUNDING * abs(mean) for error, mean in pairs)
 
@@ -286,7 +286,7 @@ def _error(error: float, size: float) -> str:
 
 
 def _number(value: float, digits: int) -> str:
-    """Return a number with some digits, and with a power of ten only if it is very small or large."""
+    """Return a number with `digits` digits, and with a power of ten only if it is very small or very large."""
     text = f"{value:.{digits}g}"
     if "e" in text and _SMALL <= abs(float(text)) < _LARGE:
         return f"{float(text):.0f}"
@@ -294,7 +294,7 @@ def _number(value: float, digits: int) -> str:
 
 
 def short(value: Any) -> str:
-    """Return a value as a cell of a table; ``-`` for one that is not known."""
+    """Return a value as a cell of a table; ``-`` for an unknown value."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return UNKNOWN
     return f"{value:.6g}" if isinstance(value, float) else printable(str(value)).replace("\n", " ")

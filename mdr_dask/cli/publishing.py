@@ -1,4 +1,4 @@
-"""Pages of studies: report and publish."""
+"""The commands that write a page about studies and pack a study for publication."""
 
 from __future__ import annotations
 

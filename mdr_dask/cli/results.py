@@ -23,7 +23,7 @@ class Reading(click.Command):
     """A command whose first argument is a store."""
 
     def invoke(self, context: click.Context) -> Any:
-        """Run the command; a chunk that cannot be read is one error."""
+        """Run the command; a chunk that cannot be read is reported as an error with one sentence."""
         from mdr_dask.store import readable
 
         with readable(context.params[str(self.params[0].name)]):
@@ -146,7 +146,7 @@ def _answer(
     limit: int,
     **parts: Any,
 ) -> None:
-    """Print or write the answer to a question."""
+    """Print the answer to a question, or write it to a file."""
     from mdr_dask import store as stores
     from mdr_dask.questions import selection
     from mdr_dask.questions.labelled import labelled
@@ -173,7 +173,7 @@ def _answer(
 
 
 def list_names(model: str, summaries: dict[str, str]) -> None:
-    """Print names with a line about each."""
+    """Print each name with one line of description."""
     if not summaries:
         click.echo(f"none for {model}")
     width = max(map(len, summaries), default=0)

@@ -106,7 +106,7 @@ def _print_plan(study: Campaign, url: str, form: str | None) -> None:
 
 
 def _counted(study: Campaign, to_do: int) -> str:
-    """Return which results are counted of a store, where more may follow them; an empty string where none do."""
+    """Return the name of the counted results if more may follow later, otherwise an empty text."""
     if study.replication.goes_on:
         return "first round"
     is_adaptive = any(axis.refinement is not None for series in study.series for axis in series.axes)
@@ -174,6 +174,6 @@ def _print_failed(url: str, progress: Progress) -> None:
 
 
 def _shared(progress: Progress) -> str:
-    """Return the share of the results that needed no solve of their own."""
+    """Return a text with the fraction of results that shared the solution of another result; empty for none."""
     share = 1 - progress.solves / max(progress.done, 1)
     return f" ({share:.1%} of the results needed none of their own)" if progress.solves and share > 0 else ""

@@ -14,7 +14,7 @@ from mdr_dask.cli.writing import FIGURES, require_suffix
 
 
 class Asking(Drawing, Reading):
-    """A command that reads a store and may draw."""
+    """A command that reads a store and may draw a figure."""
 
 
 @click.command(cls=Asking)

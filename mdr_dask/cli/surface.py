@@ -97,7 +97,7 @@ def surface(
 
 
 def _read(files: tuple[str, ...], kind: str | None, options: dict[str, Any]) -> Surface:
-    """Return the surface that files and options name."""
+    """Return the surface that the files and the options describe."""
     from pydantic import ValidationError
 
     from mdr_dask.errors import DataError
@@ -118,7 +118,7 @@ def _read(files: tuple[str, ...], kind: str | None, options: dict[str, Any]) -> 
 
 
 def _as_options(message: str) -> str:
-    """Write the parameters of a campaign that a message names as the options of this command."""
+    """Replace parameter names of a campaign in a message by the options of this command."""
     message = re.sub(r"`(map|scan|spectrum)` instead of `\w+`", r"--as \1", message)
     names = "|".join(option.name or "" for option in surface.params)
     return re.sub(rf"`({names})(?:: (\w+))?`", lambda m: " ".join(filter(None, (_option(m[1]), m[2]))), message)
@@ -129,7 +129,7 @@ def _option(name: str) -> str:
 
 
 def _kind(file: str, options: dict[str, Any]) -> str:
-    """Return what a file is: a map or a scan by its content, or a table of a spectrum by the names of its columns."""
+    """Return the kind of a file: a spectrum by the names of its columns, a map or a scan by its dimensions."""
     from mdr_dask.models.data_file import DataFile
     from mdr_dask.models.parts.height_file import TEXT, dimensions
     from mdr_dask.tables import decoded
@@ -156,7 +156,7 @@ def _write(read: Surface, path: Path) -> None:
 
 
 def _method(read: Surface) -> str:
-    """Return how the spectrum was made."""
+    """Return a description of how the spectrum was computed."""
     if read.map is not None:
         window = "Hann's window of the distance from the middle" if read.map.window == "hann" else "no window"
         return f"{read.map.detrend} subtracted, {window}, C2D in rings of the wave vector"

@@ -1,4 +1,4 @@
-"""Show who is at work on a store and its progress, until the work ends."""
+"""Show the active runs of a store and their progress, until they end."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ import click
 
 from mdr_dask.cli.printing import Row
 
-#: Seconds between two looks, at least this many times as long as a look takes.
+#: Smallest pause between two updates in seconds, and smallest ratio of the pause and the duration of an update.
 PAUSE, SHARE = 1.0, 5.0
 
 
 def at_work(store: str) -> list[str]:
-    """Return who is at work on a store: an exclusive run, or how many parts and which."""
+    """Describe the active runs of a store: the exclusive run, and the number and the names of active parts."""
     from mdr_dask import store as stores
 
     runner, parts = stores.at_work(store)
@@ -36,14 +36,14 @@ def _ranges(numbers: list[int]) -> str:
 
 
 def watch(store: str, count: Callable[[], list[Row]]) -> None:
-    """Show the progress of a run until nobody is at work: in place on a terminal, else a line for every change.
+    """Show the progress of a store until no run is active: in place on a terminal, otherwise a line for every change.
 
     Parameters
     ----------
     store : str
         Path or URL of the store.
     count : callable
-        Returns a row for every group: its name, its results, and how many there are in each state.
+        Returns a row for every group: its name, the number of its results, and their numbers in each state.
     """
     if sys.stdout.isatty():
         from rich.console import Console

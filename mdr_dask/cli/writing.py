@@ -1,4 +1,4 @@
-"""Files that commands write."""
+"""Write the output files of commands."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ format_option = click.option(
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Make the folder of a file to be written; after an error remove what was made, and name the file in the error."""
+    """Make the folder of a new file; after an error, remove what was made, and name the file in the error."""
     require_outside(path)
     there = path.exists()
     missing = [folder for folder in path.parents if not folder.exists()]
@@ -29,7 +29,7 @@ def writing(path: Path) -> Iterator[None]:
     except BaseException as error:
         if not there and path.exists():
             shutil.rmtree(path) if path.is_dir() else path.unlink()
-        with suppress(OSError):  # the folder was never made, or is in use
+        with suppress(OSError):  # the folder was not made, or is not empty
             for folder in missing:
                 folder.rmdir()
         if isinstance(error, OSError) and error.filename is None:
@@ -38,7 +38,7 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def require_outside(path: Path) -> None:
-    """Raise UsageError for a file inside a store, which would count as damage."""
+    """Raise UsageError for a file inside a store, because the store would then count as damaged."""
     for folder in path.absolute().parents:
         if (folder / "zarr.json").is_file() and _is_study(folder):
             raise click.UsageError(f"expected a file outside of stores, got {str(path)!r} in the store {folder.name}")
@@ -51,7 +51,7 @@ def _is_study(folder: Path) -> bool:
 
 
 def require_suffix(path: Path | None, known: tuple[str, ...]) -> None:
-    """Raise UsageError for a file with another suffix."""
+    """Raise UsageError for a file whose suffix is not among the known ones."""
     if path is not None and path.suffix not in known:
         raise click.UsageError(
             f"expected a file that ends in {', '.join(known[:-1])} or {known[-1]}, got {str(path)!r}"
