@@ -1,4 +1,4 @@
-"""Heights from files as instruments and people write them: maps and line scans, in text, numpy or an own format."""
+"""Heights from files of instruments and users: maps and line scans, as text, numpy arrays or in instrument formats."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
 
     from mdr_dask.physics.surfaces.maps import SurfaceMap
 
-#: Ends of the names of tables.
+#: File name extensions of text tables and of workbooks.
 TEXT = (".csv", ".txt", ".dat", ".xyz", ".asc", ".tsv", ".grd", ".prn", ".xlsx")
 SAME = 0.01
-"""Relative difference up to which two lengths count as equal: files round them, and positions are recorded ones."""
+"""Relative difference up to which two lengths count as equal: numbers in files are rounded, and positions vary."""
 MOST_COLUMNS = 6
-"""Columns that x, y, z or a line scan may have with numbers and other values beside them; a map has more."""
+"""Largest number of columns of a line scan or a table of x, y, z, including further columns; a map has more."""
 
 
 class Units(NamedTuple):
-    """Units of heights and of positions, and distances of points, m; empty where they are not stated."""
+    """Units of heights and positions, and distances between points, m; empty if they are not stated."""
 
     height: str = ""
     position: str = ""
@@ -36,14 +36,14 @@ class Units(NamedTuple):
 
 
 class Recorded(NamedTuple):
-    """A map as it was recorded, NaN where points are missing, and what was done to read it."""
+    """A recorded map, NaN where points are missing, and remarks on how it was read."""
 
     surface: SurfaceMap
     remarks: tuple[str, ...]
 
 
 class Scan(NamedTuple):
-    """Positions and heights of a line scan, m, and what was done to read it."""
+    """Positions and heights of a line scan, m, and remarks on how it was read."""
 
     position: FloatArray
     height: FloatArray
@@ -51,7 +51,7 @@ class Scan(NamedTuple):
 
 
 class _Grid(NamedTuple):
-    """Heights in the unit of the file, rows along x; steps of the positions along x and y in their unit, if any."""
+    """Heights in the unit of the file, rows along x, and steps of the positions along x and y in their own unit."""
 
     rows: FloatArray
     steps: tuple[float | None, float | None] = (None, None)
@@ -62,19 +62,19 @@ class _Grid(NamedTuple):
 def read_map(file: DataFile, units: Units) -> Recorded:
     """Return the heights of a map.
 
-    What the file states is used. Rows of text and npy run along x, one below the other along y.
+    Units and spacings stated in the file are used. Rows of text and npy files run along x and are stacked along y.
 
     Parameters
     ----------
     file : DataFile
-        Text, npy, or any format that SurfaceTopography reads.
+        Text, npy, or any format that SurfaceTopography can read.
     units : Units
-        What the user states.
+        Units and spacings stated by the user.
 
     Raises
     ------
     DataError
-        If the file holds no map, if a unit or spacing is missing, or if file and user contradict each other.
+        If the file holds no map, if a unit or spacing is missing, or if statements of file and user differ.
     """
     from mdr_dask.physics.surfaces.maps import SurfaceMap
 
@@ -91,19 +91,19 @@ def read_map(file: DataFile, units: Units) -> Recorded:
 
 
 def read_scan(file: DataFile, units: Units) -> Scan:
-    """Return a line scan as it was recorded; missing heights are interpolated.
+    """Return a line scan as recorded, with missing heights interpolated.
 
     Parameters
     ----------
     file : DataFile
-        Table of x and z, or any format that SurfaceTopography reads.
+        Table of x and z, or any format that SurfaceTopography can read.
     units : Units
-        What the user states.
+        Units and spacings stated by the user.
 
     Raises
     ------
     DataError
-        If the file does not hold a line, if a unit is missing, or if file and user contradict each other.
+        If the file does not hold a line, if a unit is missing, or if statements of file and user differ.
     """
     import numpy as np
 
@@ -138,7 +138,7 @@ def read_scan(file: DataFile, units: Units) -> Scan:
 
 
 def dimensions(file: DataFile) -> int:
-    """Return 2 if a file holds a map, 1 if it holds a line scan or another table of few columns."""
+    """Return 2 if a file holds a map, and 1 if it holds a line scan or another table with few columns."""
     if file.name.lower().endswith(".npy"):
         return 2
     if (channel := _channel(file)) is not None:
@@ -154,7 +154,7 @@ def dimensions(file: DataFile) -> int:
 
 
 def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[float, float]]:
-    """Return the unit of the heights and the spacings along x and y, all in m, from what file and user state."""
+    """Return the unit of the heights and the spacings along x and y, in m, from the statements of file and user."""
     height = _one_unit(file, "unit", grid.stated.height, units.height)
     position = _one_unit(file, "x_unit", grid.stated.position, units.position)
     metre = _metre(file, position, "x_unit") if position else _implied_unit(file, grid.steps, units)
@@ -185,7 +185,7 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
 
 
 def _implied_unit(file: DataFile, steps: tuple[float | None, float | None], units: Units) -> float | None:
-    """Return the unit of positions, m, that follows from a spacing which the user states; a power of ten."""
+    """Return the unit of positions, m, a power of ten that follows from the spacing stated by the user."""
     import math
 
     for step, spacing in zip(steps, (units.spacing, units.spacing_y or units.spacing), strict=True):
@@ -201,14 +201,14 @@ def _implied_unit(file: DataFile, steps: tuple[float | None, float | None], unit
 
 
 def _one_unit(file: DataFile, option: str, stated: str, given: str) -> str:
-    """Return the unit that a file or the user states."""
+    """Return the unit stated by the file or by the user; raise DataError if both are given and differ."""
     if stated and given and abs(_metre(file, stated, option) / _metre(file, given, option) - 1) > SAME:
         raise DataError(f"{file.name}: the file says {stated}, got {given!r}: leave out `{option}` or correct the file")
     return stated or given
 
 
 def _metre(file: DataFile, unit: str, option: str) -> float:
-    """Return a unit of length in m."""
+    """Return a unit of length, converted to m."""
     try:
         return to_si(f"1 {unit}", "m")
     except ValueError as error:
@@ -216,11 +216,11 @@ def _metre(file: DataFile, unit: str, option: str) -> float:
 
 
 def _channel(file: DataFile) -> Any:
-    """Return the main channel of a file as SurfaceTopography finds it, or None if it is text for our own reader.
+    """Return the main channel of a file, read by SurfaceTopography, or None for text that this module reads.
 
-    Plain text is left to our own readers unless SurfaceTopography finds a unit in it.
+    This module reads text files in which SurfaceTopography finds no unit.
     """
-    file.read_bytes()  # refuses a file that has changed
+    file.read_bytes()  # raises an error if the file has changed
     is_text = file.name.lower().endswith(TEXT)
     try:
         import SurfaceTopography
@@ -230,7 +230,7 @@ def _channel(file: DataFile) -> Any:
         raise DataError(f"{file.name}: this format needs SurfaceTopography: pip install 'mdr_dask[formats]'") from None
     try:
         channel = SurfaceTopography.open_topography(file.path).default_channel
-    except Exception as problem:  # each of its readers raises errors of its own
+    except Exception as problem:  # its readers raise errors of many types
         if is_text:
             return None
         reason = type(problem).__name__
@@ -239,7 +239,7 @@ def _channel(file: DataFile) -> Any:
 
 
 def _topography(file: DataFile, channel: Any, units: Units) -> tuple[Any, str]:
-    """Return the map or line of a channel, and its unit, which is that of heights and positions."""
+    """Return the map or line of a channel, and the common unit of its heights and positions."""
     stated = channel.unit or ""
     unit = _one_unit(file, "unit", stated, units.height)
     if not unit:
@@ -267,7 +267,7 @@ def _of_channel(file: DataFile, channel: Any, units: Units) -> _Grid:
 
 
 def _array(file: DataFile) -> FloatArray:
-    """Return the rows of an array of numpy."""
+    """Return the rows of a numpy array file."""
     import numpy as np
 
     try:
@@ -282,13 +282,13 @@ def _array(file: DataFile) -> FloatArray:
 
 
 def _is_grid(lines: list[str]) -> bool:
-    """Return whether a text is a grid of Surfer or ESRI."""
+    """Return whether a text is a grid file of Surfer or ESRI."""
     head = lines[0].split() if lines else []
     return head[:1] == ["DSAA"] or (bool(head) and head[0].lower() == "ncols")
 
 
 def _grid_of_text(file: DataFile) -> _Grid:
-    """Return the heights of a text, and what it states about them."""
+    """Return the heights of a text file, with the units and spacings stated in it."""
     import numpy as np
 
     lines = file.read_text().splitlines()
@@ -316,9 +316,10 @@ def _without_positions(file: DataFile, rows: FloatArray, stated: Units, remarks:
 
 
 def _stated(file: DataFile, head: list[str], first: str) -> Units:
-    """Return the units and the spacings that lines before the heights state, or a corner such as ``y [um]``.
+    """Return the units and spacings stated in the lines before the heights, or in a corner cell such as ``y [um]``.
 
-    A line that ends in a unit of length states that unit for what it names, and a length if it names a spacing.
+    If a line ends in a unit of length, it states the unit of the quantity it names; if it names a spacing, it states
+    its value.
     """
     corner = re.split(r"[\t;,]", first)[0]
     head = [*head, f"position {corner}"] if re.search(r"[\[(]", corner) else head
@@ -333,7 +334,7 @@ def _stated(file: DataFile, head: list[str], first: str) -> Units:
         if number and names & {"spacing", "pitch", "pixel", "step", "dx", "dy", "distance"}:
             key = "spacing_y" if names & {"y", "dy"} and not names & {"x", "dx"} else "spacing"
             found.setdefault(key, {})[f"{words[-2]} {words[-1]}"] = line
-        elif not number and bool(along) != bool(upwards):  # both are the names of several columns
+        elif not number and bool(along) != bool(upwards):  # a line with both names lists the columns
             found.setdefault("position" if along else "height", {})[words[-1]] = line
         elif not number and "unit" in names:
             found.setdefault("height", {})[words[-1]] = line
@@ -355,7 +356,7 @@ def _is_length(unit: str) -> bool:
 
 
 def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
-    """Return the rows of numbers of a text as a table, NaN for words, and the index of the first line that is one."""
+    """Return the numeric rows of a text as a table, NaN for words, and the index of the first such line."""
     import pandas as pd
 
     kept = [line for line in lines if line.strip() and line.lstrip()[0] not in "#%"]
@@ -377,14 +378,14 @@ def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
     common = max(set(stripped), key=stripped.count, default=0)
 
     def cells_of(line: str) -> list[str]:
-        """Return the entries of a row; an empty one at its end is a missing point unless it is one too many."""
+        """Return the entries of a row; an empty last entry is a missing point, unless the row is longer than others."""
         cells = line.split(separator)
         while len(cells) > common and not cells[-1].strip():
             cells.pop()
         return cells
 
     width = [len(cells_of(line)) for line in kept[first : last + 1]]
-    while width and width[0] != common:  # numbers in a preamble
+    while width and width[0] != common:  # skips numbers in the preamble
         first, width = first + 1, width[1:]
     try:
         table = pd.read_csv(
@@ -407,7 +408,7 @@ def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
 
 
 def _surfer(file: DataFile, lines: list[str]) -> _Grid:
-    """Return the grid of a text of Surfer: DSAA, numbers of points, ranges of x, y and z, rows from the lowest y on."""
+    """Return the grid of a Surfer text: DSAA, numbers of points, ranges of x, y and z, then rows in ascending y."""
     import numpy as np
 
     try:
@@ -421,7 +422,7 @@ def _surfer(file: DataFile, lines: list[str]) -> _Grid:
 
 
 def _esri(file: DataFile, lines: list[str]) -> _Grid:
-    """Return the grid of an ESRI text: names and numbers, then rows from the highest y on."""
+    """Return the grid of an ESRI text: names with numbers, then rows in descending y."""
     import numpy as np
 
     head = {
@@ -437,7 +438,7 @@ def _esri(file: DataFile, lines: list[str]) -> _Grid:
     return _Grid(rows[::-1], (step, step))
 
 
-#: Columns of a table of points.
+#: Columns of a table of points of a map.
 COORDINATES = (
     Column("x", "m"),
     Column("y", "m", ("Y",)),
@@ -446,9 +447,9 @@ COORDINATES = (
 
 
 def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame) -> tuple[tuple[int, str], ...]:
-    """Return place and unit of the columns x, y and z of a table, by their names; empty if it has none of them.
+    """Return index and unit of the columns x, y and z of a table, from their names; empty if any is missing.
 
-    In a table without names they are the three that are left without the numbers of the rows.
+    Without names, they are the three columns that remain after those with row numbers are left out.
     """
     try:
         sheet = read_sheet("\n".join(lines[: first + 10]), file.name)
@@ -468,7 +469,7 @@ def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFra
 
 
 def _scattered(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame, stated: Units) -> _Grid:
-    """Return the grid of a table of x, y and z in any order; points of the grid that have no row are missing."""
+    """Return the grid of a table of x, y and z in any order; grid points without a row are missing points."""
     columns = _coordinates(file, lines, first, cells)
     if not columns:
         raise DataError(
@@ -487,7 +488,7 @@ def _scattered(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame
 
 
 def _spaced(file: DataFile, height: FloatArray, units: Units) -> FloatArray:
-    """Return the positions of heights at the distance that the user states, m."""
+    """Return the positions, m, of equidistant heights with the spacing stated by the user."""
     import numpy as np
 
     if units.spacing is None:
@@ -496,7 +497,7 @@ def _spaced(file: DataFile, height: FloatArray, units: Units) -> FloatArray:
 
 
 def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]:
-    """Return positions and heights, m, of a table: by the names of its columns, or else by their numbers."""
+    """Return positions and heights, m, of a table, found by column names or, without names, by the numbers in them."""
     text = file.read_text()
     sheet = read_sheet(text, file.name)
     if sheet.names:
