@@ -38,7 +38,7 @@ class MachineError(MdrDaskError):
 
 
 class DataError(MdrDaskError):
-    """A table, profile or selection that lacks what is needed."""
+    """A table, profile or selection that is invalid or incomplete."""
 
 
 class FitError(MdrDaskError):

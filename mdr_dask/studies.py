@@ -156,7 +156,7 @@ def open_study(url: str | Path) -> xr.Dataset | xr.DataTree:
     Dataset or DataTree
         Outputs along the axes and ``realisation``, with units, their errors, and ``status``; for a campaign with
         series a DataTree with a node for each. Arrays are read when they are used. The attribute ``complete`` is False
-        as long as results are missing: means then average what is there.
+        as long as results are missing; means are then taken over the available results.
 
     Raises
     ------
@@ -248,7 +248,7 @@ def fit(study: Study, law: str, measured: str | Path | pd.DataFrame | None = Non
     law : str
         Its name; ``calibration`` finds parameters from measured points.
     measured : str, Path or DataFrame, optional
-        Table of measured points, in place of that of the campaign; units are in brackets after the column names.
+        Table of measured points, in place of the table of the campaign; units are in brackets after the column names.
 
     Returns
     -------
@@ -278,7 +278,7 @@ def plot(study: Study, figure: str, select: Words = (), **view: Any) -> Figure:
     study : Dataset, DataTree, str or Path
         A study, or the path of its store.
     figure : str
-        Name of a figure, or of an output to draw as `view` says.
+        Name of a figure, or of an output to draw along the axes in `view`.
     select : sequence of str
         Parts of the study, as for the option ``--select``.
     **view

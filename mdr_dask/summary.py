@@ -114,7 +114,7 @@ def spacing(values: tuple[float, ...]) -> str:
 
 
 def cost_lines(costs: Estimate) -> Iterator[str]:
-    """Yield counts, size and time of a study; with ``until``, those of the first round and of all possible rounds."""
+    """Yield counts, size and time of a study; with ``until``, for the first round and for all possible rounds."""
     more = costs.rounds
     cases, results = _counted("case", costs.cases, costs.growth), _counted("result", costs.results, more)
     yield f"{cases} x {_counted('realisation', costs.realisations, costs.at_most / costs.realisations)} = {results}"

@@ -202,7 +202,7 @@ def _checked(model: Model[Any], block: Block[Any], result: Result) -> Result:
     Raises
     ------
     TypeError, ValueError
-        If the result is not what the model declares.
+        If the result lacks a declared output, or has another shape or status than declared.
     """
     if not isinstance(result, Result):
         raise TypeError(f"expected a Result, got {type(result).__name__}")

@@ -105,8 +105,8 @@ def _print_frame(frame: pd.DataFrame, answer: Table, join: bool) -> None:
 def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
     """Join each mean with its errors, ``0.1234 +- 0.0005 +- 0.0001``, or its interval, ``0.1234 (0.1220, 0.1240)``.
 
-    Errors that are unknown, or zero except for rounding, in all rows are left out. The returned text names the printed
-    errors.
+    An error is left out if it is unknown in all rows, or zero except for rounding in all rows. The returned text names
+    the errors that are not left out.
     """
     known = {name for name, values in columns.items() if any(map(_is_known, values))}
     joined: dict[str, list[Any]] = {}

@@ -28,7 +28,7 @@ PARTS = ("factors", "curve", "points")
 
 LAWS = ("power", "arrhenius", "wlf")
 FAR, LEAST = 5.0, 0.002
-"""A point is reported if its distance from the merged curve exceeds both: in standard deviations, and in decades."""
+"""A point is reported if it is farther from the merged curve than FAR standard deviations and than LEAST decades."""
 
 KEPT = (".json", ".csv")
 

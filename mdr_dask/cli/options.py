@@ -12,7 +12,7 @@ from mdr_dask.cli.printing import say
 
 
 def tell(sentence: str) -> None:
-    """Print a message on stderr, beside the results on stdout."""
+    """Print a message on stderr; results are printed on stdout."""
     say(sentence, err=True)
 
 

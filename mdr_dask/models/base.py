@@ -43,8 +43,8 @@ class Parameters(BaseModel):
     A subclass may declare more about its parameters:
 
     * `renamed`: names of parameters and outputs of earlier versions, each with its replacement for a message.
-    * `alternatives`: groups of which exactly one member is given. Each member is a tuple of parameters that are given
-      together; a dot separates the names of nested parameters.
+    * `alternatives`: groups of alternatives. A user gives exactly one member of each group. A member is a tuple of
+      parameters that are given together; a dot separates the names of nested parameters.
     * `overrides`: parameters that replace another one, each with the one it replaces.
     * `settings`: parameters that set the resolution of the solver or the points to store, not the physical problem.
     * `requires`: parameters that have an effect only if another parameter has a certain value.
@@ -330,7 +330,7 @@ def with_value(parameters: Any, path: str, value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Result:
-    """What a model returns for a block.
+    """The return value of a model for a block.
 
     Parameters
     ----------

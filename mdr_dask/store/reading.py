@@ -54,8 +54,8 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
     -------
     dict of str to Dataset
         Every group by series name (``""`` for a study without series, ``"-"`` if series were added to it), numeric
-        axes in ascending order. Arrays are loaded when used; those of a group larger than `LAZY_BYTES` are Dask arrays,
-        reduced chunk by chunk.
+        axes in ascending order. Arrays are loaded when used. In a group larger than `LAZY_BYTES` they are Dask arrays,
+        which are reduced chunk by chunk.
 
     Raises
     ------
