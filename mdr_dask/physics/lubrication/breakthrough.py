@@ -159,7 +159,7 @@ def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> ND
     clusters : Clusters
         The clusters of the whole line.
     window : float
-        Width of the window in spacings, at most that of the line.
+        Width of the window in spacings, at most the length of the line.
     rule : str
         One of `EDGE_RULES`.
 
@@ -185,7 +185,7 @@ class Pair(NamedTuple):
     level : float
         Film thickness h0 in m.
     spacing : float
-        Distance dx of the nodes in m.
+        Distance dx between nodes in m.
     strength : float
         Layer strength from `layer_strength`, in 1/m.
     """
@@ -279,7 +279,7 @@ def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray
     ----------
     pair : Pair
     window : float
-        Width of the window in spacings, at most that of the line.
+        Width of the window in spacings, at most the length of the line.
     positions : tuple of two int arrays, shape (n,)
         Node of each line at the left edge of the window; see `creep_positions`.
     rule : str

@@ -100,7 +100,7 @@ def find_clusters(line: FloatArray, level: float, spacing: float, strength: floa
     level : float
         Film thickness h0 in m.
     spacing : float
-        Distance dx of the nodes in m.
+        Distance dx between nodes in m.
     strength : float
         Layer strength from `layer_strength`, in 1/m.
     """

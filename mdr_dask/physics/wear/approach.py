@@ -36,7 +36,7 @@ def nearly_limit(profile: Profile, stick_radius: float, cycles: Sequence[float],
     Parameters
     ----------
     profile : Profile
-        The virgin body, whose image rises.
+        The virgin body; its image must increase with the radius.
     stick_radius : float
         c, between 0 and 1.
     cycles : sequence of float

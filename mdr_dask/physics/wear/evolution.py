@@ -42,9 +42,9 @@ class Settings(NamedTuple):
         Longest first step, relative to the time scale of the contact; with it, small amounts of wear are right to 2
         %.
     shortest, beginning : float
-        The march fails if a step becomes shorter than `shortest` times the longest step so far (or times the first
-        step, if that is shorter), and shorter than `beginning` times the first step. In marches that succeeded, no
-        later step was below 0.13 of its reference, but some first steps had to be reduced to 1e-5.
+        The march fails if a step is shorter than `shortest` times the longest step so far (or times the first step, if
+        that is shorter), or than `beginning` times the first step. In marches that succeeded, no later step was below
+        0.13 of the longest one, but some first steps had to be reduced to 1e-5.
     """
 
     most_steps: int = 20000
@@ -107,7 +107,7 @@ class Resolution(NamedTuple):
         return min(0.1 * self.accuracy, SETTINGS.first) * self.wider
 
     def panels(self, near: int, fewest_digits: float = 2.0, sharpness: float = 1.0, coarser: float = 1.0) -> Panels:
-        """Return panels with `near` more halvings at the inner border than at the edge, times a factor `sharpness`."""
+        """Return panels; the inner border has `near` more halvings than the edge, times `sharpness`."""
         digits = max(-np.log10(coarser * self.accuracy), fewest_digits)
         # with fewer halvings, the error of the panels at the moving edge would make the steps very short
         levels = round(2.7 * digits - 3.3)
@@ -138,7 +138,7 @@ class Resolution(NamedTuple):
 
 
 class NotConvergedError(ArithmeticError):
-    """A time step fails even if it is very short."""
+    """Raised if a time step fails even though it is very short."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,9 +150,8 @@ class Moment:
     time : float
         Cycles N in partial slip, sliding path s in gross slip.
     unknowns : array, shape (n,)
-        The unknowns of the problem: values of the image at all nodes but the last, the squared width of the panels
-        over the squared width of the virgin contact, and in some problems further ones. All are of the order of
-        one.
+        The unknowns of the problem: values of the image at all nodes but the last, the width of the panels in squared
+        radii over that of the virgin contact, and in some problems further ones. All are of the order of one.
     accumulated : array, shape (n,)
         The quantity accumulated at the radii of the nodes; zero at the edge.
     """
@@ -255,7 +254,7 @@ def march(
 
 
 def settled(problem: Problem) -> Any:
-    """Return the virgin contact as it solves the discrete equations, so that the first step starts without a jump."""
+    """Return the virgin contact as a solution of the discrete equations, so the first step starts without a jump."""
     virgin = problem.start()
     known = problem.memory([virgin], np.zeros(1))
     unknowns = _Newton(problem, 1e-9).solve(virgin.unknowns, 0.0, known)

@@ -33,7 +33,7 @@ COARSEST = 1e-2
 #: At constant depth: (accuracy, factor on the step tolerance); the width 1 - c of the slip annulus below which this
 #: factor tends to 1; and the weight of the second rougher solution. See ``python -m benchmarks accuracy wear``.
 WIDER, THIN, SECOND = ((1e-4, 1.0), (3e-4, 1.5), (1e-3, 4.0), (3e-3, 5.0), (1e-2, 3.0)), 0.1, 0.25
-#: At constant depth, panels are chosen for 1.6 times the accuracy, but not for more than 5e-3 or the accuracy itself.
+#: At constant depth, panels are chosen for 1.6 times the accuracy, limited to 5e-3 unless the accuracy is larger.
 COARSER, COARSER_UNTIL = 1.6, 5e-3
 #: As `WIDER`, for gross slip at constant depth; with fine enough panels only the error of the edge remains.
 SLID_WIDER = (1e-3, 1.0), (3e-3, 3.0), (1e-2, 1.0)
@@ -128,7 +128,7 @@ def limit_under_force(profile: Profile, stick_radius: float, accuracy: float = 1
     """Return the limiting profile under constant force.
 
     Once the image jumps at the stick border, the border no longer moves and the shape inside it stays as it is. The
-    limit then follows in closed form, so the evolution is computed only up to the jump. Parameters and errors as in
+    limit then follows from this shape, so the evolution is computed only up to the jump. Parameters and errors as in
     `exact`.
     """
     check_stick_radius(stick_radius)
@@ -185,10 +185,10 @@ def _wider(accuracy: float, table: tuple[tuple[float, float], ...], power: float
 
 
 def fretted_resolution(stick_radius: float, accuracy: float) -> Resolution:
-    """Return the resolution for an accuracy at constant depth: the error of f is the square root of the step error.
+    """Return the resolution for an accuracy at constant depth: the error of f falls like the root of the step error.
 
-    Steep bodies need more nodes per panel. A thin slip annulus is worn off in few steps, so they are not lengthened as
-    much.
+    Steep bodies need more nodes per panel. A thin slip annulus is worn off in few steps, so its step tolerance is
+    increased less.
     """
     order = 4 if accuracy > 2e-3 else 5 if accuracy > 5e-4 else 6
     wider = _wider(accuracy, WIDER, min((1.0 - stick_radius) / THIN, 1.0))

@@ -37,8 +37,8 @@ class Settings(NamedTuple):
     lowest : float
         A step with y below minus this value is rejected, and the border stops at the moment before.
     coarsest : float
-        Larger accuracies are computed with this value: longer steps do not follow the border, fail, and take more
-        time.
+        Accuracies above this value are computed with this value: longer steps do not follow the border, so that more of
+        them fail and the solution takes longer.
     rougher : tuple of float
         Factors on the step tolerance of the two rougher solutions.
     thinned : int

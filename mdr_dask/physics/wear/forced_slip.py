@@ -269,9 +269,7 @@ class ForcedSlip:
         return shares
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return s - known - theta (p / eta) s at the nodes; then the error of the force, and y at the border if it
-        moves.
-        """
+        """Return s - known - theta (p / eta) s at the nodes; then the error of the force, and y at a moving border."""
         size, y, place = self.size, self.image(unknowns), self.place(unknowns)
         root, factor = math.sqrt(self.body.width * place.width), self._factor(place)
         slip, rate = self.panels.inner @ (y * factor), self.panels.outer @ y

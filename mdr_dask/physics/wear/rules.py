@@ -273,7 +273,7 @@ def _changes(rule: Rule, places: FloatArray, result: FloatArray) -> None:
 
 @jit
 def _put_cuts(rule: Rule, cuts: FloatArray) -> None:
-    """Write the ends of the pieces to `cuts`: c, the width of the layer beyond it, two wider ones, and 1."""
+    """Write the ends of the pieces to `cuts`: c, the end of the layer beyond it, two larger radii, and 1."""
     low, high, level = 0.0, 1.0 - rule.c, rule.eta * rule.rest / (1.0 + rule.rest)
     if rule.rest == 0.0:
         high = 0.0

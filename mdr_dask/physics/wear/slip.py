@@ -243,9 +243,7 @@ class GrossSlip(FixedBorder):
     wear_rate = normal_force
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return f - f0 - known - theta p, with continuity at the edge in the last row; then the error of a given
-        force.
-        """
+        """Return f - f0 - known - theta p, with continuity at the edge in the last row; then the force error."""
         accumulated = known + theta * self.rate(unknowns)
         accumulated[-1] = 0.0
         rows = self.worn(unknowns) - self.profile.height(self.radii(unknowns)) - accumulated

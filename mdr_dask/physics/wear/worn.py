@@ -342,7 +342,7 @@ def _change_beyond(scar: Scar, position: FloatArray) -> FloatArray:
 
 
 def check_stick_radius(stick_radius: float) -> None:
-    """Raise ValueError unless the stick radius means partial slip."""
+    """Raise ValueError unless the stick radius is between 0 and 1, that is, partial slip."""
     if not 0.0 < stick_radius < 1.0:
         raise ValueError(
             f"the stick radius must lie between 0 and 1 for partial slip, got {stick_radius!r}; "
