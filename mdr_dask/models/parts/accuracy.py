@@ -1,7 +1,8 @@
-"""Whether results meet the accuracy of a campaign, and the message where they do not. One rule for all models.
+"""The check whether results meet the accuracy of a campaign, and the message if not: one rule for all models.
 
-The error of an output is relative to its value; of a profile or a history the largest error counts, relative to the
-largest value. Where zero is a normal value, the model gives an absolute size (a floor) that counts instead.
+The error of an output is relative to its value. For a profile or a history, the largest error is relative to the
+largest value. For an output that can be zero, the model gives a floor: an absolute value to which the error is relative
+if the output is smaller.
 """
 
 from __future__ import annotations
@@ -23,9 +24,9 @@ def relative_errors(
     Parameters
     ----------
     values, errors : mapping of str to array, shape (cases, ...)
-        Results and their absolute errors by output; entries that are NaN in either do not count.
+        Results and their absolute errors by output; entries where either is NaN are ignored.
     floors : mapping of str to array, shape (cases,), or float
-        Absolute size by output that counts where the value is smaller.
+        Absolute values by output to which the error is relative if the result is smaller.
     """
     found = {}
     for name, value in values.items():
@@ -48,14 +49,14 @@ def missed_accuracy(
     floors: Mapping[str, ArrayLike] | None = None,
     where: str = "",
 ) -> dict[int, str]:
-    """Return a message for every case whose outputs miss the accuracy, by the index of the case.
+    """Return a message for every case with an output that misses the accuracy, by the index of the case.
 
     Parameters
     ----------
     values, errors, floors
-        As of :func:`relative_errors`.
+        As in :func:`relative_errors`.
     accuracy : float
-        Relative error allowed for every output.
+        Allowed relative error of every output.
     where : str
         Added to the message, such as ``" on the finest grid"``.
     """
@@ -65,7 +66,7 @@ def missed_accuracy(
 
 
 def missed(shares: Mapping[str, float], accuracy: float, where: str = "") -> str:
-    """Return the message about the outputs that miss an accuracy; an empty string if none does."""
+    """Return the message about the outputs that miss an accuracy, or an empty string if there are none."""
     named = [f"{name} by {_amount(share, accuracy)}" for name, share in shares.items() if share > accuracy]
     return f"an accuracy of {accuracy:.12g} is missed{where}: {', '.join(named)} (estimated)" if named else ""
 

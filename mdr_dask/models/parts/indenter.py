@@ -1,4 +1,4 @@
-"""Indenters in a campaign."""
+"""Parameters of indenters."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Plane(Parameters):
     shape: Literal["plane"] = "plane"
 
     def line(self) -> None:
-        """Return None: there is no shape beside the roughness."""
+        """Return None, because there is no shape besides the roughness."""
 
 
 class _PowerLaw(Parameters):
@@ -31,7 +31,7 @@ class _PowerLaw(Parameters):
         raise NotImplementedError
 
     def line(self) -> Shape:
-        """Return the equivalent one-dimensional profile by the rule of MDR, in metres."""
+        """Return the equivalent one-dimensional profile by the MDR rule, in metres."""
         from mdr_dask.physics.surfaces.shapes import PowerLaw
 
         return PowerLaw.of_body(*self.power_law())
@@ -79,7 +79,7 @@ class RoundedCone(Parameters):
     tip_radius: float = quantity("m", "radius of curvature R of the tip", gt=0)
 
     def line(self) -> Shape:
-        """Return the equivalent one-dimensional profile by the rule of MDR, in metres."""
+        """Return the equivalent one-dimensional profile by the MDR rule, in metres."""
         from mdr_dask.physics.surfaces.shapes import RoundedCone as Line
 
         steepness = math.tan(self.angle)

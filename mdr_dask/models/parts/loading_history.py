@@ -1,4 +1,4 @@
-"""Histories of velocity and load in a campaign."""
+"""Parameters of histories of velocity and load."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Jump(Parameters):
 
 
 class _History(Parameters):
-    """Base of all histories but the jump."""
+    """Base of all histories except the jump."""
 
     start: Literal["steady", "rest"] = Field(
         default="steady", description="before t = 0: steady sliding at `velocity`, or rest, under `normal_force`"
@@ -74,7 +74,7 @@ class TableFile(_History):
 
     @model_validator(mode="after")
     def _holds_a_history(self, info: ValidationInfo) -> TableFile:
-        """Refuse a bad table when the campaign is read, before any case fails."""
+        """Raise an error for an invalid table when the campaign is read, before any case is computed."""
         if info.context is not None:
             try:
                 _table_rows(self.file, 1.0)
@@ -96,7 +96,7 @@ def _check_rows(times: tuple[float, ...], velocities: tuple[float, ...], forces:
 
 
 def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> tuple[tuple[float, float], list[Piece]]:
-    """Return velocity and normal force before t = 0, and the loading history from t = 0 on; the last piece never ends.
+    """Return velocity and normal force before t = 0, and the pieces of the history from t = 0 on, without an end.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Linear viscoelastic materials as a campaign names them."""
+"""Parameters of linear viscoelastic materials."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class PowerLaw(Parameters):
 
 
 KINDS = ("kelvin", "standard_solid", "prony", "power_law", "dma_table")
-SOFTEST, STIFFEST = 100.0, 1e12  # shear moduli of solids, Pa: from a gel to above diamond
+SOFTEST, STIFFEST = 100.0, 1e12  # range of the shear moduli of solids, Pa: from a gel to above diamond
 LAWS = ("wlf", "arrhenius", "shift_factors")
 
 
@@ -86,7 +86,7 @@ class Material(Parameters):
 
     @property
     def law(self) -> Law | None:
-        """The law by which relaxation times depend on the temperature."""
+        """The law that describes how relaxation times depend on the temperature, or None."""
         return self.wlf or self.arrhenius or self.shift_factors
 
     @model_validator(mode="after")
@@ -119,7 +119,7 @@ def solid_of(material: Material) -> LinearSolid:
     Raises
     ------
     DataError, ValueError
-        If the numbers are not those of a solid, or the table cannot be fitted.
+        If the numbers do not describe a solid, or the table cannot be fitted.
     """
     from mdr_dask.physics import solids as rheology
 
@@ -128,7 +128,7 @@ def solid_of(material: Material) -> LinearSolid:
 
 
 def _shift(material: Material) -> float | None:
-    """Return the factor of relaxation times from the temperature where they are given to that of the material."""
+    """Return the factor of relaxation times from the temperature of the data to the temperature of the material."""
     law, temperature = material.law, material.temperature
     if law is None or temperature is None:
         return None
@@ -183,14 +183,14 @@ def _power_law_fit(law: PowerLaw) -> SeriesFit:
 def fit_error(material: Material | None) -> float:
     """Return the rms relative error of the Prony series fitted to a power law or a table; 0 for other materials.
 
-    Raises as `solid_of` does.
+    Raises the same errors as `solid_of`.
     """
     fit = None if material is None else _fit_of(material)
     return 0.0 if fit is None else fit.error
 
 
 def frequencies(material: Material) -> tuple[float, float] | None:
-    """Return lowest and highest angular frequency, rad/s, of a power law or a table at the material's temperature."""
+    """Return the range of angular frequency, rad/s, of a power law or a table at the material's temperature."""
     fit = _fit_of(material)
     if fit is None:
         return None
@@ -215,7 +215,7 @@ def fit_notes(material: Material | None) -> tuple[str, ...]:
 
 
 def _outside(material: Material) -> tuple[str, ...]:
-    """Return a note if the temperature lies outside those measured."""
+    """Return a note if the temperature is outside the measured range."""
     table, temperature = material.dma_table, material.temperature
     measured = None if table is None else _curve(table, material.law).measured
     if table is None or temperature is None or measured is None:
@@ -230,7 +230,7 @@ def _outside(material: Material) -> tuple[str, ...]:
 
 
 def _unusual(material: Material) -> tuple[str, ...]:
-    """Return a note if no solid has such moduli, because the unit may be wrong."""
+    """Return a note if the moduli are outside the range of solids, because the unit may be wrong."""
     table = material.dma_table
     if table is None:
         return ()

@@ -1,4 +1,4 @@
-"""The roughness of a line: generated, with the spectrum of a measured surface, measured, or none."""
+"""The roughness of a line: generated, generated with the spectrum of a measured surface, measured, or none."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ class Generated:
 
     hurst: float
     points: int
-    rolloff: float  # harmonic numbers: length over wavelength, 0 for none
+    rolloff: float  # harmonic number: length over wavelength, 0 for no limit
     longest: float
     is_random = True
 
     def waves(self, seed: int, realisation: int) -> Waves:
-        """Return one realisation; ValueError if no wave is left between the cut-offs."""
+        """Return one realisation; raise ValueError if there is no wave between the cut-off wavelengths."""
         return _with_random_phases(_amplitudes(self), self.points, seed, realisation)
 
     def slope(self, realisation: int) -> float:
@@ -34,7 +34,7 @@ class Generated:
 
 
 def _with_random_phases(amplitude: FloatArray, points: int, seed: int, realisation: int) -> Waves:
-    """Return one realisation of the lines with these amplitudes."""
+    """Return one realisation of a line with these amplitudes."""
     from mdr_dask.physics.surfaces import roughness
     from mdr_dask.physics.surfaces.waves import Waves
 
@@ -59,8 +59,8 @@ def _slope(line: Generated) -> float:
 class OfSurface:
     """Lines with the spectrum of a measured surface, in units of their length and rms height.
 
-    Of n files, realisation r uses file r modulo n. So the scatter between files is part of the scatter between
-    realisations, and the mean over realisations is the mean over files.
+    Realisation r uses file r modulo n of the n files. The scatter between files is therefore a part of the scatter
+    between realisations, and the mean over realisations is the mean over files.
     """
 
     surface: Surface
@@ -69,7 +69,7 @@ class OfSurface:
     is_random = True
 
     def height(self) -> float:
-        """Return the unit of height, m: the rms height over the lines of all files."""
+        """Return the unit of height, m: the rms height of the lines of all files."""
         return _height(self)
 
     def waves(self, seed: int, realisation: int) -> Waves:
@@ -97,14 +97,14 @@ def _height(line: OfSurface) -> float:
 
 @dataclass(frozen=True)
 class Measured:
-    """The line of a file, the same in every realisation, in units of its length and rms height."""
+    """The line of a file, in units of its length and rms height; it is the same in every realisation."""
 
     profile: ProfileFile
     is_random = False
 
     @property
     def points(self) -> int:
-        """Nyquist points: the samples of the line."""
+        """Nyquist points: the number of samples of the line."""
         return int(line_of(self.profile).height.size)
 
     def height(self) -> float:
@@ -113,7 +113,7 @@ class Measured:
         return float(line.height.std()) or line.length
 
     def waves(self, seed: int, realisation: int) -> Waves:
-        """Return the waves of the line through the samples."""
+        """Return the waves of the line that passes through the samples."""
         return _waves(self)
 
     def slope(self, realisation: int) -> float:
@@ -130,13 +130,13 @@ def _waves(line: Measured) -> Waves:
 
 @dataclass(frozen=True)
 class Smooth:
-    """No roughness; the number of points is kept because grids depend on it."""
+    """No roughness; the number of points is needed, because grids depend on it."""
 
     points: int
     is_random = False
 
     def waves(self, seed: int, realisation: int) -> Waves:
-        """Return no waves."""
+        """Return a line without waves."""
         import numpy as np
 
         from mdr_dask.physics.surfaces.waves import Waves

@@ -1,4 +1,4 @@
-"""The line, the body, the load and the velocity of a viscoelastic body that slides over a rough line."""
+"""Parameters of a viscoelastic body that slides over a rough line: line, body, load and velocity."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mdr_dask.models.parts.measured_line import line_of
 from mdr_dask.models.parts.surface import Surface, spectra_of, without_exponent
 from mdr_dask.units import shown
 
-#: Parameters of a generated line that follow from the file of a measured surface.
+#: Parameters of a generated line that are replaced by the file of a measured surface.
 GENERATED = ("hurst", "rms_roughness", "rolloff_wavelength", "longest_wavelength")
 #: Dimensionless numbers of a Kelvin body on a generated line.
 NUMBERS = (
@@ -115,7 +115,7 @@ class SlidingBody(Parameters):
 
 
 def frequency_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
-    """Return how the frequencies q v of a study compare with those of a law or a table, at every temperature."""
+    """Return notes that compare the frequencies q v of a study with those of a law or a table, for every material."""
     velocities = [one.velocity for one in sets]
     waves = [one.wavelengths() for one in sets]
     low = 2 * math.pi * min(velocities) / max(longest for _, longest in waves)
@@ -132,7 +132,7 @@ def frequency_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
 
 
 def _compared(asked: tuple[float, float], known: tuple[float, float]) -> str:
-    """Return a text on how far the frequencies of a study lie outside those of the data."""
+    """Return a text that says how far the frequencies of a study are outside the range of the data."""
     (low, high), (first, last) = np.log10(asked), np.log10(known)
     beyond = {"below": max(first - low, 0.0), "above": max(high - last, 0.0)}
     if high <= first or low >= last:

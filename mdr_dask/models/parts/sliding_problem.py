@@ -1,4 +1,4 @@
-"""Sliding bodies as dimensionless numbers: here loads, velocities, lines and solids are divided by their units."""
+"""Conversion of sliding bodies to dimensionless numbers: loads, velocities, lines and solids without units."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ STATUS = np.array(
     dtype=np.int8,
 )
 """The status in a store for each outcome of a solver."""
-LEAST = 1e-100  # squares and products of dimensionless numbers from here to its reciprocal can be represented
+LEAST = 1e-100  # squares and products of dimensionless numbers between LEAST and 1 / LEAST can be represented
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Roughness, shape (None: plane) and Prony terms (None: Kelvin solid), without units, of cases solved together."""
+    """Dimensionless roughness, shape (None for a plane) and Prony terms (None for a Kelvin solid) of some cases."""
 
     roughness: Roughness
     body: Shape | None
@@ -49,20 +49,20 @@ class Setting:
 
 @dataclass(frozen=True)
 class SlidingProblems:
-    """The cases of a block as dimensionless numbers, on which alone a solution depends.
+    """The cases of a block as dimensionless numbers; the dimensionless solution depends on nothing else.
 
     Parameters
     ----------
     settings : list of Setting
-        The different pairs of line and solid.
+        The different combinations of line, shape and solid.
     which : int array, shape (cases,)
-        Index into `settings` of every case, -1 for a case that cannot be solved.
+        Index into `settings` for every case, -1 for a case that cannot be solved.
     loads : array, shape (cases,)
         F_N / (4 G_inf L h).
     deborah : array, shape (cases,)
         eta v / (G_inf L): the Deborah number v tau / L of a Kelvin body.
     length, height : array, shape (cases,)
-        L and h, m: the units of length and height. h is the rms height, or L where there is no roughness.
+        L and h, m: the units of length and height. h is the rms height, or L if there is no roughness.
     faults : dict of int to str
         Messages about cases that cannot be solved.
     """
@@ -76,7 +76,7 @@ class SlidingProblems:
     faults: dict[int, str]
 
     def groups(self, *columns: NDArray[Any]) -> Iterator[tuple[Setting, IntArray]]:
-        """Yield the solvable cases that share a setting and the values of some columns."""
+        """Yield groups of solvable cases that share a setting and the values of some columns."""
         is_sound = self.which >= 0
         is_sound[list(self.faults)] = False
         sound = np.flatnonzero(is_sound)
@@ -86,7 +86,7 @@ class SlidingProblems:
             yield self.settings[self.which[sound[k]]], members
 
     def different(self, members: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Return the different pairs of Deborah number and load among some cases, and the pair of each case."""
+        """Return the different pairs of Deborah number and load in some cases, and the pair of each case."""
         pairs, which = np.unique(self.deborah[members] + 1j * self.loads[members], return_inverse=True)
         return pairs.real.copy(), pairs.imag.copy(), which
 
@@ -94,7 +94,7 @@ class SlidingProblems:
 def combinations(*columns: NDArray[Any]) -> tuple[IntArray, IntArray]:
     """Return the first row of every different combination of values in some columns, and the combination of each row.
 
-    Objects are the same value only if they are the same object.
+    Objects are compared by identity.
     """
     which = np.zeros(columns[0].size, np.int64) if columns else np.zeros(1, np.int64)
     first = np.zeros(min(which.size, 1), np.int64)
@@ -108,7 +108,7 @@ def combinations(*columns: NDArray[Any]) -> tuple[IntArray, IntArray]:
 
 
 def sliding_problems(block: Block[Any]) -> SlidingProblems:
-    """Return the cases of a block of any `SlidingBody` without units."""
+    """Return the cases of a block of any `SlidingBody` as dimensionless numbers."""
     faults: dict[int, str] = {}
     lines, which_line, length, height = _lines(block, faults)
     static, viscosity, terms, which_solid = _solids(block, faults)
@@ -145,7 +145,7 @@ def sliding_problems(block: Block[Any]) -> SlidingProblems:
 
 
 def _without_units(body: Shape | None, length: float, height: float) -> Shape | None:
-    """Return the line of an indenter in units of length and height, with canonical numbers."""
+    """Return the line of an indenter in units of length and height, as canonical numbers."""
     if body is None:
         return None
     body = body.scaled(float(length), float(height))
@@ -154,7 +154,7 @@ def _without_units(body: Shape | None, length: float, height: float) -> Shape | 
 
 
 def _travelling(term: tuple[FloatArray, FloatArray] | None, velocity: float, length: float) -> PronyTerms | None:
-    """Return Prony terms whose times are replaced by the distance travelled in them over the length of the line."""
+    """Return Prony terms with times over L / v, the time in which the body slides by the length of the line."""
     from mdr_dask.physics.sliding.problem import PronyTerms
 
     if term is None:
@@ -163,7 +163,7 @@ def _travelling(term: tuple[FloatArray, FloatArray] | None, velocity: float, len
 
 
 def refuse_immense(numbers: dict[str, FloatArray], faults: dict[int, str]) -> None:
-    """Add a message for every case whose dimensionless numbers, or their squares, overflow or underflow."""
+    """Add a message for every case with a dimensionless number that is too large or too small for arithmetic."""
     for name, column in numbers.items():
         for j in np.flatnonzero(~((column > LEAST) & (column < 1 / LEAST))):
             number, least, most = distinguishable(column[j], LEAST, 1 / LEAST, digits=6)
@@ -171,7 +171,7 @@ def refuse_immense(numbers: dict[str, FloatArray], faults: dict[int, str]) -> No
 
 
 def each(block: Block[Any], name: str) -> tuple[list[Any], IntArray]:
-    """Return the different values of a nested parameter, whichever part of it varies, and the value of every case."""
+    """Return the different values of a nested parameter, any part of which may vary, and the index for every case."""
     varied = [column for path, column in block.columns.items() if path.partition(".")[0] == name]
     if not varied:
         return [getattr(block.parameters, name)], np.zeros(block.cases, np.int64)
@@ -180,7 +180,7 @@ def each(block: Block[Any], name: str) -> tuple[list[Any], IntArray]:
 
 
 def _numbers(block: Block[Any], name: str) -> FloatArray:
-    """Return a number of every case, NaN where it is not given."""
+    """Return a number for every case, NaN if it is not given."""
     if name not in block.columns:
         value = getattr(block.parameters, name)
         return np.full(block.cases, np.nan if value is None else value, dtype=np.float64)
@@ -191,13 +191,13 @@ def _numbers(block: Block[Any], name: str) -> FloatArray:
 def _lines(
     block: Block[Any], faults: dict[int, str]
 ) -> tuple[list[Roughness | None], IntArray, FloatArray, FloatArray]:
-    """Return the different lines, the line of every case, and length and height of every case."""
+    """Return the different lines, the index of the line of every case, and length and height of every case."""
     length, height = _numbers(block, "length"), _numbers(block, "rms_roughness")
     flat = height == 0
     height = np.where(flat, length, height)
     with np.errstate(all="ignore"):
         ends = [canonical(length / _numbers(block, name)) for name in ("rolloff_wavelength", "longest_wavelength")]
-    corners = [np.where(np.isnan(end), 0.0, end) for end in ends]  # 0: no such wavelength
+    corners = [np.where(np.isnan(end), 0.0, end) for end in ends]  # 0 if there is no limit
     surfaces, which_surface = each(block, "surface")
     columns = _numbers(block, "hurst"), _numbers(block, "points").astype(np.int64), *corners
     own_length = [length] if any(surface is not None for surface in surfaces) else []
@@ -227,7 +227,7 @@ def _measured(surface: Surface, points: int, length: float) -> OfSurface | Measu
 
 
 def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArray, FloatArray, list[Any], IntArray]:
-    """Return static modulus and viscosity of every case, the Prony terms of every solid, and the solid of every case.
+    """Return static modulus and viscosity of every case, the terms of every solid, and the solid of every case.
 
     Viscosity and moduli of the terms are divided by the static modulus. The terms of a Kelvin solid are None.
     """

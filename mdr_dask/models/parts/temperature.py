@@ -1,4 +1,4 @@
-"""Laws of temperature in a campaign: the factor a_T of relaxation times between two temperatures."""
+"""Parameters of temperature laws: the factor a_T of relaxation times between two temperatures."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Wlf(Parameters):
     reference: float = quantity("K", "temperature of c1 and c2, at which a_T is 1", usual="20 degC", gt=0)
 
     def factor(self, temperature: FloatArray | float) -> FloatArray:
-        """Return a_T, of the shape of the temperatures in K; ValueError where the law ends."""
+        """Return a_T for temperatures in K, of the same shape; raise ValueError outside the range of the law."""
         from mdr_dask.physics.solids import wlf_factor
 
         lowest, end = float(np.min(temperature)), self.reference - self.c2
@@ -41,7 +41,7 @@ class Arrhenius(Parameters):
     reference: float = quantity("K", "temperature at which a_T is 1", usual="20 degC", gt=0)
 
     def factor(self, temperature: FloatArray | float) -> FloatArray:
-        """Return a_T, of the shape of the temperatures in K."""
+        """Return a_T for temperatures in K, of the same shape."""
         from mdr_dask.physics.solids import arrhenius_factor
 
         return arrhenius_factor(temperature, self.reference, self.activation_energy)
@@ -59,7 +59,7 @@ class ShiftFactors(Parameters):
 
     @model_validator(mode="after")
     def _holds_factors(self, info: ValidationInfo) -> ShiftFactors:
-        """Refuse a bad table when the campaign is read, before any case fails."""
+        """Raise an error for an invalid table when the campaign is read, before any case is computed."""
         if info.context is not None:
             try:
                 _ = self.reference
@@ -74,7 +74,7 @@ class ShiftFactors(Parameters):
         return float(np.interp(0.0, decades[::-1], temperature[::-1]))
 
     def factor(self, temperature: FloatArray | float) -> FloatArray:
-        """Return a_T at temperatures in K; log a_T is interpolated linearly. ValueError outside the table."""
+        """Return a_T for temperatures in K, by linear interpolation of log a_T; raise ValueError outside the table."""
         known, decades = _shifts(self)
         wanted = np.asarray(temperature, dtype=np.float64)
         for outside in wanted[(wanted < known[0]) | (wanted > known[-1])].ravel():

@@ -1,4 +1,4 @@
-"""Messages about results on measured surfaces outside the range that docs/validity.md has tested."""
+"""Messages about results on measured surfaces outside the range that was tested (docs/validity.md)."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from mdr_dask.models.parts.sliding_body import SlidingBody
 from mdr_dask.models.parts.sliding_problem import Setting
 
 LARGEST_LOAD = 1.0
-"""F_N / (E* L h) with E* = 4 G of an incompressible solid. Above it a line is nearer to full contact than a surface."""
-LARGEST_FRACTION = 0.5  # of the line in contact
+"""F_N / (E* L h) with E* = 4 G of an incompressible solid. Above it a line is closer to full contact than a surface."""
+LARGEST_FRACTION = 0.5  # part of the line in contact
 PAGE = "docs/validity.md"
 
 
 def load_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
-    """Return a note if loads of a study exceed those for which friction on a rough surface was tested."""
+    """Return a note if the loads of a study exceed the loads at which friction on a rough surface was tested."""
     from mdr_dask.models.parts.material import solid_of
 
     loads = []
@@ -31,7 +31,7 @@ def load_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
         try:
             modulus = one.shear_modulus if one.material is None else solid_of(one.material).static_modulus
             height, force = OfSurface(one.surface, one.points, one.length).height(), one.largest_force()
-        except (DataError, ValueError):  # the cases themselves report it
+        except (DataError, ValueError):  # the solver reports this problem for each case
             continue
         loads.append(force / (4 * (modulus or np.inf) * one.length * height))
     largest = max(loads, default=0.0)
@@ -49,11 +49,12 @@ def beyond_tested(setting: Setting, loads: FloatArray, fractions: FloatArray) ->
     Parameters
     ----------
     setting : Setting
-        Line and solid of the cases. Only a plane body on lines that stand for a measured surface has a tested range.
+        Line and solid of the cases. There is a tested range only for a plane body on lines that represent a measured
+        surface.
     loads : array, shape (cases,)
-        F_N / (4 G_inf L h), the largest of a history.
+        F_N / (4 G_inf L h); the largest value during a history.
     fractions : array, shape (cases,)
-        Length in contact over length of the line, the largest of a history; NaN if it is not known.
+        Length in contact over length of the line; the largest value during a history; NaN if it is unknown.
     """
     if setting.body is not None or not isinstance(setting.roughness, OfSurface):
         return {}

@@ -1,4 +1,4 @@
-"""What a campaign can name of steady friction: parameters, outputs, and where it is solved."""
+"""Parameters and outputs of the model `sliding_friction`; quick to import."""
 
 from __future__ import annotations
 

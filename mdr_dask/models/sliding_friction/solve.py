@@ -1,4 +1,4 @@
-"""Steady friction of a block of cases: each different case is solved once in every realisation."""
+"""Steady friction of a block of cases; cases with equal dimensionless numbers are solved once per realisation."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from mdr_dask.physics.sliding.cases import COLUMNS, Steady
 from mdr_dask.physics.sliding.problem import Request, solve
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
-ACCURACY = 0.01  # where the campaign does not give one
+ACCURACY = 0.01  # used if the campaign does not give an accuracy
 USUAL_ON_PLANES, USUAL = 2, 16  # nodes per Nyquist point of the finest grid that cases usually need
-BYTES_A_NODE = 150  # peak memory of a line and a case on it; 20 to 130 were measured
+BYTES_A_NODE = 150  # peak memory of a line and a case on it; measured: 20 to 130
 SECONDS_A_NODE = 1e-8  # of a line, or of a case on it, with all grids: an order of magnitude
 
-#: Outputs that have errors, and the column of a steady state that each is.
+#: Outputs that have errors, and the corresponding columns of a steady state.
 OUTPUTS = dict(
     zip(("friction_coefficient", "indentation_depth", "contact_fraction", "contact_slope"), COLUMNS, strict=True)
 )
 
 
 def compute(block: Block[SlidingFriction]) -> Result:
-    """Solve the cases of a block, each different one once."""
+    """Solve the cases of a block; equal cases are solved once."""
     shape = (block.cases, len(block.realisations))
     values = {name: np.full(shape, np.nan) for name in block.outputs}
     result = Result(values, np.full(shape, Status.FAILED, np.int8))
     problems = sliding_problems(block)
     solves = 0
     groups = [_Group.of(block, problems, *group) for group in _groups(block, problems)]
-    for r, realisation in enumerate(block.realisations):  # outermost: all lines of a realisation have the same phases
+    for r, realisation in enumerate(block.realisations):  # all lines of a realisation share the phases
         for group in groups:
             solves += group.solve(result, r, realisation)
     if "material_error" in block.outputs:
@@ -52,7 +52,7 @@ def compute(block: Block[SlidingFriction]) -> Result:
 def _groups(
     block: Block[SlidingFriction], problems: SlidingProblems
 ) -> Iterator[tuple[Setting, SlidingFriction, IntArray]]:
-    """Yield the cases that share setting, oversampling and scheme, with the parameters of one of them."""
+    """Yield the cases that share setting, oversampling and scheme, with the parameters of one of these cases."""
     varied = [block.columns[name] for name in ("oversampling", "scheme") if name in block.columns]
     for setting, members in problems.groups(*varied):
         yield setting, block.case(int(members[0])), members
@@ -60,7 +60,7 @@ def _groups(
 
 @dataclass
 class _Group:
-    """Cases that share line, solid and grid, each different one once."""
+    """Cases that share line, solid and grid; equal cases are solved once."""
 
     block: Block[SlidingFriction]
     problems: SlidingProblems
@@ -69,7 +69,7 @@ class _Group:
     members: IntArray
     deborah: FloatArray
     loads: FloatArray
-    which: IntArray  # the entry of `deborah` and `loads` of every member
+    which: IntArray  # index into `deborah` and `loads` for every member
 
     @classmethod
     def of(
@@ -80,7 +80,7 @@ class _Group:
         case: SlidingFriction,
         members: IntArray,
     ) -> _Group:
-        """Collect the different cases among the members."""
+        """Return the group with the different cases among its members."""
         deborah, loads, which = problems.different(members)
         with_errors = any(f"{output}_error" in block.outputs for output in OUTPUTS)
         contact = not {"contact_fraction", "contact_slope"}.isdisjoint(block.outputs)
@@ -89,7 +89,7 @@ class _Group:
         return cls(block, problems, setting, request, members, deborah, loads, which)
 
     def solve(self, result: Result, r: int, realisation: int) -> int:
-        """Write the cases of one realisation, the r-th of the block; return how many were solved."""
+        """Write the results of one realisation, index r in the block; return the number of solved cases."""
         roughness = self.setting.roughness
         if r and not roughness.is_random:
             self._repeat(result, r)
@@ -114,7 +114,7 @@ class _Group:
         return int(self.loads.size)
 
     def _repeat(self, result: Result, r: int) -> None:
-        """Copy the results of the first realisation: the line is the same in all."""
+        """Copy the results of the first realisation, because the line is the same in all realisations."""
         for array in result.values.values():
             array[self.members, r] = array[self.members, 0]
         result.status[self.members, r] = result.status[self.members, 0]
@@ -139,7 +139,7 @@ class _Group:
     def _messages(
         self, steady: Steady, values: dict[str, FloatArray], errors: dict[str, FloatArray]
     ) -> Iterator[tuple[int, str]]:
-        """Yield why a member failed, which of its outputs miss the accuracy, and whether it is outside tested loads."""
+        """Yield reasons of failures, outputs that miss the accuracy, and members outside the tested loads."""
         status = steady.status[self.which]
         for k in np.flatnonzero(status != Outcome.CONVERGED):
             yield int(k), Outcome(int(status[k])).sentence
@@ -152,7 +152,7 @@ class _Group:
 
 
 def distinct(block: Block[SlidingFriction]) -> int:
-    """Return how many different cases a block holds, over all realisations."""
+    """Return the number of different cases in a block, over all realisations."""
     problems, total = sliding_problems(block), 0
     for setting, _, members in _groups(block, problems):
         total += problems.different(members)[0].size * _lines(block, setting)
@@ -160,24 +160,24 @@ def distinct(block: Block[SlidingFriction]) -> int:
 
 
 def _lines(block: Block[SlidingFriction], setting: Setting) -> int:
-    """Return how many different lines the realisations have."""
+    """Return the number of different lines in the realisations."""
     return len(block.realisations) if setting.roughness.is_random else 1
 
 
 def seconds(block: Block[SlidingFriction]) -> float:
-    """Estimate the time of a block from its nodes, to an order of magnitude."""
+    """Return the time of a block, estimated from its nodes to an order of magnitude."""
     problems, nodes = sliding_problems(block), 0.0
     for setting, case, members in _groups(block, problems):
         solves = problems.different(members)[0].size
         visits = 1 if setting.terms is None else 4 * (4 + len(setting.terms.moduli))
         grid = 2 if case.oversampling == "auto" else case.oversampling
-        # a line takes as long as ten cases; on the first grids cases visit few of the nodes
+        # a line takes as much time as ten cases; on the coarse grids cases need only a part of the nodes
         nodes += _lines(block, setting) * setting.roughness.points * grid * (10 + 0.5 * solves * visits)
     return 1e-4 + SECONDS_A_NODE * nodes
 
 
 def memory(block: Block[SlidingFriction]) -> float:
-    """Estimate the peak memory of a block: one line on the grid that its cases usually need."""
+    """Return the estimated peak memory of a block: one line on the grid that its cases usually need."""
     problems, nodes = sliding_problems(block), 0.0
     for setting, case, _ in _groups(block, problems):
         grid = case.oversampling

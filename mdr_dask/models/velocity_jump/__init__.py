@@ -1,6 +1,7 @@
-"""Kinetics of friction after a jump of the sliding velocity, or under any loading history (thesis chapter 4).
+"""Friction after a jump of the sliding velocity, or under any loading history (thesis chapter 4).
 
-`declaration` says what a campaign can name and is light to import; `solve` turns a block of cases into arrays.
+`declaration` defines the parameters and outputs, and is quick to import; `solve` computes the outputs of a block of
+cases.
 """
 
 from mdr_dask.models.velocity_jump.declaration import MODEL, VelocityJump

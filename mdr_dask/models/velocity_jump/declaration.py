@@ -1,4 +1,4 @@
-"""Parameters and outputs of the model `velocity_jump`; light to import."""
+"""Parameters and outputs of the model `velocity_jump`; quick to import."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class VelocityJump(SlidingBody):
         return kelvin(self.shear_modulus, self.relaxation_time)
 
     def time_unit(self) -> float:
-        """Return tau, the unit of stored times: the longest time of the solid's Prony terms and dashpot."""
+        """Return tau, s, the unit of stored times: the longest relaxation time of the Prony terms and the dashpot."""
         solid = self.solid()
         return float(max([solid.viscosity / solid.static_modulus, *solid.times]))
 

@@ -1,4 +1,4 @@
-"""Solve a block of cases: jumps of a Kelvin body by a march of the depth, everything else element by element."""
+"""Solve a block of cases: jumps of a plane Kelvin body by the march of the depth, other cases by `elements`."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ from mdr_dask.physics.transients.elements.foundation import foundation
 from mdr_dask.physics.transients.elements.loading_history import Trace, trace
 from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
-ACCURACY = 0.01  # of friction before and after and of the jump, if the campaign states none
+ACCURACY = 0.01  # of friction before and after and of the jump, if the campaign does not give an accuracy
 SECONDS_NODE, SECONDS_MOMENT = 6.2e-8, 3.3e-9  # per node of a line, and per node and moment of a march
-MOMENTS = 4  # of a march, per step in a decade
-SECONDS_STEPPED = 3.5e-8  # per node squared: a history that travels a few lengths of the line
-FLAT = 1e-12  # part of the largest height: a smaller scatter is rounding
-HISTORY_ORDER = 2  # of a history in nodes and steps
+MOMENTS = 4  # moments of a march, divided by the steps per decade
+SECONDS_STEPPED = 3.5e-8  # per node squared, for a history that travels a few lengths of the line
+FLAT = 1e-12  # part of the largest height; smaller differences of heights are rounding errors
+HISTORY_ORDER = 2  # order of convergence of a history in nodes and steps
 
 #: Outputs that have errors.
 WITH_ERROR = (
@@ -57,7 +57,7 @@ TRANSIENT = ("friction_coefficient", "indentation_depth")
 
 @dataclass(frozen=True)
 class _Found:
-    """Outputs of some cases and their errors, without units: friction over h / L, depth over h."""
+    """Outputs of some cases and their errors, dimensionless: friction over h / L, depth over h."""
 
     values: dict[str, FloatArray]
     errors: dict[str, FloatArray]
@@ -78,7 +78,7 @@ def compute(block: Block[VelocityJump]) -> Result:
     for j in np.flatnonzero(after == 1):
         problems.faults.setdefault(int(j), "expected a velocity_change above rounding, the velocity stays the same")
     groups = list(_groups(block, problems))
-    for r, realisation in enumerate(block.realisations):  # outside: every line of one has the same phases
+    for r, realisation in enumerate(block.realisations):  # all lines of a realisation share the phases
         for group in groups:
             solves += group.solve(result, r, realisation)
     result.messages.update({(j, r): fault for j, fault in problems.faults.items() for r in range(shape[1])})
@@ -86,7 +86,7 @@ def compute(block: Block[VelocityJump]) -> Result:
 
 
 def _groups(block: Block[VelocityJump], problems: SlidingProblems) -> Iterator[_Group]:
-    """Yield groups of cases: those of one line and grid that are marched, and each other case by itself."""
+    """Yield groups of cases: the jumps on one line and grid that are marched together, and every other case alone."""
     protocols, which = each(block, "protocol")
     is_jump = np.array([protocol.shape == "jump" for protocol in protocols])[which]
     is_simple = np.array([setting.terms is None and setting.body is None for setting in problems.settings] + [False])
@@ -116,15 +116,15 @@ class _Group:
 
     @property
     def largest_loads(self) -> FloatArray:
-        """F_N / (4 G_inf L h) of the cases, the largest of a history."""
+        """F_N / (4 G_inf L h) of the cases; the largest value during a history."""
         return self.problems.loads[self.members]
 
     def found(self, waves: Waves) -> tuple[_Found, int]:
-        """Solve the cases on one realisation of the roughness; return also how many different ones were solved."""
+        """Solve the cases on one realisation of the roughness; also return the number of solved cases."""
         raise NotImplementedError
 
     def solve(self, result: Result, r: int, realisation: int) -> int:
-        """Write the cases of one realisation, the r-th of the block; return how many were solved."""
+        """Write the results of one realisation, index r in the block; return the number of solved cases."""
         members = self.members
         height, length = self.problems.height[members], self.problems.length[members]
         try:
@@ -150,12 +150,12 @@ class _Group:
         return solves
 
     def _messages(self, found: _Found) -> Iterator[tuple[int, str]]:
-        """Yield why a case failed, which outputs miss the accuracy, and whether it is outside the tested range."""
+        """Yield the reasons of failures, the outputs that miss the accuracy, and the cases outside the tested range."""
         for k in np.flatnonzero(found.outcome != Outcome.CONVERGED):
             outcome = Outcome(int(found.outcome[k]))
             more = ": fewer points or a shorter time" if outcome == Outcome.TOO_MANY_STEPS else ""
             yield int(k), outcome.sentence + more
-        # a transient counts only if the campaign states an accuracy
+        # the accuracy of a transient is checked only if the campaign gives an accuracy
         judged = [name for name in self.outputs if self.block.accuracy is not None or name not in TRANSIENT]
         values, errors = ({name: each[name] for name in judged} for each in (found.values, found.errors))
         floors = {name: self._floor(found, name) for name in judged}
@@ -163,9 +163,9 @@ class _Group:
         yield from beyond_tested(self.setting, self.largest_loads, found.contact).items()
 
     def _floor(self, found: _Found, name: str) -> FloatArray:
-        """Return the size with which the error of an output is compared if the output is zero within its error.
+        """Return the floor of the relative error of an output: 0, or the largest friction of the case.
 
-        This is the largest friction of the case, for instance for the friction of a body at rest.
+        The largest friction is used if the output is zero within its error, such as the friction of a body at rest.
         """
         cases = found.outcome.size
         if name == "indentation_depth":
@@ -179,7 +179,7 @@ class _Group:
 
 
 class _Marched(_Group):
-    """Jumps of a Kelvin body on one line, of which equal ones are solved once."""
+    """Jumps of a Kelvin body on one line; equal jumps are solved once."""
 
     def found(self, waves: Waves) -> tuple[_Found, int]:
         """Solve the different cases together."""
@@ -199,9 +199,9 @@ class _Marched(_Group):
 
     @cached_property
     def different(self) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Loads and Deborah numbers of the different cases, and the entry of every member.
+        """Loads and Deborah numbers of the different cases, and the index of the case of every member.
 
-        They are sorted by velocity, so that data of the line at a Deborah number are computed once.
+        They are sorted by velocity, so that the barriers of the line at a Deborah number are computed once.
         """
         before = self.problems.deborah[self.members]
         change = np.asarray(self.block.column("velocity_change"), dtype=np.float64)[self.members]
@@ -225,10 +225,10 @@ class _Marched(_Group):
 
 
 class _Followed(_Group):
-    """One case in which all elements are followed: any history, solid and indenter."""
+    """One case that is computed from the motion of all elements: any history, solid and indenter."""
 
     def found(self, waves: Waves) -> tuple[_Found, int]:
-        """Follow it on a quarter and half of the nodes with as many times the steps, and on all nodes."""
+        """Solve the case on a quarter and on half of the nodes, with longer steps in proportion, and on all nodes."""
         nodes = waves.points * self.oversampling
         grids = [nodes // every for every in (4, 2, 1) if nodes % every == 0 and nodes // every >= waves.points]
 
@@ -238,7 +238,7 @@ class _Followed(_Group):
             values = [friction[None], np.array([found.after]), found.depth[None], np.array([found.contact])]
             return Solution(values, np.array([found.outcome], np.int8))
 
-        # depths are relative to the rms height at least, which is 1 here
+        # errors of depths are relative to the rms height (1 here) if the depth is smaller
         refined = refine(solve, 1, grids, 0.0, HISTORY_ORDER, floors=[0.0, 0.0, 1.0, 0.0], shared=False)
         friction, after, depth, contact = refined.values
         error, after_error, depth_error, _ = refined.errors[:, 0]
@@ -250,12 +250,12 @@ class _Followed(_Group):
 
     @property
     def largest_loads(self) -> FloatArray:
-        """F_N / (4 G_inf L h), the largest of the history."""
+        """F_N / (4 G_inf L h), the largest value during the history."""
         case = self.block.case(int(self.members[0]))
         return self.problems.loads[self.members] * (case.largest_force() / case.normal_force)
 
     def _trace(self, waves: Waves, every: int) -> Trace:
-        """Follow the case on every so many of its nodes."""
+        """Compute the case on every n-th of its nodes, n being `every`."""
         case = self.block.case(int(self.members[0]))
         height, length = (float(column[self.members[0]]) for column in (self.problems.height, self.problems.length))
         solid, unit = case.solid(), case.time_unit()
@@ -288,7 +288,7 @@ def distinct(block: Block[VelocityJump]) -> int:
 
 
 def seconds(block: Block[VelocityJump]) -> float:
-    """Estimate the time of a block, in seconds, from its nodes and moments."""
+    """Return the time of a block, s, estimated from its nodes and moments."""
     total = 1e-3
     for group in _groups(block, sliding_problems(block)):
         nodes = group.setting.roughness.points * group.oversampling
