@@ -104,7 +104,7 @@ class Generated(_Random):
 
 @dataclass(frozen=True)
 class OfSurfaces(_Random):
-    """Two lines with the spectra of measured surfaces, in m; with several files, realisation r uses them in turn."""
+    """Two lines with the spectra of measured surfaces, in m; realisations use several files in turn."""
 
     surface_1: Surface
     surface_2: Surface

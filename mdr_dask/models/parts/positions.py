@@ -45,7 +45,7 @@ def without_positions(rows: FloatArray) -> Outer:
     Raises
     ------
     DataError
-        If positions are not equidistant, or if there are several different lines of them.
+        If positions are not equidistant, or if several lines of positions have different steps.
     """
     if min(rows.shape) < 4 * OUTER:
         return Outer(rows, (None, None), ())

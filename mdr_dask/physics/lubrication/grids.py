@@ -100,7 +100,7 @@ def aligned(
 
 def _halved_by(share: float, cells: int) -> int:
     """Return the number near `cells` for which the fraction `share` of it lies closest to the middle of a cell."""
-    far = int(0.5 / max(1 - share, 4 / cells))  # the place in its cell repeats after 1 / (1 - share) cells
+    far = int(0.5 / max(1 - share, 4 / cells))  # the position in its cell repeats after 1 / (1 - share) cells
     near = cells + np.arange(-far, far + 1)
     return int(near[np.argmin(np.abs(near * share % 1 - 0.5))])
 

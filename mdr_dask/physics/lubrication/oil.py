@@ -46,7 +46,7 @@ def walther_fit(temperature: FloatArray, viscosity: FloatArray) -> tuple[float, 
     Raises
     ------
     ValueError
-        If there are fewer than two temperatures, a viscosity is below 2 mm^2/s, or they do not fall with
+        If there are fewer than two temperatures, a viscosity is below 2 mm^2/s, or viscosities do not fall with
         temperature.
 
     Examples

@@ -122,7 +122,7 @@ def least_edge_error(stick_radius: float, accuracy: float) -> float:
 
 
 def farthest_contact(profile: Profile, stick_radius: float) -> float:
-    """Return an upper bound of the contact radius: the contact at the final depth if the border did not move."""
+    """Return an upper bound of the contact radius: the end of a table, or the contact at the largest possible depth."""
     if np.isfinite(profile.largest_radius):
         return profile.largest_radius
     abscissa, weight = gauss(64)
