@@ -181,7 +181,7 @@ NAMES = tuple(statistic.name for statistic in STATISTICS)
 
 
 def companion(dataset: xr.Dataset, output: str) -> xr.DataArray | None:
-    """Return the discretisation errors of an output, as its ``ancillary_variables`` name them; None without any."""
+    """Return the discretisation errors of an output, which its ``ancillary_variables`` name, or None without any."""
     name = dataset[output].attrs.get("ancillary_variables")
     return dataset[name] if name in dataset.data_vars else None
 

@@ -17,7 +17,7 @@ from mdr_dask.arrays import FloatArray
 
 CONFIDENCE = 0.95
 RESAMPLES = 400
-#: Number of groups of values that are shifted by their errors one group at a time; within a group errors have one sign.
+#: Number of groups in which values are shifted by their errors, one group at a time; in a group, errors have one sign.
 GROUPS = 32
 #: Probabilities of the ends of an interval.
 TAILS = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)

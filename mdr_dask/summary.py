@@ -43,7 +43,7 @@ def summary(campaign: Campaign) -> Summary:
     Raises
     ------
     CampaignError
-        If it is too large, or a tolerance names a constant that no fit gives.
+        If the campaign is too large to be run, or a tolerance names a constant that no fit of the model gives.
     """
     require_answers(campaign)
     costs = estimate(campaign)

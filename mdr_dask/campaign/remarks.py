@@ -31,7 +31,7 @@ def remarks(
     paths: Mapping[str, Path],
     units: Mapping[str, str],
 ) -> Iterator[Problem]:
-    """Yield a question for each parameter with a bare number more than three decades from its usual value.
+    """Yield a question for each parameter with a number that has no unit and is far from the usual value.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ FEWEST = 10
 def cases_that_narrow(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, taken: Sequence[IntArray]
 ) -> list[BoolArray]:
-    """Return the cases that need more realisations: constants with a too wide interval were fitted to them.
+    """Return the cases that need more realisations, because constants with too wide intervals were fitted to them.
 
     Parameters
     ----------

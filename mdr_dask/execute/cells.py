@@ -79,7 +79,7 @@ def find_cells(
 
 
 def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]]:
-    """Yield for each group an array with the number of the part that each result belongs to; `count` parts in all."""
+    """Yield for each group the number of the part of each result, for a division into `count` parts."""
     position = itertools.count()
     for template in layout:
         numbers = np.zeros(template.shape, dtype=np.int32)

@@ -126,7 +126,7 @@ def parsed(content: bytes) -> Any:
 
 
 def read_many(url: str, files: Iterable[str]) -> Iterator[tuple[str, bytes | None]]:
-    """Yield name and content of many files in order, None for missing ones; a server is asked for many at once."""
+    """Yield name and content of many files in order, None for missing ones; a server sends many at the same time."""
     path = local(url)
     if path is not None:
         with guarded(url, "reading its files"):
