@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.models.base import Model, Status
 
-#: The number of realisations grows to what is probably enough for half of the cases, by a factor within these limits.
+#: A round raises the number of realisations so that half of the cases probably have enough; limits of this factor.
 LEAST_GROWTH, MOST_GROWTH = 1.25, 4.0
 #: Growth factor in rounds for a fitted constant, because the number of realisations that it needs is unknown.
 GROWTH = 1.5

@@ -240,7 +240,7 @@ def seconds(duration: float) -> str:
     return f"{minutes // 60} h {minutes % 60} min"
 
 
-#: Decades from the usual value beyond which ``check`` asks about a number without a unit: in general, in kelvin.
+#: Decades from the usual value beyond which ``check`` asks about a number without a unit; the second for temperatures.
 _FAR, _FAR_TEMPERATURE = 3.0, 0.3
 
 

@@ -28,7 +28,7 @@ from mdr_dask.task import one_blas_thread
 SCHEDULER_PATIENCE = 10
 #: Address of the web page of a scheduler: only this machine can open it.
 DASHBOARD = "127.0.0.1:0"
-#: Dask chooses the size of an adaptive cluster so that the waiting tasks take about this long: about one block each.
+#: Time in which an adaptive cluster should finish all waiting tasks; Dask starts workers accordingly. About one block.
 TARGET_DURATION = "1s"
 #: Loggers whose messages explain why workers cannot be started; messages of the run quote them.
 STARTING = ("distributed.deploy", "dask_jobqueue", "tornado")
