@@ -1,4 +1,4 @@
-"""Realisations until a fitted constant is known well enough, and the cases on which it depends."""
+"""Decide whether a fitted constant needs more realisations, and find the cases on which it depends."""
 
 from __future__ import annotations
 
@@ -12,23 +12,25 @@ from mdr_dask.errors import CampaignError, FitError, did_you_mean
 from mdr_dask.fits import available
 from mdr_dask.fits.base import Fit
 
-#: Means are moved by this part of their standard error to find what depends on them; a fit then keeps its cases.
+#: Means are shifted by this fraction of their standard error to find the constants that depend on them. The shift is so
+#: small that the fit still selects the same cases.
 STEP = 1e-3
-#: Largest number of groups of neighbouring values along a dimension that are moved one after the other.
+#: Largest number of groups of neighbouring values along a dimension; the groups are shifted one after the other.
 GROUPS = 32
-#: A group of cases is left out if it changes the constant by less than this part of its standard error.
+#: A group of cases is left out if a shift by one standard error changes the constant by less than this share of the half
+#: width of its interval.
 NEGLIGIBLE = 0.01
-#: Relative change of the scatter by which its part of an interval is found.
+#: Relative change of the scatter for the extrapolation to zero scatter.
 LESS = 0.01
 
 
 def require_known(campaign: Campaign) -> None:
-    """Refuse a campaign whose realisations go on until a constant is known that no fit of the model gives.
+    """Raise an error if a campaign names a constant in ``until`` that no fit of its model gives.
 
     Raises
     ------
     CampaignError
-        With one sentence for each such constant.
+        With one sentence for each unknown constant.
     """
     known = available(campaign.model) if campaign.replication.answers else {}
     is_adaptive = any(axis.refinement for one in campaign.series for axis in one.axes)
@@ -52,7 +54,7 @@ def require_known(campaign: Campaign) -> None:
 def half_widths(
     fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]
 ) -> dict[str, tuple[xr.DataArray, xr.DataArray]]:
-    """Return a constant and half of its 95 % interval, by series.
+    """Return a constant and the half width of its 95 % interval, by series.
 
     Raises
     ------
@@ -68,7 +70,7 @@ def half_widths(
 
 
 def is_wide(value: xr.DataArray, half: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
-    """Return where an interval is too wide. Without ends, as of a law that does not hold, it is not."""
+    """Return where an interval is too wide; an interval without finite ends (the law does not hold) does not count."""
     return (half > _allowed(value, tolerance)) & np.isfinite(half)
 
 
@@ -80,9 +82,9 @@ def _allowed(value: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
 def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.DataArray]:
     """Return the half width that an interval would have without scatter of the realisations, by series.
 
-    It comes from errors of the grid and from the misfit of the law, and more realisations do not reduce it. It is found
-    by extrapolation from a slightly smaller and a slightly larger scatter. The smaller result is taken, because at one
-    of both the verdict about the law may change.
+    This half width comes from grid errors and from the misfit of the law; more realisations do not reduce it. It is
+    extrapolated from a slightly smaller and from a slightly larger scatter. The smaller result is returned, because the
+    verdict on the law may change at one of these two.
     """
     now = half_widths(fit, constant, groups)
 
@@ -95,7 +97,7 @@ def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -
 
 
 def _scattered(data: xr.Dataset, scale: float) -> xr.Dataset:
-    """Return a study with the same means and another scatter of its realisations."""
+    """Return a study with the same means, and the scatter of its realisations multiplied by `scale`."""
     found = {}
     for name in _results(data):
         mean = data[name].mean("realisation")
@@ -106,10 +108,10 @@ def _scattered(data: xr.Dataset, scale: float) -> xr.Dataset:
 def still_wide(
     fit: Fit, constant: str, groups: Mapping[str, xr.Dataset], tolerance: Tolerance, at_most: int
 ) -> dict[str, xr.DataArray]:
-    """Return where an interval is too wide and more realisations may narrow it enough, by series.
+    """Return where an interval is too wide and more realisations may make it narrow enough, by series.
 
-    They cannot if the part of the scatter is already within the tolerance and would, divided by the root of the
-    increase of realisations, still be too large together with the other part.
+    More realisations are useless if the half width due to scatter is already within the tolerance, and the total half
+    width would still exceed the tolerance with `at_most` realisations.
 
     Raises
     ------
@@ -132,11 +134,11 @@ def still_wide(
 def cases_behind(
     fit: Fit, constant: str, groups: Mapping[str, xr.Dataset], name: str, wide: xr.DataArray
 ) -> xr.DataArray:
-    """Return the cases of a series on which a constant depends, where it is not known well enough.
+    """Return the cases of a series on which a constant depends whose interval is too wide.
 
-    The results of the cases are moved by a small part of their standard error, group by group along every dimension
-    that the constant does not have itself. A case is chosen if the constant depends on the group of each of its
-    coordinates; so whole rows and columns are chosen, and all cases that a fit compares get the same lines.
+    The results of the cases are shifted by a small part of their standard error, group by group along every dimension
+    that the constant itself does not have. A case is chosen if the constant depends on the group of each of its
+    coordinates. Whole rows and columns are therefore chosen, and all cases that a fit compares get the same lines.
 
     Parameters
     ----------
@@ -186,22 +188,22 @@ def cases_behind(
 
 
 def _is_own(data: xr.Dataset, wide: xr.DataArray, dim: str) -> bool:
-    """Return whether a result has a dimension of its study with the same values, without a further row for all."""
+    """Return whether a dimension of a result has the values of the study, without an extra row for all values."""
     if dim in data.coords and dim in wide.coords:
         return data[dim].equals(wide[dim])
     return data.sizes[dim] == wide.sizes[dim]
 
 
 def _over(dims: list[str], flags: xr.DataArray) -> xr.DataArray:
-    """Return where any flag is set along the other dimensions."""
+    """Return where any flag is set along the dimensions that are not in `dims`."""
     bare = flags.drop_vars(flags.coords)
     return bare.any([dim for dim in bare.dims if dim not in dims])
 
 
 def _steps(data: xr.Dataset, inner: list[str]) -> dict[str, xr.DataArray]:
-    """Return by how much the results of every case are moved, all realisations alike.
+    """Return the shift of each output of every case; all realisations of a case are shifted equally.
 
-    Signs and sizes are random, because equal moves would cancel in sums and differences of cases.
+    Signs and sizes are random, because equal shifts would cancel in differences between cases.
     """
     generator, shape = np.random.Generator(np.random.Philox(0)), [data.sizes[dim] for dim in inner]
     found = {}
@@ -213,6 +215,6 @@ def _steps(data: xr.Dataset, inner: list[str]) -> dict[str, xr.DataArray]:
 
 
 def _results(data: xr.Dataset) -> list[str]:
-    """Return the outputs that differ between realisations, without their errors."""
+    """Return the names of the outputs that differ between realisations, without the companions (`<output>_error`)."""
     beside = {"status", *(array.attrs.get("ancillary_variables") for array in data.data_vars.values())}
     return [str(key) for key, array in data.data_vars.items() if key not in beside and "realisation" in array.dims]

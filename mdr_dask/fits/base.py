@@ -1,10 +1,10 @@
-"""What a fit is: a law, a function from the series of a store to the constants of the law, and whether the law holds.
+"""The class `Fit`: a law, with a function that fits its constants to the series of a store and tests the law.
 
-Every result has a variable ``law_holds``: a sentence about the law as its source states it, with the constants that the
-source states. It begins with *yes*, *approximately*, *no* or *not tested*. Where constants are fitted,
-``fitted_law_holds`` says the same of the law with the fitted constants. If the fitted law does not hold either, its
-departures enter the intervals as an error of every case (`fitted`), or the ends of the intervals are NaN. A constant
-that the data do not determine (`undetermined`) is NaN.
+Every result has a variable ``law_holds``: a sentence about the law with the constants that its source states. The
+sentence begins with *yes*, *approximately*, *no* or *not tested*. If constants are fitted, ``fitted_law_holds`` is the
+corresponding sentence about the law with the fitted constants. If the fitted law does not hold either, its departures
+enter the intervals as an error of every case (`fitted`), or the ends of the intervals are NaN. A constant that the data
+do not determine (`undetermined`) is NaN.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class Fit:
 
 
 def require(data: xr.Dataset, *names: str) -> None:
-    """Raise FitError if the study has no such parameters, as laws of a Kelvin body on a generated line need them."""
+    """Raise FitError if the study lacks one of these parameters of a Kelvin body on a generated line."""
     missing = [name for name in names if name not in data.variables]
     if missing:
         raise FitError(
@@ -98,7 +98,7 @@ FITTED_LAW_HOLDS = {"units": "1", "long_name": "whether the law holds with the f
 
 
 def _judged(result: xr.Dataset) -> xr.Dataset:
-    """Return a result whose last variable is ``law_holds``."""
+    """Return a result with ``law_holds`` as its last variable; *not tested* if the fit gives no verdict."""
     sentence = result.get("law_holds", xr.DataArray("not tested: this fit compares no law with its data"))
     return result.drop_vars("law_holds", errors="ignore").assign(law_holds=sentence.assign_attrs(LAW_HOLDS))
 
@@ -127,7 +127,7 @@ class Fitted:
         return float(np.sqrt(np.mean(self.residuals[0] ** 2)))
 
     def holds(self, where: Callable[[int], str] | None = None) -> str:
-        """Say whether the law with the fitted constants holds; arguments as in `verdict`."""
+        """Return a sentence on whether the law with the fitted constants holds; `where` as in `verdict`."""
         if np.isnan(self.constants[0]).any():
             return f"not tested: these cases do not determine the constants; departs by {100 * self.rms:.2g} % rms"
         return verdict(self.residuals, self.count, self.constants.shape[1], where)
@@ -140,7 +140,7 @@ def fitted(
     count: int,
     stated: FloatArray | None = None,
 ) -> Fitted:
-    """Fit a law; where scatter and errors do not explain its residuals, these become an error of every case.
+    """Fit a law; if scatter and errors do not explain the residuals, the residuals count as an error of every case.
 
     Parameters
     ----------
@@ -153,7 +153,8 @@ def fitted(
     count : int
         Realisations that were resampled.
     stated : array, shape (p,), optional
-        Constants that the source states. What the data would not determine about these is not determined, either.
+        Constants that the source states. A constant also counts as undetermined if the data would not determine it
+        near these values.
     """
     constants = fit(data)
     residuals = left(data, constants)
@@ -171,8 +172,8 @@ def fitted(
 def undetermined(effects: FloatArray) -> BoolArray:
     """Return which constants of a law the data do not determine.
 
-    These are the constants whose change by one, with the others refitted, changes the law by less than `WITHIN` in
-    every case. Such a constant would only follow departures of the data as small as those of a law that holds.
+    A constant is undetermined if a change of it by one, with the other constants refitted, changes the law by less than
+    `WITHIN` in every case. Its fitted value would only reflect departures that are allowed for a law that holds.
 
     Parameters
     ----------
@@ -196,7 +197,7 @@ def verdict(
     *,
     excluded: bool = False,
 ) -> str:
-    """Say whether a law holds.
+    """Return a sentence on whether a law holds, from a stack of its departures.
 
     Parameters
     ----------
@@ -207,9 +208,9 @@ def verdict(
     constants : int
         Number of constants fitted to these data.
     where : callable, int -> str, optional
-        Returns a description of a case, for that of the largest departure.
+        Returns a description of a case; used for the case with the largest departure.
     excluded : bool
-        Whether the interval of a fitted constant excludes the stated value; scatter is then no explanation.
+        Whether the interval of a fitted constant excludes the stated value; scatter then does not explain departures.
     """
     if residuals.shape[1] <= constants:
         return law_holds(residuals[0], np.nan, constants)
@@ -233,17 +234,17 @@ def short(number: float) -> str:
 def law_holds(
     departures: FloatArray, chance: float | None, constants: int = 0, where: str = "", scatter: float = 0.0
 ) -> str:
-    """Say whether a law holds.
+    """Return a sentence on whether a law holds.
 
-    Scatter never improves a verdict: where it may hide a departure beyond a limit, the limit counts as exceeded, and
-    where it may hide any departure up to the largest limit, the law is not tested.
+    Scatter never improves a verdict. If it may hide a departure beyond a limit, the limit counts as exceeded. If it may
+    hide any departure up to the largest limit, the law is not tested.
 
     Parameters
     ----------
     departures : array
         Relative departures of the data from the law.
     chance : float or None
-        Probability that scatter and errors alone cause as large departures; NaN if unknown, None if they cannot.
+        Probability that scatter and errors alone cause departures of this size; NaN if unknown, None if they cannot.
     constants : int
         Number of constants fitted to these data.
     where : str

@@ -24,7 +24,7 @@ from mdr_dask.fits.posterior import DEVIATIONS, Likelihood, Noise, Posterior, di
 from mdr_dask.fits.prediction import Prediction, prediction
 from mdr_dask.tables import decoded
 
-#: Least error of measurement that is considered, as a share of the residuals of the best prediction.
+#: Smallest error of measurement that is considered, relative to the rms residual of the best prediction.
 LEAST = 0.2
 #: Relative size of residuals that rounding may cause.
 _ROUNDING = 1e-9
@@ -32,21 +32,21 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Calibration:
-    """The posterior of the unknowns of a study.
+    """The result of a calibration: the posterior density of the unknowns of a study.
 
     Parameters
     ----------
     measured : Measured
     prediction : Prediction
-        What the study predicts at the measured points.
+        Prediction of the study at the measured points.
     posterior : Posterior
     noises : list of Noise
         Errors of measurement that were considered.
     units : dict of str to str
-        Of unknowns, conditions and the output.
+        Units of the unknowns, the conditions and the output.
     contradicted : Residuals or None
-        Residuals that the errors of the table do not explain. The errors of measurement were then enlarged until they
-        explain them, so the intervals include the misfit.
+        Residuals that the errors of the table do not explain. In this case the posterior is that for larger errors of
+        measurement, which do explain the residuals, so that the intervals include the misfit.
     """
 
     measured: Measured
@@ -58,7 +58,7 @@ class Calibration:
 
     @property
     def unknowns(self) -> list[str]:
-        """Names of the axes that the table does not name."""
+        """Names of the unknowns: the axes of the study that are not columns of the table."""
         return [*self.prediction.unknowns]
 
     @cached_property
@@ -68,7 +68,7 @@ class Calibration:
 
     @cached_property
     def ends(self) -> list[identifiability.Ends]:
-        """Which ends of the axis of each unknown the data leave open."""
+        """For each unknown, which ends of its axis the data leave open."""
         return identifiability.open_ends(self.posterior)
 
     @cached_property
@@ -78,7 +78,7 @@ class Calibration:
 
     @cached_property
     def products(self) -> list[identifiability.Product]:
-        """Products of these unknowns that the data determine."""
+        """Products of powers of the undetermined unknowns that the data determine."""
         return identifiability.products(self.posterior, self.values, self.free)
 
     @cached_property
@@ -88,12 +88,12 @@ class Calibration:
 
     @property
     def law_holds(self) -> str:
-        """Whether the model explains the measured points."""
+        """Sentence on whether the model explains the measured points."""
         return law_holds(self.residuals, self.measured.conditions)
 
     @cached_property
     def noise(self) -> tuple[FloatArray, bool]:
-        """Standard deviations of the measured points, and whether they are shares of the values."""
+        """Standard deviations of the measured points, and whether they are proportional to the values."""
         shares = self.posterior.weights @ self.posterior.noise
         cuts = np.cumsum([noise.sizes.size for noise in self.noises])[:-1]
         parts = np.split(shares, cuts)
@@ -117,8 +117,8 @@ def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
     Parameters
     ----------
     dataset : Dataset
-        A group of a study that is a grid. Its axes that are not among the conditions measured are the unknowns, one to
-        four. The prior of each is uniform over its axis, in the logarithm if its values are spaced that way.
+        A group of a study that is a grid. The axes that are not measured conditions are the unknowns, one to four. The
+        prior of each unknown is uniform over its axis, or over the logarithm if the axis is spaced logarithmically.
     measured : Measured
 
     Raises
@@ -129,9 +129,9 @@ def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
     Notes
     -----
     The likelihood is normal. Its covariance has four parts: the errors of measurement; the scatter of the lines, which
-    all cases share; half of the estimated errors of grid and interpolation, common to all points; and the same half,
-    independent for each point. Errors of measurement that are not given are either equal or equal shares of the values,
-    with a uniform prior for the logarithm of their size.
+    all cases share; half of the estimated errors of grid and interpolation as an error common to all points; and the
+    other half as an error that is independent for each point. Errors of measurement that are not given are either equal
+    for all points or proportional to the values, with a uniform prior for the logarithm of their size.
     """
     predicted = prediction(dataset, measured)
     named = (*predicted.unknowns, *measured.conditions, measured.output)
@@ -154,7 +154,7 @@ def _posterior(predicted: Prediction, measured: Measured, noises: list[Noise]) -
 
 
 def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
-    """Return errors of measurement of about the size of the residuals: equal ones, and equal shares of the values."""
+    """Return errors of measurement about as large as the residuals: equal ones, and ones proportional to the values."""
     values, count = measured.values, measured.values.size
     unknowns = len(predicted.unknowns)
     if count <= unknowns:
@@ -181,7 +181,7 @@ def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
 
 
 def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
-    """Return standard deviations around that of the residuals, up to that with a probability of 0.001."""
+    """Return sizes of the error of measurement, from `LEAST` times the rms residual to its upper limit (99.9 %)."""
     spare = max(1, count - unknowns)
     most = min(100.0, float(np.sqrt(count / chi2.ppf(0.001, spare))))
     return np.asarray(residual * np.geomspace(LEAST, most, DEVIATIONS))
@@ -208,7 +208,7 @@ def measured_of(dataset: xr.Dataset) -> Measured:
     Raises
     ------
     FitError, DataError
-        If there is none, or if it has no output of the study.
+        If there is no table, or the table has no column for an output of the study.
     """
     table = dataset.attrs.get("measured")
     if not table:
@@ -230,13 +230,13 @@ def measured_of(dataset: xr.Dataset) -> Measured:
 
 
 def with_table(groups: Mapping[str, xr.Dataset], table: Any) -> dict[str, xr.Dataset]:
-    """Return the groups of a study with another table of measurements: its path, or a pandas DataFrame."""
+    """Return the groups of a study with another table of measurements, given as a path or a pandas DataFrame."""
     named = {"name": "measured", "text": table.to_csv(index=False)} if hasattr(table, "to_csv") else read_file(table)
     return {key: data.assign_attrs(measured=named) for key, data in groups.items()}
 
 
 def read_file(path: str | Path) -> dict[str, str]:
-    """Return the table of a file in the form in which a study contains it."""
+    """Return the table in a file, in the form in which a study stores it."""
     path = Path(path)
     try:
         return {"name": path.name, "text": decoded(path.read_bytes(), str(path))}
@@ -289,7 +289,7 @@ def summary(found: Calibration) -> xr.Dataset:
 
 
 def _intervals(values: FloatArray, weights: FloatArray) -> dict[str, float]:
-    """Return the median and the ends of the intervals."""
+    """Return the weighted median and the ends of the 95 % and 68 % intervals."""
     return dict(
         zip(
             identifiability.ENDS,
@@ -300,7 +300,7 @@ def _intervals(values: FloatArray, weights: FloatArray) -> dict[str, float]:
 
 
 def _bound(found: Calibration, k: int) -> dict[str, float]:
-    """Return the interval of an unknown that is bounded on one side, if all others are determined."""
+    """Return the one-sided interval of an unknown if all other unknowns are determined; empty otherwise."""
     low, high = found.ends[k]
     if found.free != [k] or low == high:
         return {}
@@ -314,14 +314,14 @@ def _correlation(found: Calibration, one: int, other: int) -> float:
 
 
 def sentence(found: Calibration) -> str:
-    """Say what the data determine, after the verdict if the model does not explain the data."""
+    """Return a sentence on what the data determine; it starts with the verdict if the model does not explain them."""
     if found.law_holds.startswith("no:"):
         return f"the model does not explain the measured points; with errors that would explain them, {_known(found)}"
     return _known(found)
 
 
 def _known(found: Calibration) -> str:
-    """Say which unknowns the data determine, and which they do not."""
+    """Return a sentence on which unknowns the data determine, and which they do not."""
     free = [found.unknowns[k] for k in found.free]
     if not free:
         return "every unknown is determined"

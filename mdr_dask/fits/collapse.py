@@ -1,4 +1,4 @@
-"""Whether shifted curves collapse, and whether a law describes their shifts: constants, and a verdict in words."""
+"""Test whether shifted curves collapse onto a master curve, and which law the shift factors follow."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from mdr_dask.physics.superposition.laws import ShiftLaw
 from mdr_dask.physics.superposition.master_curve import Superposition
 from mdr_dask.units import conversion
 
-DEGREES = range(1, 7)  # of the polynomials that tell the scatter within curves
+DEGREES = range(1, 7)  # degrees of the polynomials that are fitted to each curve to estimate its scatter
 HOLDS = {"yes", "approximately"}
-LOG = float(np.log(10.0))  # a departure in decades, times this, is a relative one
+LOG = float(np.log(10.0))  # converts a departure in decades into a relative departure
 
 
 def laws_of(
     result: Superposition, over: str, unit: str, reference: float, *, is_temperature: bool
 ) -> tuple[list[ShiftLaw], dict[str, str]]:
-    """Fit the laws that suit the groups: a power of velocities, Arrhenius and WLF for temperatures.
+    """Fit the laws that suit the groups: a power law for velocities, Arrhenius and WLF for temperatures.
 
-    They are fitted about the middle group, whatever the reference, so that they do not depend on it; the constants are
-    those at the reference.
+    The laws are fitted relative to the middle group, so that the fit does not depend on the reference. The constants
+    are given for the reference.
 
     Returns
     -------
     laws : list of ShiftLaw
-        Of log10 a_T for temperatures, of the shift factor itself for velocities.
+        Laws of log10 a_T for temperatures, of the shift factor itself for velocities.
     verdicts : dict of str to str
-        Of each law, in words.
+        For each law, a sentence on whether it holds.
     """
     size, anchor = result.groups.size, result.groups.size // 2
     groups, factors = result.groups, result.horizontal - result.horizontal[anchor]
@@ -59,20 +59,20 @@ def laws_of(
 
 
 def sign_of(over: str) -> int:
-    """Return the sign of log10 a_T in shift factors: 1 over frequency, -1 over time."""
+    """Return the sign of log10 a_T in shift factors: -1 if the abscissa is a time, otherwise (frequency) 1."""
     return -1 if over == "t" or over.lower().startswith("time") else 1
 
 
 def kelvins(temperatures: FloatArray, unit: str, groups: FloatArray | None = None) -> FloatArray:
-    """Return temperatures in K; without a unit, those whose median is above 250 count as kelvins, others as degC.
+    """Return temperatures in K. Without a unit they are taken as kelvins if their median is above 250, else as degC.
 
     Parameters
     ----------
     temperatures : array
     unit : str
-        As a table has it.
+        Unit as written in the table; empty if there is none.
     groups : array, optional
-        All temperatures of the table, if there are others.
+        All temperatures of the table, for the median; by default `temperatures`.
     """
     if unit in ("", "1", "-"):
         unit = "K" if np.median(temperatures if groups is None else groups) > 250 else "degC"
@@ -97,9 +97,9 @@ def _constants(law: shift_laws.ShiftLaw) -> dict[str, xr.Variable]:
 
 
 def with_verdict(curve: xr.Dataset, verdicts: dict[str, str]) -> xr.Dataset:
-    """Return a master curve that says in words whether its curves collapse and which law its shifts follow.
+    """Return a master curve with ``law_holds``: whether its curves collapse, and which law its shift factors follow.
 
-    Curves collapse only where the shift factors are known: on a plateau, curves coincide wherever they lie.
+    If the curves do not determine all shift factors, the collapse is not tested: plateaus coincide for any shift.
     """
     open_steps = curve.attrs.get("undetermined", "")
     collapse = f"not tested: shift factors are {open_steps.partition(':')[0]}" if open_steps else _collapse(curve)
@@ -117,9 +117,10 @@ def with_verdict(curve: xr.Dataset, verdicts: dict[str, str]) -> xr.Dataset:
 
 
 def _collapse(curve: xr.Dataset) -> str:
-    """Compare the scatter about the merged curve with that within the curves, about a polynomial of each.
+    """Return a sentence on whether the curves collapse.
 
-    Of two ordinates that were shifted together, the one that collapses less answers.
+    The scatter about the merged curve is compared with the scatter of each curve about its own polynomial. If two
+    ordinates were shifted together, the sentence is that of the ordinate that collapses less well.
     """
     names = [name for name in ("ordinate", "companion") if f"point_{name}" in curve]
     answers = [_collapse_of(curve, name) for name in names]
@@ -151,13 +152,13 @@ def _collapse_of(curve: xr.Dataset, name: str) -> str:
 
 
 class _Within(NamedTuple):
-    """The sum of squares about a polynomial of each curve, and its degrees of freedom."""
+    """Sum of the squared residuals about one polynomial for each curve, and its degrees of freedom."""
 
     squares: float
     freedom: int
 
     def criterion(self, points: int) -> float:
-        """Return Schwarz's criterion, the least of which chooses the degree."""
+        """Return Schwarz's criterion; the degree with the smallest value is chosen."""
         mean = max(self.squares, 1e-300) / points
         return float(points * np.log(mean) + (points - self.freedom) * np.log(points))
 

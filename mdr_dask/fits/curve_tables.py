@@ -1,4 +1,4 @@
-"""Tables of curves for master curves: which columns they are, and which rows belong to which curve."""
+"""Tables of curves for master curves: find the columns, and the rows that belong to each curve."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from mdr_dask.units import conversion, is_unit
 ALIASES = {"normal_force": "normal force", "friction_coefficient": "friction coefficient"} | {
     f"{kind}_modulus": f"{kind} modulus" for kind in ("storage", "loss")
 }
-"""Names of columns in a study, and what tables call them (`mdr_dask.tables.SYNONYMS`)."""
+"""Names of columns in a study, and the names that tables use for them (`mdr_dask.tables.SYNONYMS`)."""
 
-LEAST_JUMP = 3.0  # between gaps within a group of scattered values and gaps between groups
+LEAST_JUMP = 3.0  # least ratio of a gap between two groups to a gap within a group of scattered values
 
 
 def read_table(path: str | Path) -> pd.DataFrame:
-    """Read a table of numbers: one row of names, perhaps a row of units, comments and a byte-order mark tolerated.
+    """Read a table of numbers with a row of names and an optional row of units; comments are skipped.
 
     Returns
     -------
     pandas.DataFrame
-        Floating-point columns under their own names; ``attrs["units"]`` holds the units found.
+        Floating-point columns with the names in the table; ``attrs["units"]`` holds the units found.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def read_table(path: str | Path) -> pd.DataFrame:
 
 
 def frame_of(table: xr.Dataset | pd.DataFrame) -> pd.DataFrame:
-    """Return a table, or a row for every case of a study with the means over its realisations."""
+    """Return a table unchanged; return a study as a table of means over realisations, one row for each case."""
     if isinstance(table, pd.DataFrame):
         return table
     mean = table.mean("realisation", keep_attrs=True) if "realisation" in table.dims else table
@@ -63,7 +63,7 @@ def frame_of(table: xr.Dataset | pd.DataFrame) -> pd.DataFrame:
 
 
 def finite_rows(frame: pd.DataFrame, columns: list[str]) -> tuple[pd.DataFrame, str]:
-    """Return the rows that have a finite number in each of the columns, and a sentence about the others, if any."""
+    """Return the rows with a finite number in every column, and a sentence about the rows left out (may be empty)."""
     missing = {name: ~np.isfinite(frame[name].to_numpy(dtype=np.float64)) for name in columns}
     anywhere = np.logical_or.reduce(list(missing.values()))
     if not anywhere.any():
@@ -75,7 +75,7 @@ def finite_rows(frame: pd.DataFrame, columns: list[str]) -> tuple[pd.DataFrame, 
 
 
 def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
-    """Return the column of a name or of one of its synonyms, as written or else as tables may have it."""
+    """Return the column with exactly this name, else the only column with a synonym of it, else None."""
     columns = [str(name) for name in frame.columns]
     if wanted in columns:
         return wanted
@@ -85,7 +85,7 @@ def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
 
 
 def _joined(column: str, wanted: str) -> bool:
-    """Return whether a column is called so with a unit joined to its name, such as ``freq_hz``."""
+    """Return whether a column has the wanted name followed by a unit, such as ``freq_hz``."""
     front, _, behind = column.rpartition("_")
     unit = JOINED.get(behind.casefold(), behind)
     return bool(front) and is_unit(unit) and is_called(front, wanted, ALIASES.get(wanted, wanted))
@@ -100,13 +100,13 @@ FAMILIES = (
     ("frequency", ("compliance",), "temperature"),
     ("time", ("compliance",), "temperature"),
 )
-"""Abscissa, ordinates and group of the tables that are understood without options, the first one that fits."""
+"""Abscissa, ordinates and group of tables that need no options; the first family that fits is used."""
 
 
 def columns_to_use(
     frame: pd.DataFrame, abscissa: str | None, ordinate: str | Sequence[str] | None, group: str | None
 ) -> tuple[str, tuple[str, ...], str]:
-    """Return the columns to use: those given, else the first family of which the table has all."""
+    """Return abscissa, ordinates and group: the given columns, completed from the first family that fits the table."""
     wished = None if ordinate is None else (ordinate,) if isinstance(ordinate, str) else tuple(ordinate)
     found = []
     for over, values, by in FAMILIES:
@@ -132,10 +132,10 @@ def columns_to_use(
 
 
 def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, str]) -> Vertical:
-    """Return the vertical factors that suit the columns: those of a modulus or compliance of a polymer, or none.
+    """Return the kind of vertical factors for these columns: ``modulus``, ``compliance`` or ``none``.
 
-    The abscissa must be a time or a frequency, and the group a temperature. Names and units are compared, so that a
-    column of any name is recognised by its unit.
+    Moduli and compliances need a time or frequency as abscissa and a temperature as group. Columns are recognised by
+    their name or by their unit.
     """
 
     def is_one(column: str, *names: str, unit: str) -> bool:
@@ -162,7 +162,10 @@ def _has_unit(unit: str, wanted: str) -> bool:
 
 
 def second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
-    """Return what the table varies in beside the columns used, or refuse it if that is no second group."""
+    """Return a second parameter in which the curves differ (velocity or temperature), or None.
+
+    Raise DataError if the normal force differs, or more than one other parameter.
+    """
     found = None
     for name in ("normal_force", "velocity", "temperature"):
         column = column_of(frame, name)
@@ -176,7 +179,7 @@ def second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
 def curves_of(
     frame: pd.DataFrame, over: str, ordinates: Sequence[str], by: str
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
-    """Return what the curves are grouped by, and the logarithms to base 10 of every curve's points.
+    """Return the value of the group of each curve, and log10 of the points of each curve.
 
     Ordinates have the shape (channels, points).
     """
@@ -194,7 +197,7 @@ def curves_of(
 def pairs_of(
     frame: pd.DataFrame, over: str, ordinates: Sequence[str], by: tuple[str, str]
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
-    """Return the values of both groups, shape (curves, 2), and the points of each curve."""
+    """Return the values of both groups of each curve, shape (curves, 2), and the points of each as in `curves_of`."""
     labels = np.array([clusters(frame[name].to_numpy(dtype=np.float64)) for name in by])
     keys, curves = [], []
     for pair in sorted(set(map(tuple, labels.T))):
@@ -213,11 +216,11 @@ def pairs_of(
 
 
 def clusters(values: FloatArray, abscissa: FloatArray | None = None) -> NDArray[np.intp]:
-    """Return the number of the group of each value.
+    """Return the index of the group of each value.
 
-    Measured values that scatter about a few set values are split at the largest jump among their gaps. They are taken
-    as set values if most of them occur several times, unless they alternate within one sweep of the abscissa, as
-    rounded readings do, or if their gaps are nearly equal.
+    Measured values that scatter about a few set values are divided at the wide gaps between them. Each distinct value
+    is a group of its own if the gaps are nearly equal, or if most values occur several times. An exception are values
+    that alternate within one sweep of the abscissa: these are rounded readings of one set value.
     """
     distinct, place, times = np.unique(values, return_inverse=True, return_counts=True)
     if distinct.size < 3:

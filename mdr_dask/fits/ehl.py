@@ -30,7 +30,7 @@ def _logarithms(dataset: xr.Dataset, output: str) -> FloatArray:
 
 
 def _maps(groups: Mapping[str, xr.Dataset]) -> Iterator[tuple[str, xr.Dataset]]:
-    """Yield the films of each series, separately for each value of what varies beside W, U and G (law, inlet)."""
+    """Yield the films of each series, separately for each value of other varied parameters (viscosity law, inlet)."""
     for name, dataset in groups.items():
         outputs = [output for output in _FILMS if output in dataset]
         if not outputs:
@@ -62,7 +62,7 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     residuals = table[3] - design[:, varied] @ solution
     inverse = np.linalg.pinv(design[:, varied])
     width[varied] = t.ppf(0.975, freedom) * np.sqrt(np.sum(inverse**2, axis=1) * np.sum(residuals**2) / freedom)
-    if np.sqrt(np.mean(residuals**2)) > WITHIN:  # a systematic misfit is no scatter: it may have one sign everywhere
+    if np.sqrt(np.mean(residuals**2)) > WITHIN:  # a misfit is systematic: it does not average out like scatter
         width[varied] += np.abs(inverse) @ np.abs(residuals)
     constants[varied] = np.where(undetermined(design[:, varied]), np.nan, solution)
     return constants, width, residuals
@@ -71,7 +71,7 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 def film_exponents(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Fit ``h/R = factor W^load U^speed G^material`` to the films of every series that varies W, U or G.
 
-    Where something else varies in a series, such as the law of the viscosity, each of its values gets its own fit.
+    If another parameter varies in a series, such as the viscosity law, each of its values gets its own fit.
 
     Parameters
     ----------
@@ -82,10 +82,10 @@ def film_exponents(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
     -------
     Dataset, dims (series,)
         ``<film>_factor``, ``<film>_load``, ``<film>_speed``, ``<film>_material`` for the central and the minimum film,
-        with ``_low`` and ``_high``; NaN for an exponent whose number is not varied, or only together with others.
-        ``<film>_rms`` and ``<film>_worst`` are the rms and the largest residual of ``ln h``. Films have no scatter, so
-        the intervals measure the misfit of the formula. ``law_holds`` judges the formula of Pan and Hamrock with its
-        own constants, ``fitted_law_holds`` that with the fitted ones.
+        with ``_low`` and ``_high``. An exponent is NaN if its number (W, U or G) does not vary, or varies only together
+        with the other numbers. ``<film>_rms`` and ``<film>_worst`` are the rms and the largest residual of ``ln h``.
+        Films have no scatter, so the intervals measure the misfit of the formula. ``law_holds`` refers to the formula
+        of Pan and Hamrock with its published constants, ``fitted_law_holds`` to the formula with the fitted constants.
 
     Raises
     ------

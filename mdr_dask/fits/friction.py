@@ -24,7 +24,7 @@ Variables = dict[str, xr.Variable]
 
 MODELS = ("sliding_friction",)
 ZONE_ONE = (0.01, 0.3)  # F_N / (G h L) of zone 1: other limits change alpha by up to 0.02 and beta by up to 0.14
-LINEAR = 0.05  # region I: mu / v changes by less between neighbouring velocities
+LINEAR = 0.05  # region I: mu / v changes by less than this between neighbouring velocities
 NEEDS_SLOPE = "not tested: the study has no output contact_slope"
 
 
@@ -78,14 +78,14 @@ def one_value(data: xr.Dataset, name: str) -> float:
 
 
 def constant(name: str, stack: FloatArray, count: int, long_name: str, positive: bool = False) -> Variables:
-    """Return a constant and the ends of its interval."""
+    """Return a constant and the ends of its interval as variables."""
     low, high = bootstrap.interval(stack, count, positive)
     values = {name: stack[0], f"{name}_low": low, f"{name}_high": high}
     return {key: xr.Variable((), value, {"units": "1", "long_name": long_name}) for key, value in values.items()}
 
 
 def measure(name: str, value: float, long_name: str) -> Variables:
-    """Return a number without an interval."""
+    """Return a number without an interval as a variable."""
     return {name: xr.Variable((), value, {"units": "1", "long_name": long_name})}
 
 
@@ -95,7 +95,7 @@ def text(name: str, sentence: str, long_name: str) -> Variables:
 
 
 def holds(stated: str, with_fitted: str = "") -> Variables:
-    """Return the sentences about the law as stated and about the law with the fitted constants."""
+    """Return ``law_holds`` and, if given, ``fitted_law_holds`` as variables."""
     found = {"fitted_law_holds": xr.Variable((), with_fitted, FITTED_LAW_HOLDS)} if with_fitted else {}
     return found | {"law_holds": xr.Variable((), stated, LAW_HOLDS)}
 
@@ -113,9 +113,9 @@ def each(
     series : mapping of str to Dataset
         One series.
     inner : callable
-        Returns the dimensions along which the law itself runs.
+        Returns the dimensions that one fit needs, such as load and velocity.
     fit : callable
-        Returns the variables of one point.
+        Returns the results of the fit at one point of the other dimensions.
     *outputs : str
         Outputs that the fit needs; by default the coefficient of friction.
     """
@@ -139,7 +139,7 @@ def each(
 
 
 def _varying(data: xr.Dataset, *names: str) -> list[str]:
-    """Return the dimensions along which any of some parameters varies."""
+    """Return the dimensions along which any of these parameters varies."""
     return sorted({str(dim) for name in names if name in data.coords for dim in data[name].dims})
 
 
@@ -153,14 +153,14 @@ def load_and_velocity_axes(data: xr.Dataset) -> list[str]:
 
 
 class Table(NamedTuple):
-    """An output over its scale.
+    """An output of all cases, divided by a scale.
 
     Attributes
     ----------
     values, error : array, shape (cases, realisations)
-        The output and its discretisation error.
+        The output and its discretisation error, both divided by the scale.
     columns : tuple of array, shape (cases,)
-        Numbers of the cases.
+        Other numbers of the cases, such as load and velocity.
     """
 
     values: FloatArray
@@ -172,7 +172,7 @@ class Table(NamedTuple):
         return self._moved(bootstrap.means(self.values[used].T), self._errors(used))
 
     def logarithms(self, used: Any = slice(None)) -> FloatArray:
-        """Return the stack of the logarithms of the means. An unknown error counts as large as the mean."""
+        """Return the stack of the logarithms of the means; an infinite error counts as 100 % of the mean."""
         means = bootstrap.means(self.values[used].T)
         relative = self._errors(used) / means[0]
         return self._moved(bootstrap.logarithms(means), np.where(np.isinf(relative), 1.0, relative))
@@ -188,7 +188,7 @@ class Table(NamedTuple):
         return np.concatenate([stack, bootstrap.moved(stack[0], error)]) if np.any(error > 0) else stack
 
     def count(self, used: Any = slice(None)) -> int:
-        """Return the least number of realisations of any of some cases."""
+        """Return the smallest number of successful realisations among some cases."""
         return int(np.isfinite(self.values[used]).sum(axis=1).min())
 
     def mean(self) -> FloatArray:
@@ -198,7 +198,7 @@ class Table(NamedTuple):
 
 
 def table_of(data: xr.Dataset, scale: Any, *columns: xr.DataArray, output: str = "friction_coefficient") -> Table:
-    """Return an output over a scale for all cases, with columns of numbers of the cases."""
+    """Return an output of all cases divided by a scale, with other numbers of the cases as columns."""
     values = data[output]
     error = companion(data, output)
     arrays = xr.broadcast(values / scale, (0 * values if error is None else error) / scale, *columns)
@@ -212,14 +212,14 @@ def table_of(data: xr.Dataset, scale: Any, *columns: xr.DataArray, output: str =
 
 
 def power_law(x: FloatArray, logs: FloatArray, count: int) -> Fitted:
-    """Fit a straight line to a stack of logarithms over x; the constants are its slope and its value at x = 0."""
+    """Fit a straight line to a stack of logarithms against x; the constants are its slope and its value at x = 0."""
     design = np.vstack([x, np.ones(x.size)])
     solve = np.linalg.pinv(design)
     return fitted(lambda rows: rows @ solve, lambda rows, constants: rows - constants @ design, logs, count)
 
 
 def stated_power(x: FloatArray, logs: FloatArray, power: float, count: int, where: Callable[[int], str]) -> str:
-    """Say whether a stack of logarithms follows a power law with a stated power and any factor."""
+    """Return a sentence on whether a stack of logarithms follows a power law with a stated power and any factor."""
     rest = logs - power * x
     free = power_law(x, logs, count).constants[:, 0]
     if np.isnan(free[0]):
@@ -229,14 +229,15 @@ def stated_power(x: FloatArray, logs: FloatArray, power: float, count: int, wher
 
 
 def at_load(force: FloatArray) -> Callable[[int], str]:
-    """Return a function that names the load of a case."""
+    """Return a function that describes a case by its load."""
     return lambda k: f"F_N / (G h L) = {short(force[k])}"
 
 
 def _first_linear(friction: FloatArray, velocity: FloatArray) -> int | None:
-    """Return the lowest velocity at which friction is proportional to velocity, by the realisations of both neighbours.
+    """Return the index of the lowest velocity from which friction is proportional to velocity; None if there is none.
 
-    It is not always the first one, because the time steps of the papers have a spurious floor at low velocity.
+    Two neighbouring velocities are compared by the realisations that succeeded at both. The index is not always 0,
+    because the time stepping of the papers gives a spurious lower limit of friction at low velocity.
     """
     if velocity.size == 1:
         return 0
@@ -249,13 +250,13 @@ def _first_linear(friction: FloatArray, velocity: FloatArray) -> int | None:
 
 
 def loads_of_zone_one(force: FloatArray, known: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
-    """Return the cases of every load of zone 1."""
+    """Return the indices of the cases of each load in zone 1."""
     inside = (force >= ZONE_ONE[0]) & (force <= ZONE_ONE[1]) & known
     return [np.flatnonzero((force == load) & known) for load in np.unique(force[inside])]
 
 
 def _zone_one(data: xr.Dataset) -> Variables:
-    """Fit ln (mu / v) over ln F_N in zone 1 and region I."""
+    """Fit ln (mu / v) against ln F_N in zone 1 and region I."""
     table = table_of(data, spectral_slope(data), *loads_and_velocities(data))
     force, velocity = table.columns
     rate = table.mean() / (np.sqrt(2) * velocity)
@@ -285,7 +286,7 @@ def _zone_one(data: xr.Dataset) -> Variables:
 
 
 def _velocity_of(place: FloatArray, x: FloatArray, count: int, meaning: str, unit: str) -> Variables:
-    """Return the velocity of the largest friction from the stack of its logarithm; NaN if it may lie outside."""
+    """Return the velocity of the largest friction from a stack of its logarithms; NaN if it may be out of range."""
     outside = np.isinf(place[~np.isnan(place)])
     if outside[0] or outside.mean() > bootstrap.TAILS[0]:
         place = np.full_like(place, np.nan)
@@ -294,7 +295,7 @@ def _velocity_of(place: FloatArray, x: FloatArray, count: int, meaning: str, uni
 
 
 def _plateau(data: xr.Dataset) -> Variables:
-    """Return the largest friction against velocity, and its velocity."""
+    """Return the largest friction over all velocities, and the velocity at which it occurs."""
     require(data, "shear_modulus", "relaxation_time")
     velocities, name, unit = _velocities(data)
     table = table_of(data, spectral_slope(data), velocities)
@@ -322,7 +323,7 @@ def _plateau(data: xr.Dataset) -> Variables:
 
 
 def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], count: int, reached: str) -> Variables:
-    """Judge mu = sqrt 2 slope with the slope in contact, as eq. 3.15 states, and with that of the whole line."""
+    """Test mu = sqrt 2 slope with the slope in contact, as in eq. 3.15, and with the slope of the whole line."""
     meaning = "largest friction coefficient over rms slope in contact"
     if "contact_slope" in data:
         friction, slope = table_of(data, 1.0), table_of(data, 1.0, output="contact_slope")
@@ -345,14 +346,14 @@ LINE_SLOPE = "whether mu = sqrt 2 times the rms slope of the whole line"
 
 
 def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str, str]:
-    """Return velocities, their name and unit; the store of a measured surface has no rms height to divide by."""
+    """Return velocities, their name and unit: the velocity number, or v tau for a measured surface (no rms height)."""
     if "rms_roughness" in data:
         return loads_and_velocities(data)[1], "v tau slope / (sqrt 2 h)", ""
     return data["velocity"] * data["relaxation_time"], "v tau", " m"
 
 
 def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: str) -> str:
-    """Say whether friction has a maximum or a level, or still changes at an end of the velocities."""
+    """Return a sentence on whether friction has a maximum or levels off, or still changes at an end of the range."""
     at, rise = float(found.place[0]), float(found.rise[0])
     change = f"d ln mu / d ln v = {rise:.2g}"
     known = bool(np.isfinite(ends[0]))
@@ -374,7 +375,7 @@ def least_squares(
 ) -> FloatArray:
     """Fit every row of the data, shape (rows, cases), by Levenberg-Marquardt steps; return (rows, constants).
 
-    One call of the model serves all rows, which is a hundred times faster than scipy row by row.
+    Each call of the model evaluates all rows; this is a hundred times faster than one scipy fit for each row.
     """
     size = np.eye(start.size)
     constants = np.tile(start, (data.shape[0], 1))
@@ -407,7 +408,7 @@ def law_error(departures: FloatArray, suffix: str, which: str) -> Variables:
 
 
 def rising(force: FloatArray, velocity: FloatArray, mean: FloatArray, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the known cases of regions I to III: up to the velocity of the largest friction of their load."""
+    """Return which known cases are in regions I to III: velocities up to that of the largest friction at their load."""
     used = known & (mean > 0)
     for load in np.unique(force[used]):
         same = np.flatnonzero(used & (force == load))

@@ -1,4 +1,4 @@
-"""Which unknowns the data determine, and which products of powers of the others."""
+"""Find the unknowns that the data determine, and the determined products of powers of the other unknowns."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.posterior import Posterior
 
-#: The data leave an end of an axis open if ln(density) there is less than this below its maximum: two standard errors.
+#: An end of an axis is open if ln(density) there is less than this below its maximum, i.e. within two standard errors.
 OPEN = 2.0
 #: An unknown is not determined if unknowns with an open end explain more than this share of its variance.
 LINKED = 0.25
-#: A product is determined if its spread is less than this share of its spread without data.
+#: A product is determined if its spread is less than this fraction of its spread without data.
 NARROW = 0.25
 #: Exponents are rounded to halves or thirds if the spread of the product grows by at most this factor.
 ROUNDED = 1.15
@@ -34,7 +34,7 @@ class Ends(NamedTuple):
 
 
 def open_ends(found: Posterior) -> list[Ends]:
-    """Return for each unknown which ends of its axis the data leave open."""
+    """Return which ends of the axis of each unknown the data leave open."""
     highest = found.density.max()
     ends = []
     for place in found.places.T:
@@ -44,7 +44,7 @@ def open_ends(found: Posterior) -> list[Ends]:
 
 
 def undetermined(found: Posterior, ends: Sequence[Ends]) -> list[int]:
-    """Return the unknowns that the data do not determine: those with an open end, and those that depend on them."""
+    """Return the unknowns that the data do not determine: with an open end, or dependent on an unknown with one."""
     free = [k for k, end in enumerate(ends) if any(end)]
     if not free:
         return []
@@ -54,7 +54,7 @@ def undetermined(found: Posterior, ends: Sequence[Ends]) -> list[int]:
 
 
 def _explained(centred: FloatArray, weights: FloatArray, k: int, by: list[int]) -> float:
-    """Return the share of the variance of an unknown that a quadratic function of others explains."""
+    """Return the share of the variance of unknown `k` that a quadratic function of the unknowns `by` explains."""
     columns = centred[:, by]
     terms = np.concatenate([np.ones((len(centred), 1)), columns, columns**2], axis=1)
     root = np.sqrt(weights)
@@ -65,7 +65,7 @@ def _explained(centred: FloatArray, weights: FloatArray, k: int, by: list[int]) 
 
 
 class Product(NamedTuple):
-    """A product of powers of unknowns that is determined although the unknowns are not.
+    """A product of powers of unknowns that the data determine, although they do not determine the unknowns.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ def products(found: Posterior, values: FloatArray, free: Sequence[int]) -> list[
 
 
 def _reduced(rows: FloatArray) -> FloatArray:
-    """Return rows with the same span, each with a leading 1 and as few other terms as possible."""
+    """Return rows that span the same space, each with a leading 1 and as few other terms as possible."""
     rows = rows.copy()
     done: list[int] = []
     for i in range(len(rows)):
@@ -119,7 +119,7 @@ def _reduced(rows: FloatArray) -> FloatArray:
 
 
 def _product(found: Posterior, logarithms: FloatArray, free: Sequence[int], row: FloatArray, unknowns: int) -> Product:
-    """Return a product, with simple exponents if they are as good."""
+    """Return a product; its exponents are rounded to simple fractions if the spread hardly grows."""
     best = _spread(logarithms @ row, found.weights)
     for denominator in (1, 2, 3):
         plain = np.round(row * denominator) / denominator

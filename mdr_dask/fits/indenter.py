@@ -27,11 +27,11 @@ from mdr_dask.fits.friction import (
 from mdr_dask.physics.sliding import laws
 from mdr_dask.physics.surfaces import shapes as indenter
 
-BODY = 0.3  # rms slope of the body in contact over that of the roughness, up to which the law is meant to hold
+BODY = 0.3  # the law is meant for bodies whose rms slope in contact is at most this times that of the roughness
 
 
 def _body(data: xr.Dataset) -> tuple[Any, float]:
-    """Return coefficient c and exponent n of the line c |x|^n of the indenter of a study."""
+    """Return coefficient c and exponent n of the line c |x|^n that replaces the indenter."""
     if "indenter_angle" in data.coords:
         return indenter.mapped(1.0) * np.tan(data["indenter_angle"]), 1.0
     if "indenter_radius" in data.coords:
@@ -66,8 +66,8 @@ def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
 def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
     """Return the cases in which the law of rough indenters is meant to hold.
 
-    There the body is flat compared with the roughness and is pressed in by more than the rms height, and the velocity
-    is not beyond that of the largest friction, where region IV begins.
+    In these cases the body is flat compared with the roughness and is pressed in by more than the rms height, and the
+    velocity does not exceed that of the largest friction, above which region IV begins.
     """
     coefficient, exponent = _body(data)
     width = _half_width(data)
@@ -101,7 +101,7 @@ def _indenter(data: xr.Dataset) -> Variables:
     logs = table.logarithms(used)
 
     def model(constants: FloatArray) -> FloatArray:
-        with np.errstate(invalid="ignore"):  # one realisation has no resamples
+        with np.errstate(invalid="ignore"):  # with one realisation, all resamples are NaN
             law: FloatArray = np.log(laws.indenter(xi, np.exp(constants)))
         return law
 

@@ -17,16 +17,16 @@ from mdr_dask.fits.interpolation import FEWEST, LEFT, Scale, chord_error, cubic,
 from mdr_dask.models.base import Status
 from mdr_dask.questions.selection import written_apart
 
-#: Largest size of a table, and largest number of its intervals per interval of the study.
+#: Largest number of values of a table, and largest number of table intervals per interval of the study.
 LARGEST, PIECES = 2_000_000, 16
 
 
 def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     """Return an output as a dense table over the axes of its study, with its error.
 
-    The mean over realisations is interpolated by monotone cubics (PCHIP), axis by axis. The scale of each axis is
-    logarithmic if its values are more even there, that of the output if its values differ by more than a factor of ten.
-    The table is dense enough to be interpolated linearly, as ``Dataset.interp`` does.
+    The mean over realisations is interpolated by monotone cubics (PCHIP), axis by axis. The scale of an axis is
+    logarithmic if its values are more evenly spaced in the logarithm. The scale of the output is logarithmic if its
+    values differ by more than a factor of ten. The table is dense enough for linear interpolation (``Dataset.interp``).
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
 
     Notes
     -----
-    For the error of interpolation every second value of each axis is left out and predicted from the others, once the
-    odd and once the even ones.
+    To estimate the error of interpolation, every second value of each axis is left out and predicted from the other
+    values: first the odd values, then the even ones.
     """
     if "case" in dataset.dims:
         raise FitError("expected a grid, this is a sampled study: its cases have no axes")
@@ -90,7 +90,7 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
 
 
 def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray]:
-    """Return the mean of an output and half of its interval; with one realisation, its discretisation error."""
+    """Return the mean of an output and the half width of its interval, or its grid error if there is no interval."""
     if "realisation" not in dataset[output].dims:
         return dataset[output], xr.zeros_like(dataset[output])
     kept = [name for name in (output, dataset[output].attrs.get("ancillary_variables")) if name in dataset]
@@ -108,7 +108,7 @@ def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray
 
 
 def _spared(dataset: xr.Dataset) -> xr.DataArray:
-    """Return the cases that adaptive axes left to interpolation."""
+    """Return the cases that were not computed because the adaptive axes do not need them."""
     if "status" not in dataset:
         return xr.DataArray(False)
     return (dataset["status"] == Status.NOT_NEEDED).all("realisation")
@@ -118,7 +118,7 @@ def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.Da
     """Interpolate the cases that adaptive axes left out, and add the error of this interpolation."""
     axes = [k for k, dim in enumerate(mean.dims) if _is_numeric(mean, str(dim))]
     table, error = scale.of_values(mean.to_numpy()).copy(), half.to_numpy().copy()
-    for axis in axes * 2:  # along one axis, then along the others
+    for axis in axes * 2:  # twice, because values filled along one axis are used along the other axes
         places = mean[mean.dims[axis]].to_numpy()
         lines, errors = (np.moveaxis(array, axis, -1) for array in (table, error))
         for case in np.ndindex(lines.shape[:-1]):
@@ -129,12 +129,12 @@ def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.Da
 
 
 def _between(scale: Scale, places: FloatArray, line: FloatArray, error: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a line with interpolated values between the known ones, and its errors."""
+    """Return values along an axis with the missing ones interpolated, and their errors."""
     known = np.isfinite(line)
     filled = cubic(places[known], line[known], places, 0, Scale.of(places))
     left_out = (
         left_out_error(scale, line[known], places[known], 0) / LEFT
-    )  # the spaces are as wide as with values left out
+    )  # LEFT does not apply: the gaps are as wide as with values left out
     between = np.interp(places, places[known], error[known] + left_out)
     inside = (places >= places[known][0]) & (places <= places[known][-1])
     return np.where(inside, filled, np.nan), np.where(known, error, between)
@@ -145,7 +145,7 @@ def _is_numeric(mean: xr.DataArray, dim: str) -> bool:
 
 
 def _pieces(mean: xr.DataArray, axes: list[str]) -> int:
-    """Return the number of intervals of the table per interval of the study."""
+    """Return the number of table intervals per interval of the study."""
     room = (LARGEST / mean.size) ** (1 / len(axes))
     return int(np.clip(room, 1, PIECES))
 
@@ -165,7 +165,7 @@ def _provenance(dataset: xr.Dataset) -> dict[str, str]:
 
 
 class Law:
-    """A law that was written by ``mdr-dask law``, for evaluation at many points.
+    """A law in a file written by ``mdr-dask law``, for evaluation at many points.
 
     Parameters
     ----------

@@ -8,9 +8,9 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 
-#: Least number of values of an axis: with every second one left out a curve must remain.
+#: Least number of values of an axis: without every second one, enough values for a curve must remain.
 FEWEST = 4
-#: Error of interpolation over its error with every second value left out: 1/4 at second order (1/2 at kinks).
+#: Ratio of the error of interpolation to the error without every second value: 1/4 at second order (1/2 at kinks).
 LEFT = 0.25
 
 
@@ -22,7 +22,10 @@ class Scale:
 
     @classmethod
     def of(cls, numbers: FloatArray, spread: bool = False) -> Scale:
-        """Return the scale on which sorted numbers are more even; for `spread` values, logarithmic beyond a decade."""
+        """Return the scale on which sorted numbers are more evenly spaced.
+
+        With `spread`, the scale is logarithmic if the numbers span more than a decade.
+        """
         if numbers.min() <= 0:
             return cls(False)
         if spread:
@@ -32,16 +35,16 @@ class Scale:
         return cls(bool(even[1] < even[0]))
 
     def of_values(self, values: FloatArray) -> FloatArray:
-        """Return numbers on the scale."""
+        """Return the values of numbers on this scale: their logarithms, or the numbers themselves."""
         return np.log(values) if self.logarithmic else np.asarray(values, dtype=np.float64)
 
     def back(self, values: FloatArray) -> FloatArray:
-        """Return numbers from their values on the scale."""
+        """Return numbers from their values on this scale."""
         return np.exp(values) if self.logarithmic else values
 
 
 def dense(places: FloatArray, pieces: int) -> FloatArray:
-    """Return places with each interval divided into equal pieces on their scale; the places themselves are kept."""
+    """Return places with each interval divided into pieces that are equal on their scale; all given places are kept."""
     scale = Scale.of(places)
     cut = [np.linspace(a, b, pieces, endpoint=False) for a, b in pairwise(scale.of_values(places))]
     grid = scale.back(np.concatenate([*cut, scale.of_values(places[-1:])]))
@@ -52,7 +55,7 @@ def dense(places: FloatArray, pieces: int) -> FloatArray:
 def cubic(
     places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int, scale: Scale | None = None
 ) -> FloatArray:
-    """Return monotone cubics through values along an axis, at other places; by default on the scale of the axis."""
+    """Interpolate values along an axis by monotone cubics, at other places; by default on the scale of the axis."""
     from scipy.interpolate import PchipInterpolator
 
     scale = scale or Scale.of(places)
@@ -63,7 +66,7 @@ def cubic(
 def linear(
     places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int, scale: Scale | None = None
 ) -> FloatArray:
-    """Return straight lines through values along an axis, at other places; scale as in `cubic`."""
+    """Interpolate values along an axis linearly, at other places; scale as in `cubic`."""
     from scipy.interpolate import make_interp_spline
 
     scale = scale or Scale.of(places)
@@ -71,7 +74,7 @@ def linear(
 
 
 def left_out_error(scale: Scale, table: FloatArray, places: FloatArray, axis: int) -> FloatArray:
-    """Return the error of interpolation along an axis at every place, from predictions of values that are left out."""
+    """Return the error of interpolation at every place of an axis, estimated by leaving out every second value."""
     values, truth = np.moveaxis(table, axis, -1), np.moveaxis(scale.back(table), axis, -1)
     most = np.zeros_like(truth)
     number = len(places)
@@ -84,7 +87,7 @@ def left_out_error(scale: Scale, table: FloatArray, places: FloatArray, axis: in
 
 
 def chord_error(table: FloatArray, grid: FloatArray, axis: int) -> FloatArray:
-    """Return the error of straight lines between the values of a table: second derivative times h^2 / 8."""
+    """Return the error of linear interpolation between the values of a table: second derivative times h^2 / 8."""
     values, steps = np.moveaxis(table, axis, -1), np.diff(grid)
     bend = np.abs(np.diff(np.diff(values) / steps)) / (steps[1:] + steps[:-1])
     inside = bend * np.maximum(steps[1:], steps[:-1]) ** 2 / 4

@@ -19,7 +19,7 @@ Series = Mapping[str, xr.Dataset]
 
 LAW = 0.4  # constant of eqs. 4.10 and 4.11 in the thesis
 REGION_ONE = 0.1  # mu_1 / rms slope up to which eqs. 4.9 and 4.11 differ by less than 3 %
-PLATEAU = 1.1  # mu_1 / rms slope from which friction is on its plateau, of 1.26 to 1.44
+PLATEAU = 1.1  # mu_1 / rms slope above which friction counts as on its plateau; the plateau is at 1.26 to 1.44
 
 JUMP_FIELDS = {
     "constant": "constant c of eq. 4.11",
@@ -43,7 +43,7 @@ def jump_law(before: FloatArray, constant: float | FloatArray) -> FloatArray:
 
 
 def _jump_law(series: Series) -> xr.Dataset:
-    """Fit the constant of eq. 4.11 for every Hurst exponent and for all cases, and judge the limits 4.9 and 4.10."""
+    """Fit the constant of eq. 4.11 for every Hurst exponent and for all cases, and test the limits 4.9 and 4.10."""
     cases = Cases.of(series, *LEVELS, "rms_slope")
     numbers = jump_numbers(cases)
     before, jump, zeta = numbers["before_over_slope"], numbers["jump_over_slope"], numbers["zeta"]
@@ -73,7 +73,7 @@ def _jump_law(series: Series) -> xr.Dataset:
 
 
 def _constant(before: FloatArray, jump: FloatArray, count: int) -> dict[str, float | str]:
-    """Return the constant of eq. 4.11 of some cases, from stacks of mu_1 and the jump over the slope."""
+    """Return the constant of eq. 4.11 for some cases, from stacks of mu_1 and of the jump, both over the slope."""
     row: dict[str, float | str] = {"cases": jump.shape[1], "constant_of_thesis": LAW}
     if jump.shape[1] < 2:
         reason = "not tested: the constant needs two cases"
@@ -82,7 +82,7 @@ def _constant(before: FloatArray, jump: FloatArray, count: int) -> dict[str, flo
     logs = np.log(jump)
 
     def before_of(rows: FloatArray) -> FloatArray:
-        return before if len(rows) == len(before) else before[:1]  # rows moved by departures have the mu_1 of the first
+        return before if len(rows) == len(before) else before[:1]  # data shifted by departures have mu_1 of row 0
 
     def left(rows: FloatArray, constant: FloatArray) -> FloatArray:
         return rows - np.log(jump_law(before_of(rows), np.exp(constant)))
@@ -125,7 +125,7 @@ def _limit(
     chosen: NDArray[np.bool_],
     cases: Cases,
 ) -> dict[str, float | str]:
-    """Return the mean of a number over the cases of a region, and whether it is the limit in all of them."""
+    """Return the mean of a number over the cases of a region, and whether the number equals the limit in all cases."""
     inside = region & chosen
     if not np.any(inside):
         return dict.fromkeys((name, f"{name}_low", f"{name}_high"), np.nan) | {
@@ -174,7 +174,7 @@ def _jump_linearity(series: Series) -> xr.Dataset:
 
 
 def _lines(numbers: FloatArray, change: FloatArray, count: int) -> dict[str, Any]:
-    """Return zeta and xi with their trends and intervals, and whether both are constant.
+    """Return zeta and xi with their trends and intervals, and a sentence on whether both are constant.
 
     Parameters
     ----------

@@ -18,19 +18,19 @@ from mdr_dask.errors import FitError
 from mdr_dask.fits.base import require
 
 LEVELS = ("friction_coefficient_before", "friction_coefficient_jump", "friction_coefficient_after")
-LEAST = 2  # realisations of a case that must have succeeded
+LEAST = 2  # smallest number of successful realisations of a case
 
 
 @dataclass(frozen=True)
 class Cases:
-    """A series, its axes flattened.
+    """The cases of a series, with all axes flattened into one dimension.
 
     Attributes
     ----------
     data : Dataset
-        The series, realisations last but for the times.
+        The series; the realisation is the last dimension, or the last before the times.
     template : DataArray
-        Its axes, for what is found.
+        An array with the axes of the series, which results get back.
     """
 
     data: xr.Dataset
@@ -54,17 +54,17 @@ class Cases:
 
     @property
     def counts(self) -> NDArray[np.int64]:
-        """Return the number of realisations of every case that succeeded."""
+        """Return the number of successful realisations of every case."""
         known = np.all(np.isfinite(np.stack([self.output(name) for name in LEVELS])), axis=0)
         counts: NDArray[np.int64] = known.sum(axis=1)
         return counts
 
     def count(self, used: Any = slice(None)) -> int:
-        """Return the least number of realisations that any of some cases has."""
+        """Return the smallest number of successful realisations among some cases."""
         return int(self.counts[used].min(initial=self.data.sizes["realisation"]))
 
     def column(self, name: str) -> FloatArray:
-        """Return a parameter for every case; raise FitError where the study has none."""
+        """Return a parameter for every case; raise FitError if the study does not have it."""
         require(self.data, name)
         column: FloatArray = np.asarray(self._like(self.data[name]), dtype=np.float64).ravel()
         return column
@@ -75,7 +75,7 @@ class Cases:
         return array.reshape(-1, *array.shape[self.template.ndim :])
 
     def error(self, name: str) -> FloatArray:
-        """Return the error of the grid in the mean of an output, shape (cases, ...); 0 where none is known."""
+        """Return the grid error of the mean of an output, shape (cases, ...); 0 if it is unknown."""
         error = companion(self.data, name)
         if error is None:
             return np.zeros_like(self.output(name)[:, 0])
@@ -98,7 +98,7 @@ class Cases:
 
     @property
     def slope(self) -> FloatArray:
-        """Return the rms slope of every case, which all its lines have; NaN for smooth ones."""
+        """Return the rms slope of every case, which is the same for all its lines; NaN for smooth lines."""
         good = self.output("rms_slope")
         known = np.isfinite(good) & (good > 0)
         total: FloatArray = np.where(known, good, 0.0).sum(axis=1) / np.where(
@@ -108,18 +108,18 @@ class Cases:
 
     @property
     def passing(self) -> FloatArray:
-        """Return v_1 tau q_max, the relaxation time over the time to pass 1 / q_max; q_max = pi points / length."""
+        """Return v_1 tau q_max: the relaxation time over the time in which v_1 covers 1 / q_max."""
         return self.column("velocity") * self.column("relaxation_time") * self.wavenumber
 
     @property
     def wavenumber(self) -> FloatArray:
-        """Return q_max of every case."""
+        """Return q_max = pi points / length of every case."""
         return np.pi * self.column("points") / self.column("length")
 
     def levels(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return stacks of mu_1, d_mu_0 and mu_2, shapes (1 + RESAMPLES + 2 groups, cases)."""
         outputs = np.stack([self.output(name).T for name in LEVELS], axis=1)
-        stack = bootstrap.means(outputs + 0 * outputs.sum(axis=1, keepdims=True))  # NaN in one is NaN in all three
+        stack = bootstrap.means(outputs + 0 * outputs.sum(axis=1, keepdims=True))  # a NaN in one makes all three NaN
         errors = np.stack([self.error(name) for name in LEVELS])
         if np.any(errors > 0):
             stack = np.concatenate([stack, bootstrap.moved(stack[0], errors)])
@@ -133,9 +133,9 @@ class Cases:
         return np.concatenate([start, self.output("friction_coefficient") - after[..., None]], axis=-1)
 
     def relaxing_error(self) -> FloatArray:
-        """Return the error of the grid in the mean of mu - mu_2, shape (cases, 1 + times).
+        """Return the grid error of the mean of mu - mu_2, shape (cases, 1 + times).
 
-        The error of mu contains that of mu_2, which is therefore subtracted.
+        The error of mu includes the error of mu_2, which is therefore subtracted.
         """
         whole, after = self.error("friction_coefficient"), self.error(LEVELS[2])[:, None]
         trace = np.where(np.isinf(whole), np.inf, np.maximum(whole - np.where(np.isinf(after), 0.0, after), 0.0))
@@ -145,7 +145,7 @@ class Cases:
         return value.broadcast_like(self.template).transpose(*self.template.dims)
 
     def found(self, values: NDArray[Any], unit: str, meaning: str) -> xr.DataArray:
-        """Return values of all cases over the axes of the series."""
+        """Return values of all cases as an array with the axes of the series."""
         shaped = np.asarray(values).reshape(self.template.shape)
         axes = {dim: self.template[dim] for dim in self.template.dims if dim in self.template.coords}
         return xr.DataArray(shaped, axes, self.template.dims, attrs={"units": unit, "long_name": meaning})
@@ -153,7 +153,7 @@ class Cases:
     def constants(
         self, samples: Mapping[str, FloatArray], fields: Mapping[str, tuple[str, str]], positive: tuple[str, ...] = ()
     ) -> dict[str, xr.DataArray]:
-        """Return constants and the ends of their intervals over the axes, from stacks of shape (rows, cases)."""
+        """Return constants and the ends of their intervals with the axes of the series, from stacks (rows, cases)."""
         result = {}
         for name, (unit, meaning) in fields.items():
             low, high = bootstrap.interval(samples[name], self.counts, name in positive)
@@ -164,20 +164,20 @@ class Cases:
 
 
 def is_jump(data: xr.Dataset) -> bool:
-    """Return whether the velocity of all cases of a series jumps at once."""
+    """Return whether the loading history of all cases of a series is a sudden jump of the velocity."""
     varied = any(axis["path"].split(".")[0] == "protocol" for axis in data.attrs.get("axes", []))
     history = json.loads(data.attrs.get("parameters", "{}")).get("protocol") or {}
     return not varied and history.get("shape", "jump") == "jump"
 
 
 def law_rate(number: FloatArray, hurst: FloatArray) -> FloatArray:
-    """Return the rate of eq. 4.12 with its powers 1 below and 1 - H above v_1 tau q_max = 1."""
+    """Return the rate of eq. 4.12 from v_1 tau q_max: its power is 1 below v_1 tau q_max = 1, and 1 - H above."""
     rate: FloatArray = np.where(number < 1, number, number ** (1 - hurst))
     return rate
 
 
 def jump_numbers(cases: Cases) -> dict[str, FloatArray]:
-    """Return stacks of the numbers of the jump; zeta and xi are infinite or NaN where mu_1 is 0."""
+    """Return stacks of the dimensionless numbers of the jump; zeta and xi are infinite or NaN where mu_1 is 0."""
     before, jump, after = cases.levels()
     change, slope = cases.column("velocity_change"), cases.slope
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -191,7 +191,7 @@ def jump_numbers(cases: Cases) -> dict[str, FloatArray]:
 
 
 def rows_of(cases: Cases) -> list[tuple[str, NDArray[np.bool_]]]:
-    """Return a label and the cases of every Hurst exponent, and of all; a measured surface has no exponent."""
+    """Return a label and the cases for each Hurst exponent and for all; a measured surface has only ``all``."""
     if "hurst" not in cases.data:
         return [("all", np.ones(cases.counts.size, dtype=bool))]
     hurst = cases.column("hurst")

@@ -18,8 +18,8 @@ from mdr_dask.fits.relaxation import RATE_FIELDS, Relaxation, relaxation_of, win
 
 Series = Mapping[str, xr.Dataset]
 
-TRUSTED = 0.5  # a rate enters the power law if the half width of the interval of its logarithm is smaller
-SURE = 0.1  # error of the logarithm of a rate that is added to its own for its weight
+TRUSTED = 0.5  # a rate enters the power law if the half width of the interval of ln(rate) is below this
+SURE = 0.1  # error of ln(rate) that is added in quadrature in the weights, so that no single rate dominates
 INSTANT = 1e-9  # relaxing part over rms slope below which there is no relaxation to fit
 WINDOW_TEXT = (
     "one exponential over 0 <= (t - t_0) / tau <= 8 / b_law; weights: duration of every moment over the "
@@ -60,7 +60,7 @@ def _needed() -> tuple[str, ...]:
 
 
 def _relaxations(cases: Cases) -> list[Relaxation | None]:
-    """Fit one exponential to every case; None for cases of too few realisations or without relaxation."""
+    """Fit one exponential to every case; None for cases with too few realisations or without relaxation."""
     time = cases.times
     expected, slope = law_rate(cases.passing, cases.column("hurst")), cases.slope
     found: list[Relaxation | None] = []
@@ -77,7 +77,7 @@ def _relaxations(cases: Cases) -> list[Relaxation | None]:
 
 
 def _stacked(stacks: list[FloatArray | None]) -> FloatArray:
-    """Return stacks of different length as columns of one; the value itself fills the rows that are missing."""
+    """Return stacks of different length as columns of one array; missing rows repeat the first row."""
     rows = max((stack.size for stack in stacks if stack is not None), default=1 + bootstrap.RESAMPLES)
     columns = np.full((rows, len(stacks)), np.nan)
     for k, stack in enumerate(stacks):
@@ -112,9 +112,9 @@ def _closed_laws(cases: Cases) -> tuple[FloatArray, FloatArray, list[str]]:
     Returns
     -------
     whole, of_rate : array, shape (cases,)
-        Rms departure over the times in units of d_mu_0: of the law, and of the law with the jump that was computed.
+        Rms departure over all times in units of d_mu_0: of the law, and of the law with the computed jump.
     sentences : list of str
-        Whether the law holds.
+        For each case, whether the law holds.
     """
     rate, slope, change = law_rate(cases.passing, cases.column("hurst")), cases.slope, cases.column("velocity_change")
     outputs = [*LEVELS, "friction_coefficient"]
@@ -140,7 +140,7 @@ def _closed_laws(cases: Cases) -> tuple[FloatArray, FloatArray, list[str]]:
 
 
 def _relaxation(series: Series) -> xr.Dataset:
-    """Return rate, time and length of the relaxation of every case, beside the closed law of eqs. 4.13 to 4.15."""
+    """Return rate, time and length of the relaxation of every case, and compare with the law of eqs. 4.13 to 4.15."""
     cases = Cases.of(series, *_needed())
     found = _relaxations(cases)
     stacks = {
@@ -176,7 +176,7 @@ def _relaxation(series: Series) -> xr.Dataset:
 
 
 def relaxation_curves(data: xr.Dataset) -> xr.Dataset:
-    """Return the exponential fitted to the only case of a series, over rms slope, with a band, against t'."""
+    """Return the exponential fitted to the only case of a series, with its band: mu / rms slope against t'."""
     cases = Cases.of({"": data}, *_needed())
     (found,) = _relaxations(cases)
     if found is None:
@@ -191,7 +191,7 @@ def relaxation_curves(data: xr.Dataset) -> xr.Dataset:
 
 
 def well_known(low: FloatArray, high: FloatArray) -> NDArray[np.bool_]:
-    """Return which rates are known well enough for the power law, from the ends of their intervals."""
+    """Return which rates have an interval narrow enough for the power law."""
     with np.errstate(invalid="ignore", divide="ignore"):
         known: NDArray[np.bool_] = 0.5 * np.log(high / low) < TRUSTED
     return known
@@ -209,7 +209,7 @@ POWER_FIELDS = {
 
 
 def _rate_power(series: Series) -> xr.Dataset:
-    """Fit the power of the rate over v_1 tau q_max below and above 1, for every value of the other axes."""
+    """Fit rate ~ (v_1 tau q_max)^power below and above v_1 tau q_max = 1, for every value of the other axes."""
     cases = Cases.of(series, *_needed())
     require(cases.data, "relaxation_time", "length")
     along = {dim for name in ("velocity", "relaxation_time", "points", "length") for dim in cases.data[name].dims}
@@ -250,7 +250,7 @@ def _rate_power(series: Series) -> xr.Dataset:
 def _power(
     x: FloatArray, rates: FloatArray, error: FloatArray, law: float, count: int
 ) -> tuple[list[float], tuple[str, str]]:
-    """Return the entries of `POWER_FIELDS` for the rates of one regime, and whether both laws hold."""
+    """Return the entries of `POWER_FIELDS` for one regime, and the sentences on the fitted and on the stated law."""
     if x.size < 3:
         reason = f"not tested: {x.size} rates are known to a factor of 1.6, three are needed"
         return [np.nan, np.nan, np.nan, law, np.nan, np.nan, x.size], (reason, reason)

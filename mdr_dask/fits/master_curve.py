@@ -27,7 +27,7 @@ from mdr_dask.physics.superposition import master_curve as superposition
 from mdr_dask.physics.superposition import two_factors as two_shifts
 from mdr_dask.physics.superposition.master_curve import EXPANSION, OFFSET, Superposition, Vertical
 
-SHARE_OF_BARS = 0.6827  # of the draws, within the bars `_error`
+SHARE_OF_BARS = 0.6827  # share of the draws within the bars ``_error``
 
 
 def master_curve(
@@ -40,22 +40,24 @@ def master_curve(
 ) -> xr.Dataset:
     """Shift curves of a table into one.
 
-    A table that varies in velocity and in temperature gives a factor of each, added: log x + a(v) + b(T).
+    If the curves differ in velocity and in temperature, there is a factor for each, and both are added:
+    log x + a(v) + b(T).
 
     Parameters
     ----------
     table : Dataset or DataFrame
         A series of a store (realisations are averaged) or columns of numbers.
     abscissa, ordinate, group : str, optional
-        Columns: the abscissa, the values, and what the curves differ in. By default the coefficient of friction against
-        force by velocity (or temperature), or the moduli against frequency or time by temperature. Storage and loss
-        modulus of one test are two ordinates, which are shifted together.
+        Columns: the abscissa, the values, and the parameter in which the curves differ. By default the coefficient of
+        friction against force at different velocities (or temperatures), or the moduli against frequency or time at
+        different temperatures. Storage and loss modulus of one test are two ordinates, which are shifted together.
     vertical : {'none', 'modulus', 'compliance', 'free'}, optional
-        Factors along the ordinate, see `superpose`. By default those of a modulus or a compliance against time or
-        frequency by temperature, and none otherwise.
+        Kind of the factors along the ordinate, see `superpose`. By default ``modulus`` or ``compliance`` for these
+        quantities against time or frequency at different temperatures, otherwise ``none``.
     reference : float, optional
-        Where the factors are zero; the middle group by default. Between two groups by the law that holds, otherwise by
-        interpolation, whose error is in the intervals. With two kinds of groups, the nearest value of the first one.
+        Value of the group at which the factors are zero; by default the middle group. Between two groups, the factor
+        follows from the law that holds, otherwise from interpolation, whose error is included in the intervals. With
+        two kinds of groups, the reference is the nearest value of the first kind.
 
     Returns
     -------
@@ -64,11 +66,11 @@ def master_curve(
         group, with ``_error`` (68 %), ``_low`` and ``_high`` (95 %), ``covariance`` and ``draws``;
         ``point_abscissa``, ``point_ordinate``, ``point_group``: all points after shifting; ``curve_abscissa``,
         ``curve_ordinate``, ``curve_error``: the merged curve (the error in decades), with the range measured at the
-        reference in its attrs; ``point_companion``, ``curve_companion``, ``curve_companion_error`` of a second
-        ordinate; constants of the laws that apply. With two groups also ``second_factor`` (and
-        ``second_vertical_factor``) over the second one, the constants of its laws, and in the attrs ``second``,
-        ``second_reference``, ``chi_squared`` and ``probability`` of the sum. The attr ``vertical`` says in words which
-        vertical factors were used.
+        reference in its attrs; ``point_companion``, ``curve_companion``, ``curve_companion_error`` for a second
+        ordinate; constants of the laws that apply. With two kinds of groups also ``second_factor`` (and
+        ``second_vertical_factor``) over the second kind, the constants of its laws, and in the attrs ``second``,
+        ``second_reference``, ``chi_squared`` and ``probability`` of the sum of both factors. The attr ``vertical``
+        describes the vertical factors that were used.
 
     Raises
     ------
@@ -116,14 +118,14 @@ def _sentence(kind: Vertical) -> str:
 
 
 def _require_no_axis_beside(values: xr.DataArray, used: set[str | None]) -> None:
-    """Refuse a study whose curves differ in more than they are shifted by."""
+    """Raise DataError if the curves of a study differ in a parameter that is not a group."""
     for name in values.dims:
         if name not in used and name in values.coords and values.sizes[name] > 1:
             raise DataError(f"the study varies in {str(name)!r} too: keep one of its values, or group by it")
 
 
 def _undetermined(found: Superposition) -> str:
-    """Return a sentence about steps that the curves do not determine, empty if there are none."""
+    """Return a sentence about the shifts between neighbours that the curves do not determine; empty without any."""
     if not found.undetermined:
         return ""
     runs = ", ".join(f"between {low:.6g} and {high:.6g}" for low, high in found.undetermined)
@@ -138,7 +140,7 @@ def _of_two_groups(
     vertical: Vertical,
     reference: float | None,
 ) -> xr.Dataset:
-    """Shift curves that differ in two things; the reference is of the first."""
+    """Shift curves that differ in two parameters; the reference is a value of the first parameter."""
     keys, curves = pairs_of(frame, over, ordinates, by)
     a, b = keys.T
     first = np.unique(a)
@@ -168,7 +170,7 @@ def _of_two_groups(
 
 
 def _inside(groups: FloatArray, reference: float) -> float:
-    """Return the reference, or the first or last group if it lies just outside, as measured set points scatter."""
+    """Return the reference, or the nearest group if it lies just outside the range (measured set points scatter)."""
     margin = 0.1 * np.ptp(groups) / max(groups.size - 1, 1)
     if not groups.min() - margin <= reference <= groups.max() + margin:
         told, low, high = distinguishable(reference, groups.min(), groups.max(), digits=6)
@@ -247,12 +249,12 @@ def _dataset(
 
 
 def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
-    """Return a master curve, as `master_curve` made or a file kept it, with the factors zero at another group.
+    """Return a master curve, as returned by `master_curve` or read from a file, for another reference.
 
     Raises
     ------
     DataError
-        If the value lies outside the groups.
+        If the reference lies outside the groups.
     """
     by, over = str(curve.attrs["group"]), str(curve.attrs["abscissa"])
     ordinates = [str(curve.attrs[name]) for name in ("ordinate", "companion") if curve.attrs.get(name)]
@@ -289,11 +291,11 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
 
 
 def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    """Return the friction that the force master curve is about, from the series of a store.
+    """Return the friction due to roughness for a force master curve, from the series of a store.
 
     It is the coefficient of friction of the first rough series that varies force and velocity, averaged over
-    realisations; less that of a series with the same forces and velocities and no roughness, if there is one: the
-    bulk's own friction.
+    realisations. If there is a series with the same forces and velocities and without roughness, its friction, which is
+    due to the bulk alone, is subtracted.
 
     Raises
     ------
@@ -320,7 +322,7 @@ def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
 
 
 def _of_store(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    """Return the factors and the constants of their law; the merged curve is what ``mdr-dask master-curve`` is for."""
+    """Return the factors and the constants of their laws, without the merged curve (see ``mdr-dask master-curve``)."""
     curve = master_curve(friction_of_roughness(series))
     groups = curve.attrs["group"], curve.attrs.get("second", curve.attrs["group"])
     return curve[

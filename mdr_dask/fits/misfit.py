@@ -1,4 +1,4 @@
-"""Whether measured points contradict a model: by chi squared if errors are known, else by a trend of the residuals."""
+"""Test a model against measured points: by chi squared if errors are known, else by a trend of the residuals."""
 
 from __future__ import annotations
 
@@ -26,13 +26,14 @@ class Residuals(NamedTuple):
     scaled : array, shape (points,)
         Measured minus predicted value over the standard deviation of both.
     relative : float
-        Root mean square of measured minus predicted values over that of the measured values.
+        Root mean square of measured minus predicted values, over the root mean square of the measured values.
     chi_squared : float
-        With the correlations of the errors; NaN if the errors of measurement are unknown.
+        Chi squared, including correlations of the errors; NaN if the errors of measurement are unknown.
     freedom : int
         Degrees of freedom: points minus determined combinations of unknowns.
     errors : float
-        Root mean square of the standard deviations of measured minus predicted values over that of the measured values.
+        Root mean square of the standard deviations of measured minus predicted values, over the root mean square of the
+        measured values.
     """
 
     scaled: FloatArray
@@ -43,12 +44,12 @@ class Residuals(NamedTuple):
 
     @property
     def chance(self) -> float:
-        """Probability that errors alone cause as large residuals; NaN if the errors are unknown."""
+        """Probability that errors alone cause residuals of this size; NaN if the errors are unknown."""
         return float(chi2.sf(self.chi_squared, self.freedom)) if self.freedom > 0 else np.nan
 
 
 def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str:
-    """Say whether the model explains the measured points; errors that would hide any misfit leave it untested."""
+    """Return a sentence on whether the model explains the points: *not tested* if errors would hide any misfit."""
     size = f"residuals are {100 * residuals.relative:.2g} % of the measured values, rms"
     hidden = (
         f"not tested: errors of {100 * residuals.errors:.2g} % of the measured values would hide any misfit; {size}"
@@ -72,9 +73,10 @@ def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str
 
 
 def trend(scaled: FloatArray, conditions: Mapping[str, FloatArray]) -> tuple[float, str]:
-    """Return the probability that chance alone makes residuals follow a parabola so well, and along which condition.
+    """Return the probability that a trend of the residuals is due to chance, and the condition with this trend.
 
-    Conditions enter by rank. The probability is that of the worst condition, times their number.
+    A parabola is fitted to the residuals against the rank of each condition. The smallest probability of all conditions
+    is multiplied by their number.
     """
     worst, along = 1.0, ""
     for name, values in conditions.items():

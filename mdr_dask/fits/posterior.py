@@ -13,15 +13,15 @@ from mdr_dask.fits.prediction import Predicted, Prediction
 
 #: Cells along each unknown at the start, by the number of unknowns.
 START = {1: 64, 2: 24, 3: 12, 4: 8}
-#: Least number of cells that are refined, by the number of unknowns, and largest number of cells after refinement.
+#: Least number of cells that are refined, by the number of unknowns; and largest number of cells after refinement.
 BEST, MOST = {1: 32, 2: 256, 3: 768, 4: 1536}, 160_000
 #: Cells with ln(density) further below the maximum are dropped: together they hold less than 1e-5 of the posterior.
 REACH = 14.0
-#: Refinement ends if ln(density) differs by less within the cells, on average.
+#: Refinement ends if ln(density) varies by less than this within a cell, on average.
 SMOOTH = 0.6
 #: Largest number of refinements.
 LEVELS = 16
-#: Number of sizes of the error of measurement that are considered if none is given.
+#: Number of sizes of the error of measurement that are considered if the table states no error.
 DEVIATIONS = 14
 #: Largest number of elements of an array in one step of the likelihood.
 _STEP = 2**21
@@ -33,9 +33,9 @@ class Noise(NamedTuple):
     Attributes
     ----------
     sizes : array, shape (sizes,)
-        Factors of the pattern; only 1 if the errors are known.
+        Factors of the pattern; a single factor 1 if the errors are known.
     pattern : array, shape (points,), or None
-        Standard deviations of the points for the factor 1; None for shares of the predicted values.
+        Standard deviations of the points for the factor 1; None if they are proportional to the predicted values.
     """
 
     sizes: FloatArray
@@ -57,14 +57,14 @@ class Likelihood:
     values : array, shape (points,)
         Measured values.
     noises : sequence of Noise
-        Equally likely a priori, and so are the sizes of each.
+        Possible errors of measurement. All are equally likely a priori, and so are the sizes of each.
     """
 
     def __init__(self, prediction: Prediction, values: FloatArray, noises: list[Noise]) -> None:
         self.prediction, self.values, self.noises = prediction, values, noises
 
     def __call__(self, places: FloatArray) -> FloatArray:
-        """Return logarithms for places in the unit cube, shape (sets, sizes of all noises)."""
+        """Return log-likelihoods at places in the unit cube, shape (sets, sizes of all noises)."""
         modes = 4 + self.prediction.realisations // 8
         step = max(1, _STEP // (self.values.size * modes))
         parts = [self._of(places[start : start + step]) for start in range(0, len(places), step)]
@@ -80,7 +80,7 @@ class Likelihood:
 
 
 def of_errors(values: FloatArray, predicted: Predicted, noise: FloatArray) -> FloatArray:
-    """Return the logarithm of the normal density of values, up to a constant, shape (sets,)."""
+    """Return the logarithm of the normal density of the measured values, up to a constant, shape (sets,)."""
     square, determinant = distance(values, predicted, noise)
     return -0.5 * (square + determinant)
 
@@ -88,7 +88,7 @@ def of_errors(values: FloatArray, predicted: Predicted, noise: FloatArray) -> Fl
 def distance(values: FloatArray, predicted: Predicted, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return chi squared, and the logarithm of the determinant of the covariance, shape (sets,).
 
-    The covariance is diagonal except for the few errors that the points share, which Woodbury's identity adds.
+    The covariance is diagonal except for a few errors that all points share; these are added by Woodbury's identity.
     """
     variance = np.maximum(predicted.alone + noise, np.finfo(float).tiny)
     residual = values - predicted.mean
@@ -102,16 +102,16 @@ def distance(values: FloatArray, predicted: Predicted, noise: FloatArray) -> tup
 
 
 class Posterior(NamedTuple):
-    """Cells of the unit cube with their weights.
+    """A posterior density on cells of the unit cube.
 
     Attributes
     ----------
     places : array, shape (cells, unknowns)
         Centres; 0 and 1 are the ends of the axes, linear or logarithmic.
     weights : array, shape (cells,)
-        Their sum is 1.
+        Probability of each cell; the sum is 1.
     density : array, shape (cells,)
-        Logarithm, up to a constant.
+        Logarithm of the density, up to a constant.
     noise : array, shape (cells, sizes)
         Probability of each size of the error of measurement in each cell.
     width : float
@@ -131,7 +131,7 @@ class Posterior(NamedTuple):
 
 
 def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> Posterior:
-    """Refine cells of the unit cube, over which the prior is uniform.
+    """Return the posterior density on cells of the unit cube, refined where it is high; the prior is uniform.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> 
 
 
 def _kept(density: FloatArray, fewest: int, most: int) -> NDArray[np.intp]:
-    """Return the cells to refine: all that matter, at least a few, and a random part if there are too many."""
+    """Return the cells to refine: all of high density, at least `fewest`; a random part if more than `most`."""
     order = np.argsort(density)[::-1]
     number = max(int((density > density.max() - REACH).sum()), min(fewest, density.size))
     if number <= most:

@@ -18,9 +18,9 @@ from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.interpolation import FEWEST, Scale, cubic, dense, left_out_error, linear
 from mdr_dask.questions.selection import written_apart
 
-#: Largest number of unknowns, and largest size of the dense table that is interpolated linearly.
+#: Largest number of unknowns, and largest number of values of the dense table that is interpolated linearly.
 MOST, LARGEST = 4, 4e6
-#: Largest number of intervals of the table per interval of the study.
+#: Largest number of table intervals per interval of the study.
 PIECES = 16
 #: Relative difference up to which a measured and a computed value of a parameter are the same.
 SAME = 1e-6
@@ -52,7 +52,7 @@ class Prediction:
     Parameters
     ----------
     unknowns : dict of str to array
-        Computed values, ascending.
+        Computed values of each unknown, ascending.
     realisations : int
         Number of lines.
     logarithmic : bool
@@ -71,7 +71,7 @@ class Prediction:
         return [Scale.of(values) for values in self.unknowns.values()]
 
     def values(self, places: FloatArray) -> FloatArray:
-        """Return the unknowns at places in the unit cube; 0 and 1 are the ends of their axes."""
+        """Return the unknowns at places in the unit cube, where 0 and 1 are the ends of their axes."""
         return np.stack([self._of(k, places[:, k]) for k in range(places.shape[1])], axis=1)
 
     def _of(self, k: int, place: FloatArray) -> FloatArray:
@@ -95,7 +95,7 @@ def prediction(dataset: xr.Dataset, measured: Measured) -> Prediction:
     Raises
     ------
     FitError
-        If the study is no grid, has no unknowns or too many, too few values of an axis, or cases without a value.
+        If the study is not a grid, has no unknowns or too many, too few values of an axis, or cases without a value.
     DataError
         If a measured point lies outside the study.
     """
@@ -120,7 +120,7 @@ def prediction(dataset: xr.Dataset, measured: Measured) -> Prediction:
 
 
 def _at_fixed(dataset: xr.Dataset, measured: Measured) -> xr.Dataset:
-    """Return a study without axes of one value; refuse points that were measured outside of the study."""
+    """Return a study without axes of one value; raise DataError if a measured point lies outside the study."""
     array = dataset[measured.output]
     single = [str(dim) for dim in array.dims if dim in array.coords and array.sizes[dim] == 1 and dim != "realisation"]
     dataset = dataset.squeeze(single)
@@ -160,7 +160,7 @@ def _unknowns(dataset: xr.Dataset, measured: Measured) -> dict[str, FloatArray]:
 
 
 def _is_computed(axis: FloatArray, wanted: FloatArray) -> bool:
-    """Return whether every measured value is a value of the axis."""
+    """Return whether every measured value is one of the values of the axis."""
     nearest = np.min(np.abs(wanted[:, None] - axis), axis=1)
     return bool(np.all(nearest <= SAME * np.maximum(np.abs(wanted), np.abs(axis).max() * SAME)))
 
@@ -168,7 +168,7 @@ def _is_computed(axis: FloatArray, wanted: FloatArray) -> bool:
 def _fields(
     dataset: xr.Dataset, output: str, along: Sequence[str], unknowns: Sequence[str], between: Mapping[str, bool]
 ) -> tuple[FloatArray, bool]:
-    """Return the fields that are interpolated, and whether the mean is in logarithms.
+    """Return the fields that are interpolated, and whether the field of the mean contains logarithms.
 
     The shape is (conditions ..., unknowns ..., fields). The fields are the mean, whether it is missing, the independent
     scatter, the error of grid and interpolation, and the common modes of the scatter.
@@ -203,7 +203,7 @@ def _fields(
 
 
 def _and_neighbours(absent: NDArray[np.bool_], axis: int) -> NDArray[np.bool_]:
-    """Return missing cases and their neighbours, at which the slopes of cubics depend on them."""
+    """Return missing cases and their neighbours, because cubics at the neighbours depend on the missing cases."""
     along = np.moveaxis(absent, axis, 0).copy()
     before = along.copy()
     along[1:] |= before[:-1]
@@ -224,8 +224,8 @@ def _long_enough(dataset: xr.Dataset, axis: str) -> FloatArray:
 def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the independent standard error, and the common modes of the scatter.
 
-    All cases share their lines, so the errors of their means are correlated. The scatter of a few lines is not known
-    well, so it is widened like intervals.
+    All cases share their lines, so the errors of their means are correlated. The scatter is widened by Student's t,
+    because a few lines do not determine it well.
     """
     count = deviations.shape[-1]
     if count < 2:
@@ -243,14 +243,14 @@ def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray)
 
 
 def _widened(number: NDArray[np.intp]) -> FloatArray:
-    """Return Student's t over the normal z for a number of lines."""
+    """Return the ratio of Student's t to the normal z for a number of lines."""
     few = np.maximum(number, 2)
     widened: FloatArray = bootstrap.widening(few) * np.sqrt((few - 1) / few)
     return widened
 
 
 def _at_point(fields: FloatArray, axes: Sequence[FloatArray], place: Sequence[float]) -> FloatArray:
-    """Interpolate along the conditions, which are the first dimensions, one after the other."""
+    """Return the fields at a measured point, interpolated along one condition after the other (first dimensions)."""
     for axis, wanted in zip(axes, place, strict=True):
         nearest = int(np.argmin(np.abs(axis - wanted)))
         if _is_computed(axis, np.array([wanted])):
@@ -279,7 +279,7 @@ def _require_whole(at_points: FloatArray, measured: Measured, unknowns: Mapping[
 def _interpolators(
     at_points: FloatArray, unknowns: Mapping[str, FloatArray], count: int, logarithmic: bool
 ) -> Prediction:
-    """Return linear interpolators: of the means on a dense table, and of the errors on the grid of the study."""
+    """Return a prediction that interpolates linearly: means on a dense table, errors on the grid of the study."""
     scales = [Scale.of(values) for values in unknowns.values()]
     places = [scale.of_values(values) for scale, values in zip(scales, unknowns.values(), strict=True)]
     unit = [(place - place[0]) / (place[-1] - place[0]) for place in places]

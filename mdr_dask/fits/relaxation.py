@@ -11,7 +11,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import DOUBTFUL, law_holds
 
 WINDOW = 8.0  # length of the fitted part, in units of 1 / (rate of the law)
-FLOOR = 0.01  # error of every moment due to the grid, relative to the largest relaxing part (docs/kinetics.md)
+FLOOR = 0.01  # grid error at every moment, relative to the largest relaxing part (docs/kinetics.md)
 GRID = 400  # rates that are tried, evenly spaced on a logarithmic scale
 
 RATE_FIELDS = {
@@ -27,7 +27,7 @@ class Relaxation(NamedTuple):
     ----------
     rate, amplitude, integral_rate : array, shape (rows,)
         Stacks. If scatter and errors do not explain the departures of the trace from one exponential, the last rows
-        of the rate contain the fits to the trace moved by these departures, and the integral rate.
+        of the rate are fits to the trace shifted by these departures, and the integral rate.
     holds : str
         Whether one exponential fits; departures are relative to the largest relaxing part.
     """
@@ -48,8 +48,8 @@ def widths(time: FloatArray) -> FloatArray:
 def point_weights(time: FloatArray, trace: FloatArray, error: FloatArray) -> FloatArray:
     """Return the weight of each moment of a mean trace: its duration over its variance.
 
-    The moments are dense at the start of a logarithmic grid, where neighbours carry the same information; hence the
-    duration.
+    On a logarithmic grid the early moments are dense, and neighbours carry the same information. The weight by duration
+    corrects for this.
     """
     variance = error**2 + (FLOOR * np.abs(trace).max()) ** 2
     weights: FloatArray = widths(time) / variance
@@ -58,7 +58,7 @@ def point_weights(time: FloatArray, trace: FloatArray, error: FloatArray) -> Flo
 
 
 def tried_rates(time: FloatArray) -> FloatArray:
-    """Return the rates that are tried for a trace; slower and faster ones cannot be seen at these moments."""
+    """Return the rates that are tried for a trace; slower and faster rates cannot be resolved at these moments."""
     rates: FloatArray = np.geomspace(0.02 / time[-1], 2 / time[time > 0][0], GRID)
     return rates
 
@@ -74,7 +74,7 @@ def exponential(time: FloatArray, traces: FloatArray, weights: FloatArray) -> tu
     time : array, shape (m,)
         Moments, from zero on.
     traces : array, shape (n, m)
-        What relaxes to zero.
+        Traces that relax to zero.
     weights : array, shape (m,)
         Weights of the squared residuals.
 
@@ -122,7 +122,7 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
     if not chance >= DOUBTFUL:
         rates, amplitudes = exponential(t, bootstrap.moved(y[0], residuals[0]), weights)
         rate, amplitude = np.concatenate([rate, rates, integral[:1], rate[:1]]), np.concatenate([amplitude, amplitudes])
-    if outside[0] or outside.mean() > bootstrap.TAILS[0]:  # the end of the tried rates is no property of the data
+    if outside[0] or outside.mean() > bootstrap.TAILS[0]:  # a rate at an end of the tried range says nothing
         rate = np.full_like(rate, np.nan)
     relative = residuals / np.abs(y[0]).max()
     holds = law_holds(relative[0], chance, 2, scatter=bootstrap.scatter(relative, count))
@@ -130,5 +130,5 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
 
 
 def window(time: FloatArray, expected: float) -> float:
-    """Return the last moment that is fitted; at least eight moments are."""
+    """Return the last moment of the fit, which includes at least eight moments after the first."""
     return float(time[time <= max(WINDOW / expected, time[min(8, time.size - 1)])][-1])

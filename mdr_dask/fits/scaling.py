@@ -36,12 +36,12 @@ from mdr_dask.fits.friction import (
 )
 from mdr_dask.physics.sliding import laws
 
-KNOTS = 2  # knots of the common curve of a collapse per decade of velocity
+KNOTS = 2  # knots of the common curve per decade of velocity
 SLOPE_FOLLOWED = "whether friction beyond its maximum is proportional to the slope in contact"
 
 
 def _contact_growth(data: xr.Dataset) -> Variables:
-    """Fit the power of the contact length over the load in zone 1, at the lowest velocity."""
+    """Fit the power of the contact length against the load in zone 1, at the lowest velocity."""
     table = table_of(data, 1.0, *loads_and_velocities(data), output="contact_fraction")
     force, velocity = table.columns
     used = [int(same[np.argmin(velocity[same])]) for same in loads_of_zone_one(force, table.mean() > 0)]
@@ -63,7 +63,7 @@ def _contact_growth(data: xr.Dataset) -> Variables:
 
 
 def _balance(data: xr.Dataset, used: list[int]) -> Variables:
-    """Return the slope in contact over that of the line, and mu over eq. 3.12, if the store has both."""
+    """Return the slope in contact over that of the line, and mu over eq. 3.12; empty if the store lacks an output."""
     if not {"contact_slope", "friction_coefficient"} <= set(data.data_vars):
         return {}
     slope = spectral_slope(data)
@@ -86,12 +86,12 @@ def _balance(data: xr.Dataset, used: list[int]) -> Variables:
 
 
 def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> FloatArray:
-    """Return the slope in contact over that of the line by eq. 3.21; NaN where the contact is shorter than a wave.
+    """Return the slope in contact over that of the line by eq. 3.21; NaN if the contact is below the shortest wave.
 
     Parameters
     ----------
     fraction : array
-        Length in contact over that of the line.
+        Length in contact over the length of the line.
     hurst, points : float
         Hurst exponent and number of Nyquist points of the line.
     """
@@ -106,7 +106,7 @@ def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> Floa
 
 
 def _contact_slope(data: xr.Dataset) -> Variables:
-    """Compare the slope in contact with eq. 3.21, which is stated up to a factor, and friction with that slope."""
+    """Compare the slope in contact with eq. 3.21, which leaves a factor open, and friction with this slope."""
     hurst, points = one_value(data, "hurst"), one_value(data, "points")
     slopes = table_of(data, spectral_slope(data), output="contact_slope")
     fractions = table_of(data, 1.0, output="contact_fraction")
@@ -123,7 +123,7 @@ def _contact_slope(data: xr.Dataset) -> Variables:
     )
     fraction = fractions.mean()[used]
     holding = found.holds(lambda k: f"L_cont / L = {fraction[k]:.2g}")
-    if np.ptp(np.log(fraction)) < WITHIN:  # a factor is fitted, so there is nothing left to contradict
+    if np.ptp(np.log(fraction)) < WITHIN:  # with a fitted factor, equal lengths cannot contradict the law
         holding = f"not tested: the lengths in contact of these cases differ by less than {WITHIN:.0%}"
     return {
         **constant("factor", np.exp(found.constants[:, 0]), count, "slope in contact over eq. 3.21", positive=True),
@@ -136,7 +136,7 @@ def _contact_slope(data: xr.Dataset) -> Variables:
 
 
 def _friction_of_slope(data: xr.Dataset) -> Variables:
-    """Judge the reason for region IV: beyond its maximum friction falls because the slope in contact falls."""
+    """Test the explanation of region IV: beyond its maximum, friction falls in proportion to the slope in contact."""
     if not {"friction_coefficient", *KELVIN} <= set(data.variables):
         return {}
     table = table_of(data, 1.0, *loads_and_velocities(data))
@@ -165,7 +165,7 @@ def _friction_of_slope(data: xr.Dataset) -> Variables:
 
 
 class Collapse(NamedTuple):
-    """Curves shifted onto one.
+    """Curves that were shifted onto a common curve.
 
     Attributes
     ----------
@@ -176,7 +176,7 @@ class Collapse(NamedTuple):
     constants : int
         Number of fitted heights of the common curve and fitted shifts.
     vague : array, shape (curves,)
-        Whether the data leave a shift of a curve open. Such are straight curves, and those beside a straight one.
+        Whether the data do not determine a shift of the curve, because it or its neighbour is a straight line.
     """
 
     shifts: FloatArray
@@ -190,7 +190,7 @@ def collapse(
 ) -> Collapse:
     """Shift curves onto a common curve, a natural cubic spline, by least squares.
 
-    The shifts of resampled and moved rows follow from those of the first row by linearisation.
+    The shifts of the other rows of the stack follow from those of the first row by linearisation.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def collapse(
     curve : int array, shape (points,)
         Curve of each point.
     start : array, shape (curves,)
-        Shifts along x from which the search starts; it also starts from zero, and the better end is taken.
+        Shifts along x at which the search starts. A second search starts at zero, and the better result is used.
     reference : int
         Curve that is not shifted.
     vertical : bool
@@ -217,7 +217,7 @@ def collapse(
         place = x + begin[curve]
         ends = place.min() - 0.5, place.max() + 0.5
         knots = np.linspace(*ends, 2 + int(np.ceil(KNOTS * (ends[1] - ends[0]) / np.log(10))))
-        bends = 1e-3 * np.diff(np.eye(knots.size), 2, axis=0)  # keeps the curve straight where it has no points
+        bends = 1e-3 * np.diff(np.eye(knots.size), 2, axis=0)  # straightens the curve where there are no points
 
         def residuals(unknown: FloatArray) -> FloatArray:
             height, shift = unknown[: knots.size], unknown[knots.size :].reshape(axes, free.size)
@@ -291,7 +291,7 @@ def _collapse(data: xr.Dataset) -> Variables:
 
 
 def _shifts(forces: FloatArray, loads: FloatArray, found: Collapse, stated: FloatArray, count: int) -> Variables:
-    """Return the shifts of all loads of a study in decades; NaN for loads without a curve, and for vague shifts."""
+    """Return the shifts of all loads in decades; NaN for loads without a curve and for undetermined shifts."""
     decades = np.where(found.vague, np.nan, found.shifts / np.log(10))
     columns = {"horizontal_stated": (stated / np.log(10), "shift along log velocity by eqs. 3.17 and 3.23")}
     for k, name in enumerate(("horizontal", "vertical")):

@@ -1,7 +1,7 @@
 """Sobol indices: the share of the variance of an output that each input of a study explains.
 
-The output is the mean over realisations. Each index is a quotient of products of two means, and such a product
-contains the scatter of the realisations. The product of each realisation with itself is therefore left out.
+The output is the mean over realisations. Each index is a ratio of mean products of two outputs. The product of a
+realisation with itself is left out, because it contains the variance of the scatter.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ GROUPS = 20
 def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
     """Return the Sobol indices of an output for every varied input of a sampled study.
 
-    From Saltelli's design: first-order indices after Saltelli et al. (2010), total ones after Jansen (1999). From any
-    other sampled design first-order ones only, by the products of the outputs of neighbours when the cases are sorted
-    by an input (Gamboa et al., 2022, with several neighbours).
+    For Saltelli's design, first-order indices are those of Saltelli et al. (2010), total indices those of Jansen
+    (1999). Any other sampled design gives first-order indices only: the cases are sorted by an input, and the outputs
+    of neighbours are multiplied (Gamboa et al., 2022, with several neighbours).
 
     Parameters
     ----------
@@ -43,8 +43,8 @@ def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
     -------
     Dataset
         Over ``parameter``: ``first`` and ``total`` with the ends of their 95 % intervals, ``<index>_low`` and
-        ``<index>_high``; NaN for an index that the design does not give. ``attrs`` contain the numbers of cases, cases
-        without a value, and realisations, and ``advice``: whether there are enough points.
+        ``<index>_high``; NaN for an index that the design does not give. ``attrs`` contain the numbers of cases, of
+        cases without a value and of realisations, and ``advice``: whether there are enough points.
 
     Raises
     ------
@@ -53,9 +53,9 @@ def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
 
     Notes
     -----
-    Failed cases are left out; in Saltelli's design, for each input, the pairs that need them. The intervals are those
-    of a jackknife over groups of points and over realisations. Points of a Sobol sequence are more even than random
-    ones, so the intervals are rather too wide.
+    Failed cases are left out. In Saltelli's design, a base point is left out of the index of an input if one of the
+    three cases that it needs failed. The intervals are those of a jackknife over groups of points and over
+    realisations. Points of a Sobol sequence are more even than random points, so the intervals are rather too wide.
 
     References
     ----------
@@ -99,7 +99,7 @@ def _inputs(dataset: xr.Dataset) -> dict[str, FloatArray]:
 def _values(dataset: xr.Dataset, output: str) -> tuple[FloatArray, int]:
     """Return the output, shape (realisations, cases), and the number of cases without a value.
 
-    A realisation that failed alone takes the mean of the others of its case.
+    If some realisations of a case failed, the mean of the others replaces them.
     """
     array = dataset[output]
     others = [str(dim) for dim in array.dims if dim not in ("case", "realisation")]
@@ -121,7 +121,7 @@ def _values(dataset: xr.Dataset, output: str) -> tuple[FloatArray, int]:
 
 
 def _is_saltelli(columns: FloatArray) -> bool:
-    """Return whether the cases are points a, b, and a with each input in turn taken from b."""
+    """Return whether the cases are Saltelli's design: points a, b, and a with each input in turn taken from b."""
     inputs, cases = columns.shape
     if cases % (inputs + 2):
         return False
@@ -132,7 +132,7 @@ def _is_saltelli(columns: FloatArray) -> bool:
 
 
 def _product(left: FloatArray, right: FloatArray) -> FloatArray:
-    """Return the mean product over pairs of different realisations, for each point; one realisation has no pairs."""
+    """Return for each point the mean product over pairs of different realisations; with one, the plain product."""
     count = len(left)
     if count == 1:
         return np.asarray(left[0] * right[0])
@@ -141,7 +141,7 @@ def _product(left: FloatArray, right: FloatArray) -> FloatArray:
 
 
 def _exchanged(values: FloatArray) -> FloatArray:
-    """Return first-order and total index from outputs at a, b and a with one input of b, shape (lines, points, 3)."""
+    """Return first-order and total index from outputs (lines, points, 3) at a, at b, and at a with one input of b."""
     a, b, mixed = np.moveaxis(values[:, np.isfinite(values).all(axis=(0, 2))], 2, 0)
     if a.shape[1] < FEWEST:
         raise FitError(f"expected at least {FEWEST} base points without a failed case, got {a.shape[1]}")
@@ -152,11 +152,11 @@ def _exchanged(values: FloatArray) -> FloatArray:
 
 
 def _of_neighbours(values: FloatArray) -> FloatArray:
-    """Return the first-order index and the ends of its interval, and NaN for the total one, shape (3, 2).
+    """Return the first-order index with the ends of its interval, and NaN for the total index, shape (3, 2).
 
-    Products with neighbours are right for random points. If the points fill space evenly, as those of a Sobol sequence,
-    the other inputs of neighbours differ systematically, and the mean with the product of each point with itself is
-    right. The index is the middle of both, and the interval contains both.
+    There are two estimates. Products of neighbours alone are right for random points. If the points fill space evenly,
+    as in a Sobol sequence, the other inputs of neighbours differ systematically; then the mean that includes the
+    product of each point with itself is right. The index is the middle of both estimates. The interval contains both.
     """
     (without, with_itself), (low, _), (_, high) = _with_interval(values, _neighbours)
     first = [(without + with_itself) / 2, low, high]
@@ -164,7 +164,7 @@ def _of_neighbours(values: FloatArray) -> FloatArray:
 
 
 def _neighbours(values: FloatArray) -> FloatArray:
-    """Return the first-order index from outputs sorted by an input, without and with the products of a point itself."""
+    """Return two estimates of the first-order index (see `_of_neighbours`) from outputs sorted by an input."""
     most = max(1, int(np.sqrt(values.shape[1]) / 2))
     own, square = _product(values, values).mean(), values.mean() ** 2
     near = np.mean([_product(values[:, k:], values[:, :-k]).mean() for k in range(1, most + 1)])
@@ -180,7 +180,7 @@ def _with_interval(values: FloatArray, indices: Callable[[FloatArray], FloatArra
     ----------
     values : array, shape (lines, points, ...)
     indices : callable
-        From values to indices.
+        Takes values and returns indices.
     """
     middle, lines = indices(values), len(values)
     group = np.random.Generator(np.random.Philox(0)).permutation(values.shape[1]) % GROUPS
@@ -191,7 +191,7 @@ def _with_interval(values: FloatArray, indices: Callable[[FloatArray], FloatArra
 
 
 def _jackknife(parts: list[FloatArray]) -> FloatArray:
-    """Return the half width of the interval from the indices without each part."""
+    """Return the half width of the interval from the indices that are obtained without each part in turn."""
     count = len(parts)
     error = np.sqrt((count - 1) / count * np.sum((np.array(parts) - np.mean(parts, axis=0)) ** 2, axis=0))
     half: FloatArray = t.ppf(bootstrap.TAILS[1], count - 1) * error
@@ -199,7 +199,7 @@ def _jackknife(parts: list[FloatArray]) -> FloatArray:
 
 
 def _advice(result: xr.Dataset) -> str:
-    """Say whether the intervals are narrow enough, and how many cases would make them so."""
+    """Return a sentence on whether the intervals are narrow enough, and how many more cases are needed."""
     halves = [((result[f"{name}_high"] - result[f"{name}_low"]) / 2).max().item() for name in ("first", "total")]
     widest = np.nanmax(halves)
     cases = result.attrs["cases"]

@@ -11,14 +11,14 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import DOUBTFUL
 from mdr_dask.fits.interpolation import Scale, cubic
 
-TOPS = (0.3, 0.2, 0.1, 0.05)  # parts below the maximum to which a parabola is fitted: the first that fits is taken
-FLAT = 0.05  # part below the maximum that still counts as plateau
-UPPER = 0.5  # part of the maximum above which a cubic is fitted for its place
-PLACES = 96  # number of points, even in the logarithm of velocity, to which it is fitted
+TOPS = (0.3, 0.2, 0.1, 0.05)  # a parabola is fitted to points within this share below the maximum: the first that fits
+FLAT = 0.05  # points within this share below the maximum count as plateau
+UPPER = 0.5  # the cubic for the place of the maximum is fitted above this share of the maximum
+PLACES = 96  # number of points, evenly spaced in the logarithm of velocity, to which the cubic is fitted
 
 
 def smoothed(mean: FloatArray) -> FloatArray:
-    """Return a curve with less scatter, for choosing the points that are fitted."""
+    """Return a smoothed curve, which serves only to choose the points that are fitted."""
     smooth = mean.copy()
     for _ in range(2):
         smooth[1:-1] = (smooth[:-2] + 2 * smooth[1:-1] + smooth[2:]) / 4
@@ -31,9 +31,10 @@ class Top(NamedTuple):
     Attributes
     ----------
     height : array, shape (rows,)
-        Stack without the bias of a maximum; residuals of the parabola count as an error.
+        Stack of the maximum, corrected for its bias; residuals of the parabola count as an error.
     place, rise : array, shape (rows,)
-        Logarithm of velocity, and the logarithmic slope there, which is not 0 at an end of the velocities.
+        Logarithm of the velocity of the maximum, and d ln(friction) / d ln(velocity) there. This slope is not 0 if the
+        maximum is at an end of the velocities.
     """
 
     height: FloatArray
@@ -42,12 +43,12 @@ class Top(NamedTuple):
 
 
 def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
-    """Fit a parabola to as many points about the largest friction as possible within scatter and errors.
+    """Fit a parabola to as many points about the largest friction as scatter and errors allow.
 
     Parameters
     ----------
     x : array, shape (velocities,)
-        Logarithms, ascending.
+        Logarithms of velocity, ascending.
     stack : array, shape (rows, velocities)
         Friction.
     count : int
@@ -69,7 +70,7 @@ def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
 
 
 def _about_the_top(mean: FloatArray, drop: float) -> slice:
-    """Return the points about the maximum that lie within a part of it, at least three."""
+    """Return the points about the maximum that are at most the share `drop` below it; at least three."""
     smooth = smoothed(mean)
     at = int(np.argmax(smooth))
     low = np.flatnonzero(smooth[at:] <= (1 - drop) * smooth[at])
@@ -81,7 +82,7 @@ def _about_the_top(mean: FloatArray, drop: float) -> slice:
 
 
 def _parabola(x: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return maximum, place, logarithmic slope there, and residuals of the parabola through every row."""
+    """Return for every row the maximum of its parabola, its place, the logarithmic slope there, and the residuals."""
     centre, half = x.mean(), np.ptp(x) / 2
     u = (x - centre) / half
     design = np.vstack([np.ones_like(u), u, u**2])
@@ -96,11 +97,11 @@ def _parabola(x: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, 
 
 
 def place(x: FloatArray, stack: FloatArray) -> FloatArray:
-    """Return the stack of the logarithm of the velocity of the maximum; infinite if it lies outside the velocities.
+    """Return a stack of ln(velocity) of the maximum of friction; infinite if it lies outside the velocities.
 
     It is the maximum of a cubic polynomial through ln(friction) in the upper half of the curve. The polynomial is
-    fitted at evenly spaced places on a monotone cubic through the points, so that the result does not
-    depend on their spacing. The difference to a polynomial of degree four is the error, in the last two rows.
+    fitted at evenly spaced places on a monotone cubic through the points, so that the result does not depend on their
+    spacing. The difference from a polynomial of degree four is the error, in the last two rows.
 
     Parameters
     ----------
@@ -116,7 +117,7 @@ def place(x: FloatArray, stack: FloatArray) -> FloatArray:
     parts = np.split(high, np.flatnonzero(np.diff(high) > 1) + 1)
     first, last = next((part[0], part[-1]) for part in parts if part[0] <= top <= part[-1])
     near = np.linspace(whole[first], whole[last], PLACES)
-    known = np.isfinite(stack).all(axis=1)  # one realisation has no resamples
+    known = np.isfinite(stack).all(axis=1)  # with one realisation, all resamples are NaN
     rows = np.log(np.maximum(_curve(x, stack[known], near), np.finfo(float).tiny))
     own = float(np.clip(whole[top], near[0], near[-1]))
     places = np.full(len(stack), np.nan)
@@ -130,14 +131,14 @@ def place(x: FloatArray, stack: FloatArray) -> FloatArray:
 
 
 def _joined(x: FloatArray, stack: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a stack with the mean of all points at the same place, such as equal v tau with different v and tau."""
+    """Return a stack in which points at the same place (equal v tau from different v and tau) are averaged."""
     places, group = np.unique(np.round(x, 9), return_inverse=True)
     member = np.equal.outer(group, np.arange(places.size)).astype(np.float64)
     return places, stack @ (member / member.sum(axis=0))
 
 
 def _maximum(near: FloatArray, rows: FloatArray, degree: int, own: float) -> FloatArray:
-    """Return the maximum next to a place of the polynomial through every row; infinite if it has none."""
+    """Return, for the polynomial through each row, the maximum nearest to `own`; infinite if it has none."""
     even, fine = np.linspace(-1.0, 1.0, near.size), np.linspace(-1.0, 1.0, 24 * near.size + 1)
     curves = rows @ np.linalg.pinv(np.vander(even, degree + 1)).T @ np.vander(fine, degree + 1).T
     left, middle, right = curves[:, :-2], curves[:, 1:-1], curves[:, 2:]
