@@ -17,8 +17,8 @@ from mdr_dask.fits.base import Fit
 STEP = 1e-3
 #: Largest number of groups of neighbouring values along a dimension; the groups are shifted one after the other.
 GROUPS = 32
-#: A group of cases is left out if a shift by one standard error changes the constant by less than this share of the half
-#: width of its interval.
+#: A group of cases is left out if a shift by one standard error changes the constant by less than this share of the
+#: half width of its interval.
 NEGLIGIBLE = 0.01
 #: Relative change of the scatter for the extrapolation to zero scatter.
 LESS = 0.01

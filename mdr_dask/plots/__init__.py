@@ -1,7 +1,8 @@
 """Figures drawn from a store.
 
-A figure is data (`figure`), made from the series of a store (`view` for outputs against parameters, `named` for those
-with a name) and drawn with matplotlib (`render`) or on the page of `mdr_dask.report`.
+A figure is first described as data (`figure`). The description is made from the series of a store (by `view` for any
+output against parameters, by `named` for the figures with a name) and then drawn with matplotlib (`render`) or on the
+page of `mdr_dask.report`.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from importlib.metadata import entry_points
 
 from mdr_dask.plots.base import Plot
 
-#: Modules of this package that hold ``PLOTS``.
+#: Modules of this package with a tuple ``PLOTS``.
 SUBJECTS = ("named", "history", "calibration", "master_curve")
 
 #: Entry point group in which other packages offer tuples of `Plot`.

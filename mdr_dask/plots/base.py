@@ -1,4 +1,4 @@
-"""What a figure of a store is: data about it, and a function from the series of a store to the figure."""
+"""The class `Plot`: a figure by name, with a function that makes it from the series of a store."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ class Plot:
     Parameters
     ----------
     name : str
-        As in ``mdr-dask plot STORE NAME``.
+        Name on the command line: ``mdr-dask plot STORE NAME``.
     models : tuple of str
-        Models whose stores it is for; none stands for all models.
+        Models whose stores the figure can be drawn from; an empty tuple means all models.
     summary : str
-        One line: what against what.
+        One line: the quantities on both axes.
     draw : callable, mapping of str to Dataset -> Figure
-        Takes the groups of a store as :class:`mdr_dask.fits.base.Fit` does and returns a
-        :class:`mdr_dask.plots.figure.Figure`; `mdr_dask.plots.view.draw` makes those of outputs against parameters.
+        Takes the groups of a store by the name of the series, as :class:`mdr_dask.fits.base.Fit` does, and returns a
+        :class:`mdr_dask.plots.figure.Figure`. For outputs against parameters, `mdr_dask.plots.view.draw` does this.
     fitted : bool
-        Whether it shows a fit, which takes long for a large study.
+        Whether the figure shows a fit, which takes long for a large study.
     """
 
     name: str
@@ -44,14 +44,14 @@ class Plot:
     fitted: bool = False
 
     def describe(self, groups: Mapping[str, xr.Dataset]) -> Figure:
-        """Return the figure as data; results that failed or are missing are counted.
+        """Return the figure as data, with the numbers of results that failed or are missing.
 
-        Axes of one value are parameters at a fixed value.
+        Axes with one value are treated as fixed parameters.
 
         Raises
         ------
         DataError, FitError
-            If the store does not hold the data for it.
+            If the store does not contain the necessary data.
         """
         try:
             with page.with_units(labels.chosen_units(groups)):
@@ -67,7 +67,7 @@ class Plot:
         return figure
 
     def figure(self, groups: Mapping[str, xr.Dataset]) -> Drawn:
-        """Draw it with matplotlib; raises as `describe` does."""
+        """Draw the figure with matplotlib; raises the errors of `describe`."""
         from mdr_dask.plots.render import origin_of, render
 
         drawn = render(self.describe(groups))
@@ -76,14 +76,14 @@ class Plot:
 
 
 def _squeezed(data: xr.Dataset) -> xr.Dataset:
-    """Return a series whose axes of one value are scalar coordinates."""
+    """Return a series in which axes with one value are scalar coordinates."""
     if "status" not in data:
         return data
     return data.squeeze([dim for dim in data["status"].dims if dim != "realisation" and data.sizes[dim] == 1])
 
 
 def _without_value(groups: Mapping[str, xr.Dataset]) -> list[str]:
-    """Return how many results of a store have no value, and why."""
+    """Return, for each reason, a text with the number of results of a store that have no value."""
     states = [data["status"].to_numpy() for data in groups.values() if "status" in data]
     total = sum(state.size for state in states)
     reasons = {Status.FAILED: "failed", Status.NOT_CONVERGED: "did not converge", Status.MISSING: "are missing"}

@@ -1,4 +1,4 @@
-"""What measured points say of the unknowns of a study: data and band, residuals, and the density of each unknown."""
+"""The figure of a calibration: measured points with a band, residuals, and the density of each unknown."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 SAMPLES, BINS = 400, 60
 #: Half width of a 95 % interval of a normal distribution in standard deviations.
 HALF = 1.96
-#: Bins that a density is averaged over.
+#: Weights of neighbouring bins with which a density is smoothed.
 SMOOTH = np.array([0.1, 0.2, 0.4, 0.2, 0.1])
 
 
 class _Curve(NamedTuple):
-    """Points that differ in one condition only."""
+    """Measured points that differ only in the condition on the horizontal axis."""
 
     label: str
     colour: str
@@ -36,8 +36,8 @@ class _Curve(NamedTuple):
 def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Return measured points with the band of the study, their residuals, and the density of each unknown.
 
-    Bars of points are 95 % intervals of measurement, the band is that of the posterior. A density is grey where the
-    data do not determine its unknown; what they determine instead follows.
+    Bars are 95 % intervals of the errors of measurement, the band is the interval of the posterior. A density is grey
+    if the data do not determine its unknown; panels for the products that they determine instead follow.
     """
     found, series, data = _first(groups)
     main = max(found.measured.conditions, key=lambda name: np.unique(found.measured.conditions[name]).size, default="")
@@ -58,7 +58,7 @@ def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
 
 
 def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.Dataset]:
-    """Return the calibration of the first series that the table is of."""
+    """Return the calibration of the first series that can be compared with its table."""
     reasons = []
     for name, dataset in groups.items():
         try:
@@ -74,7 +74,7 @@ def _quantity(found: fit.Calibration, name: str, data: xr.Dataset) -> labels.Qua
 
 
 def _curves(found: fit.Calibration, main: str, data: xr.Dataset) -> list[_Curve]:
-    """Return the points in groups of equal conditions other than the one along the axis."""
+    """Return the points in groups that differ only in the condition `main`; one group if there are too many."""
     others = {name: each for name, each in found.measured.conditions.items() if name != main}
     rows = np.stack(list(others.values()), axis=1) if others else np.zeros((found.measured.values.size, 1))
     places, which = np.unique(np.round(rows, 12), axis=0, return_inverse=True)
@@ -195,7 +195,7 @@ def _density(
 
 
 def of_whole_cells(ends: FloatArray, across: FloatArray, place: FloatArray, width: float) -> FloatArray:
-    """Return edges of bins that hold the same number of cells each, for unequal numbers would look like structure."""
+    """Return edges of bins with the same number of cells each; unequal numbers would look like structure."""
     low, high = int(place.argmin()), int(place.argmax())
     cell = width * (across[high] - across[low]) / (place[high] - place[low])
     start = across[low] - cell / 2

@@ -13,7 +13,7 @@ from mdr_dask.plots.labels import is_geometric
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap, Normalize
 
-#: Colours of Okabe and Ito, which colour-blind readers can tell apart; more curves than these have a colour bar.
+#: Colours of Okabe and Ito, which colour-blind readers can distinguish; more curves than colours need a colour bar.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 LINES = ("-", "--", ":", "-.")
 MARKERS = ("o", "s", "^", "D")
@@ -24,7 +24,7 @@ def _cycle(key: str) -> tuple[str, ...]:
 
 
 def most() -> int:
-    """Return how many curves can be told apart by colours."""
+    """Return the number of curves that can be distinguished by colours."""
     return len(_cycle("color") or COLOURS)
 
 
@@ -37,7 +37,7 @@ def colour(number: int) -> str:
 
 
 def line_and_marker(number: int) -> tuple[str, str]:
-    """Return line and marker of a curve; they differ from curve to curve in a style of greys, or one that says so."""
+    """Return line and marker of a curve; they differ between curves if the style is grey or defines them."""
     from matplotlib.colors import to_rgb
 
     greys = all(len(set(to_rgb(each))) == 1 for each in _cycle("color") or COLOURS)
@@ -47,7 +47,7 @@ def line_and_marker(number: int) -> tuple[str, str]:
 
 
 def bar(label: str, values: Any, log: bool | None = None) -> Bar:
-    """Return the colour bar of some values; logarithmic where the values are geometric, unless `log` says otherwise."""
+    """Return the colour bar of some values; by default it is logarithmic if the values are geometric."""
     values = np.asarray(values, dtype=np.float64)
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)

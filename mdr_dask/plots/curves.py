@@ -1,4 +1,4 @@
-"""Curves of a series: which parameters a figure shows, which it holds at one value, and means with intervals."""
+"""Curves of a series: the parameters that a figure varies, the parameters that it fixes, and means with intervals."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from mdr_dask.models.base import Status
 from mdr_dask.plots import colours, labels
 from mdr_dask.plots.figure import Bar, Key, Mean
 
-#: Dimensions of outputs themselves, for data without a status.
+#: Dimensions that belong to an output and are not axes of a study, for data without a status.
 OWN = {"relaxation_times", "radius", "position", "angle", "block", "regime"}
-#: Most parameters in a title; the table beside the figure has all.
+#: Largest number of parameters in a title; the table beside the figure lists all of them.
 MOST_FIXED = 8
 
 
 class Curve(NamedTuple):
-    """The part of a series that one curve is drawn from, and how it is drawn."""
+    """The data of one curve, with its label, colour, line and marker."""
 
     data: xr.Dataset
     label: str
@@ -32,7 +32,7 @@ class Curve(NamedTuple):
 
 
 class Family(NamedTuple):
-    """Curves along one parameter.
+    """Curves against one parameter.
 
     Attributes
     ----------
@@ -41,13 +41,13 @@ class Family(NamedTuple):
     keys : list of Key
         Entries of the legend.
     bar : Bar or None
-        The colour bar, where there are more curves than colours.
+        The colour bar, if there are more values than colours.
     held : dict of str to DataArray
-        Parameters at one value.
+        Parameters that are fixed at one value.
     left_out : list of str
-        What is not drawn, a sentence for each axis.
+        Sentences about the values that are not drawn, one for each axis.
     varying : tuple of str
-        Parameters that change from point to point beside the one on the axis, in a sampled design.
+        In a sampled design, the other parameters that change from point to point.
     """
 
     curves: list[Curve]
@@ -59,7 +59,7 @@ class Family(NamedTuple):
 
 
 def mean(data: xr.Dataset, output: str) -> Mean:
-    """Return the mean of an output over realisations with its 95 % interval, in the unit shown."""
+    """Return the mean of an output over realisations with its 95 % interval, in the unit of the figure."""
     values = data[output]
     if "realisation" not in values.dims:
         values = values.expand_dims("realisation")
@@ -71,7 +71,7 @@ def mean(data: xr.Dataset, output: str) -> Mean:
 
 
 def meaning_of_bars(data: Iterable[xr.Dataset], outputs: Sequence[str]) -> str:
-    """Return what bars and bands mean, for a title."""
+    """Return a text for the title that explains bars and bands."""
     groups = [*data]
     most = max((each.sizes.get("realisation", 1) for each in groups), default=1)
     grid = any(aggregation.companion(each, name) is not None for each in groups for name in outputs if name in each)
@@ -89,7 +89,7 @@ def axes_of(data: xr.Dataset, output: str) -> list[str]:
 
 
 def along_dim(data: xr.Dataset, along: str, output: str) -> str | None:
-    """Return the dimension that a parameter varies along, or None where it is fixed."""
+    """Return the dimension along which a parameter varies, or None if it is fixed."""
     if along in data[output].dims:
         return along
     if along in data.coords and data[along].ndim == 1 and data[along].dims[0] in data[output].dims:
@@ -98,14 +98,14 @@ def along_dim(data: xr.Dataset, along: str, output: str) -> str | None:
 
 
 def parameters_along(data: xr.Dataset, dim: str) -> list[str]:
-    """Return the parameters that change along a dimension: one, or all those of a sampled design."""
+    """Return the parameters that change along a dimension: one for an axis, several for a sampled design."""
     names = [str(name) for name, values in data.coords.items() if values.dims == (dim,)]
     axes = [str(axis["name"]) for axis in data.attrs.get("axes", [])]
     return sorted(names or [dim], key=lambda name: axes.index(name) if name in axes else -1)
 
 
 def hold(data: xr.Dataset, dims: Sequence[str]) -> tuple[xr.Dataset, list[str]]:
-    """Hold axes at their middle value; return the rest of the series, and a sentence for each of these axes."""
+    """Fix axes at their middle value; return the rest of the series, and a text for each axis with several values."""
     places = {dim: data.sizes[dim] // 2 for dim in dims}
     sentences = [_only_one(data, dim, place) for dim, place in places.items() if data.sizes[dim] > 1]
     return data.isel(places), sentences
@@ -118,7 +118,7 @@ def _only_one(data: xr.Dataset, dim: str, place: int) -> str:
 
 
 def thin(data: xr.Dataset, dim: str, most: int) -> tuple[xr.Dataset, list[str]]:
-    """Return a series with at most so many values along an axis, spread evenly, and what is left out."""
+    """Return a series with at most `most` evenly spread values along an axis, and a text about the values left out."""
     size = data.sizes[dim]
     if size <= most:
         return data, []
@@ -132,20 +132,21 @@ def thin(data: xr.Dataset, dim: str, most: int) -> tuple[xr.Dataset, list[str]]:
 def family(data: xr.Dataset, output: str, along: str, by: str = "") -> Family:
     """Split a series into curves along a parameter.
 
-    With `by`, curves differ in this parameter alone and other axes are held at their middle value. Without it, up to as
-    many curves as there are colours are drawn; of more, one axis has the colours, another one of few values the line
-    styles, and the rest is held. More values than colours become a colour bar; of words, some are left out.
+    With `by`, the curves differ in this parameter alone, and other axes are fixed at their middle value. Without `by`,
+    all curves are drawn if there are enough colours. Otherwise one axis is shown by colours, another axis with few
+    values by line styles, and the remaining axes are fixed. An axis with more values than colours gets a colour bar.
+    If its values are words, some of them are left out instead.
 
     Parameters
     ----------
     data : Dataset
         A series.
     output : str
-        Output whose axes count.
+        The output that is drawn.
     along : str
         The parameter on the horizontal axis.
     by : str
-        The parameter of the colours.
+        The parameter that colours show.
 
     Raises
     ------
@@ -180,7 +181,7 @@ def family(data: xr.Dataset, output: str, along: str, by: str = "") -> Family:
 
 
 def with_one_legend(families: Mapping[str, Family]) -> tuple[list[str], list[str]]:
-    """Return as many series as possible that share a legend and a colour bar, and a sentence about the others."""
+    """Return the largest group of series with the same legend and colour bar, and a text about the other series."""
     groups: dict[Any, list[str]] = {}
     for name, one in families.items():
         groups.setdefault((tuple(one.keys), one.bar), []).append(name)
@@ -192,7 +193,7 @@ def with_one_legend(families: Mapping[str, Family]) -> tuple[list[str], list[str
 
 
 def _most_shown(data: xr.Dataset, others: list[str]) -> list[str]:
-    """Return the axis for the colours, and perhaps one for line styles: those that show most curves."""
+    """Return the axis for colours, and perhaps one for line styles, that together show the most curves."""
     few = len(colours.LINES)
     pairs = [[one, two] for one in others for two in others if two != one and data.sizes[two] <= few]
     choices = [*([dim] for dim in others), *pairs]
@@ -205,7 +206,7 @@ def _is_numeric(data: xr.Dataset, dim: str) -> bool:
 
 
 def _split(data: xr.Dataset, dims: list[str], joined: bool) -> tuple[list[Curve], list[Key], Bar | None]:
-    """Return a curve for every point of some axes, the entries of their legend, and their colour bar."""
+    """Return a curve for every combination of values of some axes, the entries of the legend, and the colour bar."""
     cells = list(np.ndindex(*(data.sizes[dim] for dim in dims)))
     parts = [needed(data.isel(dict(zip(dims, cell, strict=True)))) for cell in cells]
     named = [", ".join(_names(part, dims)) for part in parts]
@@ -241,7 +242,7 @@ def _split(data: xr.Dataset, dims: list[str], joined: bool) -> tuple[list[Curve]
 
 
 def needed(curve: xr.Dataset) -> xr.Dataset:
-    """Leave out the values of an adaptive axis that a curve did not need."""
+    """Return a curve without the values of an adaptive axis that were not needed."""
     if "status" not in curve:
         return curve
     spared = (curve["status"] == Status.NOT_NEEDED).all("realisation")
@@ -249,7 +250,7 @@ def needed(curve: xr.Dataset) -> xr.Dataset:
 
 
 def _names(part: xr.Dataset, dims: Sequence[str]) -> list[str]:
-    """Return how the parameters along some axes are written, for one curve."""
+    """Return the labels of one curve: its parameters along some axes, with values."""
     axes = part.attrs.get("axes", [])
     found = []
     for dim in dims:
@@ -260,12 +261,12 @@ def _names(part: xr.Dataset, dims: Sequence[str]) -> list[str]:
 
 
 def scalars(data: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Return the parameters at one value."""
+    """Return the parameters of a series that have one value."""
     return {str(name): value for name, value in data.coords.items() if value.ndim == 0 and name != "realisation"}
 
 
 def fixed_by_all(held: Sequence[Mapping[str, xr.DataArray]]) -> dict[str, xr.DataArray]:
-    """Return what several families hold at the same value."""
+    """Return the parameters that all families have at the same value."""
     first = held[0] if held else {}
     return {
         name: value
@@ -278,10 +279,10 @@ def fixed_by_all(held: Sequence[Mapping[str, xr.DataArray]]) -> dict[str, xr.Dat
 
 
 def fixed_text(held: Mapping[str, xr.DataArray], data: xr.Dataset) -> str:
-    """Return the parameters of a title.
+    """Return the text of the fixed parameters for a title.
 
-    Axes of the study come first, for their value was chosen by the figure or by ``--select``, then fixed parameters
-    with a symbol.
+    Axes of the study come first, because their value was chosen by the figure or by ``--select``. Fixed parameters that
+    have a symbol follow.
     """
     axes = [str(axis["name"]) for axis in data.attrs.get("axes", [])]
     names = [name for name in axes if name in held]
@@ -294,7 +295,7 @@ def _is_known(value: xr.DataArray) -> bool:
 
 
 def parameters_of(data: xr.Dataset) -> dict[str, Any]:
-    """Return the parameters of a series as its store keeps them, names of rules and shapes among them."""
+    """Return the parameters of a series as stored, including those that are words (names of rules and shapes)."""
     found: dict[str, Any] = json.loads(data.attrs.get("parameters", "{}"))
     return found
 

@@ -1,6 +1,6 @@
-"""A figure as data: panels with everything that is drawn in them, independent of how it is drawn.
+"""A figure as data: panels and everything that is drawn in them, independent of the drawing library.
 
-`render` draws it with matplotlib, `mdr_dask.report` draws it in a browser, and its table is written beside it.
+`render` draws the figure with matplotlib, `mdr_dask.report` draws it in a browser, and `Figure.table` lists its points.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ import xarray as xr
 from mdr_dask.arrays import FloatArray
 from mdr_dask.plots.labels import plain
 
-#: Columns of a table before and after those of the parameters.
+#: Columns of a table before and after the columns of the parameters.
 FIRST = ("panel", "curve", "what")
 LAST = tuple(f"{name}{end}" for name in ("x", "y", "value") for end in ("", "_low", "_high"))
-#: Entry of the column ``what`` for results of a study; laws have their names there.
+#: Entry of the column ``what`` for results of a study; the entry for a law is its name.
 DATA = "data"
 Kind = Literal["curve", "law", "band", "dots", "map", "absent"]
 
@@ -39,17 +39,17 @@ class Axis:
     Parameters
     ----------
     label : str
-        With its unit; symbols as mathtext between dollars.
+        Label with its unit; symbols as mathtext between dollars.
     log : bool
         Whether it is logarithmic.
     ticks : sequence of (float, str)
-        Ticks with texts, for words in place of numbers.
+        Positions and texts of ticks, for words instead of numbers.
     low, high : float, optional
-        Limits; None for those of the data.
+        Limits; None for the limits of the data.
     quantity : str
-        Name of the parameter or output whose values are shown unchanged, apart from the unit; empty for others.
+        Name of the parameter or output on the axis; empty if the axis shows a quantity derived from it.
     reverse : bool
-        Whether values grow downwards or to the left.
+        Whether values increase downwards or to the left.
     """
 
     label: str
@@ -88,17 +88,18 @@ class Trace:
     Parameters
     ----------
     kind : str
-        ``curve`` and ``law`` (points, joined where they have a line), ``band`` (from ``y_low`` to ``y_high``), ``dots``
-        (coloured by ``value``), ``map`` (cells coloured by ``value``), ``absent`` (marks at the foot of the panel).
+        ``curve`` and ``law`` (points, joined if there is a line style), ``band`` (from ``y_low`` to ``y_high``),
+        ``dots`` (coloured by ``value``), ``map`` (cells coloured by ``value``), ``absent`` (marks at the lower edge of
+        the panel).
     data : Dataset
-        ``x``, ``y`` and ``value`` as the axes show them, with ``_low`` and ``_high`` where their intervals are known;
-        coordinates are the parameters of each point, in SI.
+        ``x``, ``y`` and ``value`` in the units of the axes, with ``_low`` and ``_high`` if their intervals are known;
+        the coordinates are the parameters of each point, in SI.
     what : str
         ``data``, the name of a law, or the reason why cases have no value.
     label : str
         Name of the curve.
     colour, line, marker : str
-        As in matplotlib.
+        As in matplotlib; empty for no line or no marker.
     bars : bool
         Whether intervals are drawn as bars instead of a band.
     """
@@ -113,7 +114,7 @@ class Trace:
     bars: bool = False
 
     def column(self, name: str) -> FloatArray:
-        """Return one variable of all points in a row, broadcast to the shape of the trace."""
+        """Return one variable of all points as a flat array, broadcast to the shape of the trace."""
         whole = self.data[name].broadcast_like(self.data[self._widest]).transpose(*self.data[self._widest].dims)
         return np.asarray(whole.values, dtype=np.float64).ravel()
 
@@ -122,7 +123,7 @@ class Trace:
         return str(max(self.data.data_vars, key=lambda name: self.data[name].ndim))
 
     def frame(self) -> pd.DataFrame:
-        """Return a row for every point that is drawn."""
+        """Return a table with a row for every point that is drawn."""
         data, own = self.data, [str(name) for name in self.data.variables]
         rows: pd.DataFrame = (data if data.sizes else data.expand_dims("point")).to_dataframe().reset_index()[own]
         drawn = next(name for name in ("value", "y", "y_low", "x") if name in rows)
@@ -132,9 +133,9 @@ class Trace:
 
 @dataclass
 class Panel:
-    """Axes with the traces in them.
+    """One panel: its axes and the traces in it.
 
-    `keys` are the entries of the legend; without any, and without a colour bar, those of the traces.
+    `keys` are the entries of the legend. If it is empty and there is no colour bar, the traces are the entries.
     """
 
     x: Axis
@@ -145,7 +146,7 @@ class Panel:
     keys: list[Key] = field(default_factory=list)
 
     def entries(self) -> list[Key]:
-        """Return the entries of the legend, without doubles."""
+        """Return the entries of the legend, without duplicates."""
         of_traces = [Key(t.label, t.colour, t.line, t.marker) for t in self.traces if t.label and not self.bar]
         found = self.keys or of_traces
         return list(dict.fromkeys(found))
@@ -153,24 +154,24 @@ class Panel:
 
 @dataclass
 class Figure:
-    """A figure.
+    """A figure as data.
 
     Parameters
     ----------
     panels : list of Panel
         In rows from left to right, or in stacks from left to right.
     subject : str
-        What it shows, for its title.
+        The subject, for the title.
     fixed : str
-        Parameters at one value.
+        Text with the fixed parameters.
     bars : str
-        What bars and bands mean.
+        Explanation of bars and bands.
     left_out : list of str
-        What is not drawn.
+        Texts about results that are not drawn.
     warnings : list of str
         Warnings about the results of the study.
     columns : int, optional
-        Most panels in a row.
+        Largest number of panels in a row.
     stack : int
         Number of successive panels that stand one above the other.
     ratio : float
@@ -191,14 +192,14 @@ class Figure:
     share_y: bool = False
 
     def leave_out(self, sentences: Iterable[str]) -> None:
-        """Add sentences about what is not drawn."""
+        """Add texts about results that are not drawn, without duplicates."""
         self.left_out = [*dict.fromkeys([*self.left_out, *(sentence for sentence in sentences if sentence)])]
 
     def table(self) -> pd.DataFrame:
-        """Return all that is drawn, a row for every point.
+        """Return a table of the whole figure with a row for every point.
 
-        Parameters are in SI, ``x``, ``y`` and ``value`` as the axes show them. Parameters that are the same everywhere
-        are in ``attrs["held"]``, units of all of them in ``attrs["units"]``.
+        Parameters are in SI; ``x``, ``y`` and ``value`` are in the units of the axes. Parameters that are the same for
+        all points are in ``attrs["held"]``, and the units of all parameters are in ``attrs["units"]``.
         """
         frames = [trace.frame().assign(panel=k + 1) for k, panel in enumerate(self.panels) for trace in panel.traces]
         frames = [frame.dropna(axis=1, how="all") for frame in frames if len(frame)]
@@ -216,7 +217,7 @@ class Figure:
         return {str(name): str(value.attrs.get("units", "1")) for name, value in coords}
 
     def head(self, origin: Mapping[str, str]) -> list[str]:
-        """Return the comment lines above the table: origin, parameters held, units, and labels of each panel."""
+        """Return the comment lines above the table: origin, fixed parameters, units, and labels of each panel."""
         table = self.table()
         units = table.attrs["units"]
         held = {
@@ -245,10 +246,10 @@ def columns(of: xr.Dataset | xr.DataArray | None = None, **values: Any) -> xr.Da
     Parameters
     ----------
     of : Dataset or DataArray, optional
-        Its coordinates along the dimensions of the values, and its scalar ones, are the parameters of the points.
+        Its scalar coordinates and those along the dimensions of the values become the parameters of the points.
     **values
-        ``x``, ``y`` and ``value``: a `Mean` brings its ends along; a plain array of as many numbers as the labelled
-        array beside it has the same dimension.
+        ``x``, ``y`` and ``value``. A `Mean` also gives the ends of its interval. A plain array gets the dimensions of a
+        labelled array of the same shape.
     """
     parts: dict[str, Any] = {}
     for name, value in values.items():
@@ -272,12 +273,12 @@ def columns(of: xr.Dataset | xr.DataArray | None = None, **values: Any) -> xr.Da
 
 
 def _apart(name: Any) -> str:
-    """Return the name of a parameter that is no column of a figure's own."""
+    """Return the name of a parameter, changed if it equals one of the fixed columns of the table."""
     return f"parameter {name}" if name in (*FIRST, *LAST) else str(name)
 
 
 def edges(centres: FloatArray, log: bool) -> FloatArray:
-    """Return the ends of the cells around the values of an axis, halfway between them: of their logarithms if `log`."""
+    """Return the edges of cells around the values of an axis, halfway between the values, or their logarithms."""
     if centres.size == 1:
         half = 0.5 * (abs(float(centres[0])) or 1.0)
         return np.array([centres[0] - half, centres[0] + half])

@@ -74,7 +74,7 @@ def _column(name: str, data: xr.Dataset, one: curves.Family) -> list[Panel]:
 
 
 def _driven(name: str, data: xr.Dataset) -> tuple[Axis, labels.Quantity]:
-    """Return axis and unit of a prescribed quantity; it is no parameter where the history itself has its values."""
+    """Return axis and unit of a prescribed quantity; the quantity may be part of the history and not a parameter."""
     unit = {"velocity": "m/s", "normal_force": "N"}[name]
     values = data[name] if name in data.coords else xr.DataArray(np.nan, attrs={"units": unit})
     how = labels.quantity(name, values)
@@ -82,7 +82,7 @@ def _driven(name: str, data: xr.Dataset) -> tuple[Axis, labels.Quantity]:
 
 
 def _trace(case: xr.Dataset, last: float) -> xr.Dataset:
-    """Return friction before the history, just after its first instant, and along it."""
+    """Return friction before the history, just after its start, and during it."""
     before = curves.mean(case, BEFORE)
     at_once = case.assign({JUMP: (case[BEFORE] + case[JUMP]).assign_attrs(case[JUMP].attrs)})
     errors = [aggregation.companion(case, name) for name in (BEFORE, JUMP)]
@@ -98,7 +98,7 @@ def _trace(case: xr.Dataset, last: float) -> xr.Dataset:
 
 
 def loading_history(case: VelocityJump, last: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return times in relaxation times up to `last`, with velocity in m/s and normal force in N at these times."""
+    """Return times in relaxation times, up to `last`, with the velocity in m/s and the normal force in N."""
     unit = case.time_unit()
     (speed, force), parts = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
     found = [np.array([[-LEAD * last, 0.0], [speed, speed], [force, force]])]

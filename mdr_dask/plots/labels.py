@@ -1,4 +1,4 @@
-"""How quantities are written in figures: symbols, units, labels of axes, and single values."""
+"""Texts for quantities in figures: symbols, units, labels of axes, and single values."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mdr_dask.errors import DataError
 from mdr_dask.plots import page
 from mdr_dask.units import conversion
 
-#: Names and symbols of parameters, where they are better than the parameter's own name.
+#: Labels of parameters with a symbol; other parameters are labelled by their name.
 SYMBOLS: Mapping[str, str] = {
     "normal_force": "normal force $F_N$",
     "line_load": "line load $w$",
@@ -42,9 +42,9 @@ SYMBOLS: Mapping[str, str] = {
     "xi": r"$\xi$",
     "relaxation_times": r"$(t - t_0)/\tau$",
 }
-#: Units that are shown in place of an SI unit, where the campaign has none of its own.
+#: Units that are shown instead of an SI unit if the campaign states no unit.
 USUAL = {"rad/s": "rpm", "rad": "deg"}
-#: Powers of a thousand whose prefix everybody reads, and the units that are written with a prefix.
+#: Common prefixes by their power of a thousand, and the units that are written with a prefix.
 PREFIXES = {-3: "n", -2: "u", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
 _PREFIXED = re.compile(r"(m|Pa|N|s|W|ohm)(?:\^([23]))?")
 #: Symbols in the long names of outputs, as mathtext.
@@ -60,15 +60,15 @@ class Quantity(NamedTuple):
     offset: float = 0.0
 
     def of(self, values: Any) -> Any:
-        """Return values in SI in the unit shown."""
+        """Convert values from SI to the unit shown."""
         return values * self.factor + self.offset
 
 
 def chosen_units(groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
     """Return the unit in which figures show every quantity of some series.
 
-    A parameter has the unit in which all campaigns write it. Other quantities have the SI unit with the prefix that
-    brings the largest value between 1 and 1000; temperatures are in degrees Celsius.
+    A parameter is shown in the unit of the campaign files if all of them use the same one. Other quantities are shown
+    in the SI unit with the prefix that brings the largest value between 1 and 1000, temperatures in degrees Celsius.
     """
     written = [written_units(str(data.attrs.get("campaign", ""))) for data in groups.values()]
     found: dict[str, str] = {}
@@ -100,12 +100,12 @@ def _readable(name: str, unit: str, arrays: list[xr.DataArray]) -> str:
 
 
 def quantity(name: str, values: xr.DataArray) -> Quantity:
-    """Return how a parameter or an output is written.
+    """Return the symbol and the unit in which figures show a parameter or an output.
 
     Raises
     ------
     DataError
-        If it cannot be shown in the unit that was requested.
+        If the quantity cannot be converted to the requested unit.
     """
     unit = str(values.attrs.get("units", "1"))
     symbol = SYMBOLS.get(name) or (name.replace("_", " ") if name in values.coords else meaning(values, name))
@@ -120,7 +120,7 @@ def quantity(name: str, values: xr.DataArray) -> Quantity:
 
 
 def meaning(values: xr.DataArray, name: str) -> str:
-    """Return the long name of an output without its explanation in brackets, symbols as mathtext."""
+    """Return the long name of an output without the explanation in brackets, with symbols as mathtext."""
     words = re.split(r"[;,] | \(", str(values.attrs.get("long_name", name.replace("_", " "))))[0]
     for ascii_form, symbol in _MATHTEXT.items():
         words = re.sub(ascii_form, symbol, words)
@@ -128,7 +128,7 @@ def meaning(values: xr.DataArray, name: str) -> str:
 
 
 def shown(name: str, values: xr.DataArray) -> Any:
-    """Return values as an array in the unit that figures show; words as they are."""
+    """Return values as an array in the unit of the figures; words remain unchanged."""
     if values.dtype.kind not in "fiu":
         return values.values
     return quantity(name, values).of(np.asarray(values.values, dtype=np.float64))
@@ -153,7 +153,7 @@ def printed_unit(unit: str) -> str:
 
 
 def named(name: str, value: xr.DataArray) -> str:
-    """Return one value as legends and titles write it: ``$F_N$ = 1.5 N``."""
+    """Return one value as text for legends and titles: ``$F_N$ = 1.5 N``."""
     how, number = quantity(name, value), shown(name, value)
     text = f"{float(number):.4g}" if value.dtype.kind in "fiu" else str(number[()])
     symbol = how.symbol[how.symbol.index("$") :] if "$" in how.symbol else how.symbol

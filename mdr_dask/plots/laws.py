@@ -1,4 +1,4 @@
-"""Laws that figures draw beside the data of an output: each a row with a function."""
+"""Laws that figures draw together with the data of an output."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class Law(NamedTuple):
     Attributes
     ----------
     name : str
-        As the legend calls it.
+        Name in the legend.
     models, output
-        What it is a law of.
+        Models and output to which the law applies.
     holds_for : callable, Dataset -> bool
-        Whether it is written for a series.
+        Returns whether the law applies to a series.
     value : callable, Dataset -> DataArray
-        Its value in SI, from the parameters and the outputs in `NEEDED`.
+        Returns the value of the law in SI, from the parameters and the outputs in `NEEDED`.
     """
 
     name: str
@@ -39,24 +39,26 @@ class Law(NamedTuple):
     value: Callable[[xr.Dataset], xr.DataArray]
 
 
-#: Outputs that laws are computed from.
+#: Outputs that some laws need as input.
 NEEDED = ("rms_slope", "friction_coefficient_before")
 
 
 def law_of(data: xr.Dataset, output: str) -> Law | None:
-    """Return the law of an output that is written for a series."""
+    """Return the law of an output that applies to a series, or None."""
     model = data.attrs.get("model")
     known = (law for law in LAWS if model in law.models and law.output == output)
     return next((law for law in known if law.holds_for(data)), None)
 
 
 def along(data: xr.Dataset, name: str, count: int = 200) -> xr.Dataset:
-    """Return a curve with many values of its parameter; unchanged where an output that the law needs varies along it.
+    """Return the data of a curve on many values of its parameter, for a smooth law.
+
+    The data are unchanged if an output that the law needs varies along the curve.
 
     Parameters
     ----------
     data : Dataset
-        What one curve is drawn from: nothing but `name` varies.
+        Data of one curve: nothing but `name` varies.
     name : str
         The parameter.
     count : int
@@ -102,7 +104,7 @@ def _is_rough_indenter(data: xr.Dataset) -> bool:
 
 
 def _jump(data: xr.Dataset) -> xr.DataArray:
-    """Return the law of the jump, from the stored friction before it."""
+    """Return the jump of friction by its law, from the stored friction before the jump."""
     from mdr_dask.fits.jumps import LAW, jump_law
 
     slope = spectral_slope(data)

@@ -15,14 +15,15 @@ from mdr_dask.plots import colours, curves, labels
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Bar, Figure, Key, Mean, Panel, Trace, columns
 
-#: Rms deviation from the merged curve up to which curves count as one.
+#: Largest rms deviation from the merged curve at which the curves count as collapsed.
 COLLAPSED = 0.05
 
 
 def draw_master_curve(curve: xr.Dataset) -> Figure:
-    """Return what :func:`mdr_dask.fits.master_curve.master_curve` found: curves, merged curve and factors.
+    """Return the figure of a master curve from :func:`mdr_dask.fits.master_curve.master_curve`.
 
-    Bars and the band are 68 %; the merged curve is dashed beyond the range measured at the reference.
+    It shows the curves as measured, the merged curve and the shift factors. Bars and band are 68 % intervals. The
+    merged curve is dashed beyond the range that was measured at the reference.
     """
     shown = [(str(curve.attrs["group"]), "shift_factor", "vertical_factor", curve.attrs["reference"])]
     if "second" in curve.attrs:
@@ -50,7 +51,7 @@ def draw_master_curve(curve: xr.Dataset) -> Figure:
 
 
 def _collapse(curve: xr.Dataset) -> str:
-    """Return how far the points are from the merged curve, and whether that is a collapse."""
+    """Return a text with the rms deviation of the points from the merged curve, and whether the curves collapse."""
     away = deviations(curve)
     rms, largest = float(np.sqrt(np.mean(away**2))), float(np.max(np.abs(away)))
     verdict = "" if rms < COLLAPSED else "the curves do NOT collapse: "
@@ -58,7 +59,7 @@ def _collapse(curve: xr.Dataset) -> str:
 
 
 def deviations(curve: xr.Dataset) -> FloatArray:
-    """Return the natural logarithms of the points over the merged curve, straight between its points on both scales."""
+    """Return ln(point / merged curve) for every point; the merged curve is interpolated linearly in logarithms."""
     x, y = (np.log(curve[f"curve_{name}"].to_numpy()) for name in ("abscissa", "ordinate"))
     order = np.argsort(x)
     at = np.log(curve["point_abscissa"].to_numpy())
@@ -104,12 +105,12 @@ class _Group(NamedTuple):
 
 
 def _groups(curve: xr.Dataset) -> tuple[list[_Group], list[Key], Bar | None]:
-    """Return every group, with the legend of a few or the colour bar of many."""
+    """Return all groups, with a legend if they are few or a colour bar if they are many."""
     by = str(curve.attrs["group"])
     values = curve[by].to_numpy()
     bar = colours.bar(_label(by, curve[by]), values) if values.size > colours.most() else None
     points = curve[[name for name in curve.data_vars if curve[name].dims == ("point",)]]
-    # readings scatter about round values: a hundredth of the smallest step is enough to distinguish them
+    # readings scatter about round values, so labels are rounded to a hundredth of the smallest step
     digits = -int(np.floor(np.log10(np.min(np.diff(np.sort(values))) / 100)))
     found = [
         _Group(
@@ -157,7 +158,7 @@ def _merged(curve: xr.Dataset, groups: list[_Group]) -> Panel:
 
 
 def _lines(x: FloatArray, y: FloatArray, error: FloatArray, inside: NDArray[np.bool_]) -> list[Trace]:
-    """Return a merged curve with its band, solid where the reference itself was measured."""
+    """Return a merged curve with its band; it is solid in the range that was measured at the reference."""
     black: dict[str, Any] = {"colour": "#000000"}
     return [
         Trace("band", columns(x=x, y=Mean(y, y / error, y * error)), "merged curve", **black),

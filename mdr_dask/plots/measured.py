@@ -1,4 +1,4 @@
-"""Measured points in any figure that shows their output against one of their conditions."""
+"""Add measured points to any figure that shows their output against one of their conditions."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Figure, Key, Mean, Panel, Trace, columns
 from mdr_dask.units import shown
 
-#: Relative difference up to which a condition is that of a curve or a panel.
+#: Largest relative difference at which a measured condition counts as equal to that of a curve or panel.
 SAME = 1e-3
 #: Half width of a 95 % interval in standard errors.
 HALF = 1.96
@@ -31,7 +31,7 @@ def with_points(
     Raises
     ------
     DataError
-        If the table cannot be read, or is of no output of the study.
+        If the table cannot be read, or has no column for an output of the study.
     """
     given = with_table(groups, file)
     return given, {name: _with_points(figure) for name, figure in figures.items()}
@@ -88,9 +88,10 @@ def _apart(measured: Measured, data: xr.Dataset) -> list[str]:
 
 
 def _add(panel: Panel, measured: Measured, data: xr.Dataset) -> int:
-    """Add the points at the conditions of a panel, in the colours of its curves; return their number.
+    """Add the measured points that have the conditions of a panel, and return their number.
 
-    Points are black beside a single curve, and if the table lacks a parameter in which the curves differ.
+    Points have the colours of their curves. They are black if there is only one curve, or if the table lacks a
+    parameter in which the curves differ.
     """
     found, keys = 0, panel.entries()
     left = np.ones(measured.values.size, dtype=bool)

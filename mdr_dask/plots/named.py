@@ -1,4 +1,4 @@
-"""The named figures: each a description of outputs against parameters (`mdr_dask.plots.view.View`)."""
+"""The figures with a name, each described by one view or several (`mdr_dask.plots.view.View`)."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from mdr_dask.plots.view import View, draw
 
 
 def described(name: str, model: str, summary: str, *views: View, otherwise: View | None = None) -> Plot:
-    """Return a figure of outputs of a model.
+    """Return a named figure of outputs of a model.
 
     Parameters
     ----------
     name, model, summary : str
-        As of `Plot`.
+        As in `Plot`.
     *views : View
-        What it shows, one above the other.
+        Views of the figure, one above the other.
     otherwise : View, optional
-        What it shows of a store that does not hold the data for the others.
+        View for a store that does not contain the data for the other views.
     """
 
     def either(groups: Mapping[str, xr.Dataset]) -> Figure:
@@ -39,7 +39,7 @@ def described(name: str, model: str, summary: str, *views: View, otherwise: View
 SLIDING, JUMP, MIXED, EHL, WEAR = (
     *("sliding_friction", "velocity_jump", "mixed_lubrication", "ehl_line", "fretting_wear"),
 )
-#: Limits of the film ratio: of the criterion of breakthrough, and between the regimes of lubrication.
+#: Limits of the film ratio: for the criterion of breakthrough, and between the lubrication regimes.
 FILM_RATIOS = {
     0.5: "film ratio 0.5: below it breakthrough is an artefact",
     1.0: "film ratio 1: boundary below, mixed above",

@@ -1,4 +1,4 @@
-"""The page that figures are drawn for: printed size, title, units and style, as requested by the user."""
+"""The appearance of figures that the user requests: printed size, title, units and style."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.units import to_si
 
-#: Letters and lines of a figure with a requested size, in points: a journal prints it without scaling.
+#: Sizes of letters and lines in points for a figure with a requested size, which is printed without scaling.
 LETTERS: dict[Any, Any] = {
     "font.size": 8,
     "axes.labelsize": 8,
@@ -25,27 +25,27 @@ LETTERS: dict[Any, Any] = {
     "lines.linewidth": 1.0,
     "lines.markersize": 3,
 }
-#: The same for a figure on a screen.
+#: Sizes of letters and lines for a figure on a screen.
 SCREEN: dict[Any, Any] = {"legend.fontsize": 8, "lines.linewidth": 1.2, "lines.markersize": 4}
-#: Metres to an inch; least and greatest width and height in metres.
+#: Length of an inch in metres; smallest and largest width and height in metres.
 INCH = 0.0254
 LEAST, MOST = 0.02, 1.0
 
 
 @dataclass(frozen=True)
 class Page:
-    """What a user requests of the look of a figure.
+    """The requested appearance of a figure.
 
     Parameters
     ----------
     width, height : float, optional
-        In inches; without a height, it follows from the content.
+        Size in inches; without a height, the height follows from the content.
     title : str, optional
-        The title; None for the default, which is a description on a screen and no title at a requested size.
+        The title; None for the default: a description on a screen, no title if a size is requested.
     units : mapping of str to str
         Units by the name of a quantity.
     used : set of str
-        Quantities that were shown so far.
+        Names of the quantities that figures have shown so far.
     cycle : tuple of mappings
         Colours, lines and markers of successive curves, from the style.
     """
@@ -109,7 +109,7 @@ def with_units(units: Mapping[str, str]) -> Iterator[None]:
 
 
 def current() -> Page:
-    """Return the page that figures are drawn for."""
+    """Return the page for which figures are drawn at present."""
     return _PAGE.get() or Page()
 
 
@@ -119,7 +119,7 @@ def size(text: str) -> tuple[float, float | None]:
     Raises
     ------
     DataError
-        If it is no size, or none between 20 mm and 1 m.
+        If the text is not a size, or the size is not between 20 mm and 1 m.
     """
     match = re.fullmatch(r"([\d.]+)\s*([a-z]*)(?:\s*x\s*([\d.]+)\s*([a-z]+))?", text.strip())
     if match is None or not (match[2] or match[4]):

@@ -1,7 +1,7 @@
 """Draw a figure with matplotlib: panels, legend, colour bars and title, without overlaps at any width.
 
-The height follows from the content unless it was requested. Legends and colour bars have a place of their own below or
-beside the panels; labels are broken into lines, and ticks are thinned out, where they would collide.
+The height follows from the content unless it was requested. Legends are below the panels and colour bars beside them.
+Labels are broken into lines and ticks are thinned out if they would overlap.
 """
 
 from __future__ import annotations
@@ -29,28 +29,28 @@ from mdr_dask.version import __version__
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Width of a panel on a screen in inches, alone and beside others; of a panel at a requested width, at least.
+#: Width in inches of a single panel on a screen, of a panel beside others, and least width at a requested width.
 ALONE, BESIDE, LEAST_PANEL = 6.4, 4.2, 2.2
-#: Least height of a panel in inches, and most panels in a row.
+#: Least height of a panel in inches, and largest number of panels in a row.
 LEAST_HEIGHT, MOST_COLUMNS = 1.3, 3
 #: Largest share of a requested height for the legend; entries beyond it are left out.
 LEGEND_SHARE = 0.35
-#: Least distance of the texts of two ticks, in points.
+#: Least distance between the texts of two ticks, in points.
 GAP = 3
-#: Most lines of a title.
+#: Largest number of lines of a title.
 MOST_LINES = 7
-#: Most decades of a logarithmic axis; a share of 1e-90 would hide everything else.
+#: Largest number of decades of a logarithmic axis; a value of 1e-90 would hide everything else.
 DECADES = 15
-#: Points of a curve from which on they have no markers.
+#: Curves with at least this number of points are drawn without markers.
 MANY_POINTS = 60
-#: Height in a panel of marks for cases without a value.
+#: Height of the marks for cases without a value above the lower edge, as a share of the panel.
 FOOT = 0.02
 #: Dots per inch of a picture for a screen, and of one for print.
 DPI, PRINTED_DPI = 150, 300
 
 
 class Drawn(MplFigure):
-    """A figure of matplotlib with its description; a notebook shows it at the end of a cell."""
+    """A matplotlib figure with its description; a notebook displays it at the end of a cell."""
 
     def __init__(self, description: Figure, **options: Any) -> None:
         super().__init__(**options)
@@ -64,16 +64,16 @@ class Drawn(MplFigure):
         return stream.getvalue()
 
     def table(self) -> pd.DataFrame:
-        """Return all that is drawn: see `mdr_dask.plots.figure.Figure.table`."""
+        """Return a table of all points that are drawn: see `mdr_dask.plots.figure.Figure.table`."""
         return self.description.table()
 
     def save(self, path: str | Path) -> None:
-        """Write the figure, and its data beside it: ``mu.pdf`` and ``mu.csv``.
+        """Write the figure and its table to files: ``mu.pdf`` and ``mu.csv``.
 
         Raises
         ------
         DataError
-            If there is a table of that name that belongs to no figure.
+            If there already is a table of that name that does not belong to a figure.
         """
         beside = table_beside(path)
         self.savefig(path, dpi=DPI if page.current().width is None else PRINTED_DPI)
@@ -83,7 +83,7 @@ class Drawn(MplFigure):
 
 
 def table_beside(path: str | Path) -> Path:
-    """Return the place of the table of a figure; DataError if there is a table that belongs to no figure."""
+    """Return the path for the table of a figure; raise DataError if it is a table that does not belong to a figure."""
     beside = Path(path).with_suffix(".csv")
     if beside.exists() and not beside.read_bytes().startswith(b"# mdr_dask"):
         raise DataError(f"{beside} exists and was not written beside a figure; choose another name for the figure")
@@ -109,7 +109,7 @@ def _campaign_of(held: Mapping[Any, Any]) -> str:
 
 
 def render(description: Figure) -> Drawn:
-    """Return the figure of matplotlib."""
+    """Draw a figure with matplotlib and return it."""
     panels, asked = description.panels, page.current()
     columns = _columns(description)
     rows = -(-len(panels) // (columns * description.stack)) * description.stack
@@ -156,7 +156,7 @@ def _axes(figure: Drawn, description: Figure, rows: int, columns: int) -> list[A
 
 
 def _share_labels(places: list[Axes], panels: list[Panel]) -> None:
-    """Label a horizontal axis once where the panel below has the same."""
+    """Remove the label of a horizontal axis if the panel below has the same axis."""
     at = {}
     for axes, panel in zip(places, panels, strict=True):
         place = axes.get_subplotspec()
@@ -234,7 +234,7 @@ def _curve(axes: Axes, trace: Trace, _: Panel) -> None:
 
 
 def _lengths(value: Any, low: Any, high: Any) -> Any:
-    """Return the lengths of bars down and up, 0 where they are unknown."""
+    """Return the lengths of error bars downwards and upwards, 0 if they are unknown."""
     return np.nan_to_num(np.clip([value - low, high - value], 0, None), nan=0.0, posinf=0.0)
 
 
@@ -274,7 +274,7 @@ _DRAW = {"curve": _curve, "law": _curve, "band": _band, "dots": _dots, "map": _m
 
 
 def _bars(figure: Drawn, places: list[Axes], panels: list[Panel]) -> None:
-    """Draw the colour bars: one for all panels where it is the same."""
+    """Draw the colour bars; one for all panels if it is the same for all."""
     from matplotlib.cm import ScalarMappable
 
     beside: dict[Bar, list[Axes]] = {}
@@ -324,7 +324,7 @@ def _width_of(figure: Drawn, text: str, size: Any) -> float:
 
 
 def _broken(figure: Drawn, text: str, width: float, size: Any) -> str:
-    """Return a text in lines of at most so many inches; a value is not parted from its symbol and its unit."""
+    """Break a text into lines of at most `width` inches; a value stays with its symbol and its unit."""
     joined = text.replace(" = ", "\u00a0=\u00a0")
     lines: list[str] = []
     for word in joined.split(" "):
@@ -370,7 +370,7 @@ def _legend(figure: Drawn, keys: list[Key]) -> float:
 
 
 def _fit(figure: Drawn, places: list[Axes]) -> None:
-    """Break labels into lines that are no longer than their axes, and thin out ticks that collide."""
+    """Break labels into lines that are no longer than their axes, and thin out ticks that overlap."""
     for _ in range(2):
         figure.draw_without_rendering()
         changed = False
@@ -396,7 +396,7 @@ def _fit(figure: Drawn, places: list[Axes]) -> None:
 
 
 def _thin(figure: Drawn, axis: Any, name: str) -> bool:
-    """Keep every second tick of an axis until their texts do not touch; return whether any was left out."""
+    """Leave out every second tick of an axis until the texts do not overlap; return whether any was left out."""
     from matplotlib.ticker import FixedLocator, FuncFormatter
 
     renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]

@@ -1,6 +1,6 @@
 """Any output of any model against its parameters: curves, maps, and main effects.
 
-A `View` says what is shown, and `draw` makes the figure of it.
+A `View` describes a figure, and `draw` makes it.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from mdr_dask.plots import colours, curves, labels, laws
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 
-#: Most panels of one figure, and most letters in a line of a word at a tick.
+#: Largest number of panels of one figure, and of letters in one line of the text at a tick.
 MOST_PANELS, LONGEST_WORD = 6, 20
-#: Main effects of a sampled study: cases in a bin, most bins, most parameters, and most cases that are drawn as points.
+#: Main effects of a sampled study: least cases in a bin, and most bins, parameters and cases drawn as points.
 IN_A_BIN, MOST_BINS, MOST_EFFECTS, MOST_POINTS = 8, 10, 12, 5000
-#: Marks for cases without a value, and for cases whose mean lacks some realisations: the others may differ from these.
+#: Marks for cases without a value, and for cases whose mean lacks some realisations and may therefore be biased.
 MARKS = {
     Status.FAILED: ("x", "failed"),
     Status.NOT_CONVERGED: ("+", "did not converge"),
@@ -35,21 +35,21 @@ SOME = "v", "mean without realisations that failed"
 
 @dataclass(frozen=True)
 class View:
-    """What a figure of outputs shows.
+    """The description of a figure of outputs.
 
     Parameters
     ----------
     outputs : str or tuple of str
-        Outputs, or errors beside them; several have panels one above the other.
+        Outputs, or their errors; several are drawn in panels one above the other.
     over : str or tuple of str
         The parameter on the horizontal axis; two for a map, none for the main effects of all parameters.
     by : str
-        The parameter of the colours.
+        The parameter that colours show.
     panels : str
-        The parameter that panels differ in.
+        The parameter in which panels differ.
     log : str, optional
-        Which axes are logarithmic, of ``x``, ``y`` and ``z`` (colours). By default, those whose numbers are positive
-        and spread over more than a factor of ten.
+        Letters of the logarithmic axes, out of ``x``, ``y`` and ``z`` (colours). By default, the axes whose numbers are
+        positive and span more than a factor of ten.
     single : bool
         Whether the first realisation is drawn instead of the mean over realisations.
     guides : mapping of str to mapping of float to str
@@ -66,12 +66,12 @@ class View:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The outputs."""
+        """Names of the outputs."""
         return (self.outputs,) if isinstance(self.outputs, str) else tuple(self.outputs)
 
     @property
     def along(self) -> tuple[str, ...]:
-        """The parameters on the axes."""
+        """Names of the parameters on the axes."""
         return (self.over,) if isinstance(self.over, str) else tuple(self.over)
 
     def is_log(self, which: str, values: Any) -> bool:
@@ -82,14 +82,14 @@ class View:
 
 
 class _Part(NamedTuple):
-    """The series in one panel, by name, and the title of the panel."""
+    """The series of one panel, by name, and the title of the panel."""
 
     title: str
     series: dict[str, xr.Dataset]
 
 
 def figure_of(view: View) -> Plot:
-    """Return the figure of a view, with the output's name."""
+    """Return the figure of a view, named after its output."""
     over = " and ".join(view.along) or "every parameter that varies"
     return Plot(view.names[0], (), f"{view.names[0]} against {over}", lambda groups: draw(groups, view))
 
@@ -100,7 +100,7 @@ def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
     Raises
     ------
     DataError
-        If no series can be drawn as requested, with the reason of each.
+        If no series can be drawn as requested; the message has the reason for each series.
     """
     figures, shown, reasons = [], [], []
     for view, output in [(each, name) for each in views for name in each.names]:
@@ -132,7 +132,7 @@ def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
 
 
 def _holding(groups: Mapping[str, xr.Dataset], view: View, output: str) -> tuple[dict[str, xr.Dataset], list[str]]:
-    """Return the series that hold an output and vary along what is named, and the reasons of the others."""
+    """Return the series with an output that vary in the named parameters, and the reasons against the other series."""
     known = sorted({str(name) for data in groups.values() for name in data.data_vars if name != "status"})
     if output not in known:
         hint = did_you_mean(output, known)
@@ -150,7 +150,7 @@ def _holding(groups: Mapping[str, xr.Dataset], view: View, output: str) -> tuple
 
 
 def _unfit(data: xr.Dataset, view: View, output: str) -> str:
-    """Return why a series cannot be drawn as requested; nothing if it can."""
+    """Return the reason why a series cannot be drawn as requested; empty if it can be drawn."""
     own = [str(dim) for dim in data[output].dims if dim not in (*curves.axes_of(data, output), "realisation")]
     known = [*_varied(data, output), *own]
     for name in (*view.along, view.by, view.panels):
@@ -188,14 +188,14 @@ def _subject(view: View, output: str, found: Mapping[str, xr.Dataset], more: int
 
 
 def _places(data: xr.Dataset, name: str) -> xr.DataArray:
-    """Return places along an axis: numbers in the unit shown, or consecutive numbers for words."""
+    """Return positions along an axis: numbers in the unit shown, or consecutive numbers for words."""
     values = data[name]
     shown = labels.shown(name, values) if values.dtype.kind in "fiu" else np.arange(values.size)
     return xr.DataArray(shown, dims=values.dims)
 
 
 def _axis(name: str, arrays: list[xr.DataArray], view: View, which: str) -> Axis:
-    """Return the axis of a parameter: with its scale, or with words in place of numbers."""
+    """Return the axis of a parameter, linear or logarithmic, or with words as ticks."""
     first = arrays[0]
     own = name in curves.OWN and first.attrs.get("units", "1") == "1"
     label = labels.meaning(first, name) if own else labels.label(name, first)
@@ -219,7 +219,7 @@ def _lines(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     panels = [_panel(part, each, view, output, x) for part, each in zip(parts, families, strict=True)]
     first = next(iter(found.values()))
     log = view.is_log("y", np.concatenate([_values(panel) for panel in panels]))
-    log &= view.log is not None or not labels.quantity(output, first[output]).offset  # degrees Celsius have no zero
+    log &= view.log is not None or not labels.quantity(output, first[output]).offset  # not for degrees Celsius
     y = Axis(labels.label(output, first[output]), log, quantity=output)
     for panel in panels:
         panel.y = y
@@ -251,7 +251,7 @@ def _guides(levels: Mapping[float, str], panel: Panel) -> list[Trace]:
 
 
 def _parts(found: Mapping[str, xr.Dataset], view: View, output: str) -> tuple[list[_Part], list[str]]:
-    """Return what each panel shows: a value of a parameter, all series, or one series where all are too many curves."""
+    """Return the contents of the panels: a parameter value each, all series, or one series each if they are many."""
     if view.panels:
         return _by_value(found, view)
     families = {name: curves.family(data, output, view.along[0], view.by) for name, data in found.items()}
@@ -315,7 +315,7 @@ def _panel(part: _Part, families: Mapping[str, curves.Family], view: View, outpu
 
 
 def _coloured(families: Mapping[str, curves.Family]) -> list[tuple[curves.Curve, curves.Family]]:
-    """Return the curves of a panel with their family; several series have colours and markers of their own."""
+    """Return the curves of a panel with their families; with several series, curves get new colours and markers."""
     every = [(name, curve, one) for name, one in families.items() for curve in one.curves]
     if len(families) == 1:
         return [(curve, one) for _, curve, one in every]
@@ -349,7 +349,7 @@ def _law(curve: curves.Curve, law: laws.Law, along: str, output: str) -> Trace:
 
 
 def _counted(data: xr.Dataset, output: str) -> xr.Dataset:
-    """Return a series with the number of realisations of each mean as a coordinate ``realisations``."""
+    """Return a series with a coordinate ``realisations``: the number of realisations in each mean."""
     if "realisation" not in data[output].dims:
         return data
     count = xr.DataArray(aggregation.count(data[output]).variable, attrs={"units": "1"})
@@ -357,7 +357,7 @@ def _counted(data: xr.Dataset, output: str) -> xr.Dataset:
 
 
 def _absent(curve: curves.Curve, x: xr.DataArray, output: str, marked: dict[str, str]) -> list[Trace]:
-    """Return marks at the foot of a panel where all or some realisations have no value, with the reason."""
+    """Return marks at the lower edge of a panel for cases in which all or some realisations failed, with reasons."""
     data = curve.data
     if "status" not in data:
         return []
@@ -460,7 +460,7 @@ def _effects(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure
 
 
 def _means(data: xr.Dataset, output: str, name: str) -> tuple[xr.DataArray, Mean]:
-    """Return the mean over all other axes at every value of one."""
+    """Return the mean over all other axes for every value of one axis."""
     rest = [dim for dim in curves.axes_of(data, output) if dim != name]
     error = aggregation.companion(data, output)
     pair = data[output].mean(rest), None if error is None else abs(error).mean(rest)
@@ -468,7 +468,7 @@ def _means(data: xr.Dataset, output: str, name: str) -> tuple[xr.DataArray, Mean
 
 
 def _bins(data: xr.Dataset, output: str, name: str, dim: str) -> tuple[xr.DataArray, Mean]:
-    """Return the mean of groups of cases, in the order of one parameter of a sampled study."""
+    """Return means over groups of cases of a sampled study, which are sorted by one parameter and then divided."""
     cases = aggregation.mean(data[output])
     cases = cases.mean([each for each in cases.dims if each != dim]).dropna(dim)
     if not cases.size:
