@@ -1,4 +1,4 @@
-"""A measured line in a campaign."""
+"""Parameters of a measured line."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class ProfileFile(NamedByFile):
 
     @model_validator(mode="after")
     def _holds_a_line(self, info: ValidationInfo) -> ProfileFile:
-        """Refuse a bad file when the campaign is read, before any case fails."""
+        """Raise an error for an invalid file when the campaign is read, before any case is computed."""
         if info.context is not None:
             try:
                 line_of(self)
@@ -46,7 +46,7 @@ class ProfileFile(NamedByFile):
         return self
 
     def notes(self) -> tuple[str, ...]:
-        """Return points, length, rms height and rms slope of the line."""
+        """Return notes with points, length, rms height and rms slope of the line, and with remarks about the file."""
         remarks = (*_scan(self).remarks, *doubts_of_line(line_of(self), self.detrend))
         return (_statistics(self), *(f"profile {self.file.name}: {remark}" for remark in remarks))
 
@@ -75,7 +75,7 @@ def line_of(profile: ProfileFile) -> MeasuredLine:
     Raises
     ------
     DataError
-        If the file does not hold a line.
+        If the file does not contain a line.
     """
     from mdr_dask.physics.surfaces.measured import measured_line
 

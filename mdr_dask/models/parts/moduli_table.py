@@ -1,4 +1,4 @@
-"""Tables of a dynamic mechanical analysis in a campaign, and one curve of moduli from each."""
+"""Tables of a dynamic mechanical analysis as parameters, and the curve of moduli that follows from a table."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from mdr_dask.models.parts.temperature import Law
 from mdr_dask.tables import Column, Read, TableError, is_called, plain, read_sheet, read_table
 from mdr_dask.units import shown
 
-#: Names of moduli in tension, `plain`.
+#: Names of columns of moduli in tension, after `plain`.
 _IN_TENSION = re.compile(r"(?<!\w)e(?:'|1|[ _]?stor|$)|young|tensile|tension")
-SAME_TEMPERATURE = 1.0  # K: scatter of an instrument about its set point
-#: Gap between the moduli of neighbouring curves above which they cannot overlap, decades: scatter of instruments.
+SAME_TEMPERATURE = 1.0  # K; temperatures of one curve scatter by less
+#: Gap between the moduli of neighbouring curves, in decades, that cannot be due to the scatter of an instrument.
 APART = 0.02
 
 
@@ -48,7 +48,7 @@ class ModulusTable(NamedByFile):
 
     @model_validator(mode="after")
     def _holds_moduli(self, info: ValidationInfo) -> ModulusTable:
-        """Refuse a bad table when the campaign is read, before any case fails."""
+        """Raise an error for an invalid table when the campaign is read, before any case is computed."""
         if info.context is not None:
             try:
                 _measured(self)
@@ -57,7 +57,7 @@ class ModulusTable(NamedByFile):
         return self
 
     def notes(self) -> tuple[str, ...]:
-        """Return the columns of the table that are not used, in a sentence, if there are any."""
+        """Return a note that lists the unused columns of the table, if there are any."""
         remark = _table(self).remark
         return (f"table {self.file.name}: {remark}",) if remark else ()
 
@@ -69,13 +69,13 @@ class Moduli:
     Parameters
     ----------
     omega, storage, loss : array, shape (points,)
-        Angular frequency, rad/s, and moduli of shear, Pa.
+        Angular frequency, rad/s, and moduli, Pa: shear moduli from `one_curve`, otherwise as measured.
     temperature : float or None
-        Temperature of the curve, K; None if the table has none.
+        Temperature of the curve, K; None if the table has no temperatures.
     measured : tuple of float or None
         Lowest and highest temperature of the table, K.
     superposed : str
-        How the curves of several temperatures were superposed; empty for one temperature.
+        A text that describes how the curves of several temperatures were superposed; empty for one temperature.
     """
 
     omega: FloatArray
@@ -87,7 +87,7 @@ class Moduli:
 
 
 def one_curve(chosen: ModulusTable, law: Law | None) -> Moduli:
-    """Return the shear moduli of a table at one temperature; several temperatures are superposed if none is chosen.
+    """Return the shear moduli of a table at one temperature; several temperatures are superposed unless one is chosen.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def one_curve(chosen: ModulusTable, law: Law | None) -> Moduli:
 
 
 def _as_measured(chosen: ModulusTable, law: Law | None) -> Moduli:
-    """Return the moduli at one temperature, in shear or in tension as the table has them."""
+    """Return the moduli at one temperature, in shear or in tension as in the table."""
     omega, storage, loss, temperature = _measured(chosen)
     if temperature is None:
         return Moduli(omega, storage, loss, None, None)
@@ -121,7 +121,7 @@ def _near(temperature: FloatArray, wanted: float) -> FloatArray:
 
 
 def _levels(temperature: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return the temperature of every row as an index, and the temperatures, ascending."""
+    """Return, for every row, the index of its temperature, and the different temperatures in ascending order."""
     order = np.argsort(temperature, kind="stable")
     member = np.empty(order.size, dtype=np.intp)
     member[order] = np.append(0, np.cumsum(np.diff(temperature[order]) > SAME_TEMPERATURE))
@@ -134,7 +134,7 @@ Rows = tuple[FloatArray, FloatArray, FloatArray]
 def _by_law(
     chosen: ModulusTable, law: Law | None, rows: Rows, member: IntArray, levels: FloatArray, ends: tuple[float, float]
 ) -> Moduli:
-    """Shift the curve of every temperature by the factors of a law."""
+    """Return the moduli of all temperatures, shifted in frequency by the factors of a law."""
     if law is None:
         raise DataError(
             f"{chosen.file.name}: has several temperatures: name one by table_temperature, a reference to superpose "
@@ -149,7 +149,7 @@ def _by_law(
 def _by_curves(
     reference: float, law: Law | None, rows: Rows, member: IntArray, levels: FloatArray, ends: tuple[float, float]
 ) -> Moduli:
-    """Shift the curves of every temperature to the reference until those of both moduli overlap."""
+    """Return the moduli of all temperatures, shifted to the reference so that the curves of both moduli overlap."""
     _require_overlap(rows[1], member, levels)
     across, along, text = _superposed(reference, tuple(levels), member.tobytes(), *(each.tobytes() for each in rows))
     omega, storage, loss = rows
@@ -181,7 +181,7 @@ def _superposed(
 
 
 def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, reference: float) -> str:
-    """Return a text on the largest difference between shift factors from the curves and those of a law."""
+    """Return a text with the largest difference between the shift factors from the curves and those of a law."""
     if law is None:
         return ""
     try:
@@ -195,7 +195,7 @@ def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, referenc
 
 
 def _require_overlap(storage: FloatArray, member: IntArray, levels: FloatArray) -> None:
-    """Refuse curves with a gap in the modulus before any is shifted, because no horizontal shift closes it."""
+    """Raise DataError if there is a gap between the moduli of two curves, which no horizontal shift can close."""
     low, high = (
         np.array([find(storage[member == number]) for number in range(levels.size)]) for find in (np.min, np.max)
     )
@@ -229,9 +229,9 @@ def _table(chosen: ModulusTable) -> Read:
 
 
 def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
-    """Return angular frequency, storage modulus, loss modulus and temperature (or None) of a file, in SI.
+    """Return angular frequency, storage modulus, loss modulus and temperature (or None) of a file, in SI units.
 
-    Moduli in tension without a Poisson ratio are refused.
+    Raise DataError for moduli in tension without a Poisson ratio.
     """
     name, table = chosen.file.name, _table(chosen)
     omega, storage, loss = table["frequency"], table["storage modulus"], table.get("loss modulus")
@@ -254,7 +254,7 @@ def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray,
 
 
 def _columns(chosen: ModulusTable) -> tuple[Column, ...]:
-    """Return the columns of a dynamic mechanical analysis."""
+    """Return the columns of a table of a dynamic mechanical analysis."""
     return (
         Column("frequency", "rad/s", above=0, given_unit=chosen.frequency_unit),
         Column(
