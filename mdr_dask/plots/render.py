@@ -39,7 +39,7 @@ LEGEND_SHARE = 0.35
 GAP = 3
 #: Largest number of lines of a title.
 MOST_LINES = 7
-#: Largest number of decades of a logarithmic axis; a value of 1e-90 would hide everything else.
+#: Largest number of decades of a vertical logarithmic axis; a share of 1e-90 would hide everything else.
 DECADES = 15
 #: Curves with at least this number of points are drawn without markers.
 MANY_POINTS = 60
@@ -184,9 +184,9 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
 def _finish_axis(axes: Axes, name: str, axis: Axis) -> None:
     if axis.low is not None or axis.high is not None:
         getattr(axes, f"set_{name}lim")(axis.low, axis.high)
-    elif axis.log:
-        low, high = getattr(axes, f"get_{name}lim")()
-        getattr(axes, f"set_{name}lim")(max(low, high / 10.0**DECADES), high)
+    elif axis.log and name == "y":
+        low, high = axes.get_ylim()
+        axes.set_ylim(max(low, high / 10.0**DECADES), high)
     if axis.reverse:
         getattr(axes, f"invert_{name}axis")()
     if axis.ticks:
