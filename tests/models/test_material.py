@@ -73,7 +73,7 @@ def test_temperature_moves_relaxation_times(law, factor):
 
 
 def test_table_of_one_temperature_is_fitted():
-    chosen = {"file": TABLE, "table_temperature": 353.0 + 4.8, "poisson_ratio": 0.35, "arms_per_decade": 2.0}
+    chosen = {"file": TABLE, "table_temperature": 353.0 + 4.8, "poisson_ratio": 0.35, "terms_per_decade": 2.0}
     solid = solid_of(material(dma_table=chosen))
     # at 1 Hz and 84.9 C, from the file, tension to shear
     modulus = complex_modulus(solid, 2 * np.pi)
@@ -103,7 +103,7 @@ def test_the_fit_says_how_well_it_holds():
     )
     error = fit_error(fitted)
     assert 0.005 < error < 0.05  # the scatter of the data is 2 %
-    denser = fitted.model_copy(update={"dma_table": fitted.dma_table.model_copy(update={"arms_per_decade": 3.0})})
+    denser = fitted.model_copy(update={"dma_table": fitted.dma_table.model_copy(update={"terms_per_decade": 3.0})})
     assert fit_error(denser) < error
     kelvin = material(kelvin={"shear_modulus": 1e6, "relaxation_time": 1e-3})
     assert fit_error(kelvin) == 0

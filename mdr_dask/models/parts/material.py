@@ -169,7 +169,7 @@ def _table_fit(table: ModulusTable, law: Law | None) -> SeriesFit:
     from mdr_dask.physics.solids import fit_series
 
     moduli = _curve(table, law)
-    return fit_series(moduli.omega, moduli.storage, moduli.loss, table.arms_per_decade)
+    return fit_series(moduli.omega, moduli.storage, moduli.loss, table.terms_per_decade)
 
 
 @lru_cache(maxsize=256)

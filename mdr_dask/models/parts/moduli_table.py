@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
@@ -28,6 +30,7 @@ APART = 0.02
 class ModulusTable(NamedByFile):
     """A Prony series fitted to a table of frequency, storage and loss modulus, measured at one or more temperatures."""
 
+    renamed: ClassVar[Mapping[str, str]] = {"arms_per_decade": "write terms_per_decade"}
     file: NamedFile = Field(
         description="table with columns frequency, storage modulus, loss modulus or tan delta, optionally temperature"
     )
@@ -44,7 +47,7 @@ class ModulusTable(NamedByFile):
     poisson_ratio: float | None = quantity(
         "1", "for moduli in tension, which are divided by 2 (1 + nu)", default=None, ge=-1, le=0.5
     )
-    arms_per_decade: float = quantity("1", "Prony terms per factor of ten in time", default=1.0, gt=0, le=5)
+    terms_per_decade: float = quantity("1", "Prony terms per factor of ten in time", default=1.0, gt=0, le=5)
 
     @model_validator(mode="after")
     def _holds_moduli(self, info: ValidationInfo) -> ModulusTable:
