@@ -1,4 +1,4 @@
-"""What a user asks of a study: which part of it, under which condition, in which units, as which table.
+"""Questions about a study: select a part, apply a condition, convert units, and return a table or labelled arrays.
 
-Read `selection` (parts of a study), then `units` (columns in the units asked for).
+Read `selection` (parts of a study) first, then `units` (columns in the requested units).
 """

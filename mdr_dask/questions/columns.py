@@ -18,9 +18,9 @@ from mdr_dask.questions.expression import Column, Value, evaluate, parse
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Columns with the state of the results of a row, and with the number of finished ones.
+#: Columns with the state of the results of a row, and with the number of finished results.
 STATUS, REALISATIONS = "status", "realisations"
-#: Number of results in each state, for a row that combines several cases.
+#: Variable with the number of results in each state, for rows that combine several cases.
 COUNTS = "state_counts"
 #: States of results that need no further work.
 COMPLETE = (Status.DONE, Status.NOT_NEEDED)
@@ -36,7 +36,7 @@ def numbers(dataset: xr.Dataset) -> dict[str, Number]:
 
 
 def fixed_words(dataset: xr.Dataset) -> dict[str, str]:
-    """Return the fixed parameters that are words, nested names joined by ``_``."""
+    """Return the fixed parameters whose value is a word, by name; nested names are joined by ``_``."""
     import pandas as pd
 
     flat = pd.json_normalize(_parameters(dataset.attrs.get("parameters", "{}")), sep="_")
@@ -51,7 +51,7 @@ def _parameters(text: str) -> dict[str, object]:
 
 
 class Columns:
-    """The columns of a part of a study; each is computed once.
+    """The columns of a part of a study; each column is computed once.
 
     Parameters
     ----------
@@ -66,14 +66,14 @@ class Columns:
 
     @property
     def known(self) -> list[str]:
-        """All names, for hints in messages."""
+        """Names of all columns, for hints in messages."""
         data = self.dataset
         return [*map(str, data.data_vars), *map(str, data.coords), *self._numbers, REALISATIONS]
 
     def find(self, name: str) -> Column | None:
-        """Return the values of a column, an output by its mean over realisations; None if there is no such name."""
+        """Return the values of a column (for an output, its mean over realisations); None if the name is unknown."""
         if name not in self._found:
-            self._found[name] = None  # for a formula that refers to itself
+            self._found[name] = None  # ends the recursion of a formula that refers to itself
             self._found[name] = self._make(name)
         return self._found[name]
 
@@ -83,7 +83,7 @@ class Columns:
         Raises
         ------
         DataError
-            If there is no such column, or the study lacks a part of its formula.
+            If there is no such column, or the study lacks a quantity in its formula.
         """
         from xarray import DataArray
 
@@ -98,7 +98,7 @@ class Columns:
         return array
 
     def unknown(self, name: str) -> DataError:
-        """Return the error for an unknown column, or for one of which a part is missing."""
+        """Return the error for an unknown column, or for a number whose formula needs a missing quantity."""
         from mdr_dask.errors import did_you_mean
 
         if name in self._numbers:
@@ -151,7 +151,7 @@ def _unit(array: xr.DataArray) -> str | None:
 
 
 def needed(dataset: xr.Dataset, names: Iterable[str]) -> list[str]:
-    """Return the outputs that columns need, also those in the formulas of numbers."""
+    """Return the outputs that columns need, including those in the formulas of dimensionless numbers."""
     known, found = numbers(dataset), []
     for name in names:
         if name in dataset.data_vars:
@@ -162,7 +162,7 @@ def needed(dataset: xr.Dataset, names: Iterable[str]) -> list[str]:
 
 
 def counts(dataset: xr.Dataset) -> xr.DataArray:
-    """Return the number of results of every row in each state, along the dimension ``state``."""
+    """Return for every row the number of results in each state, along the dimension ``state``."""
     import xarray as xr
 
     if COUNTS in dataset:
@@ -173,7 +173,7 @@ def counts(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def states(dataset: xr.Dataset) -> xr.DataArray:
-    """Return the state of every row: of one result ``failed``, of several ``done`` or ``2 failed, 1 missing``."""
+    """Return the state of every row as text: ``failed`` for one result, ``2 failed, 1 missing`` for several."""
     from xarray import DataArray
 
     if STATUS in dataset and "realisation" not in dataset[STATUS].dims:

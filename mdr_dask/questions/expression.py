@@ -1,8 +1,8 @@
 """Conditions and formulas as a user types them: ``velocity > 3 km/h and contact_fraction < 50 %``.
 
-Read by Python's own parser and evaluated node by node with numpy: numbers, quantities, names, words, arithmetic,
-comparisons, ``and``, ``or``, ``not``, ``in`` and the functions in `FUNCTIONS`. Nothing else is evaluated, and no text
-is ever executed.
+Python's own parser reads the text, and numpy evaluates it node by node: numbers, quantities, names, words, arithmetic,
+comparisons, ``and``, ``or``, ``not``, ``in`` and the functions in `FUNCTIONS`. Nothing else is allowed, and no text is
+ever executed as code.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
     "log": np.log,
     "log10": np.log10,
 }
-#: Relative difference up to which numbers count as equal, here and in selections: six digits copied from a screen.
+#: Relative difference up to which numbers count as equal, also in selections; screens show six digits.
 SAME = 1e-5
 _LONGEST = 500
 _NUMBER = re.compile(r"(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.])|(?<![\w.])\d+\.?\d*(?=[^\W\d_])")
@@ -47,7 +47,7 @@ _OPERATORS: Mapping[type[ast.AST], Callable[[Any, Any], Any]] = {
 
 
 class Column(NamedTuple):
-    """The values of a name: numbers with their coherent SI unit, or words and truth values with None."""
+    """Values of a name with their coherent SI unit; the unit is None for words and truth values."""
 
     array: Any
     unit: str | None
@@ -56,7 +56,8 @@ class Column(NamedTuple):
 class Value(NamedTuple):
     """Numbers in SI with their dimension (of pint), words, or truth values.
 
-    The dimension is None for words, for truth values, and for a bare number, which is in the SI unit of its neighbour.
+    The dimension is None for words, for truth values, and for a number without a unit. Such a number is taken to be in
+    the SI unit of the quantity with which it is combined.
     """
 
     array: Any
@@ -64,13 +65,13 @@ class Value(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """Numpy's letter for the type, found without loading a lazy array."""
+        """Numpy's letter for the data type; a lazy array is not loaded."""
         return str((self.array if hasattr(self.array, "dtype") else np.asarray(self.array)).dtype.kind)
 
 
 @dataclass(frozen=True)
 class Expression:
-    """A parsed text: its syntax tree, and its quantities by the names that replace them in the tree."""
+    """A parsed text: its syntax tree, and the quantities with units, which are replaced by names in the tree."""
 
     text: str
     tree: ast.expr
@@ -78,7 +79,7 @@ class Expression:
 
     @property
     def names(self) -> set[str]:
-        """All names in it, including words without quotation marks."""
+        """All names in the expression, including words without quotation marks."""
         found = {_name(node) for node in ast.walk(self.tree) if isinstance(node, ast.Name | ast.Attribute)}
         return found - self.quantities.keys() - FUNCTIONS.keys()
 
@@ -89,7 +90,7 @@ def parse(text: str) -> Expression:
     Raises
     ------
     DataError
-        If it is neither.
+        If the text is neither a condition nor a formula.
     """
     wanted = "expected a condition such as 'velocity > 1 mm/s and hurst < 0.7'"
     if len(text) > _LONGEST:
@@ -108,9 +109,9 @@ def evaluate(expression: Expression, find: Callable[[str], Column | None], known
     Parameters
     ----------
     expression : Expression
-        As `parse` returns it.
+        The return value of `parse`.
     find : callable, str -> Column or None
-        Gives the values of a name; None if there is no such name.
+        Returns the values of a name; None if there is no such name.
     known : sequence of str
         All names, for the hint in the message about an unknown one.
 
@@ -124,7 +125,7 @@ def evaluate(expression: Expression, find: Callable[[str], Column | None], known
 
 
 def _without_units(text: str) -> tuple[str, dict[str, Value]]:
-    """Replace every number with a unit, which Python cannot parse, by a name."""
+    """Replace every number with a unit by a name, because Python cannot parse units."""
     quantities: dict[str, Value] = {}
     parts, end = [], 0
     for match in _NUMBER.finditer(text):
@@ -166,7 +167,7 @@ def _name(node: ast.expr) -> str:
 
 
 class _Evaluation:
-    """Evaluates the nodes of one expression."""
+    """The evaluation of the nodes of one expression."""
 
     def __init__(self, expression: Expression, find: Callable[[str], Column | None], known: Sequence[str]) -> None:
         self.text, self.quantities, self.find, self.known = expression.text, expression.quantities, find, known
@@ -211,7 +212,7 @@ class _Evaluation:
             raise DataError(f"{self.text!r}: no column {name!r}{did_you_mean(name, self.known)}")
         try:
             return Value(found.array, None if found.unit is None else dimension_of(found.unit)[0])
-        except ValueError:  # a unit of a user's own model that pint does not have
+        except ValueError:  # pint does not have this unit of a model from outside this package
             return Value(found.array)
 
     def _truth(self, node: ast.expr) -> Any:
@@ -240,7 +241,7 @@ class _Evaluation:
         return _OPERATORS[type(op)](first.array, second.array)
 
     def _equal(self, left: ast.expr, right: ast.expr) -> Any:
-        """Compare numbers up to rounding, or words; next to words, a name without a meaning is a word itself."""
+        """Compare numbers within `SAME`, or words; in a comparison with words, an unknown name counts as a word."""
         sides = [None if self._is_unknown(node) else self.value(node) for node in (left, right)]
         if any(side is not None and side.kind in "OUT" for side in sides):
             names = (_name(left), _name(right))

@@ -1,4 +1,4 @@
-"""Average over cases: one row for each combination of values of some axes."""
+"""Averages over cases: one row for each combination of values of some axes."""
 
 from __future__ import annotations
 
@@ -24,10 +24,11 @@ CASES = "cases"
 def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None = None) -> xr.Dataset:
     """Average every output over the cases of each group, and keep the scatter over realisations.
 
-    The mean of a group is the mean of its cases' means, each case counted once. Realisations are common to all cases,
-    so that these means scatter together: realisation r of a group is ``m + R u_r``, where ``u_r`` is the sum over its
-    cases c of ``(x_cr - m_c) / (n_c C)``. Mean and standard error of these R numbers are those of the group, also where
-    cases have different numbers n_c of realisations; where all have the same, they are plain means over the cases.
+    The mean m of a group is the mean over its C cases of their means m_c, each case counted once. All cases share their
+    R realisations, so their means scatter together. Realisation r of a group is therefore ``m + R u_r``, where ``u_r``
+    is the sum over the cases c of ``(x_cr - m_c) / (n_c C)``. The mean and the standard error of these R numbers are
+    those of the group, even if the cases have different numbers n_c of realisations. If all n_c are equal,
+    ``m + R u_r`` is the plain mean over the cases.
 
     Parameters
     ----------
@@ -41,8 +42,8 @@ def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None =
     Returns
     -------
     Dataset
-        With the dimension ``group`` in place of those of the cases, the axes in `by` as coordinates along it, and the
-        variables ``cases`` and ``state_counts``. The grid error of a group is the mean of those of its cases.
+        The dimension ``group`` replaces the dimensions of the cases. The axes in `by` are coordinates along it, and the
+        variables ``cases`` and ``state_counts`` are added. The grid error of a group is the mean over its cases.
     """
     import xarray as xr
 
@@ -122,7 +123,7 @@ def _common(values: FloatArray, members: _Members) -> FloatArray:
 
 
 def _errors(values: FloatArray, members: _Members) -> FloatArray:
-    """Return the mean error of every group, the same for all its realisations."""
+    """Return the mean error of every group, repeated for all its realisations."""
     each = _common(np.abs(values), members)
     there = np.isfinite(each)
     with np.errstate(invalid="ignore"):

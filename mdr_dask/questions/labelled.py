@@ -1,4 +1,4 @@
-"""Answer a question with labelled arrays, for NetCDF and Zarr."""
+"""Answers to a question as labelled arrays, for NetCDF and Zarr."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mdr_dask.questions.table import Question
 
 
-#: Bytes of the pieces of an array, one for each core.
+#: Size in bytes of the pieces of an array, which are computed on different cores.
 PIECE = 2**20
 
 
@@ -34,7 +34,7 @@ def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn
     Returns
     -------
     Dataset
-        Lazy: statistics and the counts of states along ``state``, or single results and their ``status``.
+        Lazy arrays: statistics and the counts of states along ``state``, or single results and their ``status``.
 
     Raises
     ------

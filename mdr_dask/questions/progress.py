@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Group(NamedTuple):
-    """Messages of one series that differ in their numbers only.
+    """Messages of one series that differ only in their numbers.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Group(NamedTuple):
 
 
 def counts(url: str) -> list[dict[str, Any]]:
-    """Return for each series its name, the number of its results, and how many of them are in each state."""
+    """Return for each series its name, the number of results, and the number of results in each state."""
     found = []
     for name in store.series_names(url):
         status = store.ledger(url, name)
@@ -48,11 +48,11 @@ def counts(url: str) -> list[dict[str, Any]]:
 
 
 def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return the current messages of a series: those of the last attempt at each result, if the ledger agrees."""
+    """Return the current messages of a series: from the last attempt at each result, if its state is still the same."""
     last: dict[tuple[int, ...], dict[str, Any]] = {}
     telling = [record for record in store.records(url, series) if record["messages"]]
     for record in sorted(telling, key=lambda record: record["attempt"]):
-        for message in (each for each in record["messages"] if "place" in each):  # since version 0.2
+        for message in (each for each in record["messages"] if "place" in each):  # stores of version 0.2 and later
             last[tuple(message["place"])] = {"series": series, "attempt": record["attempt"], **message}
     ledger = store.ledger(url, series, dataset["status"].shape)
     inside = [place for place in last if len(place) == ledger.ndim and np.less(place, ledger.shape).all()]
@@ -60,12 +60,12 @@ def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]
 
 
 def grouped(found: Sequence[dict[str, Any]], studies: Mapping[str, xr.Dataset]) -> list[Group]:
-    """Group messages that differ in their numbers only, in the order of their first appearance.
+    """Group messages that differ only in their numbers, in the order of their first appearance.
 
     Parameters
     ----------
     found : sequence of dict
-        As `messages` returns them.
+        Messages as returned by `messages`.
     studies : mapping of str to Dataset
         The groups of the study by series, for the units of its axes.
     """
@@ -89,7 +89,7 @@ _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 
 
 def _merged(texts: Sequence[str]) -> str:
-    """Return one text for texts that differ in their numbers only, with ranges: ``a film ratio of 0.2 to 0.4``."""
+    """Merge texts that differ only in their numbers; numbers become ranges: ``a film ratio of 0.2 to 0.4``."""
     columns = iter(list(zip(*map(_NUMBER.findall, texts), strict=True)))
 
     def ends(_: re.Match[str]) -> str:

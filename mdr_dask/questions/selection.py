@@ -1,4 +1,4 @@
-"""Select parts of a study as a user types them: ``velocity=1 mm/s..1 m/s``, ``hurst=0.3,0.7``, ``wear_rule=exact``."""
+"""Selections of parts of a study: ``velocity=1 mm/s..1 m/s``, ``hurst=0.3,0.7``, ``wear_rule=exact``."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings
     dataset : Dataset
         A group of a study, or a Dataset derived from it.
     selections : sequence of str
-        Each has the name of an axis, a column of a sampled study, ``case`` or ``realisation``, and after ``=`` values
-        and ranges, separated by commas: ``velocity=1 mm/s..1 m/s``, ``hurst=0.3,0.7``, ``radius=..2``. Both ends of a
-        range are included; bare numbers are in SI units. A number between two values selects the nearest one.
+        Each is a name, ``=``, and values or ranges separated by commas: ``velocity=1 mm/s..1 m/s``, ``hurst=0.3,0.7``,
+        ``radius=..2``. The name is that of an axis, a column of a sampled study, ``case`` or ``realisation``. Both ends
+        of a range are included; numbers without a unit are in SI. A number between two values selects the nearest one.
     tell : callable, str -> object
         Receives a message when the nearest value differs from the given one.
 
     Returns
     -------
     Dataset
-        With all its dimensions; a fixed parameter selects everything.
+        The selected part with all dimensions. A selection by a fixed parameter with this value keeps everything.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def select_all(
 
 
 def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
-    """Keep the cases that meet a condition on means over realisations; the others become NaN and not needed."""
+    """Keep the cases that meet a condition on means over realisations; other cases become NaN and *not needed*."""
     truth = Columns(dataset).truth(condition)
     masked = {name: array.where(truth) for name, array in dataset.data_vars.items() if name != "status"}
     status = dataset["status"].where(truth, Status.NOT_NEEDED.value).astype(dataset["status"].dtype)
@@ -78,7 +78,7 @@ def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
 
 
 def where_all(groups: Mapping[str, xr.Dataset], condition: str) -> dict[str, xr.Dataset]:
-    """Keep the cases of all groups that meet a condition; DataError if there are none."""
+    """Keep the cases of all groups that meet a condition; raise DataError if there are none."""
     kept = {name: where(dataset, condition) for name, dataset in groups.items()}
     if all((dataset["status"] == Status.NOT_NEEDED.value).all() for dataset in kept.values()):
         raise DataError(f"--where {condition}: no result meets the condition")
@@ -86,7 +86,7 @@ def where_all(groups: Mapping[str, xr.Dataset], condition: str) -> dict[str, xr.
 
 
 def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
-    """Return the group of a series; the only one if no name is given."""
+    """Return the group of a series; without a name, the only group."""
     names = ", ".join(datasets)
     if series is None:
         if len(datasets) > 1:
@@ -98,7 +98,7 @@ def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
 
 
 def outputs(dataset: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
-    """Keep the named outputs with their errors; without names all outputs that have one number for each result."""
+    """Keep the named outputs with their errors; without names, all outputs with one number for each result."""
     known = [str(name) for name in dataset.data_vars if name != "status"]
     for name in names:
         if name not in known:
@@ -111,14 +111,14 @@ def outputs(dataset: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
 
 
 def written(value: Any, unit: str | None, digits: int = 6) -> str:
-    """Return a value with its unit as in a selection."""
+    """Return a value with its unit as text, in the form of a selection."""
     if not isinstance(value, int | float | np.number):
         return str(value)
     return f"{value:.{digits}g}" if unit in (None, "1", "") else f"{value:.{digits}g} {unit}"
 
 
 def written_apart(unit: str, value: float, *limits: float) -> tuple[str, ...]:
-    """Return a value and its limits with their unit, with as many digits as distinguish them."""
+    """Return a value and its limits as texts with a unit, with enough digits to distinguish them."""
     return distinguishable(value, *limits, digits=6, write=lambda number, digits: written(number, unit, digits))
 
 
@@ -131,7 +131,7 @@ def _parsed(text: str) -> tuple[str, str]:
 
 
 def _axis(dataset: xr.Dataset, name: str) -> xr.DataArray:
-    """Return the values of a name; the value of a fixed parameter has a dimension of its own."""
+    """Return the values of a name as a one-dimensional array, also for a fixed parameter."""
     from xarray import DataArray
 
     if name in dataset.dims and name not in dataset.coords:
@@ -192,7 +192,7 @@ def _words(text: str) -> list[str]:
 
 
 def _nearest(values: NDArray[Any], wanted: float, name: str, unit: str, tell: Tell) -> NDArray[np.bool_]:
-    """Return which value is nearest to a number; none for a number outside the axis."""
+    """Return which value is nearest to a number; no value if the number lies outside the axis."""
     distance = np.abs(values - wanted)
     slack = SAME * max(abs(wanted), np.abs(values).max())
     if not values.min() - slack <= wanted <= values.max() + slack:
@@ -204,7 +204,7 @@ def _nearest(values: NDArray[Any], wanted: float, name: str, unit: str, tell: Te
 
 
 def _intervals(wanted: str, name: str, unit: str) -> Iterator[tuple[float, float]]:
-    """Yield the ends of every range of a selection; both are equal for a single value."""
+    """Yield the ends of every range of a selection; both ends are equal for a single value."""
     pieces = [[end.strip() for end in piece.split("..")] for piece in wanted.split(",")]
     numbers = [end for piece in pieces for end in piece if end]
     bare = [_is_bare(end) for end in numbers]
@@ -234,7 +234,7 @@ def _number(text: str, name: str, unit: str) -> float:
 
 
 def _extent(values: NDArray[Any], unit: str) -> str:
-    """Return a text about the values of an axis."""
+    """Return a text with the range of an axis, for messages."""
     if values.size == 1:
         return f"it is {written(values[0], unit)} everywhere"
     if values.size <= 6:

@@ -1,4 +1,4 @@
-"""Answer a question with rows, computed box by box, so that the first rows of a large study are cheap."""
+"""Answers to a question as rows, computed box by box, so that the first rows of a large study are available quickly."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MEANS = ("mean", "standard_error", "grid_error")
-#: Rows computed at a time, and the largest size in bytes of a study that is read at once.
+#: Number of rows computed at a time, and the largest size in bytes of a study that is read at once.
 ROWS, WHOLE = 2**16, 2**26
 
 
@@ -37,23 +37,23 @@ class Question:
     Parameters
     ----------
     outputs : tuple of str
-        Names of outputs; without names all outputs that have one number for each result.
+        Names of outputs; without names, all outputs with one number for each result.
     selections : tuple of str
-        As `mdr_dask.questions.selection.select` takes them.
+        Selections as in `mdr_dask.questions.selection.select`.
     where : str
         A condition on means over realisations, or on single results if `statistics` is None.
     group_by : tuple of str
-        Axes: one row for each combination of their values, averaged over all other cases.
+        Axes: one row for each combination of their values, averaged over all other axes.
     sort : tuple of str
-        Columns or formulas; a leading ``-`` is descending. Missing values come last.
+        Columns or formulas by which rows are sorted; a leading ``-`` means descending. Missing values come last.
     columns : tuple of str
-        Axes, parameters, outputs, dimensionless numbers, ``status``, ``realisations``; all axes and outputs if none.
+        Axes, parameters, outputs, dimensionless numbers, ``status``, ``realisations``; by default all axes and outputs.
     units : mapping of str to str
-        Units of columns, others are SI.
+        Units of columns; all other columns are in SI.
     statistics : tuple of str, optional
-        Over realisations; None for a row for each result.
+        Statistics over realisations; None for one row for each result.
     written : bool
-        Whether axes and parameters that are not in `units` are in the unit of the campaign file.
+        Whether axes and parameters that are not in `units` are given in the unit of the campaign file.
     """
 
     outputs: tuple[str, ...] = ()
@@ -69,9 +69,9 @@ class Question:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows in frames, and the units of their columns.
+    """Rows as a sequence of data frames, and the units of their columns.
 
-    `total` is the number of rows, None if it is not known before the last frame; `keys` is the number of leading
+    `total` is the number of rows, or None if it is unknown before the last frame. `keys` is the number of leading
     columns that identify a row.
     """
 
@@ -87,7 +87,7 @@ def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = 
     Parameters
     ----------
     dataset : Dataset
-        A group of a study, as :func:`mdr_dask.store.datasets` opens it.
+        A group of a study, as returned by :func:`mdr_dask.store.datasets`.
     question : Question
         The question.
     limit : int
@@ -98,7 +98,7 @@ def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = 
     Returns
     -------
     Table
-        Rows are computed while the frames are read, in constant memory unless they are sorted.
+        Rows are computed when their frame is read, in constant memory unless they are sorted.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = 
 
 
 class _Maker:
-    """Computes the frames of one question box by box."""
+    """The computation of the frames of one question, box by box."""
 
     def __init__(self, dataset: xr.Dataset, question: Question, tell: Tell) -> None:
         raw = question.statistics is None
@@ -143,7 +143,7 @@ class _Maker:
         self.keys = 0
 
     def units(self) -> dict[str, str]:
-        """Return the units of the columns; errors of the question are found here."""
+        """Return the units of the columns from one row; errors in the question are raised here."""
         rows = self._rows(self._data, dict.fromkeys(self._dims, slice(0, 1)))
         self._kept(rows)
         self._keys(rows)
@@ -167,7 +167,7 @@ class _Maker:
         return ordered
 
     def picked(self, places: NDArray[np.intp]) -> Iterator[pd.DataFrame]:
-        """Yield the rows at some positions, in their order."""
+        """Yield the rows at given positions, in the order of the positions."""
         data = self._data.load() if places.size > ROWS else self._data
         for start in range(0, places.size, ROWS):
             along = np.unravel_index(places[start : start + ROWS], tuple(self.sizes.values()))
@@ -192,7 +192,7 @@ class _Maker:
 
     @property
     def may_leave_out(self) -> bool:
-        """Whether there may be cases without a row, because an adaptive axis did not need them."""
+        """Whether there may be cases without a row, because adaptive axes do not need them."""
         adaptive = "adaptive:" in str(self._data.attrs.get("campaign", ""))
         return adaptive and not (self._raw or self._question.group_by)
 
@@ -210,7 +210,7 @@ class _Maker:
         return [np.broadcast_to(value, rows.sizes["row"]) for value in values]
 
     def _names(self, rows: xr.Dataset) -> list[str]:
-        """Return the columns of the table."""
+        """Return the names of the columns of the table."""
         if self._question.columns:
             return list(dict.fromkeys([*self._question.columns, *self._outputs]))
         along = [str(name) for name, coord in rows.coords.items() if coord.dims == ("row",)]
@@ -242,20 +242,20 @@ class _Maker:
 
 
 def _ranks(key: NDArray[Any]) -> NDArray[Any]:
-    """Return numbers with the order of a key; words are ordered alphabetically."""
+    """Return numbers that sort like the values of a key; words are sorted alphabetically."""
     import pandas as pd
 
     return pd.factorize(key, sort=True)[0] if key.dtype.kind == "O" else key
 
 
 def _numbered(dataset: xr.Dataset) -> xr.Dataset:
-    """Give a dimension without values, such as the cases of a sampled study, the numbers from 0."""
+    """Assign the numbers from 0 to dimensions without values, such as the cases of a sampled study."""
     bare = [dim for dim in dataset.dims if dim not in dataset.coords]
     return dataset.assign_coords({dim: np.arange(dataset.sizes[dim]) for dim in bare})
 
 
 def _flattened(array: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
-    """Return the columns of a statistic with several numbers."""
+    """Return the columns of a statistic; intervals and quantiles have several."""
     if "bound" in array.dims:
         return {f"{name.removesuffix('interval')}{end}": array.isel(bound=k) for k, end in enumerate(("low", "high"))}
     if "quantile" in array.dims:
@@ -264,16 +264,16 @@ def _flattened(array: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
 
 
 def boxes(sizes: Mapping[str, int], most: int, chunks: Sequence[int] = ()) -> Iterator[dict[str, slice]]:
-    """Cut a grid into boxes in the order of its rows.
+    """Divide a grid into boxes in the order of its rows.
 
     Parameters
     ----------
     sizes : mapping of str to int
-        Lengths of the dimensions, the slowest first.
+        Lengths of the dimensions; the last one varies fastest.
     most : int
         Largest number of points of a box.
     chunks : sequence of int
-        Lengths of the chunks; longer boxes end at the end of a chunk.
+        Lengths of the chunks; boxes longer than a chunk end at the end of a chunk.
     """
     dims, inner = list(sizes), 1
     cut = len(dims)

@@ -1,4 +1,4 @@
-"""Convert columns to other units: ``velocity=km/h,wear_volume=um^3``."""
+"""Conversion of columns to other units: ``velocity=km/h,wear_volume=um^3``."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from mdr_dask.units import conversion
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Suffixes of statistics in the unit of their output.
+#: Suffixes of statistics that are values in the unit of their output.
 _OF_OUTPUTS = ("mean", "interval", "quantile")
-#: The same for differences, which are converted without the zero of a temperature scale.
+#: Suffixes of statistics that are differences, which are converted without the zero point of a temperature scale.
 _DIFFERENCES = ("error", "standard_deviation", "standard_error", "grid_error")
 
 
@@ -36,18 +36,18 @@ def parse_units(texts: Sequence[str]) -> dict[str, str]:
 
 
 def as_written(study: xr.Dataset) -> dict[str, str]:
-    """Return the units of numerical axes and parameters in the campaign file of a study."""
+    """Return the units of numerical axes and parameters as written in the campaign file of a study."""
     written = written_units(str(study.attrs.get("campaign", "")))
     return {name: unit for name, unit in written.items() if name in study.coords and study[name].dtype.kind in "fiu"}
 
 
 def in_units(dataset: xr.Dataset, wanted: Mapping[str, str]) -> xr.Dataset:
-    """Convert variables and coordinates, outputs together with their statistics and errors.
+    """Convert variables and coordinates; an output is converted together with its statistics and errors.
 
     Parameters
     ----------
     dataset : Dataset
-        With the unit of every variable in ``attrs["units"]``.
+        Variables with their unit in ``attrs["units"]``.
     wanted : mapping of str to str
         Units by the name of an axis, a parameter or an output, in any spelling that a campaign file may use.
 

@@ -1,8 +1,8 @@
-"""A page about a study: one HTML file that needs no network; and a study packed for publication.
+"""The report on a study (one HTML file that needs no network), and the zip of a study for publication.
 
-Read in this order: `figures` (a figure as data for the page), `cases` (means of all cases, for the choice of axes),
-`subjects` (method, papers and limits of each model), `study` (everything about one store), `page` (the HTML),
-`publishing`.
+Read in this order: `figures` (a figure as data for the page), `cases` (means of all cases, for figures with axes that
+the reader chooses), `subjects` (method, papers and limits of each model), `study` (the content for one store), `page`
+(the HTML), `publishing` (the zip).
 """
 
 from mdr_dask.report.page import page

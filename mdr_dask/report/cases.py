@@ -1,4 +1,4 @@
-"""The means of all cases of a study with their errors, for the choice of axes on the page."""
+"""Means and errors of all cases of a study, for figures on the page whose axes the reader chooses."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mdr_dask.plots import curves, labels
 from mdr_dask.report.figures import Json, numbers
 from mdr_dask.report.words import markup, plain
 
-#: Cases of one series on the page; of more, values of the longest axes are left out.
+#: Largest number of cases of one series on the page; beyond it, values of the longest axes are left out.
 MOST_CASES = 4000
 
 
@@ -24,9 +24,9 @@ def cases_of(groups: Mapping[str, xr.Dataset]) -> list[Json]:
     Returns
     -------
     list of dict
-        For each series ``axes`` and ``outputs`` with labels, and columns of all cases: ``at`` the parameters that
-        vary, in the units of figures, ``value``, ``low``, ``high``, ``lines`` and ``grid`` of each output. ``reduced``
-        names the values of axes that are left out.
+        For each series: ``axes`` and ``outputs`` with labels; columns with a number for each case, namely the varied
+        parameters (``at``, in the units of figures), and ``value``, ``low``, ``high``, ``lines`` (standard error) and
+        ``grid`` (grid error) of each output; and ``reduced``, texts on values of axes that are left out.
     """
     found = [_series(name, data) for name, data in groups.items()]
     return [series for series in found if series["outputs"] and series["axes"]]
@@ -51,7 +51,7 @@ def _series(name: str, data: xr.Dataset) -> Json:
 
 
 def main_outputs(data: xr.Dataset) -> list[str]:
-    """Return the outputs of a study without their errors."""
+    """Return the names of the outputs of a study, without companions (`<output>_error`)."""
     names = [str(name) for name in data.data_vars if name != "status"]
     errors = {str(data[name].attrs.get("ancillary_variables")) for name in names}
     return [name for name in names if name not in errors]
@@ -63,7 +63,7 @@ def _companions(data: xr.Dataset, outputs: list[str]) -> list[str]:
 
 
 def _thinned(data: xr.Dataset, dims: list[str]) -> tuple[xr.Dataset, list[str]]:
-    """Return at most `MOST_CASES` cases: of the longest axes evenly spread values, and what is left out."""
+    """Return at most `MOST_CASES` cases, with evenly spread values of the longest axes, and texts on those left out."""
     left_out: list[str] = []
     while (total := math.prod(data.sizes[dim] for dim in dims)) > MOST_CASES:
         longest = max(dims, key=lambda dim: data.sizes[dim])
@@ -87,7 +87,7 @@ def _column(values: Any, dims: tuple[Any, ...], shape: xr.DataArray) -> list[Any
 
 
 def _measured(data: xr.Dataset, output: str, shape: xr.DataArray) -> Json:
-    """Return mean, interval and both errors of an output, in the unit that figures show."""
+    """Return mean, interval, standard error and grid error of an output, in the unit of the figures."""
     how = labels.quantity(output, data[output])
     if "realisation" not in data[output].dims:
         return {"value": _column(how.of(data[output]), data[output].dims, shape)}

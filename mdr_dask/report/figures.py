@@ -1,4 +1,4 @@
-"""Figures as data for the page: what `mdr_dask.plots.figure.Figure` describes, as JSON."""
+"""Figures as data for the page: a `mdr_dask.plots.figure.Figure` as JSON."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from mdr_dask.plots.figure import LAST, Axis, Bar, Figure, Panel, Trace, edges
 from mdr_dask.plots.labels import plain
 from mdr_dask.report.words import markup
 
-#: Points of one figure of the page; more are thinned out.
+#: Largest number of points of one figure on the page; longer curves are thinned out.
 MOST_POINTS = 20_000
-#: Digits of a number on the page, and colours that a scale is made of.
+#: Digits of a number on the page, and number of colours of a colour bar.
 DIGITS, SHADES = 9, 17
 
 Json = dict[str, Any]
@@ -27,7 +27,7 @@ Json = dict[str, Any]
 def drawn_of(
     figures: Mapping[str, Plot], groups: Mapping[str, xr.Dataset], provenance: Any
 ) -> Iterator[Json | tuple[str, str]]:
-    """Yield every figure that a study has the data for; of the others name and reason."""
+    """Yield every figure for which a study has the data; for every other figure, its name and the reason."""
     for name, each in figures.items():
         try:
             figure = each.describe(groups)
@@ -38,13 +38,13 @@ def drawn_of(
 
 
 def figure_data(name: str, summary: str, figure: Figure, origin: Mapping[str, str]) -> Json:
-    """Return a figure as the page draws it.
+    """Return a figure as data for the page.
 
     Returns
     -------
     dict
-        ``panels`` with labels and scales, ``traces`` with a column for everything drawn, ``scales`` of colours,
-        ``parameters`` with labels and units, and the texts around them; labels are HTML, all else is plain text.
+        ``panels`` with labels and scales, ``traces`` with the columns of their points, ``scales`` of colours,
+        ``parameters`` with labels and units, and the texts of the figure. Labels are HTML, all other texts are plain.
     """
     every = [(k, panel, trace) for k, panel in enumerate(figure.panels) for trace in panel.traces]
     total = sum(trace.column("x").size for *_, trace in every)
@@ -83,7 +83,7 @@ def _axis(axis: Axis) -> Json:
 
 
 def _trace(trace: Trace, panel: int, of: Panel, bars: list[Bar], step: int) -> Json:
-    """Return what one curve, law or map draws, every `step`-th point of it, in the order in which it is joined."""
+    """Return one curve, law or map as data: every `step`-th point, in the order in which points are joined."""
     columns = {str(name): trace.column(str(name)) for name in trace.data.data_vars}
     x, drawn = columns["x"], columns.get("value", columns.get("y", columns["x"]))
     order = np.argsort(x, kind="stable") if trace.kind == "curve" and trace.line else np.arange(x.size)
@@ -120,19 +120,19 @@ def _trace(trace: Trace, panel: int, of: Panel, bars: list[Bar], step: int) -> J
 
 
 def _once(column: list[Any]) -> Any:
-    """Return a column whose values are all alike as that value."""
+    """Return a column, or a single value if all values of the column are equal."""
     return column[0] if column and all(value == column[0] for value in column) else column
 
 
 def numbers(values: NDArray[Any]) -> list[Any]:
-    """Return numbers as JSON holds them, to `DIGITS` digits; None for what is not finite; texts as they are."""
+    """Return values for JSON: numbers to `DIGITS` digits, None for numbers that are not finite, and texts."""
     if values.dtype.kind not in "fiu":
         return [str(value) for value in values.ravel()]
     return [float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None for value in values.ravel().tolist()]
 
 
 def _shades(bar: Bar) -> Json:
-    """Return the ends of a colour bar, and the colours between them."""
+    """Return the ends of a colour bar, and its colours."""
     between = np.geomspace if bar.log else np.linspace
     shades = [colours.shade(bar, value) for value in between(bar.low, bar.high, SHADES)]
     return {"low": bar.low, "high": bar.high, "log": bar.log, "colours": shades}

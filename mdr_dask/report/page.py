@@ -1,7 +1,7 @@
-"""The page: one HTML file with everything in it, and a policy that forbids everything else.
+"""The page: one HTML file that contains all data and scripts, with a content security policy.
 
-The template escapes text from a store, data are a block of JSON that no browser runs, and the policy allows only the
-scripts of this package, by their digests. So nothing that a store contains can become a script.
+The template escapes text from a store. Data are a block of JSON that browsers do not run. The policy allows only the
+scripts of this package, by their digests. So nothing in a store can become a script.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def page(studies: Sequence[Study]) -> str:
     Parameters
     ----------
     studies : sequence of Study
-        As `mdr_dask.report.read_study` returns them.
+        Contents as returned by `mdr_dask.report.read_study`.
 
     Returns
     -------
@@ -62,7 +62,7 @@ def policy() -> str:
         [
             "default-src 'none'",
             f"script-src {scripts}",
-            "style-src 'unsafe-inline'",  # the figures' library sets styles of its own
+            "style-src 'unsafe-inline'",  # the plotting library sets its own styles
             "img-src data: blob:",
             "connect-src 'none'",
             "base-uri 'none'",
@@ -72,20 +72,20 @@ def policy() -> str:
 
 
 def harmless(data: Any) -> str:
-    """Return data as JSON that cannot end the block of the page around it."""
+    """Return data as JSON that cannot close the script element that contains it."""
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026").replace("\u2028", "\\u2028")
 
 
 @lru_cache(maxsize=16)
 def asset(name: str) -> str:
-    """Return a file of this package."""
+    """Return the text of a file of this package."""
     return (files("mdr_dask.report") / "assets" / name).read_text(encoding="utf-8")
 
 
 @lru_cache(maxsize=64)
 def mathml(equation: Equation) -> str:
-    """Return an equation as MathML, for browsers and screen readers; without latex2mathml, as LaTeX."""
+    """Return an equation as MathML, for browsers and screen readers, or as LaTeX if latex2mathml is not installed."""
     try:
         from latex2mathml.converter import convert
     except ModuleNotFoundError:

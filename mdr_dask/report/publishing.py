@@ -1,4 +1,4 @@
-"""A study packed for publication: one zip that is a Zarr store."""
+"""A study packed for publication: one zip file that is a Zarr store."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def _put(packed: zipfile.ZipFile, name: str, content: bytes) -> None:
 
 
 def _campaign(url: str, study: Study) -> tuple[bytes, dict[str, bytes]]:
-    """Return the campaign and the files that it names; files from other folders are renamed, also in the text."""
+    """Return the campaign and the files that it names; files from other folders are renamed, also in the campaign."""
     text, found = study.campaign, {}
     for file in _named_files(url):
         name = PurePosixPath(str(file["name"]).replace("\\", "/"))
@@ -86,7 +86,7 @@ def _campaign(url: str, study: Study) -> tuple[bytes, dict[str, bytes]]:
 
 
 def _read(file: Mapping[str, str]) -> bytes:
-    """Return the content of a file that a campaign names; refuse one that has changed since."""
+    """Return the content of a file that a campaign names; raise StoreError if it has changed since the run."""
     path = Path(file["path"])
     content = path.read_bytes() if path.is_file() else b""
     if hashlib.sha256(content).hexdigest() != file["sha256"]:
@@ -116,7 +116,7 @@ def _named_files(url: str) -> list[dict[str, str]]:
 
 
 def _environment() -> str:
-    """Return what was installed when the study was published, as pip reads it."""
+    """Return the installed packages with versions as a requirements file for pip, with Python and machine."""
     lines = [f"# Python {platform.python_version()}, {platform.platform()}, {os.cpu_count()} processors"]
     lines.append(f"# {datetime.now(UTC).isoformat(timespec='seconds')}; versions of each block: status/records")
     found = {str(one.metadata["Name"]): str(one.version) for one in distributions() if one.metadata["Name"]}

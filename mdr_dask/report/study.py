@@ -28,16 +28,16 @@ from mdr_dask.report.figures import Json, drawn_of
 from mdr_dask.report.subjects import Subject, subject_of
 from mdr_dask.units import seconds
 
-#: Rows of a table on the page; a note below the table has the command that prints all.
+#: Largest number of rows of a table on the page; a note gives the command that prints all rows.
 MOST_ROWS = 60
-#: Values of an axis that are written out.
+#: Largest number of values of an axis that are listed.
 LISTED = 6
-#: Cases of a series that the page is made from; of larger studies, evenly spread values of the axes are read.
+#: Largest number of cases of a series that are read; in larger studies, evenly spread values of the axes are read.
 MOST_CASES = 4000
 
 
 class Table(NamedTuple):
-    """A table of the page: a title, headings, rows of texts, and a note below."""
+    """A table of the page: title, headings, rows of texts, and a note below the table."""
 
     title: str
     headings: list[str]
@@ -52,25 +52,25 @@ class Study:
     Parameters
     ----------
     url, title, model, summary : str
-        Where its store is, the campaign's name, its model, and the model's summary.
+        Location of the store, name of the campaign, name of the model, and summary of the model.
     facts : dict of str to str
-        The study in a few lines.
+        Main facts about the study, by label.
     campaign, source : str
-        The campaign as written, and the name of its file.
+        Text of the campaign file, and its name.
     understood, counts, machines, laws, errors : lists of Table
-        The campaign as understood; results in each state; who computed it; fits; the share of each error.
+        Axes and fixed parameters; results in each state; computers and versions; fits; sources of the errors.
     failures : list of Group
-        Messages of failed results and warnings, those alike together.
+        Messages of failed results and warnings, grouped.
     not_fitted, not_drawn : list of (name, reason)
-        Laws and figures for which the study does not hold the data.
+        Laws and figures for which the study does not contain the data.
     figures, cases : list of dict
-        As `mdr_dask.report.figures` and `mdr_dask.report.cases` return them.
+        Data from `mdr_dask.report.figures` and `mdr_dask.report.cases`.
     subject : Subject or None
-        Its method.
+        Description of the method.
     digests, rerun : dict of str to str, list of str
-        Digests of campaign and results; commands.
+        Digests of campaign and results; commands that compute the study again.
     at_work : str
-        Processes that work on it.
+        Processes that are working on the study.
     """
 
     url: str
@@ -102,7 +102,7 @@ def read_study(url: str) -> Study:
     Raises
     ------
     StoreError
-        If there is no study at `url`, or it is damaged.
+        If there is no study at `url`, or the study is damaged.
     """
     with store.readable(url):
         return _read(url)
@@ -116,7 +116,7 @@ def _read(url: str) -> Study:
 
 
 def _thinned(data: xr.Dataset) -> xr.Dataset:
-    """Return a series of at most `MOST_CASES` cases, in memory: evenly spread values of the longest axes."""
+    """Load at most `MOST_CASES` cases of a series, with evenly spread values of the longest axes."""
     dims = [str(dim) for dim in data["status"].dims if dim != "realisation"]
     while (cases := math.prod(data.sizes[dim] for dim in dims)) > MOST_CASES:
         longest = max(dims, key=lambda dim: data.sizes[dim])
@@ -175,12 +175,12 @@ def _study(url: str, held: Mapping[str, Any], whole: Mapping[str, xr.Dataset], g
 
 
 def _shows_no_errors(figure: Json) -> bool:
-    """Return whether a figure shows no errors; such figures come last."""
+    """Return whether a figure shows no errors; the page shows these figures last."""
     return not any("y_low" in trace or "value_low" in trace for trace in figure["traces"])
 
 
 def who_is_at_work(url: str) -> str:
-    """Return which processes work on a study; nothing if none does."""
+    """Return a text with the processes that are working on a study; empty if there are none."""
     try:
         runner, parts = store.at_work(url)
     except StoreError as error:
@@ -224,7 +224,7 @@ def _count_table(counted: list[Json]) -> Table:
 
 
 def _understood(name: str, data: xr.Dataset) -> Iterator[Table]:
-    """Yield the axes of a series and its fixed parameters, as the campaign was understood."""
+    """Yield tables with the axes and with the fixed parameters of a series."""
     of = f" of {name}" if name else ""
     dims = [str(dim) for dim in data["status"].dims if dim != "realisation"]
     varied = [axis for dim in dims for axis in curves.parameters_along(data, dim) if axis in data.coords]
@@ -250,7 +250,7 @@ def _understood(name: str, data: xr.Dataset) -> Iterator[Table]:
 
 
 def _shown(name: str, value: xr.DataArray) -> str:
-    """Return one value in the unit that figures show."""
+    """Return one value as text in the unit of the figures."""
     unit = labels.quantity(name, value).unit
     return f"{float(labels.shown(name, value)):.6g} {unit}".strip()
 
@@ -282,7 +282,7 @@ def _machines(records: list[Json], held: Mapping[str, Any]) -> list[Table]:
 
 
 def _laws(url: str, model: str, groups: Mapping[str, xr.Dataset]) -> tuple[list[Table], list[tuple[str, str]]]:
-    """Return the fits that a study has the data for, each with its intervals and whether the law holds."""
+    """Return tables of the fits with intervals and verdicts, and the names of fits without data, with reasons."""
     found: list[Table] = []
     missing: list[tuple[str, str]] = []
     for name, law in fits.available(model).items():
@@ -329,7 +329,7 @@ def _places(result: xr.Dataset, dims: list[str]) -> Iterator[dict[str, int]]:
 
 
 def _interval(columns: Mapping[str, xr.DataArray], name: str, at: Mapping[str, int]) -> str:
-    """Return a constant with the ends of its interval, where they are known."""
+    """Return a constant as text, with the ends of its interval if they are known."""
     parts = [columns[each] for each in (name, f"{name}_low", f"{name}_high") if each in columns]
     cells = [part.isel({dim: place for dim, place in at.items() if dim in part.dims}) for part in parts]
     if len(cells) < 3 or not all(np.isfinite(cell.item()) for cell in cells[1:]):
@@ -343,7 +343,7 @@ def _cell(value: xr.DataArray) -> str:
 
 
 def _errors(name: str, data: xr.Dataset) -> Iterator[Table]:
-    """Yield how much of the errors of the means comes from the scatter of realisations, and how much from the grid."""
+    """Yield a table of the errors of the means: the parts from scatter of the realisations and from the grid."""
     rows = []
     for output in main_outputs(data):
         if "realisation" not in data[output].dims or set(data[output].dims) > set(data["status"].dims):

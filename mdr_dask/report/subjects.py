@@ -1,4 +1,4 @@
-"""What a report says of the method of each model: the paragraph, equations, papers, and what it can and cannot say."""
+"""Texts of the report on the method of each model: a paragraph, equations, papers, and the limits of the method."""
 
 from __future__ import annotations
 
@@ -6,27 +6,27 @@ from typing import NamedTuple
 
 
 class Equation(NamedTuple):
-    """An equation in LaTeX, and what it says."""
+    """An equation in LaTeX, and its meaning."""
 
     latex: str
     meaning: str
 
 
 class Subject(NamedTuple):
-    """The method of a model.
+    """The description of the method of a model.
 
     Attributes
     ----------
     method : str
-        The paragraph for a paper.
+        A paragraph that can be used in a paper.
     equations : tuple of Equation
-        What is solved.
+        The equations that are solved.
     papers : tuple of str
-        What to cite.
+        Papers to cite.
     can, cannot : tuple of str
-        What the numbers say, and what they do not.
+        Statements that the results support, and statements that they do not support.
     page : str
-        The page of the documentation that says more.
+        The page of the documentation with more details.
     """
 
     method: str
@@ -66,7 +66,7 @@ SHARED_LOAD = (
     "K. L. Johnson, J. A. Greenwood, S. Y. Poon, A simple theory of asperity contact in EHL. Wear 19, 91 (1972)."
 )
 
-#: Of rough surfaces, whatever slides on them.
+#: Limits of the method for rough surfaces, common to several models.
 _ROUGH = (
     "Friction and forces of one-dimensional lines with the spectrum given, as means and scatter of an ensemble.",
     "Trends with load, velocity, modulus and spectrum, and the exponents of its laws.",
@@ -214,5 +214,5 @@ SUBJECTS: dict[str, Subject] = {
 
 
 def subject_of(model: str) -> Subject | None:
-    """Return what is known of the method of a model; None for one of the user's own."""
+    """Return the description of the method of a model; None for a model from outside this package."""
     return SUBJECTS.get(model)

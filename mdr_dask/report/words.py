@@ -1,11 +1,11 @@
-"""Labels of figures as HTML: mathtext with its indices raised and lowered, everything else as plain text."""
+"""Labels of figures as HTML: mathtext with subscripts and superscripts, all other text unchanged."""
 
 from __future__ import annotations
 
 import re
 from html import escape
 
-#: Commands of mathtext in labels of this package, and the characters that they stand for.
+#: Commands of mathtext in labels of this package, and the characters that replace them.
 _CHARACTERS = {
     "alpha": "α",
     "beta": "β",
@@ -34,18 +34,19 @@ _INDEX = re.compile(r"([_^])(?:\{([^{}]*)\}|(.))")
 
 
 def markup(label: str) -> str:
-    """Return a label as HTML: ``$F_N$`` with a lowered N, every other character as itself.
+    """Return a label as HTML: ``$F_N$`` with N as a subscript, every other character unchanged.
 
-    Only the parts between two dollars are read as mathtext, and the one markup that comes out is ``sub`` and ``sup``.
+    Only the parts between two dollars are read as mathtext. The only HTML elements in the result are ``sub`` and
+    ``sup``.
     """
     parts = label.split("$")
-    if len(parts) % 2 == 0:  # a dollar that nobody closed
+    if len(parts) % 2 == 0:  # an unmatched dollar
         return escape(label)
     return "".join(_formula(part) if k % 2 else escape(part) for k, part in enumerate(parts))
 
 
 def plain(label: str) -> str:
-    """Return a label without markup, for names that are read aloud."""
+    """Return a label without markup, for screen readers."""
     return re.sub(r"</?su[bp]>", "", markup(label)).replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&")
 
 
