@@ -68,7 +68,7 @@ def inverse_transform(
     breaks : sequence of float
         Places where g or one of its derivatives jumps.
     tolerance : float
-        Error wanted, relative to the largest value met.
+        Allowed error, relative to the largest value.
 
     Returns
     -------
@@ -116,7 +116,7 @@ def forward_transform(
     jumps : sequence of (radius, height)
         Places where f itself jumps, and by how much.
     tolerance : float
-        Error wanted, relative to the largest value met.
+        Allowed error, relative to the largest value.
 
     Returns
     -------
@@ -169,7 +169,7 @@ def pressure(
     jumps : sequence of (position, height)
         Places inside the contact where g itself jumps, and by how much.
     tolerance : float
-        Error wanted, relative to the largest value met.
+        Allowed error, relative to the largest value.
 
     Returns
     -------

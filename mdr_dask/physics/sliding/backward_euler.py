@@ -40,7 +40,7 @@ ROWS = 7
 
 
 class Nodal(NamedTuple):
-    """Heights of a line at its nodes, starting after the highest node.
+    """Heights of a line at its nodes.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Nodal(NamedTuple):
     blocks : array, shape (n // BLOCK, KNOWN)
         From `_blocks`.
     periodic : bool
-        Whether the line is periodic; its highest node is then the last one.
+        Whether the line is periodic; it then ends at its highest node.
     """
 
     height: FloatArray
@@ -313,7 +313,7 @@ def steady_by_steps(
     Parameters
     ----------
     height : array, shape (n,)
-        Heights; if the line is periodic, they start after the highest node, which comes last.
+        Heights. A periodic line starts at the node after the highest one and ends at the highest one.
     periodic : bool
         Whether the line is periodic; if not, elements enter undeformed at the first node.
     deborah, loads : array, shape (cases,)

@@ -123,7 +123,7 @@ def _decayed(x: float) -> float:
     """Return 1 - exp(-x) for x >= 0; for small x by a series, which is faster and exact to rounding."""
     if x > 1 / 32:
         return -math.expm1(-x)
-    # products instead of divisions, which would take a tenth of the time of a sweep
+    # products, because divisions would take a tenth of the time of a sweep
     rest = 1 - x * (1 / 5) * (1 - x * (1 / 6) * (1 - x * (1 / 7)))
     return x * (1 - x * (1 / 2) * (1 - x * (1 / 3) * (1 - x * (1 / 4) * rest)))
 

@@ -50,7 +50,7 @@ class Nodes(NamedTuple):
     Parameters
     ----------
     height, slope : array, shape (BEFORE + n + AFTER,)
-        Heights relative to the first node, and rises per cell, with nodes of the previous and the next period.
+        Heights relative to the first node, and slopes as rises per cell, both with some nodes of the neighbouring periods.
     ends : array, shape (2, BEFORE + n + AFTER) or (2, 0)
         From `ends_of`, with the same additional nodes.
     blocks : array, shape (n // BLOCK, KNOWN)
@@ -692,7 +692,7 @@ class NodeToNode:
         self._height, self._slope, self._cases, self._error = height, slope, cases, error
         loads = cases.loads
         self._rates = np.full((loads.size, SECANTS), np.nan)
-        self._depth, self._change = np.full((2, loads.size), np.nan)  # of the mean line, from the previous grid
+        self._depth, self._change = np.full((2, loads.size), np.nan)  # depth of the mean line, and its last change
 
     def solve(self, level: int, cases: IntArray) -> Solution:
         """Solve cases on a grid of `level` nodes per Nyquist point: 1 for all cases, then 2, 4, 8, ... for any cases.

@@ -42,8 +42,8 @@ def follow(
     """Write the derivatives of the integrals of e_m and of u over the line in one direction.
 
     Contacts and free recoveries of fixed lengths act linearly on the stretches. The shift of the places where contact
-    begins and ends has an effect of second order only, because u is continuous there. A free recovery takes two
-    products of a matrix and a vector more than a contact.
+    begins and ends has an effect of second order only, because u is continuous there. A free recovery takes three
+    products of a matrix and a vector, a contact none.
 
     Parameters
     ----------

@@ -176,7 +176,7 @@ class Passage(NamedTuple):
     Parameters
     ----------
     lengths : array, shape (>= 2 nodes + 2,)
-        Lengths of free recoveries and contacts alternately, from a free recovery on, whose length may be 0.
+        Lengths of free recoveries and contacts alternately; the first one is a free recovery and may be 0.
     imbalance : array, shape (terms,)
         Integral of e_m over the line.
     totals : array, shape (6,)

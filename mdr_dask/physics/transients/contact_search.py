@@ -68,7 +68,7 @@ from mdr_dask.physics.transients.patches import (
 )
 
 SEPARATIONS = 1024  # largest number of places of separation at one instant
-PERIODS = 3  # largest number of periods of the line over which an element is followed
+PERIODS = 3  # largest number of periods of the line for which the search is repeated
 VISITS = 6  # largest number of changes of contact in a cell: a cubic force changes sign at most three times
 ROUNDING = 1e-9  # relative to a displacement
 CLOSE = 1e-9  # cells: accuracy of the place where contact is lost to free elements

@@ -27,7 +27,7 @@ from mdr_dask.physics.transients.patches import (
     track_of,
 )
 
-KEPT_CELLS, KEPT_SPEEDS = 2**21, 4  # barriers are kept for so many cells (16 bytes each), at least for four speeds
+KEPT_CELLS, KEPT_SPEEDS = 2**21, 4  # number of cells whose barriers are kept (16 bytes each), at least four speeds
 WHOLE = 1 - 1e-12  # fraction of the line in contact that counts as full contact, within rounding
 NEWTON_STEPS = 60
 NEARLY = 1e-6  # part of the load that may be missing before the last Newton step; the error is about its square

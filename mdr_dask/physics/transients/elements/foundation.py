@@ -32,7 +32,7 @@ class Foundation(NamedTuple):
     outward, inward : array, shape (modes, modes)
         Transformation from the modes to the state (u of a solid with a dashpot, a_1, ...), and back.
     push : array, shape (modes,)
-        Growth rates of the modes, summed over all elements, under a unit load.
+        Growth rates of the modes of the mean over all elements, under a unit load.
     """
 
     moduli: FloatArray
