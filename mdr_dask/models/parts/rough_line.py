@@ -108,7 +108,7 @@ class Measured:
         return int(line_of(self.profile).height.size)
 
     def height(self) -> float:
-        """Return the unit of height, m: the rms height, or the length of a flat line."""
+        """Return the unit of height, m: the rms height, or the length if the line is flat."""
         line = line_of(self.profile)
         return float(line.height.std()) or line.length
 

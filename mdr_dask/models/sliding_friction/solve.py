@@ -20,9 +20,9 @@ from mdr_dask.physics.sliding.problem import Request, solve
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 ACCURACY = 0.01  # used if the campaign does not give an accuracy
-USUAL_ON_PLANES, USUAL = 2, 16  # nodes per Nyquist point of the finest grid that cases usually need
+USUAL_ON_PLANES, USUAL = 2, 16  # nodes per Nyquist point on the finest grid that cases usually need
 BYTES_A_NODE = 150  # peak memory of a line and a case on it; measured: 20 to 130
-SECONDS_A_NODE = 1e-8  # of a line, or of a case on it, with all grids: an order of magnitude
+SECONDS_A_NODE = 1e-8  # per node of a line, and per node of a case on it, for all grids: order of magnitude
 
 #: Outputs that have errors, and the corresponding columns of a steady state.
 OUTPUTS = dict(

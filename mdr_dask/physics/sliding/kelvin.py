@@ -29,7 +29,7 @@ SUMS = 7
 
 
 class Blocks(NamedTuple):
-    """The highest point of every `BLOCK` cells, and the integrals over them."""
+    """The largest height in every `BLOCK` cells, and the sums of the integrals over these cells."""
 
     peak: FloatArray
     mean: FloatArray

@@ -50,7 +50,7 @@ class Nodes(NamedTuple):
     Parameters
     ----------
     height, slope : array, shape (BEFORE + n + AFTER,)
-        Heights relative to the first node, and slopes as rises per cell, both with some nodes of the neighbouring periods.
+        Heights relative to the first node, and slopes as rises per cell, with some nodes of the neighbouring periods.
     ends : array, shape (2, BEFORE + n + AFTER) or (2, 0)
         From `ends_of`, with the same additional nodes.
     blocks : array, shape (n // BLOCK, KNOWN)

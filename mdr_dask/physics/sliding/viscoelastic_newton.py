@@ -315,7 +315,7 @@ def solve_sliding(
         else:
             residual[:] = 1.0  # a unit change of the depth; elements enter undeformed
             follow(residual, swept, False, product, workspace)
-            # contact at the end of the line would continue beyond it
+            # the load is the integral of the stress: u behind the line is unknown if its end is in contact
             step[terms] = max((strain_area - totals[1]) / product[terms], -DEEPEST_STEP * unknown[terms])
         largest = 0.0
         for j in range(size):

@@ -43,7 +43,7 @@ class PreparedLine(NamedTuple):
 
     @classmethod
     def of(cls, line: CubicLine) -> PreparedLine:
-        """Prepare a line."""
+        """Return a line with its cells, blocks and track, without barriers."""
         cells = cut(line)
         return cls(cells, blocks_of(cells), track_of(cells), {})
 

@@ -171,7 +171,7 @@ def _sliding(line: CubicLine, solid: Foundation, state: State, deborah: float, d
 def _orbit(
     solid: Foundation, line: CubicLine, deborah: float, depth: float, state: State, periods: int
 ) -> tuple[bool, float]:
-    """Carry one element along the line at constant depth until its state repeats, and write the state of all elements.
+    """Move one element along the line at constant depth until its state repeats, and write the state of all elements.
 
     The number of nodes may be a multiple of the number of elements. Return whether the state repeats, and the
     displacement at the end.
