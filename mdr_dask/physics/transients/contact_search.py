@@ -4,16 +4,16 @@ The search visits the cells of the line one by one, from the highest point on an
 move. It records where contact last ended and where free elements may have separated (`FreeRecovery`). The force on an
 element in contact is lift + h + D h', where the lift is the depth plus its rate. In each cell that is examined:
 
-* Inside a patch, contact ends where the force falls through zero, or where free elements that were pressed deeper
-  elsewhere arrive and are below the line (contact is then lost although the contact force is positive).
+* Inside a patch, contact ends where the force falls through zero, or where free elements arrive with a displacement
+  larger than the depth plus the height of the line (contact is then lost although the contact force is positive).
 * Outside a patch, contact begins where the line rises above the free elements and the force would be positive.
 
 A patch is added to the sums when its end is found. Three bounds, none of which can miss a contact, allow most cells to
 be skipped:
 
-* A cell in contact is skipped if the force was positive in the whole cell while every element now ahead passed it, and
-  if free elements cannot be displaced further than the line there. Along the line u' = (drift - u) / D, so that u stays
-  below w wherever w + D h' exceeds the largest drift.
+* A cell in contact is skipped if the force was positive everywhere in it while the elements that are now further along
+  the line passed it, and if the displacement u of free elements cannot exceed w = depth + h there. Along the line
+  u' = (drift - u) / D, so that u stays below w wherever w + D h' exceeds the largest drift.
 * A free cell is skipped if a lower bound of the displacement of its free elements is above its highest point. The bound
   is computed along the line from the last known displacement and the least drift.
 * A free cell is also skipped if its gap is wider than a gap can have opened since the elements separated: the cell was
