@@ -1,13 +1,13 @@
-"""Every benchmark: ``python -m benchmarks KIND [ARGUMENTS]``; without a kind, what there is."""
+"""All benchmarks: ``python -m benchmarks KIND [ARGUMENTS]``; without a kind, a list of the kinds."""
 
 import importlib
 import os
 import sys
 
-#: As in the runner's workers: threads of linear algebra that wait for each other would count as time.
+#: One thread for linear algebra, as in the runner's workers, because waiting threads would count as processor time.
 os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
-#: Name, module whose `main` runs it, and one line about it.
+#: Kinds by name, with the module whose `main` runs the benchmark, and a one-line description.
 KINDS = {
     "accuracy": ("benchmarks.accuracy", "error, time and stated errors of every solver: docs/accuracy-and-speed.md"),
     "campaigns": ("benchmarks.campaigns", "error and time of whole campaigns that are given an accuracy"),
@@ -24,7 +24,7 @@ KINDS = {
 
 
 def main(kind: str = "", *arguments: str) -> None:
-    """Run one kind, or print the kinds."""
+    """Run one kind of benchmark, or print the list of kinds."""
     if kind in KINDS:
         importlib.import_module(KINDS[kind][0]).main(*arguments)
     else:

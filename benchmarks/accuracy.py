@@ -1,10 +1,10 @@
-"""Accuracy against time of every solver, and whether its stated errors hold.
+"""Measure error against processor time for every solver, and test its stated errors.
 
-python -m benchmarks accuracy             every solver, 20 random cases of each family; then the page
+python -m benchmarks accuracy             all solvers, 20 random cases of each family; then write the page
 python -m benchmarks accuracy wear 5      one solver, 5 cases
-python -m benchmarks accuracy page        the page again, from the table
+python -m benchmarks accuracy page        only write the page, from the stored table
 
-Rows of solvers that are not measured keep their date.
+Solvers that are not measured keep their rows and dates.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ COLUMNS = ("cases", "method", "setting", "number", "time", "error", "stated", "h
 
 
 def text(rows: Sequence[Row]) -> str:
-    """Return the page."""
+    """Return the text of the page."""
     parts = [HEAD]
     for name, solver in SOLVERS.items():
         of_solver = [row for row in rows if row.solver == name]
@@ -52,14 +52,14 @@ def text(rows: Sequence[Row]) -> str:
 
 
 def cells(row: Row) -> tuple[str, ...]:
-    """Return a row of the page."""
+    """Return the cells of one row of a table on the page."""
     errors = number(row.error) if row.error == row.error else "no solution"
     held = number(100 * row.held, " %")
     return row.case, row.method, row.setting, str(row.cases), seconds(row.seconds), errors, number(row.stated), held
 
 
 def draw(rows: Sequence[Row]) -> None:
-    """Write the figure: a panel for every solver with its first family, a curve for every method."""
+    """Write the figure: one panel for the first family of every solver, one curve for every method."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import NullFormatter
 
@@ -77,7 +77,7 @@ def draw(rows: Sequence[Row]) -> None:
             axes.loglog([row.seconds for row in points], [row.error for row in points], "o-", ms=4, label=method)
         axes.set_title(f"{name}: {first[0].case}", fontsize="small")
         for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
-            axis.set_view_interval(low / 2, max(2 * high, 30 * low))  # so that labels of decades are enough
+            axis.set_view_interval(low / 2, max(2 * high, 30 * low))  # wide enough for labels at decades
             axis.set_minor_formatter(NullFormatter())
         axes.grid(alpha=0.3)
         axes.legend(fontsize="xx-small")
@@ -87,7 +87,7 @@ def draw(rows: Sequence[Row]) -> None:
 
 
 def main(*arguments: str) -> None:
-    """Measure the solvers with these names, or all, with so many cases; then write the page and its figure."""
+    """Measure the named solvers (default: all) with a number of cases; then write the page and its figure."""
     names = [name for name in arguments if not name.isdigit() and name != "page"]
     if unknown := set(names) - set(SOLVERS):
         raise SystemExit(f"no solver {', '.join(sorted(unknown))}; known: {', '.join(SOLVERS)}")

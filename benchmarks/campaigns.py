@@ -1,11 +1,11 @@
-"""Whole campaigns of every model that are given an accuracy: their error and processor time.
+"""Measure error and processor time of whole campaigns that request an accuracy.
 
-python -m benchmarks campaigns             all models, four campaigns each; prints a table
-python -m benchmarks campaigns wear 1      one model, one campaign each
+python -m benchmarks campaigns             all models, four campaigns for each accuracy; prints a table
+python -m benchmarks campaigns wear 1      one model, one campaign for each accuracy
 
-Each campaign goes through the runner into a store on disk, on one thread. It asks for an accuracy, and for the same
-standard error where lines are random. Its error, of grid and lines together, is the rms over cases and campaigns,
-relative to a campaign of finer settings and other lines.
+The runner computes each campaign into a store on disk, on one thread. The campaign requests an accuracy, and the same
+standard error if its lines are random. The error includes grid and lines. It is the rms over cases and campaigns,
+relative to a reference campaign with finer settings and other lines.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ SEED_OF_TRUTH = 99
 
 @dataclass(frozen=True)
 class Study:
-    """A campaign to several accuracies.
+    """A campaign that is computed with several accuracies.
 
     Parameters
     ----------
     text, output : str
-        The campaign without accuracy, and the output that is judged.
+        The campaign without an accuracy, and the output that is compared.
     asked : dict
-        The rest of the campaign for every accuracy.
+        For every accuracy, the lines that are added to the campaign.
     truth : str
-        The rest of the campaign of the reference.
+        The lines that are added for the reference.
     least : float
-        Errors are relative to the reference, or to this where the reference is smaller.
+        Errors are relative to the reference, or to this number if the reference is smaller.
     """
 
     text: str
@@ -66,7 +66,7 @@ class Study:
 
 
 def until(accuracy: float, output: str) -> str:
-    """Return the rest of a campaign that asks for an accuracy and the same standard error."""
+    """Return the lines of a campaign that request an accuracy and the same standard error."""
     return f"accuracy: {accuracy:g}\nrealisations: {{at_least: 10, at_most: 4096, until: {{{output}: {accuracy:g}}}}}"
 
 
@@ -158,7 +158,7 @@ parameters:
 
 
 def main(*arguments: str) -> None:
-    """Print a table of the models with these names, or of all, with so many campaigns for each accuracy."""
+    """Print a table for the named models (default: all), with a number of campaigns for each accuracy."""
     names = [name for name in arguments if not name.isdigit()] or list(STUDIES)
     if unknown := set(names) - set(STUDIES):
         raise SystemExit(f"no campaign {', '.join(sorted(unknown))}; known: {', '.join(STUDIES)}")

@@ -1,6 +1,7 @@
-"""Friction at very high velocity, the figure of docs/high-speed.md: ``python -m benchmarks high_speed [PNG]``.
+"""Friction at very high velocity, for the figure of docs/high-speed.md: ``python -m benchmarks high_speed [PNG]``.
 
-Twenty lines of H = 0.7, 1000 Nyquist points, F_N / (G h L) = 0.3. Prints the figures that the page quotes.
+There are twenty lines with H = 0.7 and 1000 Nyquist points, at F_N / (G h L) = 0.3. The numbers in the page are
+printed.
 """
 
 import numpy as np
@@ -13,12 +14,12 @@ from mdr_dask.physics.surfaces.waves import Waves
 
 POINTS, LINES, HURST, LOAD = 1000, 20, 0.7, 0.3 / 4
 DEBORAH = np.geomspace(1e-5, 1e4, 28)  # v tau / L
-GLASS = 100.0  # glassy over static modulus of the standard solid
+GLASS = 100.0  # ratio of glassy to static modulus of the standard solid
 FINE = 64
 
 
 def main(path: str = "docs/pictures/high-speed.png") -> None:
-    """Compute the curves, print what the page quotes, and draw them."""
+    """Compute the curves, print the numbers in the page, and draw the figure."""
     amplitude = roughness.amplitudes(POINTS // 2, HURST)
     slope = roughness.spectral_slope(amplitude)
     loads = np.full(DEBORAH.size, LOAD)
@@ -43,7 +44,7 @@ def main(path: str = "docs/pictures/high-speed.png") -> None:
             highest = int(np.argmax(nodes))
             plateaus[oversampling].append((nodes[highest] - nodes[highest - 1]) * nodes.size)
         solid = []
-        for deborah in DEBORAH:  # the same friction at low velocity: sum of G_m tau_m equal to that of the dashpot
+        for deborah in DEBORAH:  # sum of G_m tau_m as for the dashpot: equal friction at low v
             terms = PronyTerms((GLASS - 1,), (deborah / (GLASS - 1),))
             solid.append(solve(rough, terms, np.zeros(1), loads[:1], Request(0.02))[0].drag[0] / LOAD)
         curves.setdefault(f"standard solid, glassy modulus {GLASS:g} G", []).append(np.array(solid))
@@ -60,7 +61,7 @@ def main(path: str = "docs/pictures/high-speed.png") -> None:
 
 
 def _thesis() -> float:
-    """Return the mean rise to the highest node of the thesis's lines, over their rms slope."""
+    """Return the mean rise to the highest node of the lines of the thesis, over their rms slope."""
     amplitude = roughness.amplitudes(2500, HURST)
     rises = []
     for line in range(200):

@@ -1,8 +1,8 @@
-"""Shift factors of measured moduli beside published ones: ``python -m benchmarks published_factors``
+"""Compare shift factors of measured moduli with published ones: ``python -m benchmarks published_factors``.
 
-The published factors are those of straight lines: to each curve a power of the frequency is fitted by least squares of
-the modulus itself, and neighbours are brought together at one modulus, half way between the lowest of the curve
-nearer to the reference and the highest of the other.
+The published factors follow from straight lines in double-logarithmic axes. A power of the frequency is fitted to each
+curve by least squares of the modulus itself. Neighbouring curves are then shifted so that their lines meet at one
+modulus, half way between the lowest modulus of the curve nearer to the reference and the highest of the other curve.
 """
 
 from pathlib import Path
@@ -19,7 +19,7 @@ REFERENCE = 7
 
 
 def measured():
-    """Return temperatures (C) and (log10 of time, log10 of modulus) of each curve, coldest first, as measured."""
+    """Return the measured temperature (degC) and (log10 time, log10 modulus) of each curve, coldest first."""
     table = read_table(DATA / "time_user_raw.csv").to_numpy()
     parts = [table[table[:, 3] == number] for number in np.unique(table[:, 3])]
     return np.array([part[:, 2].mean() for part in parts]), [tuple(np.log10(part[:, :2]).T) for part in parts]
@@ -31,7 +31,7 @@ def published():
 
 
 def by_straight_lines(curves):
-    """Return log10 of the factors as they were published: see above."""
+    """Return log10 of the factors by the method of the published ones (straight lines, see above)."""
     factors = np.zeros(len(curves))
     for other in range(REFERENCE - 1, -1, -1):
         factors[other] = factors[other + 1] + _met_by_lines(curves[other + 1], curves[other])
@@ -52,7 +52,7 @@ def _met_by_lines(near, far):
 
 
 def joint(temperatures, curves, vertical="modulus"):
-    """Return what was found, log10 of its factors, and the ends of their intervals of 95 %."""
+    """Return the superposition, log10 of its factors, and the ends of their 95 % intervals."""
     found = superpose(temperatures, curves, vertical, temperatures[REFERENCE], kelvin=temperatures + 273.15)
     low, high = -found.interval()[::-1, : temperatures.size]
     return found, -found.horizontal, low, high

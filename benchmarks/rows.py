@@ -1,4 +1,4 @@
-"""Rows of the measured tables: one method at one setting, its time, its errors and whether its stated errors hold."""
+"""Rows of the benchmark tables: time, errors and test of the stated errors of one method at one setting."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ DOCS = Path(__file__).parents[1] / "docs"
 
 
 class Row(NamedTuple):
-    """One method at one setting; NaN where something does not apply.
+    """Results of one method at one setting; numbers that do not apply are NaN.
 
-    `seconds` is processor time. `error` and `stated` are the true and the stated error, `held` is the share of values
-    whose error is at most the stated one. `measured` is the date and the version of the package.
+    `seconds` is processor time. `error` and `stated` are the true and the stated error. `held` is the share of values
+    whose error is at most the stated error. `measured` is the date and the version of the package.
     """
 
     solver: str
@@ -36,13 +36,13 @@ class Row(NamedTuple):
 
 
 def read(path: Path) -> list[Row]:
-    """Return the rows of a table."""
+    """Read the rows of a table."""
     with path.open(newline="") as file:
         return [Row(*row[:4], int(row[4]), *map(float, row[5:9]), row[9]) for row in list(csv.reader(file))[1:]]
 
 
 def write(rows: Iterable[Row], path: Path) -> None:
-    """Write rows into a table; solvers measured now replace their earlier rows."""
+    """Write rows into a table; they replace earlier rows of the same solvers."""
     rows = list(rows)
     solvers = {row.solver for row in rows}
     kept = [row for row in read(path) if row.solver not in solvers] if path.exists() else []
@@ -55,14 +55,14 @@ def write(rows: Iterable[Row], path: Path) -> None:
 
 
 def timed(function: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
-    """Return a value and the processor time of the call."""
+    """Call a function and return its value and the processor time."""
     started = time.process_time()
     value = function(*arguments)
     return value, time.process_time() - started
 
 
 def timed_in_turns(functions: Mapping[Any, Callable[[], Any]], rounds: int) -> dict[Any, tuple[Any, float]]:
-    """Return value and least processor time of functions that are called in turns, so that all see the same machine."""
+    """Call functions in turns, so that all run under equal conditions; return values and least processor times."""
     found = [{name: timed(function) for name, function in functions.items()} for _ in range(rounds)]
     return {name: (found[0][name][0], min(each[name][1] for each in found)) for name in functions}
 

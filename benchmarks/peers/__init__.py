@@ -1,10 +1,10 @@
-"""Solvers beside those of other programs and beside the ways of the papers: part of docs/comparison.md.
+"""Compare our solvers with other programs and with the methods of the papers: a part of docs/comparison.md.
 
-python -m benchmarks peers              all subjects; peers that are not installed are left out
+python -m benchmarks peers              all subjects; programs that are not installed are left out
 python -m benchmarks peers contact      one subject: contact, curves, friction, statistics or transforms
-python -m benchmarks peers page         the page again, from the table
+python -m benchmarks peers page         only write the page, from the stored table
 
-Peers are dependencies of these benchmarks only: ``pip install '.[peers]'``.
+The other programs are dependencies of these benchmarks only: ``pip install '.[peers]'``.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from benchmarks.rows import DOCS, Row, number, read, table, write
 OURS = "mdr_dask"
 SUBJECTS = ("friction", "contact", "curves", "transforms", "statistics")
 TABLE, PAGE, HEADING = DOCS / "evidence/peers.csv", DOCS / "comparison.md", "## Solvers\n"
-#: What is compared, under which licence, and how the methods differ.
+#: Texts on each comparison: its subject, the licences of the programs, and the differences between the methods.
 ABOUT = {
     "steady sliding": (
         "Friction of a Kelvin solid on one line, beside stepping in time as in the thesis: all springs move on by a "
@@ -84,7 +84,7 @@ No solver of lubricated line contacts was found that installs beside this packag
 
 
 def installed(package: str) -> str | None:
-    """Return name and version of a peer; or print how to install it, and return None."""
+    """Return name and version of a program; if it is not installed, print how to install it and return None."""
     try:
         return f"{package} {version(package)}"
     except PackageNotFoundError:
@@ -93,7 +93,7 @@ def installed(package: str) -> str | None:
 
 
 def text(rows: Iterable[Row]) -> str:
-    """Return the part of the page: a table for each subject, in the order of `ABOUT`."""
+    """Return this part of the page: a table for each subject, in the order of `ABOUT`."""
     rows, parts = list(rows), [HEAD]
     for name, (what, differs) in ABOUT.items():
         of_subject = [row for row in rows if row.solver == name]
@@ -106,7 +106,7 @@ def text(rows: Iterable[Row]) -> str:
 
 
 def cells(rows: list[Row]) -> str:
-    """Return rows as a table, with times also as multiples of ours in the same case."""
+    """Return rows as a table; times are also given as multiples of our time in the same case."""
     stated = any(np.isfinite(row.held) for row in rows)
     found = []
     for case, group in groupby(rows, lambda row: row.case):
@@ -120,7 +120,7 @@ def cells(rows: list[Row]) -> str:
 
 
 def main(*arguments: str) -> None:
-    """Compare some subjects, or all; then write the part of the page."""
+    """Compare the named subjects (default: all); then write this part of the page."""
     if unknown := set(arguments) - {*SUBJECTS, "page"}:
         raise SystemExit(f"no subject {', '.join(sorted(unknown))}; known: {', '.join(SUBJECTS)}")
     for subject in () if "page" in arguments else arguments or SUBJECTS:

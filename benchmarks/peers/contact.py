@@ -1,4 +1,4 @@
-"""Bodies of revolution and a rough punch beside boundary elements."""
+"""Compare bodies of revolution and a rough punch with boundary element programs."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ WIDTH, RADIUS = 2.0, 0.5
 #: Exponent and amplitude of f = amplitude r^n.
 BODIES = {"parabola": (2.0, 0.5), "flat: n = 6": (6.0, 2.0)}
 PUNCH, HURST, LINES = 128, 0.8, 200
-CHOSEN = slice(2, 7)  # of the loads of `punches`
+CHOSEN = slice(2, 7)  # the loads of `punches` that are used
 LOADS = punches.LOADS[CHOSEN]
 
 
 class Pressed(NamedTuple):
-    """Depth of a body of unit modulus, and the pressure on a grid."""
+    """Indentation depth, and pressure on a grid, for a half-space of unit modulus."""
 
     depth: float
     pressure: np.ndarray
 
 
 def tamaas(height: np.ndarray, width: float, force: float, tolerance: float = 1e-10) -> Pressed:
-    """Press a surface by Tamaas, with free boundaries."""
+    """Press a surface against a half-space with Tamaas, with free boundaries."""
     import tamaas as tm
 
     tm.set_log_level(tm.LogLevel.error)
@@ -49,7 +49,7 @@ def tamaas(height: np.ndarray, width: float, force: float, tolerance: float = 1e
 
 
 def contact_mechanics(height: np.ndarray, width: float, force: float, tolerance: float = 1e-6) -> Pressed:
-    """Press a surface by ContactMechanics; the tolerance is that of the penetration, over the height."""
+    """Press a surface against a half-space with ContactMechanics; the tolerance is penetration over height range."""
     from ContactMechanics import FreeFFTElasticHalfSpace
     from ContactMechanics.Systems import NonSmoothContactSystem
     from SurfaceTopography import Topography
@@ -64,13 +64,13 @@ def contact_mechanics(height: np.ndarray, width: float, force: float, tolerance:
 
 
 def peers() -> dict[str, Callable[..., Pressed]]:
-    """Return the boundary elements that are installed."""
+    """Return the boundary element programs that are installed."""
     known = (("tamaas", tamaas), ("ContactMechanics", contact_mechanics))
     return {name: solver for package, solver in known if (name := installed(package))}
 
 
 def transformed(exponent: float, amplitude: float, force: float) -> tuple[float, float]:
-    """Return depth and radius of contact of a body of revolution by its image, from the slope of f."""
+    """Return depth and contact radius of a body of revolution from its image, computed from the slope of f."""
     share, weight = gauss(64)
 
     def image(x: np.ndarray) -> np.ndarray:
@@ -85,14 +85,14 @@ def transformed(exponent: float, amplitude: float, force: float) -> tuple[float,
 
 
 def on_a_grid(press: Callable[..., Pressed], exponent: float, amplitude: float, force: float, points: int):
-    """Return depth and radius of contact by points in contact."""
+    """Return depth and contact radius on a grid; the radius follows from the number of points in contact."""
     place = (np.arange(points) - points // 2) * WIDTH / points
     found = press(-amplitude * np.hypot(place[:, None], place) ** exponent, WIDTH, force)
     return found.depth, np.sqrt(np.count_nonzero(found.pressure > 0) / np.pi) * WIDTH / points
 
 
 def bodies() -> Iterator[Row]:
-    """Yield the larger error of depth and radius against closed forms, on finer and finer grids."""
+    """Yield rows with the larger error of depth and radius against closed forms, on increasingly fine grids."""
     solvers = peers()
     for case, (exponent, amplitude) in BODIES.items():
         body = amplitude, exponent
@@ -110,17 +110,17 @@ def bodies() -> Iterator[Row]:
 
 
 def stiffness(depths: np.ndarray) -> np.ndarray:
-    """Return dF/dd between loads, over E* L."""
+    """Return the stiffness dF/dd between neighbouring loads, over E* L."""
     return np.diff(LOADS) / np.diff(depths)
 
 
 def by_lines() -> np.ndarray:
-    """Return mean depths, over the rms height, of the lines that stand for the punch."""
+    """Return the mean depths of the lines that replace the punch, over the rms height."""
     return np.mean([punches.line(HURST, PUNCH, index)[0][CHOSEN] for index in range(LINES)], axis=0)
 
 
 def rough() -> Iterator[Row]:
-    """Yield the largest error of the stiffness of one rough punch; everything beyond the punch is far below."""
+    """Yield rows with the largest error of the stiffness of one rough punch; outside it, the surface is far below."""
     place = (np.arange(PUNCH) + 0.5) / PUNCH - 0.5
     surface = punches.HEIGHT * punches.areal_surface(punches.spectrum(HURST, PUNCH), (PUNCH, PUNCH), (1.0, 1.0), 1, 0)
     surface[np.hypot(place[:, None], place) >= 0.5] = -1.0
@@ -146,6 +146,6 @@ def rough() -> Iterator[Row]:
 
 
 def compared() -> Iterator[Row]:
-    """Yield bodies of revolution and the rough punch."""
+    """Yield the rows for bodies of revolution and for the rough punch."""
     yield from bodies()
     yield from rough()

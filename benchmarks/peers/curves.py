@@ -1,4 +1,4 @@
-"""Shift factors beside mastercurves and pyvisco."""
+"""Compare shift factors with those of the programs mastercurves and pyvisco."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ DECADE = np.log(10)
 
 
 def ours(groups, pieces):
-    """Return factors and half widths of 95 %, the first curve's factor being zero."""
+    """Return our factors and the half widths of their 95 % intervals; the factor of the first curve is zero."""
     found = superpose(groups, pieces, reference=groups[0])
     low, high = found.interval()[:, : found.groups.size]
     return found.horizontal, (high - low) / 2
 
 
 def by_gaussian_processes(groups, pieces, noise):
-    """Return the same by mastercurves, in natural logarithms and within two decades, as its manual has it."""
+    """Return factors and half widths by mastercurves, in natural logarithms and within two decades as in its manual."""
     from mastercurves import MasterCurve
     from mastercurves.transforms import Multiply
 
@@ -38,7 +38,7 @@ def by_gaussian_processes(groups, pieces, noise):
 
 
 def by_power_laws(groups, pieces):
-    """Return factors by pyvisco, which states no error."""
+    """Return factors by pyvisco, which gives no error."""
     import pandas as pd
     from pyvisco import master
 
@@ -51,7 +51,7 @@ def by_power_laws(groups, pieces):
     unknown = np.full(len(pieces), np.nan)
     try:
         return master.get_aT(table, groups[0])[0]["log_aT"].to_numpy(), unknown
-    except RuntimeError:  # a fit of a power law did not converge
+    except RuntimeError:  # the fit of a power law did not converge
         return unknown, unknown
 
 
@@ -67,8 +67,8 @@ def ways():
 
 
 def compared() -> Iterator[Row]:
-    """Yield median time, error and half width of each method, and the share of factors inside, for each shape."""
-    warnings.simplefilter("ignore")  # of Gaussian processes that end at a bound, and of pandas about attributes
+    """Yield, for each shape and method, median time, error and half width, and the share of factors in the interval."""
+    warnings.simplefilter("ignore")  # on Gaussian processes at a bound, and on attributes in pandas
     methods = ways()
     for shape in CASES:
         judged = {name: [] for name in methods}

@@ -1,7 +1,7 @@
-"""Steady friction beside stepping in time, as the thesis did.
+"""Compare steady friction with time stepping, the method of the thesis.
 
-All springs of a line stand on it at rest, then it moves on by a cell in each step. A step of backward Euler finds the
-depth that carries the load. Friction is the mean over the last part of the way.
+At first the springs are in contact with a line at rest. Then the line moves by one cell in each step. Each step of
+backward Euler finds the depth that carries the load. Friction is the mean over the last part of the distance.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ CASES = {
     "transition": (0.7, 0.3, 0.003),
     "few peaks": (0.3, -2.0, 0.003),
 }
-#: Relaxation times for which the line moves on, and the part of the way that counts.
+#: Sliding time in relaxation times, and the share of it, at the end, over which friction is averaged.
 WAY, LAST = 12, 0.1
 
 
 def stepped(line, deborah: float, load: float, nodes: int) -> float:
-    """Return the friction of a line that is stepped in time until it slides steadily; unit length, unit modulus."""
+    """Return friction by time stepping until the line slides steadily, for unit length and unit modulus."""
     height = line.heights(nodes)
-    slope = (height - np.roll(height, 1)) * nodes  # of the cell that it has come over, so that no work is lost
-    damping = deborah * nodes  # of a spring in a step of one cell
+    slope = (height - np.roll(height, 1)) * nodes  # slope of the cell just passed, so that the work is exact
+    damping = deborah * nodes  # damping of a spring during one step of one cell
     steps = max(int(WAY * deborah * nodes), 20)
     displacement, depth, sums = np.zeros(nodes), 0.0, []
     for step in range(steps):
@@ -50,17 +50,20 @@ def stepped(line, deborah: float, load: float, nodes: int) -> float:
 
 
 def _carrying(load: float, summits: np.ndarray, depth: float) -> float:
-    """Return the depth at which summits, in rising order, carry a mean load: forces are pieces of straight lines."""
+    """Return the depth at which springs carry a mean load, from their heights in rising order.
+
+    The load is a piecewise linear function of the depth.
+    """
     falling = summits[::-1]
     numbers = np.arange(1, falling.size + 1)
     sums = np.cumsum(falling)
-    carried = (sums - numbers * falling) / falling.size  # as each comes into contact
+    carried = (sums - numbers * falling) / falling.size  # load at which each spring comes into contact
     count = np.searchsorted(carried, load, side="right")
     return (load * falling.size - sums[count - 1]) / count
 
 
 def compared() -> Iterator[Row]:
-    """Yield the least time of each method with which its error is at most a goal."""
+    """Yield the least time in which each method reaches a given error."""
     modes = sliding.MODES
     for name, (hurst, depth, deborah) in CASES.items():
         amplitude, phase = roughness.amplitudes(modes, hurst), roughness.phases(0, 1, modes)

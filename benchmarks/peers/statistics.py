@@ -1,4 +1,4 @@
-"""Statistics of lines and maps beside SurfaceTopography."""
+"""Compare statistics of lines and maps with those of SurfaceTopography."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from mdr_dask.physics.surfaces.spectrum import self_affine
 from mdr_dask.physics.surfaces.waves import waves_of
 
 POINTS, SIDE, HURST = 2**16, 512, 0.8
-#: Points of the shortest wave.
+#: Number of points per shortest wavelength.
 SHORTEST = {"smooth": 8, "to the grid": 2}
 
 
 def lines(shortest: int) -> tuple[np.ndarray, float]:
-    """Return a line of unit length, with its rms slope from the amplitudes."""
+    """Return a line of unit length, and its exact rms slope from the amplitudes."""
     modes = POINTS // shortest - (shortest == 2)
     amplitude = roughness.amplitudes(modes, HURST)
     height = roughness.line(amplitude, roughness.phases(1, 0, modes), POINTS)
@@ -30,7 +30,7 @@ def lines(shortest: int) -> tuple[np.ndarray, float]:
 
 
 def maps(shortest: int) -> tuple[np.ndarray, float]:
-    """Return a map of unit size, with its rms gradient from the amplitudes."""
+    """Return a map of unit size, and its exact rms gradient from the amplitudes."""
     spectrum = self_affine(HURST, 1.0, shortest / SIDE)
     height = areal_surface(spectrum, (SIDE, SIDE), (1.0, 1.0), 1, 0)
     q = np.hypot(*np.meshgrid(*wavenumbers((SIDE, SIDE), (1.0, 1.0)), indexing="ij"))
@@ -66,7 +66,7 @@ def peer_of_map(height):
 
 
 def compared() -> Iterator[Row]:
-    """Yield the error of the rms slope or gradient, with the time of height, slope and spectrum."""
+    """Yield rows with the error of the rms slope or gradient, and the time for height, slope and spectrum."""
     name = installed("SurfaceTopography")
     for what, made, ours, theirs in (("line", lines, of_line, peer_of_line), ("map", maps, of_map, peer_of_map)):
         for waves, shortest in SHORTEST.items():

@@ -1,4 +1,4 @@
-"""Pressure from a line load beside PyAbel."""
+"""Compare the pressure from a line load with PyAbel."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from benchmarks.peers import OURS, installed
 from benchmarks.rows import Row, timed_in_turns
 from mdr_dask.physics.mdr.transforms import pressure
 
-RADII = np.linspace(0, 2, 1601)  # the edges are among them
+RADII = np.linspace(0, 2, 1601)  # the edges of the contacts are among these radii
 WIDTH = 0.3
 
 
 def bell(r):
-    """Return line load, its slope, and pressure of a Gaussian."""
+    """Return the line load, its slope, and the pressure for a Gaussian."""
     load = np.sqrt(np.pi) * WIDTH * np.exp(-((r / WIDTH) ** 2))
     return load, -2 * r / WIDTH**2 * load, np.exp(-((r / WIDTH) ** 2))
 
 
 def hertz(r):
-    """Return the same of a parabola in contact up to 1."""
+    """Return the line load, its slope, and the pressure for a parabola with contact radius 1."""
     return np.pi / 2 * np.maximum(1 - r**2, 0), np.where(r <= 1, -np.pi * r, 0.0), np.sqrt(np.maximum(1 - r**2, 0))
 
 
-#: Functions, and the edge of the contact.
+#: Cases: the functions, and the radius at the edge of the contact.
 CASES = {"smooth: Gaussian": (bell, 2.0), "edge: Hertz": (hertz, 1.0)}
 
 
 def peers(load, spacing):
-    """Return PyAbel's methods for one row of samples."""
+    """Return the methods of PyAbel for one row of samples."""
     name = installed("PyAbel")
     if name is None:
         return {}
@@ -47,7 +47,7 @@ def peers(load, spacing):
 
 
 def compared() -> Iterator[Row]:
-    """Yield the largest error of each method."""
+    """Yield rows with the largest error of each method."""
     for case, (function, edge) in CASES.items():
         load, _, truth = function(RADII)
 

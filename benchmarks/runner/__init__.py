@@ -1,1 +1,1 @@
-"""Benchmarks of runner."""
+"""Benchmarks of the runner."""

@@ -1,11 +1,11 @@
-"""Our runner beside others: processor time, memory, files, and what is left after a kill.
+"""Compare our runner with other programs: processor time, memory, files, and results left after a kill.
 
-python -m benchmarks runner 4000       the same 4000 cases by each way; prints a table
+python -m benchmarks runner 4000       the same 4000 cases by each program; prints a table
 
-Every way of `ways` computes the same cases with the same function in the same blocks, in a process tree of its own.
-Its processor time is that of the whole tree, with starting and importing; "above the loop" is what is more than that
-of a plain loop on one core. Memory is the largest sum of proportional set sizes (PSS). Then each way runs again: all
-its processes are killed (SIGKILL) once half of the cases are computed, what is left is read, and a second run finishes.
+Every program in `ways` computes the same cases with the same function in the same blocks, in its own process tree. The
+processor time is that of the whole tree, including start and imports; "above the loop" is the excess over a plain loop
+on one core. Memory is the largest sum of proportional set sizes (PSS). Then each program runs again. All its processes
+are killed (SIGKILL) when half of the cases are computed, the remaining results are read, and a second run finishes.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from benchmarks.rows import table
 from benchmarks.runner.ways import SPEEDS, WAYS
 
 ROOT = Path(__file__).parents[2]
-#: Seconds after which a run is ended.
+#: Seconds after which a run is stopped.
 LIMIT = 400.0
-#: Starts a program, adopts what outlives its parent (PR_SET_CHILD_SUBREAPER), and prints the time that all used.
+#: A script that starts a program, adopts orphaned processes (PR_SET_CHILD_SUBREAPER), and prints the time of all.
 LAUNCHER = """
 import ctypes, os, resource, subprocess, sys
 ctypes.CDLL(None).prctl(36, 1, 0, 0, 0)
@@ -47,7 +47,7 @@ sys.exit(code != 0)
 
 @dataclass(frozen=True)
 class Trial:
-    """One way at work in a folder."""
+    """The runs of one program in a folder."""
 
     way: str
     folder: Path
@@ -82,7 +82,7 @@ class Trial:
                 launched.communicate()
 
     def watched(self, kill_at: int | None = None) -> tuple[float, float, float]:
-        """Run, or run until so many cases are computed; return processor time, wall time, and peak memory in MB."""
+        """Run to the end, or kill the run after `kill_at` cases; return processor time, wall time, peak memory (MB)."""
         begun, peak = time.monotonic(), 0
         with self.started("run") as launched:
             while launched.poll() is None:
@@ -120,7 +120,7 @@ def memory_below(pid: int) -> int:
 
 
 def kill_below(pid: int) -> None:
-    """Kill all that a launcher has started, at once, and what they may have started meanwhile."""
+    """Kill all processes below a launcher, and repeat this until none is alive."""
     while alive := [process for process in below(pid) if process.status() != psutil.STATUS_ZOMBIE]:
         for process in alive:
             with suppress(psutil.Error):
@@ -128,7 +128,7 @@ def kill_below(pid: int) -> None:
 
 
 def attempt(act, *arguments):
-    """Return what an act returns, or the reason why it failed."""
+    """Return the result of a function, or the message of its error."""
     try:
         return act(*arguments)
     except RuntimeError as error:
@@ -136,7 +136,10 @@ def attempt(act, *arguments):
 
 
 def after_a_kill(trial: Trial, expected: np.ndarray) -> tuple[str, str, str]:
-    """Kill a run at half time; return what is left, what the second run computed again, and what it ended with."""
+    """Kill a run after half of the cases, and run again.
+
+    Return texts on the results left, on the cases computed again, and on whether the final results are the same.
+    """
     trial.watched(expected.size // 2)
     before = trial.computed
     left = attempt(trial.read)
@@ -151,7 +154,7 @@ def after_a_kill(trial: Trial, expected: np.ndarray) -> tuple[str, str, str]:
 
 
 def compare(folder: Path, cases: int, names: list[str]) -> Iterator[tuple[str, ...]]:
-    """Yield a row for each way."""
+    """Yield a row of the table for each program."""
     lines = cases // SPEEDS
     loop = Trial("bare loop", folder / "loop", lines)
     bare, wall, memory = loop.watched()
@@ -173,10 +176,10 @@ def compare(folder: Path, cases: int, names: list[str]) -> Iterator[tuple[str, .
 
 
 def main(cases: str = "4000", *names: str) -> None:
-    """Compare the ways with these names, or all."""
+    """Compare the named programs (default: all)."""
     head = ("way", "processors", "above the loop", "wall", "peak memory", "files")
     head += ("left after the kill", "computed again", "ends with the same numbers")
     with tempfile.TemporaryDirectory() as scratch:
-        Trial("bare loop", Path(scratch, "warm"), 2).watched()  # compiles
+        Trial("bare loop", Path(scratch, "warm"), 2).watched()  # compiles the functions
         rows = compare(Path(scratch), int(cases), list(names or [name for name in WAYS if name != "bare loop"]))
         print(table(head, rows))

@@ -1,7 +1,7 @@
-"""Parts of a campaign killed at random: ``python -m benchmarks kills [PARTS] [KILLS] [SEED]``.
+"""Kill parts of a campaign at random: ``python -m benchmarks kills [PARTS] [KILLS] [SEED]``.
 
-Starts all parts at once, kills one after the other with SIGKILL at random instants and starts it again; then compares
-every chunk with those of an undisturbed run, and counts the blocks that were done twice.
+All parts start at the same time. At random instants, one part is killed with SIGKILL and started again. Afterwards
+every chunk is compared with that of an undisturbed run, and the blocks that were computed twice are counted.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from mdr_dask import store
 from mdr_dask.execute import Resources, run
 from mdr_dask.store import files
 
-PAUSE, BLOCKS_PER_KILL = 0.05, 12  # seconds that a block sleeps
+PAUSE, BLOCKS_PER_KILL = 0.05, 12  # PAUSE: seconds that a block sleeps
 
 
 def chunks(url: str) -> dict[str, bytes | None]:
-    """Return all bytes of a store that are not metadata or records."""
+    """Return the content of all files of a store except metadata and records."""
     return dict(files.read_many(url, [name for name in files.listed(url) if "/c/" in name or name.endswith("/c")]))
 
 
 def main(parts: str = "8", kills: str = "100", seed: str = "1") -> None:
-    """Run a study in parts with so many kills, and print what differs from an undisturbed run."""
+    """Run a study in parts with a number of kills, and print the differences from an undisturbed run."""
     toy.install()
     blocks, start = BLOCKS_PER_KILL * int(kills), time.monotonic()
     with tempfile.TemporaryDirectory() as folder:

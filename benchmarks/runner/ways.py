@@ -1,8 +1,8 @@
-"""One study computed by our runner and in the ways of other programs; `compare` starts each in its own process.
+"""One study, computed by our runner and by other programs; `compare` starts each program in its own process.
 
-The friction of one rough line at one speed is a case; twenty speeds and any number of lines make the study. All ways
-call the same function, case by case, and work in forty equal blocks on two cores, each as its own manual recommends.
-Every way computes what is missing; `read` returns the results found, NaN where there are none.
+A case is the friction of one rough line at one speed. The study has twenty speeds and any number of lines. All programs
+call the same function, case by case, in forty equal blocks on two cores, and are used as their manuals recommend. A run
+computes the missing results. `read` returns all results, NaN where there are none.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ MODES, POINTS, LOAD = 500, 2000, 0.5
 
 @cache
 def tally() -> int:
-    """Return the file to which each computed case adds a byte: the count outlives a process that is killed."""
+    """Return the file to which each computed case appends a byte, so that the count survives a killed process."""
     return os.open(os.environ["PEERS_TALLY"], os.O_WRONLY | os.O_APPEND | os.O_CREAT)
 
 
@@ -46,7 +46,7 @@ def friction(speed: int, line: int) -> float:
 
 @dataclass(frozen=True)
 class Study:
-    """A folder, and the number of lines that are computed in it at every speed."""
+    """A study: its folder, and the number of lines at every speed."""
 
     folder: Path
     lines: int
@@ -177,7 +177,7 @@ def read_pipefunc(study: Study) -> np.ndarray:
 
 
 class Case(Parameters):
-    """A line and a speed, by their numbers."""
+    """A case: the numbers of its line and its speed."""
 
     speed: int = quantity("1", "number of the speed", ge=0)
     line: int = quantity("1", "number of the line", ge=0)
@@ -217,7 +217,7 @@ def read_ours(study: Study) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Way:
-    """How the study is computed, and how what is there is read."""
+    """One program: a function that computes the study, and a function that reads its results."""
 
     run: Callable[[Study], None]
     read: Callable[[Study], np.ndarray]
@@ -235,7 +235,7 @@ WAYS = {
 
 
 def main(act: str, folder: str, lines: str, way: str) -> None:
-    """Run a way in a folder, or read what it has left into a file."""
+    """Run a program in a folder, or write the results in this folder to a file."""
     study = Study(Path(folder), int(lines))
     if act == "run":
         WAYS[way].run(study)
@@ -244,6 +244,6 @@ def main(act: str, folder: str, lines: str, way: str) -> None:
 
 
 if __name__ == "__main__":
-    from benchmarks.runner import ways  # so that workers find what is pickled
+    from benchmarks.runner import ways  # workers must find pickled functions by this module name
 
     ways.main(*sys.argv[1:])

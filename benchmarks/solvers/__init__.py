@@ -1,9 +1,9 @@
-"""Every solver of the package: random cases, solutions to an accuracy and beside other methods, and references."""
+"""Benchmarks of all solvers: random cases, solutions by our and by other methods, and references."""
 
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))  # for the slow references
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))  # contains the slow reference solvers
 
 from benchmarks.solvers import curves, lubrication, revolution, sliding, transients
 

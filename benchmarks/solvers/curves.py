@@ -1,4 +1,4 @@
-"""Planted families of curves: how often intervals of shift factors hold, and how large the errors are."""
+"""Families of curves with known shift factors: coverage of the intervals, and errors of the factors."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ON_PLATEAUS = {
     "steep": lambda x: 2 + 1.5 * np.tanh(x / 2),
     "decay": lambda x: -np.log10(1 + 10**x),
 }
-#: Shape, curves, points, relative scatter of the ordinate, and overlap of neighbours.
+#: Settings: shape, number of curves, points per curve, relative scatter of the ordinate, and overlap of neighbours.
 PLATEAUS = (
     ("decay", 15, 10, 0.02, 0.3),
     ("decay", 15, 20, 0.005, 0.3),
@@ -37,14 +37,15 @@ PLATEAUS = (
     ("sigmoid", 8, 20, 0.005, 0.5),
     ("sigmoid", 3, 10, 0.02, 0.3),
 )
-EXPANSION = 6e-4  # of polymers, 1/K
-WINDOW, POINTS = 2.5, 16  # decades of frequency, and points of each curve of a polymer
+EXPANSION = 6e-4  # thermal expansion of polymers, 1/K
+WINDOW, POINTS = 2.5, 16  # decades of frequency and number of points of each curve of a polymer
 
 
 class Family(NamedTuple):
-    """Groups, curves of log10 of abscissa and ordinate, planted factors in decades, and the kind of vertical factors.
+    """A family of curves with known shift factors.
 
-    One of the factors is zero: that of the reference.
+    `curves` contains log10 of abscissa and ordinate, `factors` are in decades and zero for the reference, and
+    `vertical` is the kind of vertical factors.
     """
 
     groups: np.ndarray
@@ -54,7 +55,7 @@ class Family(NamedTuple):
 
     @property
     def reference(self) -> float:
-        """The group whose factor is zero."""
+        """Value of the group whose factor is zero."""
         return float(self.groups[np.flatnonzero(self.factors == 0)[0]])
 
     def merged(self) -> Found:
@@ -71,7 +72,7 @@ class Family(NamedTuple):
 
 
 def on_a_shape(shape: str, random: np.random.Generator, scatter: float = 0.01) -> Family:
-    """Draw ten curves of thirty points, two decades wide and 0.2 to 0.6 decades apart."""
+    """Draw a family of ten curves of thirty points, two decades wide and 0.2 to 0.6 decades apart."""
     factors = np.append(0, np.cumsum(random.uniform(0.2, 0.6, 9)))
     factors -= factors[5]
     x = np.linspace(-1, 1, 30)
@@ -80,7 +81,7 @@ def on_a_shape(shape: str, random: np.random.Generator, scatter: float = 0.01) -
 
 
 def on_a_plateau(setting: tuple[str, int, int, float, float], random: np.random.Generator) -> Family:
-    """Draw curves two decades wide that run into a plateau; overlaps vary by an eighth."""
+    """Draw curves two decades wide that approach a plateau; the distances of neighbours vary by an eighth."""
     shape, count, points, noise, overlap = setting
     steps = 2 * (1 - overlap) * (1 + 0.25 * random.uniform(-0.5, 0.5, count - 1))
     factors = np.append(0, np.cumsum(steps))
@@ -98,15 +99,18 @@ def maxwell(frequency: np.ndarray, times: np.ndarray, moduli: np.ndarray) -> tup
 
 
 def glass(random: np.random.Generator, low: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return times and moduli of the transition to a glass: a power law from the time `low` down."""
+    """Return times and moduli of a glass transition: a power law at times below `low`."""
     times = low * 10.0 ** -np.arange(0.0, 9.0, 0.25)
     rise = random.uniform(0.5, 0.7)
     return times, 10 ** random.uniform(5.3, 5.8) * (times / low) ** -rise * 0.25 * np.log(10)
 
 
 def melt(random: np.random.Generator) -> tuple[np.ndarray, np.ndarray, float]:
-    """Draw Doi and Edwards' odd modes with a log-normal spread of times, and a glass; times, moduli, first decade."""
-    decades = random.uniform(2.5, 4.5)  # of the plateau
+    """Draw a melt: the odd modes of Doi and Edwards with log-normally spread times, and a glass transition.
+
+    Return times, moduli, and the decade at which the frequencies begin.
+    """
+    decades = random.uniform(2.5, 4.5)  # width of the plateau
     modes, spread = np.arange(1, 32, 2), np.linspace(-2, 2, 17)
     share = np.exp(-(spread**2) / 2)
     times = (10.0 ** (random.uniform(0.1, 0.5) * spread)[:, None] / modes**2).ravel()
@@ -116,7 +120,7 @@ def melt(random: np.random.Generator) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def rubber(random: np.random.Generator) -> tuple[np.ndarray, np.ndarray, float]:
-    """Draw a network, a weak power law and a glass."""
+    """Draw a rubber: a network, a weak power law and a glass transition; return as `melt`."""
     times = 10.0 ** np.arange(-3.0, 6.0, 0.25)
     network = 10 ** random.uniform(5.5, 6.3)
     weak = network * random.uniform(0.05, 0.2) * times ** -random.uniform(0.1, 0.25) * 0.25 * np.log(10)
@@ -129,7 +133,7 @@ POLYMERS = (melt,) * 7 + (rubber,) * 5
 
 
 def of_a_polymer(number: int, random: np.random.Generator, channels: slice = slice(2)) -> Family:
-    """Draw measured moduli of one of the twelve polymers at four to eight temperatures, with WLF factors and b_T."""
+    """Draw noisy moduli of one of the twelve polymers at four to eight temperatures, with WLF factors and b_T."""
     times, moduli, begin = POLYMERS[number](np.random.default_rng(100 + number))
     count = int(random.integers(4, 9))
     c1, c2 = random.uniform(10, 16), random.uniform(60, 150)
@@ -149,7 +153,7 @@ def of_a_polymer(number: int, random: np.random.Generator, channels: slice = sli
 
 
 def drawn(kind, *choices):
-    """Return a function that draws a family with one of some choices."""
+    """Return a function that draws a family of a kind with a random one of these choices."""
 
     def draw(random: np.random.Generator) -> tuple[Family, Truth]:
         family = kind(choices[random.integers(len(choices))], random)

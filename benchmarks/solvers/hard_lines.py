@@ -1,4 +1,4 @@
-"""Adversarial measured lines: families of samples that are hard for a solver of Fourier lines; tests use them too."""
+"""Families of measured lines that are hard for a solver of Fourier lines; also used by tests."""
 
 import numpy as np
 
@@ -68,7 +68,7 @@ FAMILIES = (*(shape.__name__ for shape in SHAPES), "few", "odd")
 
 
 def samples(family, random):
-    """Return the samples of a line of a family, with mean 0 and rms height 1."""
+    """Return the samples of a random line of a family, with mean 0 and rms height 1."""
     counts = {"few": FEW, "odd": ODD}.get(family, EVEN)
     shapes = {shape.__name__: shape for shape in SHAPES}
     while True:

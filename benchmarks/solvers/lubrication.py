@@ -1,4 +1,4 @@
-"""Films of line contacts against another solver, and breakthrough of rollers against finer lines."""
+"""Benchmarks of films of line contacts (against another solver) and breakthrough of rollers (against finer lines)."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from mdr_dask.physics.surfaces.waves import series
 
 E_STAR = 115.385e9
 HEAVY = Path(__file__).parents[2] / "tests/references/heavy_line_contacts.csv"
-KNOWN = 5e-6  # relative error of those films
-BOX = ((2e-6, 5e-4), (1e-13, 1e-9), (500.0, 8000.0))  # W, U, G
+KNOWN = 5e-6  # relative error of the films in HEAVY
+BOX = ((2e-6, 5e-4), (1e-13, 1e-9), (500.0, 8000.0))  # ranges of W, U, G
 OPTIONS = (
     {},
     {"compressible": False},
@@ -44,7 +44,7 @@ def films(case: line_contact.LineContact, accuracy: float) -> Found | None:
 
 
 def uniform(case: line_contact.LineContact, count: int) -> Found | None:
-    """Return both films by Newton on equal cells from a Hertzian pressure, as is usual in the literature."""
+    """Return both films by Newton's method on equal cells, starting from a Hertzian pressure, as in the literature."""
     guess = 1.5 * film_formulas.expected_film(case.M, case.L)
     start = max(grids.inlet_position(guess), -20 * np.sqrt(2 * guess) - 1)
     grid = Grid.of(np.linspace(start, 1.5, count))
@@ -54,7 +54,7 @@ def uniform(case: line_contact.LineContact, count: int) -> Found | None:
 
 
 def any_contact(random: np.random.Generator) -> tuple[line_contact.LineContact, Truth] | None:
-    """Draw a contact of the whole box and its films to 1e-6."""
+    """Draw a contact in the whole range, with its films to 1e-6."""
     numbers = (float(np.exp(random.uniform(np.log(low), np.log(high)))) for low, high in BOX)
     case = line_contact.line_contact(numbers, E_STAR, **OPTIONS[random.integers(len(OPTIONS))])
     exact = films(case, 1e-6)
@@ -63,13 +63,13 @@ def any_contact(random: np.random.Generator) -> tuple[line_contact.LineContact, 
 
 @cache
 def heavy_contacts() -> list[dict[str, str]]:
-    """Return the heavy contacts that another solver has solved."""
+    """Return the heavily loaded contacts with films by another solver."""
     with HEAVY.open() as file:
         return list(csv.DictReader(line for line in file if not line.startswith("#")))
 
 
 def heavy_contact(random: np.random.Generator) -> tuple[line_contact.LineContact, Truth]:
-    """Draw one of the heavy contacts, with the films of the other solver."""
+    """Draw one of the heavily loaded contacts, with the films of the other solver."""
     row = heavy_contacts()[random.integers(len(heavy_contacts()))]
     law = {"viscosity_law": row["viscosity_law"], "compressible": row["compressible"] == "true"}
     law |= {"viscosity": float(row["viscosity"])} if row["viscosity"] else {}
@@ -83,7 +83,7 @@ PERIMETER, FINER = 2 * np.pi * 0.05, 8
 
 
 def rollers(random: np.random.Generator) -> tuple[declaration.MixedLubrication, Truth] | None:
-    """Draw rollers, a layer, an edge rule and in one of five cases creep; the truth is on eight times the points."""
+    """Draw rollers with a layer and an edge rule, in one of five cases with creep; the truth is on 1.6 million points."""
     case = declaration.MixedLubrication(
         normal_force=random.uniform(200, 1200),
         rotation_speed=power(random, -1, 1),
@@ -102,13 +102,17 @@ def rollers(random: np.random.Generator) -> tuple[declaration.MixedLubrication, 
 
 
 def revolution(case: declaration.MixedLubrication, points: int | str, accuracy: float | None = None) -> Found | None:
-    """Return the probability of one revolution on so many points, or on as many as an accuracy needs."""
+    """Return the probability of breakthrough in one revolution, on a number of points or to an accuracy."""
     found = one_case(MODEL, case.model_copy(update={"points": points}), OUTPUTS, accuracy=accuracy)
     return found and Found(*(float(found[name]) for name in OUTPUTS))
 
 
 class Revolution(NamedTuple):
-    """Waves of both rollers together, m, the level above which they touch, and the window, as a share of the line."""
+    """One revolution of two rollers.
+
+    `waves` are those of both rollers together in m, `level` is the height in m above which they touch, and `window` is
+    the contact width as a share of the perimeter.
+    """
 
     waves: np.ndarray
     level: float
@@ -117,17 +121,17 @@ class Revolution(NamedTuple):
 
 STRENGTH = float(breakthrough.layer_strength(1e6, E_STAR, 5e-9))
 LEVELS = (1.0431e-6, 0.5317e-6, 0.3080e-6)  # films at 40, 60 and 80 C and 800 N, m
-WINDOW = 945.4e-6  # contact width at 800 N over the perimeter
+WINDOW = 945.4e-6  # contact width at 800 N as a share of the perimeter
 
 
 def splines(case: Revolution, points: int) -> Found:
-    """Return the probability by splines of the line on so many points, their transform included."""
+    """Return the probability by splines through points of the line; the time includes the Fourier transform."""
     clusters = find_clusters(closest(case.waves, points), case.level, PERIMETER / points, STRENGTH)
     return Found(float(np.mean(breakthrough.contact_lengths(clusters, case.window * points) > 0)))
 
 
 def window_by_window(case: Revolution, points: int) -> Found:
-    """Return the probability as the thesis counts it: window by window, a cluster is a run of points."""
+    """Return the probability by the method of the thesis: window by window, with runs of points as clusters."""
     width, limit = round(case.window * points), STRENGTH * (PERIMETER / points) ** 2
     return Found(_breaking(series(case.waves, points) - case.level, width, limit) / points)
 
@@ -150,7 +154,7 @@ def _breaking(overlap: np.ndarray, width: int, limit: float) -> int:
 
 
 def thesis_rollers(random: np.random.Generator) -> tuple[Revolution, Truth]:
-    """Draw a revolution of the thesis's rollers at 800 N; the truth is splines on two million points."""
+    """Draw a revolution of the rollers of the thesis at 800 N; the truth is by splines on two million points."""
     amplitude = 0.2e-6 * roughness.amplitudes(100_000, 0.7, longest=748.0)
     phase = random.uniform(0, 2 * np.pi, (100_000, 2))
     waves = 0.5 * amplitude * np.exp(1j * phase).sum(axis=1)

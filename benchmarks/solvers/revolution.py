@@ -1,4 +1,4 @@
-"""Bodies of revolution: worn profiles by every rule, and transforms between profile and image."""
+"""Benchmarks of bodies of revolution: worn profiles by all rules, and transforms between profile and image."""
 
 from __future__ import annotations
 
@@ -20,11 +20,14 @@ from mdr_dask.physics.wear.history import LoadBlock, history
 from mdr_dask.physics.wear.rules import fast
 from mdr_dask.physics.wear.worn import Worn, virgin_load
 
-FEW = 20.0  # amounts of wear beyond which cycles are not followed one by one
+FEW = 20.0  # largest amount of wear for which every cycle is simulated
 
 
 class Wearing(NamedTuple):
-    """A body r^n, its c / a0 (0 is gross slip), amount of wear, whether the force is held, and radii to compare at."""
+    """A wear problem: a body r^n, its c / a0 (0 for gross slip), and the amount of wear.
+
+    `held` tells whether the force (or else the depth) is constant; results are compared at `radii`.
+    """
 
     profile: PowerProfile
     stick: float
@@ -34,11 +37,11 @@ class Wearing(NamedTuple):
 
     @property
     def scale(self) -> float:
-        """The depth that can wear, over that of the contact."""
+        """Largest wear depth over indentation depth."""
         return 1 - float(self.profile.image(np.array(self.stick)))
 
     def heights(self, worn: Worn) -> Found:
-        """Return the worn profile without an error."""
+        """Return a worn profile without a stated error."""
         return Found(worn.height(self.radii))
 
     def exact(self, accuracy: float) -> Found:
@@ -47,13 +50,13 @@ class Wearing(NamedTuple):
         return Found(worn.height(self.radii), worn.error("worn_profile", self.radii))
 
     def by_blocks(self, cells: int) -> Found:
-        """Return the worn profile by a block of load, stepped on a uniform grid."""
+        """Return the worn profile for one block of load, in steps on a uniform grid."""
         kept = {"force": 2 * virgin_load(self.profile, 1.0)} if self.held else {"depth": 1.0}
         block = LoadBlock(self.amount, self.scale if self.stick > 0 else np.inf, **kept)
         return self.heights(history(self.profile, [block], cells=cells)[0])
 
     def by_fast_rule(self) -> Found | None:
-        """Return the worn profile by the thesis's fast rule."""
+        """Return the worn profile by the fast rule of the thesis."""
         if self.held or self.stick == 0:
             return None
         return self.heights(fast(self.profile, self.stick, self.amount, 0.8))
@@ -76,7 +79,7 @@ def wearing(slips: bool, held: bool, random: np.random.Generator) -> tuple[Weari
 
 
 class Image(NamedTuple):
-    """An image g(x), its kinks, and radii at which its profile is wanted."""
+    """An image g(x), the positions of its kinks, and the radii at which its profile is computed."""
 
     image: Callable[[np.ndarray], np.ndarray]
     breaks: tuple[float, ...]
@@ -88,7 +91,7 @@ class Image(NamedTuple):
         return Found(found.value, found.error)
 
     def by_matrix(self, cells: int) -> Found:
-        """Return the profile by the matrix of a uniform grid, which is kept from the first call on."""
+        """Return the profile by the matrix of a uniform grid; the matrix is computed once and reused."""
         grid, flat = _grid(cells), self.image(np.zeros(1))
         return Found(np.interp(self.radii, grid.nodes, grid.inverse @ (self.image(grid.nodes) - flat) + flat))
 

@@ -1,4 +1,4 @@
-"""Steady sliding, against one element that is followed along a fine line step by step until grids agree."""
+"""Benchmarks of steady sliding. The reference follows one element along a line, on grids refined until they agree."""
 
 from __future__ import annotations
 
@@ -19,12 +19,15 @@ from mdr_dask.physics.surfaces.shapes import PowerLaw
 from mdr_dask.physics.surfaces.waves import Waves, waves_of
 
 MODES = 64
-AGREED, WORK = 1e-6, 2**21  # of the reference: relative change between grids, most cells times Prony terms
-DOUBT = 1e-3  # cases of which the reference knows less are left out
+AGREED, WORK = 1e-6, 2**21  # for the reference: relative change between grids; largest cells x Prony terms
+DOUBT = 1e-3  # cases in which the reference has a larger relative error are left out
 
 
 class Sliding(NamedTuple):
-    """A line, the same as heights at nodes, a solid (no terms for a Kelvin solid), its dashpot, and the load."""
+    """A case: a line, a function for its heights at nodes, a solid, the Deborah number of its dashpot, and the load.
+
+    `terms` is None for a Kelvin solid.
+    """
 
     line: RoughLine
     nodes: Callable[[int], np.ndarray]
@@ -41,18 +44,18 @@ class Sliding(NamedTuple):
 
 
 def generated(random: np.random.Generator) -> tuple[RoughLine, Callable[[int], np.ndarray]]:
-    """Return a generated line with a random Hurst exponent, and the same as heights at nodes."""
+    """Return a generated line with a random Hurst exponent, and a function for its heights at nodes."""
     amplitude, phase = roughness.amplitudes(MODES, random.uniform()), random.uniform(0, 2 * np.pi, MODES)
     return RoughLine(Waves(0.5 * amplitude * np.exp(1j * phase), 2 * MODES)), slow.waves(amplitude, phase)
 
 
 def power(random: np.random.Generator, low: float, high: float) -> float:
-    """Return a number between two powers of ten, each power alike."""
+    """Return a random number between 10^low and 10^high, uniform in its logarithm."""
     return float(10 ** random.uniform(low, high))
 
 
 def known(line, nodes, terms: PronyTerms | None, deborah: float, depth: float) -> tuple[Sliding, Truth] | None:
-    """Return the case that has this depth, with the friction of the reference."""
+    """Return the case with this depth and the friction of the reference; None if the reference is not accurate."""
     moduli, times = (np.array(terms.moduli), np.array(terms.deborah)) if terms else (np.empty(0), np.empty(0))
     body = slow.Body(moduli, times, deborah)
     exact = slow.reference(nodes, depth, body, line.body is None, AGREED, WORK)
@@ -63,7 +66,7 @@ def known(line, nodes, terms: PronyTerms | None, deborah: float, depth: float) -
 
 
 def on_plane(low: float, high: float, random: np.random.Generator):
-    """Draw a Kelvin solid on a generated line, with a depth between two numbers of rms heights."""
+    """Draw a Kelvin solid on a generated line, at a depth between `low` and `high` rms heights."""
     line, nodes = generated(random)
     deborah = power(random, -1.5, 0.5) / line.roughness.rms_slope()
     return known(line, nodes, None, deborah, random.uniform(low, high))
@@ -84,7 +87,7 @@ def on_indenter(rough: bool, random: np.random.Generator):
 
 
 def general(count: int | None, random: np.random.Generator):
-    """Draw a solid of one to five Prony terms, or of so many over twenty decades, on a generated line."""
+    """Draw a solid of one to five Prony terms, or of `count` terms over twenty decades, on a generated line."""
     line, nodes = generated(random)
     if count:
         terms = PronyTerms(tuple(10 ** random.uniform(-1, 1, count)), tuple(np.geomspace(1e-16, 1e4, count)))
@@ -96,7 +99,7 @@ def general(count: int | None, random: np.random.Generator):
 
 
 def measured(general: bool, random: np.random.Generator):
-    """Draw a measured line that is hard for Fourier series, under a Kelvin solid or one of Prony terms."""
+    """Draw a measured line that is hard for Fourier series, with a Kelvin solid or a solid of Prony terms."""
     height = samples(str(random.choice([name for name in FAMILIES if name != "odd"])), random)
     line, deborah, terms = RoughLine(waves_of(height)), 0.0, None
     if general:
@@ -112,12 +115,12 @@ def measured(general: bool, random: np.random.Generator):
 
 
 def to(*accuracies: float) -> dict[str, Callable[[Any], Found | None]]:
-    """Return the settings of the method that the models use."""
+    """Return the method of the models, for several accuracies."""
     return {f"{accuracy:g}": partial(Sliding.found, request=Request(accuracy)) for accuracy in accuracies}
 
 
 def on_grids(scheme, *grids: int) -> dict[str, Callable[[Any], Found | None]]:
-    """Return a scheme of a Kelvin solid on grids."""
+    """Return a scheme for a Kelvin solid, on several grids."""
     return {f"grid {grid}": partial(Sliding.found, request=Request(1.0, grid, scheme)) for grid in grids}
 
 

@@ -1,4 +1,4 @@
-"""A solver under test: random cases with known truths, and methods that solve them."""
+"""The class `Solver`: random cases with known results, and the methods that solve them."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 from benchmarks.rows import Row, timed_in_turns
 from mdr_dask.models.base import Block, Model, Parameters, Status
 
-ROUNDING = 1e-9  # of the scale: errors below count as held
+ROUNDING = 1e-9  # errors below this share of the scale count as within the stated error
 
 
 class Truth(NamedTuple):
-    """Known values, their own error, and the scale that errors are relative to."""
+    """Known values, their error, and the scale to which errors are relative."""
 
     values: ArrayLike
     doubt: ArrayLike = 0.0
@@ -25,7 +25,7 @@ class Truth(NamedTuple):
 
 
 class Found(NamedTuple):
-    """Computed values and their stated errors; NaN where a method states none."""
+    """Computed values and their stated errors; NaN if a method states no error."""
 
     values: ArrayLike
     stated: ArrayLike = np.nan
@@ -33,19 +33,19 @@ class Found(NamedTuple):
 
 @dataclass(frozen=True)
 class Solver:
-    """One solver of the package beside other methods.
+    """One solver of the package, and other methods for comparison.
 
     Parameters
     ----------
     name : str
     about : str
-        What the errors are, and what the truth is.
+        Definition of the error, and description of the truth.
     families : dict
-        Name and function that draws a case and its truth from a generator; None if the case has no solution.
+        Functions by name that draw a case and its truth from a generator, or None if the case has no solution.
     methods : dict
-        Method, setting and function that solves a case. A method that does not apply to a case returns None.
+        Functions by method and setting that solve a case, or return None if the method does not apply.
     rounds : int
-        Calls of each method, of which the least time counts; the first may compile.
+        Number of calls of each method; the least time counts, because the first call may compile.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Solver:
     rounds: int = 3
 
     def measure(self, cases: int, seed: int) -> Iterator[Row]:
-        """Yield for every family, method and setting: median time, error that 90 % of cases stay below, stated error.
+        """Yield a row for every family, method and setting: median time, 90 % quantile of the error, stated error.
 
         Parameters
         ----------
@@ -85,7 +85,7 @@ class Solver:
 def judged(found: Found, truth: Truth) -> tuple[float, float, float]:
     """Return the largest error and the largest stated error over the scale, and the share of stated errors that hold.
 
-    A method with another error than the reference is judged down to the doubt of the reference only.
+    Errors smaller than the error of the truth cannot be resolved; the error of the truth is then returned.
     """
     errors = np.abs(np.asarray(found.values) - truth.values)
     held = errors <= found.stated + np.asarray(truth.doubt) + ROUNDING * np.asarray(truth.scale)

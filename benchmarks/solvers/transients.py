@@ -1,4 +1,7 @@
-"""Velocity jumps and loading histories, against every element followed in time or the same solver on fine grids."""
+"""Benchmarks of velocity jumps and loading histories.
+
+The reference follows every element in time, or is the same solver on a fine grid.
+"""
 
 from __future__ import annotations
 
@@ -33,13 +36,13 @@ class JumpCase(NamedTuple):
     load: float
 
     def jumped(self, accuracy: float | None, oversampling: int, per_decade: float | None):
-        """Return the solution to an accuracy, with a march if it has steps."""
+        """Return the solution to an accuracy; with a march if `per_decade` steps are given."""
         problem = JumpProblem(RoughLine(self.waves), np.array([self.load]), np.array([[self.before, self.after]]))
         march = per_decade and MarchRequest(TIMES, np.pi * POINTS, per_decade)
         return solve_jumps(problem, JumpRequest(accuracy, oversampling, march or None, bool(march)))
 
     def marched(self, oversampling: int, per_decade: float) -> Found | None:
-        """Return the transient by the march of the models, over the friction at the end."""
+        """Return the transient by the march of the models, over the steady friction after the jump."""
         found = self.jumped(0.01, oversampling, per_decade)
         if found.outcome[0] != Outcome.CONVERGED:
             return None
@@ -47,7 +50,7 @@ class JumpCase(NamedTuple):
         return Found((found.trace[0] - last) / last, found.trace_error[0] / last)
 
     def levels(self, accuracy: float) -> Found | None:
-        """Return friction before, at and after the jump over that after it."""
+        """Return friction before the jump, jump, and friction after it, over the friction after it."""
         found = self.jumped(accuracy, 4, None)
         if found.outcome[0] != Outcome.CONVERGED:
             return None
@@ -55,7 +58,7 @@ class JumpCase(NamedTuple):
         return Found(values / values[2], stated / values[2])
 
     def followed(self, oversampling: int) -> Found:
-        """Follow every element, pressed at rest, for 10 tau before and after the jump, in steps of a cell and less."""
+        """Follow every element from contact at rest, for 10 tau before and after the jump, in steps of up to a cell."""
         nodes = POINTS * oversampling
         height = self.waves.heights(nodes)
         step = 1 / nodes / max(self.before, self.after)
@@ -72,7 +75,7 @@ class JumpCase(NamedTuple):
         return Found(relaxing(moments - jump, state.drag))
 
     def papers(self, oversampling: int) -> Found:
-        """March by the papers' backward Euler from rest, at v_1 for 10 tau and at v_2 for 10 tau."""
+        """March from rest by the backward Euler method of the papers, for 10 tau at v_1 and 10 tau at v_2."""
         n = POINTS * oversampling
         height = self.waves.heights(n)
         before, after = int(RUN_IN * self.before * n), int(RUN_IN * self.after * n)
@@ -83,7 +86,7 @@ class JumpCase(NamedTuple):
 
 
 def relaxing(moments: np.ndarray, drag: np.ndarray) -> np.ndarray:
-    """Return the transient at `TIMES` over the drag at the end."""
+    """Return the transient at `TIMES`, over the drag at the end."""
     return (np.interp(TIMES, moments, drag) - drag[-1]) / drag[-1]
 
 
@@ -98,8 +101,8 @@ def rest_depth(height: np.ndarray, load: float) -> float:
 def backward_euler(height: np.ndarray, ratios: np.ndarray, depth: float, load: float, drag: np.ndarray) -> None:
     """March by backward Euler: in every step each element moves on by one cell.
 
-    The depth carries the load, sum of max(0, w (1 + r) - r u_old) with r = tau / dt, found by Newton; drag by central
-    differences of the height.
+    The depth follows from the load, which is the sum of max(0, w (1 + r) - r u_old) with r = tau / dt, by Newton's
+    method. The drag is computed with central differences of the height.
     """
     n = height.size
     u, old = np.maximum(height + depth, 0.0), np.empty(n)
@@ -128,7 +131,7 @@ def backward_euler(height: np.ndarray, ratios: np.ndarray, depth: float, load: f
 
 
 def jump_case(least: float, most: float, random: np.random.Generator) -> JumpCase:
-    """Draw a jump of the velocity by a factor between two powers of ten."""
+    """Draw a jump of the velocity by a factor between 10^least and 10^most."""
     amplitude = roughness.amplitudes(POINTS // 2, random.uniform())
     waves = Waves(0.5 * amplitude * np.exp(2j * np.pi * random.uniform(size=POINTS // 2)), POINTS)
     before = power(random, -2, -0.7)
@@ -136,14 +139,14 @@ def jump_case(least: float, most: float, random: np.random.Generator) -> JumpCas
 
 
 def transient(least: float, most: float, random: np.random.Generator) -> tuple[JumpCase, Truth]:
-    """Draw a jump and its transient by every element on two grids, extrapolated at second order."""
+    """Draw a jump, with its transient from following every element on two grids, extrapolated at second order."""
     case = jump_case(least, most, random)
     half, finest = (np.asarray(case.followed(grid).values) for grid in (FINEST // 2, FINEST))
     return case, Truth((4 * finest - half) / 3, np.max(np.abs(finest - half)) / 3)
 
 
 def steady(random: np.random.Generator) -> tuple[JumpCase, Truth] | None:
-    """Draw a jump and its levels by the solver at 1e-6."""
+    """Draw a jump, with its steady levels by the solver at 1e-6."""
     case = jump_case(-1, 1, random)
     exact = case.levels(1e-6)
     return exact and (case, Truth(exact.values, exact.stated, np.abs(exact.values)))
@@ -160,7 +163,7 @@ INDENTERS = ({"shape": "plane"}, {"shape": "parabola", "radius": 0.05}, {"shape"
 
 
 def history(random: np.random.Generator) -> tuple[VelocityJump, Truth] | None:
-    """Draw a loading history and its friction on a grid three times finer with twice the steps."""
+    """Draw a loading history, with its friction on a fine grid with small steps."""
     velocity, force = power(random, -3, 0.5), power(random, -2, 0.5)
     protocols: list[dict[str, object]] = [
         {"shape": "steps", "start": "rest", "times": [0.0], "velocities": [velocity]},

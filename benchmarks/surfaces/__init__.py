@@ -1,1 +1,1 @@
-"""Measured surfaces, and how far rough lines stand for them."""
+"""Benchmarks of measured surfaces, and of the validity of rough lines in place of surfaces."""

@@ -1,8 +1,9 @@
-"""Friction of lines beside Persson's theory for tyres and seals: ``python -m benchmarks persson``.
+"""Compare friction of lines with Persson's theory for tyres and seals: ``python -m benchmarks persson``.
 
 B. N. J. Persson, J. Chem. Phys. 115, 3840 (2001), with his correction S = 1/2 + P^2/2 of the elastic energy in partial
-contact. Both get the same isotropic spectrum and the same Kelvin or standard solid. A line of length L carries the load
-on a disc of diameter L, as in docs/validity.md. The theory is an approximation of its own: it is exact in full contact.
+contact. Lines and theory have the same isotropic spectrum and the same Kelvin or standard solid. A line of length L
+carries the load on a disc of diameter L, as in docs/validity.md. The theory is exact in full contact, otherwise an
+approximation.
 """
 
 import numpy as np
@@ -16,19 +17,19 @@ from mdr_dask.physics.surfaces.spectrum import self_affine
 from mdr_dask.physics.surfaces.waves import Waves
 
 LINES, STATIC = 10, 1e6
-#: Name: Hurst exponent, longest wave, roll-off, shortest wave, rms height (m), length of the line (m), Nyquist points.
+#: Hurst exponent, longest wave, roll-off and shortest wave (m), rms height (m), length of the line (m), Nyquist points.
 SURFACES = {
     "road": (0.8, 8e-3, 5e-3, 4e-5, 2e-4, 16e-3, 800),
     "ground steel": (0.8, 2e-4, 1e-4, 1e-6, 5e-7, 4e-4, 800),
 }
-#: Glassy over static modulus (None: a Kelvin solid), and relaxation time in s.
+#: Ratio of glassy to static modulus (None for a Kelvin solid), and relaxation time in s.
 SOLIDS = {"Kelvin": (None, 1e-6), "standard": (30.0, 1e-5)}
 PRESSURES = (1e-2, 3e-2, 1e-1, 3e-1, 1.0)  # MPa
 VELOCITIES = (1e-2, 1.0)  # m/s
 
 
 def modulus(solid, omega):
-    """Return G* of a solid, Pa."""
+    """Return the complex shear modulus of a solid in Pa."""
     glass, time = solid
     if glass is None:
         return STATIC * (1 + 1j * omega * time)
@@ -38,7 +39,7 @@ def modulus(solid, omega):
 def persson(spectrum, solid, pressure, velocity):
     """Return friction and relative area in contact by Persson's theory."""
     q = np.geomspace(spectrum.wavenumber[0], spectrum.wavenumber[-1], 400)
-    angle = (np.arange(200) + 0.5) * np.pi / 400  # a quarter of the circle
+    angle = (np.arange(200) + 0.5) * np.pi / 400  # angles of a quarter of the circle
     effective = 4 * modulus(solid, q[:, None] * velocity * np.cos(angle)) / pressure  # E / (1 - nu^2) = 4 G
     density = spectrum.at(q)
     squares = 2 * np.pi * np.mean(np.abs(effective) ** 2, axis=1)
@@ -53,7 +54,7 @@ def persson(spectrum, solid, pressure, velocity):
 
 
 def lines(spectrum, solid, pressure, velocity, length, points):
-    """Return friction (mean and standard error over lines), part of the line in contact, and F / (E* L h)."""
+    """Return friction (mean and standard error over lines), contact fraction, and F / (E* L h)."""
     amplitude = spectrum.line(length, points // 2)
     height = np.sqrt(np.sum(amplitude**2) / 2)
     load = pressure * np.pi / 4 * length**2 / (4 * STATIC * length * height)
@@ -71,7 +72,7 @@ def lines(spectrum, solid, pressure, velocity, length, points):
 
 
 def main():
-    """Print a table: friction of lines over that of the theory."""
+    """Print a table of the friction of lines over the friction of the theory."""
     rows = []
     for name, (hurst, longest, rolloff, shortest, rms, length, points) in SURFACES.items():
         spectrum = self_affine(hurst, longest, shortest, rms, rolloff)

@@ -1,6 +1,6 @@
-"""Rough circular punches on an elastic half-space by ContactMechanics, and the lines of the method beside them.
+"""Rough circular punches on an elastic half-space (by ContactMechanics), and the lines that replace them.
 
-``python -m benchmarks validity`` computes what is missing in docs/evidence/punches.csv.
+``python -m benchmarks validity`` computes the rows that are missing in docs/evidence/punches.csv.
 """
 
 import csv
@@ -21,24 +21,24 @@ TABLE = Path(__file__).parents[2] / "docs/evidence/punches.csv"
 COLUMNS = ("body", "hurst", "points", "index", "load", "approach", "contact", "gap")
 HURST = (0.3, 0.5, 0.8)
 LOADS = np.geomspace(1e-4, 1, 9)  # F / (E* L h)
-HEIGHT = 1e-3  # h / L: any, all is linear
-TOLERANCE = 3e-5  # largest penetration over h
+HEIGHT = 1e-3  # h / L; its value does not matter, because the problem is linear
+TOLERANCE = 3e-5  # largest allowed penetration over h
 LINES, SEED = 200, 14
-LONGEST, RESOLVED = 2, 8  # waves over the diameter; points of the shortest wave
+LONGEST, RESOLVED = 2, 8  # longest waves per diameter; points per shortest wave
 
 
 def spectrum(hurst, points):
-    """Return the spectrum of the punch of diameter 1 and rms height 1."""
+    """Return the spectrum of a punch of diameter 1 and rms height 1."""
     return self_affine(hurst, 1 / LONGEST, RESOLVED / points)
 
 
 def line(hurst, points, index):
-    """Return approach and gap over h, and length in contact over L, of one line at every load."""
+    """Return approach over h, contact length over L, and mean gap over h, of one line at every load."""
     modes = points // RESOLVED
     amplitude = spectrum(hurst, points).line(1.0, modes)
     height = np.sort(roughness.line(amplitude, roughness.phases(SEED, index, modes), points))[::-1]
     touching = np.arange(1, points + 1)
-    carried = (np.cumsum(height) - touching * height) / points  # F / (E* L h) as each point comes into contact
+    carried = (np.cumsum(height) - touching * height) / points  # F / (E* L h) at which each point comes into contact
     count = np.searchsorted(carried, LOADS, side="right")
     depth = (LOADS * points - np.cumsum(height)[count - 1]) / count
     gap = [np.mean(np.maximum(-d - height, 0)) for d in depth]
@@ -47,7 +47,7 @@ def line(hurst, points, index):
 
 @lru_cache(maxsize=1)
 def free_half_space(points):
-    """Return ContactMechanics' half-space of unit size and modulus; its transforms pass over the padding."""
+    """Return the half-space of ContactMechanics with unit size and modulus, with faster transforms of padded arrays."""
     from ContactMechanics import FreeFFTElasticHalfSpace
 
     class HalfSpace(FreeFFTElasticHalfSpace):
@@ -71,7 +71,7 @@ def free_half_space(points):
 
 
 def half_space(hurst, points, index):
-    """Return approach and gap over h, and area in contact over that of the punch, of one surface at every load."""
+    """Return approach over h, contact area over punch area, and mean gap over h, of one surface at every load."""
     from ContactMechanics.Systems import NonSmoothContactSystem
     from SurfaceTopography import Topography
 
@@ -91,7 +91,7 @@ def half_space(hurst, points, index):
 
 
 def rows():
-    """Return what has been computed, as a list of dictionaries."""
+    """Read the table of results as a list of dictionaries."""
     if not TABLE.exists():
         return []
     with TABLE.open() as stream:
@@ -99,7 +99,7 @@ def rows():
 
 
 def compute(surfaces=20, points=512):
-    """Append what is missing, one surface or line after the other."""
+    """Compute the missing rows, and append them to the table after each surface or line."""
     known = {(row["body"], float(row["hurst"]), int(row["points"]), int(row["index"])) for row in rows()}
     for body, function, count in (("line", line, LINES), ("half-space", half_space, surfaces)):
         for index in range(count):

@@ -1,8 +1,8 @@
-"""Make the road of campaigns/road.yaml: three maps of one generated asphalt, and their spectrum as `surface` writes it.
+"""Make the data of campaigns/road.yaml: three maps of a generated asphalt, and their spectrum from `mdr-dask surface`.
 
-``python -m benchmarks road [FOLDER]``: C2D ~ q^(-2 - 2 H) with H = 0.8 from 2.5 mm down to 10 um, constant
-above, rms height 50 um; 20 nm of white noise of the instrument; 1024 x 1024 points 5 um apart, cut out of a larger
-periodic surface and tilted.
+``python -m benchmarks road [FOLDER]``: C2D ~ q^(-2 - 2 H) with H = 0.8 for wavelengths from 2.5 mm to 10 um, constant
+above, and an rms height of 50 um. White noise of 20 nm is added. The maps have 1024 x 1024 points at distances of 5 um;
+they are cut out of a larger periodic surface and tilted.
 """
 
 import sys
@@ -21,7 +21,7 @@ SPECTRUM = self_affine(0.8, 8e-3, 1e-5, 5e-5, 2.5e-3)
 
 
 def main(folder=str(Path(__file__).parents[2] / "campaigns/data/road")):
-    """Write maps, spectrum and figure into a folder."""
+    """Write the maps, their spectrum and the figure into a folder."""
     folder = Path(folder)
     side = POINTS * 3 // 2
     names = []

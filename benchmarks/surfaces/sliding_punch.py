@@ -1,6 +1,6 @@
-"""A rough circular punch that slides over a Kelvin half-space at constant speed, and the lines of the method beside it.
+"""A rough circular punch that slides over a Kelvin half-space at constant speed, and the lines that replace it.
 
-``python -m benchmarks validity`` computes what is missing in docs/evidence/sliding_punch.csv.
+``python -m benchmarks validity`` computes the rows that are missing in docs/evidence/sliding_punch.csv.
 """
 
 import csv
@@ -26,23 +26,23 @@ COLUMNS = (
 )
 HEADING = "q [rad/m],C2D [m^4]"
 HURST, SEED = 0.8, 15
-DEBORAH = (0.01, 0.1)  # v tau / L: beyond, what leaves the punch comes back through the period of the transform
-DEPTHS = (-1.5, -0.5, 0.5)  # over the rms height
+DEBORAH = (0.01, 0.1)  # v tau / L; at higher values, periodic images of the punch interact
+DEPTHS = (-1.5, -0.5, 0.5)  # depths over the rms height
 LINES = 40
 
 
 @lru_cache(maxsize=8)
 def response(points, deborah):
-    """Return the response of displacements of unit modulus E* = 4 G to forces, in the frame of the punch.
+    """Return the displacement response to forces for unit modulus E* = 4 G, in the frame of the punch.
 
-    A Kelvin half-space has u + v tau du/dx = u_el, with the displacements u_el of the elastic one.
+    For a Kelvin half-space u + v tau du/dx = u_el, where u_el is the displacement of the elastic half-space.
     """
     q_x, _ = wavenumbers((2 * points, 2 * points), (2.0, 2.0))
     return free_half_space(points).response / (1 + 1j * deborah * q_x)[:, None]
 
 
 def slide(height, depth, deborah):
-    """Return the forces on the points of a punch that is pressed in by a depth and slides along x."""
+    """Return the forces on the points of a punch that slides along x at a given depth."""
     points = height.shape[0]
     place = (np.arange(points) + 0.5) / points - 0.5
     punch = np.hypot(place[:, None], place) < 0.5
@@ -78,7 +78,7 @@ def slide(height, depth, deborah):
 
 
 def lines(points, load, deborah, count=LINES):
-    """Return mean friction over h / L, contact fraction, and the standard error of the friction, of the lines."""
+    """Return the mean friction of the lines over h / L, their contact fraction, and the standard error of friction."""
     surface = Surface.model_validate({"spectrum": table(points)})
     parameters = SlidingFriction(
         length=1.0,
@@ -96,7 +96,7 @@ def lines(points, load, deborah, count=LINES):
 
 @lru_cache(maxsize=4)
 def table(points):
-    """Write the spectrum of the punch, of unit rms height; return the name of the file."""
+    """Write the spectrum of the punch for unit rms height to a file, and return its name."""
     one = spectrum(HURST, points)
     with tempfile.NamedTemporaryFile("w", suffix=".csv", delete=False) as file:
         np.savetxt(file, np.column_stack([one.wavenumber, one.density]), "%.17g", ",", header=HEADING, comments="")
@@ -104,7 +104,7 @@ def table(points):
 
 
 def case(points, surfaces, deborah, depth):
-    """Return load over E* L h, friction over h / L of both bodies with standard errors, area and length in contact."""
+    """Return load over E* L h, friction over h / L of punch and lines with standard errors, contact area and length."""
     found = []
     for index in range(surfaces):
         height = areal_surface(spectrum(HURST, points), (points, points), (1.0, 1.0), SEED, index)
@@ -120,7 +120,7 @@ def case(points, surfaces, deborah, depth):
 
 
 def rows():
-    """Return what has been computed, as a list of dictionaries of numbers."""
+    """Read the table of results as a list of dictionaries of numbers."""
     if not TABLE.exists():
         return []
     with TABLE.open() as stream:
@@ -128,7 +128,7 @@ def rows():
 
 
 def compute(points=128, surfaces=2):
-    """Append what is missing, one case after the other."""
+    """Compute the missing rows, and append them to the table after each case."""
     known = {tuple(row[name] for name in COLUMNS[:4]) for row in rows()}
     for deborah in DEBORAH:
         for depth in DEPTHS:
@@ -147,7 +147,7 @@ def compute(points=128, surfaces=2):
 
 
 def table_of_cases():
-    """Return the rows of the table in docs/validity.md."""
+    """Yield the rows of the table in docs/validity.md."""
     for row in sorted(rows(), key=lambda row: (row["points"], row["deborah"], row["load"])):
         yield (
             *(f"{row[name]:g}" for name in ("points", "surfaces", "deborah")),

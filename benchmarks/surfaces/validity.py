@@ -1,10 +1,10 @@
-"""Where the method holds: data, figure and tables of docs/validity.md.
+"""Data, figure and tables of docs/validity.md on the validity of the method.
 
-python -m benchmarks validity               computes what is missing (20 surfaces of 512 x 512 points), then the tables
-python -m benchmarks validity page          figure and tables again
+python -m benchmarks validity               compute missing data (20 surfaces of 512 x 512 points), then write the page
+python -m benchmarks validity page          only write figure and tables
 
-Stiffness, approach and contact of rough circular punches on a half-space (ContactMechanics), and of the lines of the
-method beside them, without a free parameter; and the friction of a sliding punch.
+Stiffness, approach and contact of rough circular punches on a half-space (ContactMechanics) are compared with those of
+the lines that replace them, without a free parameter. So is the friction of a sliding punch.
 """
 
 from pathlib import Path
@@ -22,7 +22,7 @@ BODIES = ("half-space", "line")
 
 
 def collected(points):
-    """Return arrays (bodies, loads) of approach, contact and gap by body and Hurst exponent."""
+    """Return arrays of approach, contact and gap (realisations, loads), by kind of body and Hurst exponent."""
     found = {}
     for row in punches.rows():
         if int(row["points"]) == points:
@@ -33,12 +33,12 @@ def collected(points):
 
 
 def stiffness(approach):
-    """Return dF/dd over E* L between loads, in each body."""
+    """Return the stiffness dF/dd between neighbouring loads, over E* L, of each realisation."""
     return np.diff(punches.LOADS) / np.diff(approach, axis=1)
 
 
 def ratio(line, surface, draws=2000):
-    """Return the ratio of the means over bodies, and its 95 % interval by resampling both."""
+    """Return the ratio of the means of line and surface, and its 95 % interval by resampling both."""
     generator = np.random.default_rng(0)
     means = [each[generator.integers(0, len(each), (draws, len(each)))].mean(axis=1) for each in (line, surface)]
     low, high = np.percentile(means[0] / means[1], [2.5, 97.5], axis=0)
@@ -62,7 +62,7 @@ def tables(found):
 
 
 def draw(found):
-    """Write the figure: stiffness, approach, contact; a column each Hurst exponent."""
+    """Write the figure with stiffness, approach and contact; each Hurst exponent has a column."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10, 8.5), layout="constrained")
@@ -94,7 +94,7 @@ def draw(found):
 
 
 def main(*arguments):
-    """Compute what is missing, or nothing if only the page is wanted, and write figure and tables."""
+    """Compute missing data unless the argument is ``page``, and write figure and tables."""
     if "page" not in arguments:
         punches.compute(20, POINTS)
         sliding_punch.compute()
@@ -103,7 +103,7 @@ def main(*arguments):
 
 
 def with_tables(page):
-    """Return the page with the tables of today's evidence between its marks."""
+    """Return the text of the page with the current tables between its marks."""
     *parts, sliding = *tables(collected(POINTS)), table(sliding_punch.HEAD, sliding_punch.table_of_cases())
     for name, text in zip(TABLES, (*parts, sliding), strict=True):
         start, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"

@@ -1,4 +1,4 @@
-"""The thesis, claim by claim: what it says and whether it holds; ``python -m benchmarks thesis [LINES]``."""
+"""Test the thesis claim by claim: ``python -m benchmarks thesis [LINES]``."""
 
 from benchmarks.thesis.claims import CHAPTERS
 from benchmarks.thesis.ledger import WORDS, Claim, FromFit, Studies, page, word

@@ -24,7 +24,7 @@ MIDDLE = {"hurst": slice(0.15, 0.85)}
 THREE = {"hurst": [0.2, 0.5, 0.8]}
 FEW = {"hurst": "[0, 0.2, 0.5, 0.8, 1]"}
 ALL = {"hurst": "all"}
-#: Loads on the plateau, and a few speeds and Hurst exponents of the kinetics.
+#: Reduced axes of campaigns: few speeds and Hurst exponents of the kinetics, and loads on the plateau.
 SPEEDS = {"series_velocity": "{velocity: {geometric: [10 um/s, 10 m/s, 15]}, hurst: [0, 0.3, 0.7, 1]}"}
 LOADS = {
     "series_force_velocity": "{normal_force: {geometric: [0.1 N, 100 N, 4]}, velocity: [1 mm/s, 0.1 m/s, 10 m/s]}",

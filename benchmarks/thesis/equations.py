@@ -1,10 +1,10 @@
-"""Where each equation of the thesis is in the code, and how it was checked."""
+"""Table of the equations of the thesis: place in the code, and check."""
 
 from __future__ import annotations
 
 from benchmarks.thesis.ledger import row
 
-#: Equation, place in the code, check. Where the print is damaged or wrong, the reading is given.
+#: Equation, place in the code, check. For damaged or wrong printed equations, the form that was used is given.
 EQUATIONS = (
     ("(2.1), (2.2)", "parameters E*, G*", "Mindlin's 8 G* a"),
     ("(2.3), (3.1)-(3.5)", "physics/solids.py", "creep and relaxation in closed form"),

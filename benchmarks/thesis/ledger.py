@@ -1,7 +1,7 @@
-"""What a claim of the thesis is, the studies on which it is judged, and the page that lists all claims.
+"""Claims of the thesis, the studies by which they are tested, and the page that lists all claims.
 
-Every verdict is a sentence that begins with one of `WORDS`. The first four are those of the fits
-(`mdr_dask.fits.base.law_holds`), and where a claim is a law that can be fitted, the sentence is the fit's own.
+Every verdict is a sentence that begins with one of `WORDS`. The first four words are also those of the fits
+(`mdr_dask.fits.base.law_holds`). If a claim is a law that can be fitted, the sentence is taken from the fit.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ class Studies:
     Parameters
     ----------
     lines : int
-        Realisations at most.
+        Largest number of realisations.
     points : int or None
-        Nyquist points of the lines in place of 5000, for a quick look.
+        Number of Nyquist points of the lines instead of 5000, for a quick test.
     folder : str
-        Where the stores are kept.
+        Folder of the stores.
     """
 
     lines: int
@@ -45,9 +45,9 @@ class Studies:
     folder: str = field(default_factory=tempfile.mkdtemp)
 
     def __call__(self, name: str, series: Sequence[str] = (), **replaced: str) -> dict[str, xr.Dataset]:
-        """Return the series of a campaign, all or those named, with some of its lines ``key: value`` replaced.
+        """Return series of a campaign (default: all), with some lines ``key: value`` of the campaign replaced.
 
-        A key ``series_NAME`` stands for the line of a series.
+        A key ``series_NAME`` means the line ``NAME: value`` below ``series:``.
         """
         text = (CAMPAIGNS / f"{name}.yaml").read_text()
         if self.points:
@@ -85,15 +85,15 @@ class Claim:
     Parameters
     ----------
     item : str
-        Its number in the thesis.
+        Number in the thesis.
     claim : str
-        What it says.
+        The statement.
     command : str
-        How a user gets our result.
+        Command that gives our result.
     judge : callable, Studies -> str, or str
-        The verdict, a sentence that begins with one of `WORDS`, or how it is found.
+        The verdict (a sentence that begins with one of `WORDS`), or a function that returns it.
     why : str
-        What explains the verdict.
+        Explanation of the verdict.
     """
 
     item: str
@@ -103,7 +103,7 @@ class Claim:
     why: str = ""
 
     def verdict(self, studies: Studies) -> str:
-        """Return the sentence."""
+        """Return the verdict as a sentence."""
         return self.judge if isinstance(self.judge, str) else self.judge(studies)
 
 
@@ -113,24 +113,24 @@ def word(sentence: str) -> str:
 
 
 def compared(figure: str, *departures: float) -> str:
-    """Return the verdict on relative departures of exact numbers, with a figure."""
+    """Return the verdict on relative departures without scatter, followed by a text with numbers."""
     return f"{law_holds(np.array(departures), None)}; {figure}"
 
 
 @dataclass(frozen=True)
 class FromFit:
-    """The verdict of a fit: its own sentence, of the worst case where there are several.
+    """A verdict that is the sentence of a fit; with several cases, that of the worst case.
 
     Parameters
     ----------
     campaign, law, series : str
         As in ``mdr-dask fit results/CAMPAIGN.zarr LAW --series SERIES``.
     sentence : str
-        Name of the sentence.
+        Name of the variable with the sentence.
     constants : tuple of str
         Constants to print with their intervals.
     within : dict
-        Cases that the claim is about, by label along dimensions.
+        Cases to which the claim refers, by label along dimensions.
     shown : dict
         Cases whose constants are printed.
     replaced : dict
@@ -147,7 +147,7 @@ class FromFit:
     replaced: dict[str, str] = field(default_factory=dict)
 
     def __call__(self, studies: Studies) -> str:
-        """Return the sentence, with the constants."""
+        """Return the sentence of the fit, followed by the constants."""
         groups = studies(self.campaign, (self.series,) if self.series else (), **self.replaced)
         model = next(iter(groups.values())).attrs["model"]
         found = next(iter(available(model)[self.law].results(groups).values()))
@@ -182,7 +182,7 @@ def _number(value: object) -> str:
 
 
 def _shown(part: xr.Dataset, name: str) -> str:
-    """Return a constant with its interval, of every case."""
+    """Return a text with a constant and its interval for every case."""
     ends = [part[name], part.get(f"{name}_low", part[name]), part.get(f"{name}_high", part[name])]
     if part[name].ndim == 0:
         return f"{name} = {_interval(*(float(end) for end in ends))}"

@@ -18,7 +18,7 @@ MODES, HURSTS = 2500, (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
 def transforms(_: Studies) -> str:
-    """Take a body with a bend to its line and back."""
+    """Transform a body with a bend to its line and back."""
     radius = np.linspace(0.05, 1.0, 20)
     image = forward_transform(lambda r: 2 * r + 1.05 * r**2.5, radius).value
     exact = power_factor(2.0) * radius**2 + 0.3 * power_factor(3.5) * radius**3.5
@@ -28,7 +28,7 @@ def transforms(_: Studies) -> str:
 
 
 def hertz(_: Studies) -> str:
-    """Compare Hertz's sphere, F = 4/3 E* R^(1/2) d^(3/2), with the line of the method."""
+    """Compare Hertz's law for a sphere, F = 4/3 E* R^(1/2) d^(3/2), with the line of the method."""
     E_star, R, depth = 1e9, 0.02, 1e-5
     radius = contact.contact_radius(depth, 1 / (2 * R), 2.0)
     force = contact.normal_force(radius, 1 / (2 * R), 2.0, E_star)
@@ -47,7 +47,7 @@ def lines(_: Studies) -> str:
 
 
 def integral(power: int, limits: str) -> Judge:
-    """Return the judge of an integral of the spectrum in place of the sum over 2500 harmonics."""
+    """Return a function that compares an integral of the spectrum with the sum over 2500 harmonics."""
 
     def judge(_: Studies) -> str:
         k, departures = np.arange(1, MODES + 1.0), {}
@@ -75,7 +75,7 @@ def rule(_: Studies) -> str:
 
 
 def _numbers(dataset: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
-    """Return mu over slope, force number and velocity number of means over lines."""
+    """Return the mean of mu over slope, the force number and the velocity number."""
     mean = dataset[["friction_coefficient", "rms_slope"]].mean("realisation")
     force = laws.force_number(dataset.normal_force, dataset.shear_modulus, dataset.rms_roughness, dataset.length)
     velocity = laws.velocity_number(dataset.velocity, dataset.relaxation_time, mean.rms_slope, dataset.rms_roughness)
@@ -83,7 +83,7 @@ def _numbers(dataset: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray, xr.DataAr
 
 
 def slope_squared(studies: Studies) -> str:
-    """Vary the slope by the shortest wave alone, in region I of zone 1."""
+    """Vary the slope only by the shortest wave, in region I of zone 1, and fit the power of friction."""
     points = "[2000, 3240, 5184, 8640, 13824]" if studies.points is None else "[500, 800, 1250, 2000]"
     text = {"points": points, "velocity": "1 um/s", "hurst": "0.7", "normal_force": "30 mN"}
     mean = studies("friction_force", **text)[""].mean("realisation")
@@ -93,7 +93,7 @@ def slope_squared(studies: Studies) -> str:
 
 
 def force_over_modulus(studies: Studies) -> str:
-    """Compare two rubbers under loads of one ratio to their moduli."""
+    """Compare two rubbers under loads with the same ratio to their moduli."""
     soft = studies("quickstart", shear_modulus="1 MPa", normal_force="[1 mN]")[""]
     hard = studies("quickstart", shear_modulus="100 MPa", normal_force="[100 mN]")[""]
     ratio = hard.friction_coefficient.values / soft.friction_coefficient.values
@@ -111,7 +111,7 @@ def regions(studies: Studies) -> str:
 
 
 def last_level(studies: Studies) -> str:
-    """Follow mu of one light load to 1000 km/s: the claim is that it no longer changes."""
+    """Compute mu at one light load up to 1000 km/s; the claim is that it no longer changes."""
     text = {"normal_force": "10 mN", "velocity": "[10 km/s, 100 km/s, 1e6 m/s]"}
     mean = studies("friction_force", **text)[""].mean("realisation")
     mu = mean.friction_coefficient.squeeze().to_numpy()
@@ -123,7 +123,7 @@ def last_level(studies: Studies) -> str:
 
 
 def transition(studies: Studies) -> str:
-    """Measure region II: from 90 % of the line of region I to 90 % of the plateau."""
+    """Measure region II, from where mu is 90 % of the law of region I to where it is 90 % of the plateau."""
     mu, _, velocity = _numbers(studies("friction_force")[""])
     heavy, speed = (x.sel(normal_force=1.5, method="nearest").to_numpy() for x in (mu, np.log10(velocity)))
     below_line = heavy[0] * 10 ** (speed - speed[0]) / heavy
@@ -163,7 +163,7 @@ def slope_of_depth(studies: Studies) -> str:
 
 
 def full_contact(studies: Studies) -> str:
-    """Compare cases wholly in contact with mu = 4 eta v L slope^2 / F."""
+    """Compare cases in full contact with mu = 4 eta v L slope^2 / F."""
     grid = {"points": f"{studies.points or 5000}\n  oversampling: 4"}
     data = studies("friction_force", normal_force="[100 N, 1 kN]", velocity="[1e-5, 1e-3]", **grid)[""]
     law = 4 * data.shear_modulus * data.relaxation_time * data.velocity * data.length * data.rms_slope**2
@@ -173,14 +173,14 @@ def full_contact(studies: Studies) -> str:
 
 
 def slopes(_: Studies) -> str:
-    """Work out (3.16), rms over mean of the slopes, for three distributions, beside the plateau sqrt 2."""
+    """Compute (3.16), rms over mean of the slopes, for two distributions, and compare it with sqrt 2."""
     normal, tip = np.sqrt(np.pi / 2), 2 / np.sqrt(3)
     figure = f"{normal:.3f} for normal slopes and {tip:.3f} for one parabolic tip"
     return f"{law_holds(np.array([normal, tip]) / np.sqrt(2) - 1, None)}; {figure}"
 
 
 def shifts(studies: Studies) -> str:
-    """Compare the free shifts along the velocity with those of the interpolation law."""
+    """Compare fitted shifts along the velocity with those of the interpolation law."""
     from mdr_dask.fits import available
 
     (found,) = available("sliding_friction")["collapse"].results(studies("friction_force")).values()
@@ -189,26 +189,26 @@ def shifts(studies: Studies) -> str:
 
 
 def layer(_: Studies) -> str:
-    """Force at which the contact of the rig's ball is as wide as the layer: F = 16/3 G a^3 / R, a = D/2."""
+    """Compute the force at which the contact of the ball is as wide as the layer: F = 16/3 G a^3 / R, a = D/2."""
     force = 16 / 3 * 3e6 * (5e-3 / 2) ** 3 / 0.05
     return compared(f"{force:.1f} N at 2a = D; 40 N is a = D", 40 / force - 1)
 
 
 def heating(_: Studies) -> str:
-    """Repeat 2 mu G d v / lambda of the rig's ball at 100 N."""
+    """Compute the temperature rise 2 mu G d v / lambda of the ball at 100 N."""
     depth = (3 * 100 / (16 * 3e6 * np.sqrt(0.05))) ** (2 / 3)
     rise = 2 * 0.5 * 3e6 * depth * 0.01 / 20
     return compared(f"d = {1e3 * depth:.2f} mm and {rise:.1f} K", 0.06 / rise - 1)
 
 
 def small_heating(_: Studies) -> str:
-    """Repeat 2 mu G h v / lambda of the micro-contacts."""
+    """Compute the temperature rise 2 mu G h v / lambda of the micro-contacts."""
     rise = 2 * 0.5 * 1.5e9 * 1e-7 * 0.01 / 20
     return compared(f"{rise:.3f} K by the thesis's formula", 0.08 / rise - 1)
 
 
 def trends(studies: Studies) -> str:
-    """Count neighbours among the operation cases whose probability changes as the thesis says."""
+    """Count pairs of neighbouring cases whose probability of breakthrough changes as the thesis states."""
     probability = studies("rolling2013", ("operation",))["operation"].breakthrough_probability.mean("realisation")
     right, pairs = 0, 0
     for dim, sign in (("temperature", 1), ("normal_force", 1), ("rotation_speed", -1)):
@@ -220,7 +220,7 @@ def trends(studies: Studies) -> str:
 
 
 def switching(studies: Studies) -> str:
-    """Give the probability of breakthrough at 800 N, 100 rpm and 40 degC, of one line and of 24 beside each other."""
+    """Give the probability of breakthrough at 800 N, 100 rpm and 40 degC, for one line and for 24 parallel lines."""
     operation = studies("rolling2013", ("operation",))["operation"].breakthrough_probability
     value = operation.sel(normal_force=800, method="nearest").mean("realisation")
     one = float(value.sel(rotation_speed=100 * 2 * np.pi / 60, temperature=313.15, method="nearest"))
@@ -229,7 +229,7 @@ def switching(studies: Studies) -> str:
 
 
 def film_ratio(studies: Studies) -> str:
-    """Compare the smallest with the central film."""
+    """Compare the minimum film with the central film."""
     films = studies("ehl_map", ("barus",))["barus"]
     ratio = (films.minimum_film / films.central_film).to_numpy().ravel()
     return compared(f"{100 * ratio.min():.0f} to {100 * ratio.max():.0f} %", *(ratio / 0.75 - 1))
@@ -250,13 +250,13 @@ def stribeck(studies: Studies) -> str:
 
 
 def unit_dependent(_: Studies) -> str:
-    """Rebuild the factor 1.806 of (B.22) from the 1.714 of (B.21): the powers of E' add to 0.002."""
+    """Derive the factor 1.806 of (B.22) from the factor 1.714 of (B.21); the powers of E' add up to 0.002."""
     factor = 1.714 * 2.31e11**0.002
     return compared(f"1.714 E'^0.002 = {factor:.4f} with E' = 2 E* = 2.31e11 Pa", 1.806 / factor - 1)
 
 
 def limiting_radius(_: Studies) -> str:
-    """Compare the printed (6.16), a = sqrt(2 + c^2/4) - c/2, with the exact equation of the volume."""
+    """Compare eq. 6.16 as printed, a = sqrt(2 + c^2/4) - c/2, with the exact volume balance."""
 
     def exact(c: float) -> float:
         return float(brentq(lambda a: (a * a / 2 - 1) * np.arccos(c / a) + c / 2 * np.sqrt(a * a - c * c), 1.0001, 2))
@@ -266,7 +266,7 @@ def limiting_radius(_: Studies) -> str:
 
 
 def fast_rule(studies: Studies) -> str:
-    """Give the largest error of the fast rule with xi = 0.8 over stick radius and cycles, in units of d0."""
+    """Give the largest error of the fast rule with xi = 0.8, for all stick radii and cycles, in units of d0."""
     groups = studies("fast_wear_error")
     exact, fast = groups["exact"].worn_profile, groups["fast"].worn_profile.sel(xi=0.8, method="nearest")
     away = (fast - exact).to_numpy().ravel()

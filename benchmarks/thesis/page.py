@@ -1,4 +1,4 @@
-"""Make docs/thesis.md: ``python -m benchmarks thesis [LINES]`` (60 rough lines if not given)."""
+"""Write docs/thesis.md: ``python -m benchmarks thesis [LINES]`` (default: 60 rough lines)."""
 
 from pathlib import Path
 
