@@ -83,7 +83,7 @@ PERIMETER, FINER = 2 * np.pi * 0.05, 8
 
 
 def rollers(random: np.random.Generator) -> tuple[declaration.MixedLubrication, Truth] | None:
-    """Draw rollers with a layer and an edge rule, in one of five cases with creep; the truth is on 1.6 million points."""
+    """Draw rollers with a layer and an edge rule, and sometimes with creep; the truth is on 1.6 million points."""
     case = declaration.MixedLubrication(
         normal_force=random.uniform(200, 1200),
         rotation_speed=power(random, -1, 1),
