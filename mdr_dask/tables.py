@@ -1,7 +1,7 @@
-"""Tables as people and instruments write them: the one reader of every table that a campaign or a command names.
+"""The reader of all tables that campaigns and commands name, as written by people and instruments.
 
-Columns go by their names, in any order; units stand in brackets behind the names, joined to them, or in a row of their
-own. Text before the table, blocks with repeated names, decimal commas, UTF-16 and Excel workbooks are understood.
+Columns are recognised by their names, in any order. Units are in brackets after the names, joined to the names, or in a
+separate row. Text before the table, blocks with repeated names, decimal commas, UTF-16 and Excel workbooks are allowed.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from mdr_dask.units import example_unit, is_unit, to_si
 COMMENT = "#%"
 BLANKS = r"\s+"
 SEPARATORS = ("\t", ";", ",", BLANKS)
-#: Letters beyond ASCII that do not follow each other in Western text.
+#: Four consecutive letters outside ASCII, which do not occur in Western text.
 MANY_LETTERS = re.compile(r"[^\x00-\x7f]{4}")
-#: The line above each sheet of a workbook, before its name.
+#: Start of the line that precedes each sheet of a workbook; the name of the sheet follows.
 SHEET = "# sheet of a workbook: "
-#: Tables with more columns are no measurements.
+#: Largest number of columns of a table.
 MOST_COLUMNS = 1000
-#: Problems that are shown of one table.
+#: Largest number of problems of one table that are shown.
 MOST_SHOWN = 10
-#: Two columns of one quantity agree to this part: instruments print three digits or more.
+#: Largest relative difference between two columns of the same quantity; instruments print three digits or more.
 AGREE = 0.01
-#: Characters of a number; longer entries are no measurements.
+#: Largest number of characters of a number.
 LONGEST_NUMBER = 60
 SEMICOLONS = " (put semicolons between the values if they have decimal commas)"
 NO_ROWS = "expected a line of names and at least one line of values"
 
-#: Names of quantities as instruments and people write them, `plain`; columns add their own.
+#: Common names of quantities in the form of `plain`; a `Column` may have further names.
 SYNONYMS = {
     "temperature": ("T", "temp", "sample temperature", "temperature sample", "ts", "tr", "temperatur"),
     "frequency": (
@@ -113,7 +113,7 @@ SYNONYMS = {
     "wear volume": ("worn volume", "verschleißvolumen"),
 }
 _ALIKE = str.maketrans({"’": "'", "′": "'", "″": "''", '"': "''", "µ": "μ", "δ": "δ"})
-#: Units that people join to a name, as they write them there.
+#: Units that may be joined to a name, as in ``freq_hz``, by their spelling in lower case.
 JOINED = {
     "pa": "Pa",
     "kpa": "kPa",
@@ -126,7 +126,7 @@ JOINED = {
     "n": "N",
 }
 _DEGREES = {"c": "degC", "°c": "degC", "ºc": "degC", "deg c": "degC", "f": "degF", "°f": "degF", "deg f": "degF"}
-#: A heading for the common logarithms of a quantity: ``log10 q``, ``lg(q)``.
+#: A heading of a column of common logarithms: ``log10 q``, ``lg(q)``.
 _LOGARITHM = re.compile(r"(?:log10|log|lg)(?:[\s_]+|\s*(?=\())(.+)", re.IGNORECASE)
 #: The end of a word that is abbreviated, as in ``Ang. frequency``.
 _ABBREVIATED = re.compile(r"(?<=\w{3})\.")
@@ -145,7 +145,7 @@ _MISSING = frozenset({"", "nan", "na", "nodata", "null", "none"})
 
 
 class Problem(NamedTuple):
-    """One thing wrong with a table: where, counted from 1, and what; line 0 means the whole table."""
+    """One problem of a table: line and column, counted from 1, and a text; line 0 means the whole table."""
 
     line: int
     column: int
@@ -153,14 +153,14 @@ class Problem(NamedTuple):
 
 
 class TableError(DataError):
-    """A table that does not hold what it should: the name of its file, and all its problems."""
+    """The error for a table that cannot be used: the name of its file, and all problems."""
 
     def __init__(self, source: str, problems: Sequence[Problem]) -> None:
         super().__init__(source, tuple(problems))
 
     @property
     def problems(self) -> tuple[Problem, ...]:
-        """Every problem, in the order of the table."""
+        """All problems, in the order of the table."""
         found: tuple[Problem, ...] = self.args[1]
         return found
 
@@ -175,22 +175,22 @@ class TableError(DataError):
 
 @dataclass(frozen=True)
 class Column:
-    """A column that a table may have.
+    """The description of a column that a table may have.
 
     Parameters
     ----------
     name : str
-        Its name in messages and in what is read; its `SYNONYMS` are understood too.
+        Name in messages and in the result; its `SYNONYMS` are also recognised.
     unit : str
-        SI unit of what is read, ``"1"`` for a pure number. Angular frequencies (``rad/s``) take Hz and rpm too.
+        SI unit of the result, ``"1"`` for a pure number. For angular frequencies (``rad/s``) a table may use Hz or rpm.
     other_names : tuple of str
-        Further names. Case, blanks and punctuation do not matter, but for names of one letter.
+        Further names. Case, blanks and punctuation are ignored, except in names of one letter.
     needed : bool
-        Whether a table without it is refused.
+        Whether a table must have this column.
     above, least : float, optional
-        Values must lie above the one, and not below the other, in SI.
+        Limits in SI: values must be greater than `above`, and at least `least`.
     given_unit : str
-        Unit of a column that has none in the table; empty to refuse a column with a dimension but no unit.
+        Unit to use if the table states none. If it is empty, a column with a dimension must state its unit.
     """
 
     name: str
@@ -207,9 +207,9 @@ class Column:
 
 
 def is_called(heading: str, *names: str) -> bool:
-    """Return whether a heading is one of some names or of their synonyms, or one with its symbol or abbreviated.
+    """Return whether a heading is one of the names or a synonym, perhaps abbreviated or followed by a symbol.
 
-    ``Storage modulus G'`` and ``Stor. mod.`` are names of the storage modulus.
+    For example, ``Storage modulus G'`` and ``Stor. mod.`` are names of the storage modulus.
     """
     known = [each for name in names for each in (name, *SYNONYMS.get(plain(name), ()), *SYNONYMS.get(name, ()))]
     if len(heading.strip()) == 1:
@@ -224,13 +224,13 @@ def is_called(heading: str, *names: str) -> bool:
 
 
 def plain(name: str) -> str:
-    """Return a name without what does not matter: case, blanks, punctuation, kinds of primes."""
+    """Return a name in a standard form: lower case, single blanks, no punctuation, one kind of prime."""
     return re.sub(r"[\s_.\-:]+", " ", name.strip().casefold().translate(_ALIKE)).strip()
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One entry of a table: its text, and its place; lines and columns count from 1."""
+    """One entry of a table: its text and its position; lines and columns are counted from 1."""
 
     text: str
     line: int
@@ -238,17 +238,17 @@ class Cell:
     sheet: str = ""
 
     def problem(self, what: str) -> Problem:
-        """Return what is wrong with it; places in a workbook are the names of a sheet and its row."""
+        """Return a problem at this position; in a workbook, the position is the name of the sheet and the row."""
         if self.sheet:
             return Problem(0, 0, f"sheet {self.sheet!r}, row {self.line}: {what}")
         return Problem(self.line, self.column, what)
 
     def is_missing(self) -> bool:
-        """Return whether it is empty or says that there is no number: ``-``, ``n.a.``, ``NaN``, ``****``."""
+        """Return whether the entry is empty or marks a missing number: ``-``, ``n.a.``, ``NaN``, ``****``."""
         return re.sub(r"[\s.,/*#_<>–—-]", "", self.text.casefold()) in _MISSING
 
     def is_entry(self) -> bool:
-        """Return whether it holds a number, or says that one is missing."""
+        """Return whether the entry is a number or marks a missing number."""
         return bool(_NUMBER.match(self.text)) or self.is_missing()
 
 
@@ -263,11 +263,11 @@ class Sheet:
     names : tuple of Cell
         Headings without their units; empty for a table without names.
     units : tuple of str
-        Unit of each column as written, empty where it has none.
+        Unit of each column as written; empty if there is none.
     rows : tuple of tuple of Cell
-        All equally long.
+        Rows of equal length.
     notes : tuple of Cell
-        First entries of the lines of words below the numbers.
+        First entries of the text lines below the numbers.
     """
 
     source: str
@@ -278,16 +278,16 @@ class Sheet:
 
     @property
     def remark(self) -> str:
-        """A sentence that names the lines left out, empty if there are none."""
+        """A text that names the lines left out; empty if there are none."""
         shown = dict.fromkeys(repr(cell.text[:60]) for cell in self.notes)
         return f"lines below the numbers, left out: {', '.join(shown)}" if shown else ""
 
 
 class Read(dict[str, FloatArray]):
-    """Columns that were read, by `Column.name`.
+    """The columns that were read from a table, by `Column.name`.
 
-    `lines` holds the number of each row in the table, `headings` the names of the columns as written, `unused` those of
-    the other columns, and `left_out` a sentence about lines that were left out.
+    `lines` contains the line number of each row, `headings` the names of the columns as written, `unused` the names of
+    columns that were not read, and `left_out` a text about lines that were left out.
     """
 
     headings: Mapping[str, str] = MappingProxyType({})
@@ -297,13 +297,13 @@ class Read(dict[str, FloatArray]):
 
     @property
     def remark(self) -> str:
-        """A sentence that names the columns not used and the lines left out, empty if there are none."""
+        """A text that names the columns not used and the lines left out; empty if there are none."""
         unused = f"not used: {', '.join(self.unused)}" if self.unused else ""
         return "; ".join(filter(None, (unused, self.left_out)))
 
 
 def is_table(path: str | Path) -> bool:
-    """Return whether there is a file that may hold a table, not a campaign or a published study."""
+    """Return whether a path is a file that may contain a table, and not a campaign or a published study."""
     return Path(path).is_file() and Path(path).suffix not in (".yaml", ".zip")
 
 
@@ -313,7 +313,7 @@ def decoded(content: bytes, source: str) -> str:
     Raises
     ------
     DataError
-        If it is none of these.
+        If the content is none of these.
     """
     if content[:4] == b"PK\x03\x04":
         return _workbook(content, source)
@@ -339,7 +339,7 @@ def _workbook(content: bytes, source: str) -> str:
         raise DataError(
             f"{source}: reading Excel workbooks needs openpyxl (or save the sheet as 'CSV UTF-8')"
         ) from None
-    except Exception as error:  # openpyxl and zipfile raise what the damage happens to cause
+    except Exception as error:  # openpyxl and zipfile raise many kinds of errors for damaged files
         raise DataError(f"{source}: expected a table or an Excel workbook, got neither ({error})") from None
     lines = []
     for name, sheet in sheets.items():
@@ -349,7 +349,7 @@ def _workbook(content: bytes, source: str) -> str:
 
 
 def read_table(text: str, source: str, columns: Sequence[Column], allow_missing: bool = False) -> Read:
-    """Read the numbers of a table in SI; columns that are not asked for are left out.
+    """Read the requested columns of a table, in SI.
 
     Parameters
     ----------
@@ -358,20 +358,20 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
     source : str
         Name of the file, for messages.
     columns : sequence of Column
-        What it may hold. A table without names is read in this order.
+        The columns that the table may have. The columns of a table without names must be in this order.
     allow_missing : bool
-        Whether empty entries are NaN; else they are refused.
+        Whether empty entries are read as NaN; otherwise they are an error.
 
     Returns
     -------
     Read
-        The columns that are there, by `Column.name`, arrays of shape (rows,).
+        The columns that the table has, by `Column.name`, as arrays of shape (rows,).
 
     Raises
     ------
     TableError
-        With every problem, by line and column: missing or misspelt columns, two columns of one quantity that disagree,
-        missing or unknown units, entries that are no numbers, impossible values.
+        With all problems by line and column: missing or misspelt columns, two columns of one quantity that disagree,
+        missing or unknown units, entries that are not numbers, impossible values.
     """
     sheet = read_sheet(text, source)
     first, problems, read = sheet.names or sheet.rows[0], [], Read()
@@ -413,7 +413,7 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
 
 
 class _Match(NamedTuple):
-    """The column of a heading, None if it has none, its unit, and whether its entries are common logarithms."""
+    """The `Column` of a heading or None, the unit as written, and whether the entries are common logarithms."""
 
     column: Column | None
     unit: str
@@ -421,7 +421,7 @@ class _Match(NamedTuple):
 
 
 def _matched(sheet: Sheet, columns: Sequence[Column]) -> list[_Match]:
-    """Return what each column of a table is; without names the columns are taken in the order given."""
+    """Return the match of each column of a table; in a table without names, columns are matched in the given order."""
     if sheet.names:
         return [_match_of(cell, unit, columns) for cell, unit in zip(sheet.names, sheet.units, strict=True)]
     if len(sheet.rows[0]) > len(columns):
@@ -431,7 +431,7 @@ def _matched(sheet: Sheet, columns: Sequence[Column]) -> list[_Match]:
 
 
 def _match_of(heading: Cell, unit: str, columns: Sequence[Column]) -> _Match:
-    """Return what a column is, also if its heading is ``log10 q``, ``lg(q)`` or ``log10(C2D / m^4)``."""
+    """Return the match of a heading, including headings such as ``log10 q``, ``lg(q)`` or ``log10(C2D / m^4)``."""
     column, written = match(heading.text, unit, columns)
     found = _LOGARITHM.fullmatch(heading.text)
     if column or not found:
@@ -443,14 +443,14 @@ def _match_of(heading: Cell, unit: str, columns: Sequence[Column]) -> _Match:
 
 
 def _antilogarithm(cell: Cell) -> Cell:
-    """Return ten to the power of a number; other entries as they are."""
+    """Return a cell with ten to the power of its number; other entries remain unchanged."""
     if not _NUMBER.match(cell.text) or len(cell.text) > LONGEST_NUMBER or abs(float(cell.text)) > 300:
         return cell
     return replace(cell, text=repr(10.0 ** float(cell.text)))
 
 
 def match(heading: str, unit: str, columns: Sequence[Column]) -> tuple[Column | None, str]:
-    """Return the column of a heading, None if it has none, and its unit, which may be joined to it (``freq_hz``)."""
+    """Return the column of a heading or None, and its unit, which may be joined to the heading (``freq_hz``)."""
     names = [(heading, unit)]
     front, _, behind = heading.replace(" ", "_").rpartition("_")
     if front and not unit:
@@ -474,21 +474,21 @@ def _fits(unit: str, column: Column) -> bool:
 def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = None) -> Sheet:
     """Split a table into headings, units and rows of cells.
 
-    Text before the headings is skipped. Where the headings are repeated, another block of the same table begins. Lines
-    of words below the last numbers are left out. Pairs of columns with a number above each (as digitised from a figure)
-    become three columns.
+    Text before the headings is skipped. Repeated headings begin another block of the same table. Text lines below the
+    last numbers are left out. Pairs of columns with a number above each pair (as digitised from a figure) become three
+    columns.
 
     Parameters
     ----------
     text, source : str
         The table and the name of its file.
     is_name : callable, optional
-        For tables whose entries may be words: whether a heading is one of the names that mark the line of headings.
+        For tables whose entries may be words: returns whether a text is a name by which the line of headings is found.
 
     Raises
     ------
     TableError
-        If there are no rows, rows of different length, or decimal commas and points.
+        If there are no rows, if rows differ in length, or if decimal commas and points are mixed.
     """
     raw = _numbered(text)
     lines = [line for line in raw if line.text.lstrip()[0] not in COMMENT]
@@ -507,7 +507,7 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
 
 
 class _Line(NamedTuple):
-    """A line of text, its number, counted from 1, and the sheet of a workbook that it belongs to."""
+    """A line of text with its number, counted from 1, and the name of its sheet in a workbook."""
 
     number: int
     text: str
@@ -515,7 +515,7 @@ class _Line(NamedTuple):
 
 
 def _numbered(text: str) -> list[_Line]:
-    """Return the lines of a text that are not empty; those of a workbook count from the first of their sheet."""
+    """Return the lines of a text that are not empty; in a workbook, lines are counted from the start of their sheet."""
     found, sheet, before = [], "", 0
     for number, line in enumerate(text.lstrip("\ufeff").splitlines(), 1):
         if line.startswith(SHEET):
@@ -526,15 +526,16 @@ def _numbered(text: str) -> list[_Line]:
 
 
 def _numeric_columns(rows: Sequence[tuple[Cell, ...]], width: int) -> list[bool]:
-    """Return which columns hold numbers in half of the lines of numbers or more."""
+    """Return which columns contain numbers in at least half of the rows."""
     counts = Counter(place for row in rows for place, cell in enumerate(row) if _NUMBER.match(cell.text))
     return [2 * counts[place] >= len(rows) for place in range(width)]
 
 
 def _label_of(row: tuple[Cell, ...], numeric: Sequence[bool]) -> str:
-    """Return what a line of numbers is that begins with words: ``settings`` above a block, or a ``mean`` below it.
+    """Return the kind of a line that begins with a word and contains numbers: ``settings``, ``mean`` or empty.
 
-    Settings fill less than half of the columns, and a mean has words in a column of numbers. Other lines have none.
+    Settings, above a block, fill less than half of the columns. A mean, below a block, has a word in a column of
+    numbers.
     """
     first = next(place for place, cell in enumerate(row) if cell.text)
     if not re.match(r"(?!inf)[^\W\d]{2}", row[first].text, re.IGNORECASE) or row[first].is_missing():
@@ -545,7 +546,7 @@ def _label_of(row: tuple[Cell, ...], numeric: Sequence[bool]) -> str:
 
 
 def _fits_columns(row: tuple[Cell, ...], numeric: Sequence[bool]) -> bool:
-    """Return whether a line has numbers, or words for missing ones, in the columns of numbers, and is no short one."""
+    """Return whether a line fills half of the columns, with numbers or missing marks in the columns of numbers."""
     cells = [cell for cell, holds in zip(row, numeric, strict=False) if holds]
     is_long = 2 * sum(bool(cell.text) for cell in row) >= len(numeric)
     return is_long and any(cell.text for cell in cells) and all(cell.is_entry() for cell in cells)
@@ -563,7 +564,7 @@ def _blocks(source: str, rows: list[tuple[Cell, ...]], width: int, raw: list[_Li
     for i in range(begin + 1, len(rows)):
         data[i] = (data[i] and labels[i] != "mean") or _fits_columns(rows[i], numeric)
     words = [i for i in range(begin) if not data[i]]
-    if not words and begin + 2 < len(rows) and not data[begin + 1]:  # numbers above the names of pairs of columns
+    if not words and begin + 2 < len(rows) and not data[begin + 1]:  # numbers above the names: pairs of columns
         words, begin = [begin, begin + 1], begin + 2
     wide = [i for i in words if len(rows[i]) == width] or words[-1:]
     names: tuple[Cell, ...] = rows[wide[-1]] if wide else _names_in_remark(raw, rows[begin])
@@ -609,7 +610,7 @@ def _blocks(source: str, rows: list[tuple[Cell, ...]], width: int, raw: list[_Li
 
 
 def _even(source: str, rows: list[tuple[Cell, ...]], names: tuple[Cell, ...]) -> list[tuple[Cell, ...]]:
-    """Return rows as long as the names: empty entries at the end of columns of words need not be written."""
+    """Return rows of the length of the names; empty entries at the end are added in columns of words."""
     width, even, problems = len(names), [], []
     numeric = _numeric_columns(rows, width)
     for row in rows:
@@ -625,7 +626,7 @@ def _even(source: str, rows: list[tuple[Cell, ...]], names: tuple[Cell, ...]) ->
 
 
 def _no_numbers(row: tuple[Cell, ...], numeric: Sequence[bool]) -> Problem:
-    """Return what is wrong with a line between lines of numbers: words in a column of numbers, or words alone."""
+    """Return the problem of a line without numbers between lines of numbers."""
     words = [cell for cell in row if cell.text and not cell.is_entry()]
     wrong = [cell for cell, holds in zip(row, numeric, strict=False) if holds and cell in words]
     cell = (wrong or words or row)[0]
@@ -633,7 +634,7 @@ def _no_numbers(row: tuple[Cell, ...], numeric: Sequence[bool]) -> Problem:
 
 
 def _with_points(source: str, rows: list[tuple[Cell, ...]]) -> list[tuple[Cell, ...]]:
-    """Return rows with points for decimal commas; refuse rows with both, in which one separates thousands."""
+    """Return rows with decimal points instead of commas; raise TableError if the rows contain both."""
     commas, points = (
         [cell for row in rows for cell in row if mark in cell.text and _NUMBER.match(cell.text)] for mark in ",."
     )
@@ -656,7 +657,10 @@ def _with_points(source: str, rows: list[tuple[Cell, ...]]) -> list[tuple[Cell, 
 
 
 def _plain_sheet(source: str, rows: list[tuple[Cell, ...]], is_name: Callable[[str], bool]) -> Sheet:
-    """Return a table with words: the first line with a known name holds the names, perhaps the next one units."""
+    """Return a table whose entries may be words.
+
+    The first line with a known name contains the names; the next line may contain units.
+    """
     begin = next((i for i, row in enumerate(rows) if any(map(is_name, _stripped(row)))), 0)
     names, rows = rows[begin], rows[begin + 1 :]
     rows = _even(source, rows, names)
@@ -672,12 +676,12 @@ def _plain_sheet(source: str, rows: list[tuple[Cell, ...]], is_name: Callable[[s
 
 
 def _stripped(row: tuple[Cell, ...]) -> list[str]:
-    """Return the entries of a line without units in brackets."""
+    """Return the texts of a line without units in brackets."""
     return [cell.text for cell in _headings(row, (), len(row))[0]]
 
 
 def _names_in_remark(raw: list[_Line], first: tuple[Cell, ...]) -> tuple[Cell, ...]:
-    """Return the names in the last remark above the numbers, if it holds as many."""
+    """Return the names in the last comment line above the numbers, if their number fits; otherwise empty."""
     above = [line for line in raw if line.number < first[0].line and line.text.lstrip()[0] in COMMENT]
     for line in above[-1:]:
         words = line._replace(text=line.text.lstrip(COMMENT + " "))
@@ -689,13 +693,13 @@ def _names_in_remark(raw: list[_Line], first: tuple[Cell, ...]) -> tuple[Cell, .
 
 
 def _stated(rows: Sequence[tuple[Cell, ...]]) -> tuple[str, str] | None:
-    """Return the temperature and its unit that the text above a block states last."""
+    """Return the last temperature, with its unit, in the text above a block; None if there is none."""
     found = [match for row in rows for match in _STATED.finditer(" ".join(cell.text for cell in row))]
     return (found[-1][1].replace(",", "."), found[-1][2].replace(" ", "")) if found else None
 
 
 def _are_pairs(headings: tuple[Cell, ...]) -> bool:
-    """Return whether the same two names are repeated."""
+    """Return whether the headings are the same two names, repeated."""
     names = [plain(cell.text) for cell in headings]
     return len(names) >= 4 and len(names) % 2 == 0 and names == names[:2] * (len(names) // 2)
 
@@ -707,7 +711,7 @@ def _from_pairs(
     above: tuple[Cell, ...],
     rows: list[tuple[Cell, ...]],
 ) -> Sheet:
-    """Return pairs of columns, each with a number above it, as three columns; the third is a temperature."""
+    """Return pairs of columns as three columns; the third is the number above each pair, a temperature."""
     long, problems = [], []
     labels = [cell for cell in above if cell.text]
     found = [re.search(r"[+-]?\d+(?:[.,]\d+)?", cell.text) for cell in labels]
@@ -727,14 +731,14 @@ def _from_pairs(
 
 
 def numbers(sheet: Sheet) -> FloatArray:
-    """Return the entries of a table as they are written, whatever their units, shape (rows, columns).
+    """Return the entries of a table as numbers without conversion of units, shape (rows, columns).
 
-    NaN where an entry is empty, and in columns of words alone.
+    Empty entries and columns that contain only words are NaN.
 
     Raises
     ------
     TableError
-        If an entry is no number in a column that has some.
+        If an entry is not a number in a column that contains numbers.
     """
     columns, problems = [], []
     for cells in zip(*sheet.rows, strict=True):
@@ -748,17 +752,17 @@ def numbers(sheet: Sheet) -> FloatArray:
     return np.array(columns).T
 
 
-#: Columns without names that are described one by one; more of them are a map.
+#: Largest number of columns without names that are described one by one; a table with more is described as a map.
 MOST_DESCRIBED = 6
 
 
 def described(text: str, source: str) -> str:
-    """Return the number of rows of a table, and name, unit and range of its columns, as it has them.
+    """Return a text with the number of rows of a table, and the name, unit and range of each column as written.
 
     Raises
     ------
     TableError
-        If it is no table of numbers.
+        If the text is not a table of numbers.
     """
     sheet = read_sheet(text, source)
     columns = numbers(sheet).T
@@ -777,13 +781,13 @@ def described(text: str, source: str) -> str:
 
 
 def _is_data(row: tuple[Cell, ...]) -> bool:
-    """Return whether a line holds numbers in half of its filled cells or more."""
+    """Return whether at least half of the filled cells of a line are numbers."""
     filled = [cell for cell in row if not cell.is_missing()]
     return 2 * sum(bool(_NUMBER.match(cell.text)) for cell in filled) >= max(len(filled), 1)
 
 
 def _are_units(row: tuple[Cell, ...], surely: bool) -> bool:
-    """Return whether a line holds units: known ones, or any words below the only line of names if not `surely`."""
+    """Return whether a line contains units; unless `surely`, any words count as units."""
     units = [_unit_of(cell.text.strip("[](){}<> ")) for cell in row]
     words = [unit for unit in units if unit not in ("", "-", "--", "1")]
     bracketed = all(re.fullmatch(r"\[.*\]", cell.text) for cell in row if cell.text)
@@ -814,7 +818,7 @@ def _looks_like_a_unit(text: str) -> bool:
 
 
 def _unit_of(text: str) -> str:
-    """Return a unit as `units` spells it: degrees, exponents without a sign, and words."""
+    """Return a unit in the spelling of `mdr_dask.units`, for example for degrees and for exponents."""
     text = re.sub(r"[⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻]+", lambda power: "^" + unicodedata.normalize("NFKC", power[0]), text.strip())
     text = unicodedata.normalize("NFKC", text.replace("º", "°")).replace("−", "-")
     factor = text[: len(text) - len(_factor(text)[1])]
@@ -825,7 +829,7 @@ def _unit_of(text: str) -> str:
 
 
 def _separator(lines: Sequence[str], numeric: bool) -> str:
-    """Return what separates the cells: the mark that leaves most lines of two or more numbers."""
+    """Return the separator of cells: the one for which most lines contain two or more numbers."""
     counts = [sum(_numbers_between(line, mark) > 1 for line in lines) for mark in SEPARATORS]
     if not numeric or not any(counts):
         counts = [sum(mark in line for line in lines) for mark in SEPARATORS[:3]]
@@ -834,12 +838,12 @@ def _separator(lines: Sequence[str], numeric: bool) -> str:
     if best == ",":
         first = next(i for i, line in enumerate(lines) if _numbers_between(line, ",") > 1)
         if first and "," not in lines[first - 1] and all(_NUMBER.match(line.strip()) for line in lines[first:]):
-            return ";"  # one column with decimal commas
+            return ";"  # a single column with decimal commas
     return best
 
 
 def _numbers_between(line: str, separator: str) -> int:
-    """Return how many cells of a line are numbers; none if fewer than half are."""
+    """Return the number of cells of a line that are numbers; 0 if they are fewer than half."""
     cells = [cell.strip().strip('"') for cell in re.split(separator, line.strip())]
     filled = [cell for cell in cells if cell]
     count = sum(bool(_NUMBER.match(cell)) for cell in filled)
@@ -853,7 +857,7 @@ def _cells(lines: Sequence[_Line], separator: str) -> list[tuple[Cell, ...]]:
     blank = separator == BLANKS
     texts = [
         re.sub(r"\s+(?=[\[(])", "", line.text.strip()) if blank else line.text for line in lines
-    ]  # a unit and its name
+    ]  # joins a unit in brackets to its name
     counts = [len(re.split(separator, text)) for text in texts]
     frame = pd.read_csv(
         io.StringIO("\n".join(text.replace("\x00", " ") for text in texts)),
@@ -878,7 +882,7 @@ def _cells(lines: Sequence[_Line], separator: str) -> list[tuple[Cell, ...]]:
 
 
 def _unit(written: str, column: Column) -> str:
-    """Return the unit of a column in its table, known to fit; empty for SI."""
+    """Return the unit of a column after checking that it fits; empty if no conversion is needed."""
     unit = written or column.given_unit
     if unit in ("-", "1") and column.unit == "1":
         return ""
@@ -893,7 +897,7 @@ def _unit(written: str, column: Column) -> str:
 
 
 def _values(cells: Sequence[Cell], column: Column, unit: str, allow_missing: bool) -> tuple[FloatArray, list[Problem]]:
-    """Return the values of a column in SI, and what is wrong with them."""
+    """Return the values of a column in SI, and the problems of its entries."""
     values, problems = np.full(len(cells), np.nan), []
     for number, cell in enumerate(cells):
         try:
@@ -921,7 +925,7 @@ def _number(cell: Cell, column: Column, unit: str, allow_missing: bool) -> float
 
 
 def _in_si(number: str, unit: str, wanted: str) -> float:
-    """Convert as a campaign file does; angular frequencies take Hz and 1/s, wave numbers 1/m."""
+    """Convert a number as in campaign files; also Hz and 1/s to angular frequencies, and 1/m to wavenumbers."""
     if not unit:
         return float(number)
     factor, unit = _factor(unit)
@@ -935,7 +939,7 @@ def _in_si(number: str, unit: str, wanted: str) -> float:
 
 
 def _factor(unit: str) -> tuple[float, str]:
-    """Return the number before a unit, 1 if there is none, and the unit behind it."""
+    """Return the number before a unit (1 if there is none), and the unit without it."""
     found = _FACTOR.match(unit)
     if not found:
         return 1.0, unit
