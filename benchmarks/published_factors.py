@@ -15,7 +15,7 @@ from mdr_dask.physics.superposition.master_curve import superpose
 
 DATA = Path(__file__).parents[1] / "tests" / "data" / "dma"
 REFERENCE = 7
-"""Number of the curve at 3 C, counted from the coldest, at which the published factors are zero."""
+"""Index of the curve at 3 degC, counted from the coldest; its published factor is zero."""
 
 
 def measured():

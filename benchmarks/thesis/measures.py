@@ -1,4 +1,4 @@
-"""Measurements for claims of the thesis that no fit judges."""
+"""Tests of claims of the thesis that are not tested by a fit."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def integral(power: int, limits: str) -> Judge:
 
 
 def rule(_: Studies) -> str:
-    """Compare rms height and gradient of a surface C2D with those of the line pi q C2D, by quadrature."""
+    """Compare rms height and gradient of a surface with spectrum C2D and of the line pi q C2D, by quadrature."""
     q, departures = np.geomspace(1.0, 1e3, 20001), []
     for hurst in (0.3, 0.7):
         surface, line = q ** (-2 - 2 * hurst), np.pi * q * q ** (-2 - 2 * hurst)
@@ -134,7 +134,7 @@ def transition(studies: Studies) -> str:
 
 
 def weak_dependence(studies: Studies) -> str:
-    """Compare the largest friction of loads above F = 0.1."""
+    """Compare the largest friction at all loads above F = 0.1."""
     mu, force, _ = _numbers(studies("friction_force")[""])
     top = mu.max("velocity").where(force > 0.1, drop=True).to_numpy()
     return compared(f"largest mu/slope {top.min():.2f} to {top.max():.2f}, F = 0.1 to 1000", *(top / top.mean() - 1))
@@ -236,7 +236,7 @@ def film_ratio(studies: Studies) -> str:
 
 
 def density(_: Studies) -> str:
-    """Give the largest rise of the density that the law allows."""
+    """Give the largest relative increase of the density by the density law."""
     most = oil.DENSITY_RISE / oil.DENSITY_SATURATION
     return compared(f"{100 * most:.1f} %", most / 0.33 - 1)
 

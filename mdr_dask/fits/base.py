@@ -20,11 +20,11 @@ from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.campaign import Campaign
 from mdr_dask.errors import FitError, distinguishable
 
-#: A law holds up to this relative departure, rms; the largest departure may be twice as large.
+#: A law holds if the rms relative departure is at most this, and the largest departure at most twice this.
 WITHIN = 0.05
-#: A law holds approximately up to this relative departure, rms; the largest departure may be twice as large.
+#: A law holds approximately if the rms relative departure is at most this, and the largest at most twice this.
 APPROXIMATE = 0.15
-#: A departure that scatter and errors alone would cause with a smaller probability counts against the law.
+#: A departure counts against a law if the probability that scatter and errors alone cause it is below this.
 DOUBTFUL = 0.05
 
 
@@ -48,7 +48,7 @@ class Fit:
     apart : bool
         Whether each series of a store is fitted separately. ``compute`` then gets a mapping with one series.
     constants : tuple of str, or callable, Campaign -> tuple of str
-        Constants with an interval that may decide on the number of realisations (``until: {name.constant: 1 %}``).
+        Constants whose interval may determine the number of realisations (``until: {name.constant: 1 %}``).
     """
 
     name: str
@@ -59,7 +59,7 @@ class Fit:
     constants: tuple[str, ...] | Callable[[Campaign], tuple[str, ...]] = ()
 
     def constants_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """Return the constants that may decide on the number of realisations of a campaign."""
+        """Return the constants that may determine the number of realisations of a campaign."""
         return self.constants(campaign) if callable(self.constants) else self.constants
 
     def results(self, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:

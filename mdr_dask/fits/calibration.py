@@ -1,4 +1,4 @@
-"""Calibration: unknown parameters from measured points, by the posterior over the grid of a study."""
+"""Calibration: estimate unknown parameters from measured points by their posterior density on a study."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from mdr_dask.tables import decoded
 
 #: Smallest error of measurement that is considered, relative to the rms residual of the best prediction.
 LEAST = 0.2
-#: Relative size of residuals that rounding may cause.
+#: Smallest relative residual; smaller ones may be due to rounding.
 _ROUNDING = 1e-9
 
 

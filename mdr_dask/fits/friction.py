@@ -23,7 +23,7 @@ Series = Mapping[str, xr.Dataset]
 Variables = dict[str, xr.Variable]
 
 MODELS = ("sliding_friction",)
-ZONE_ONE = (0.01, 0.3)  # F_N / (G h L) of zone 1: other limits change alpha by up to 0.02 and beta by up to 0.14
+ZONE_ONE = (0.01, 0.3)  # range of F_N / (G h L) in zone 1; other limits change alpha by up to 0.02, beta by up to 0.14
 LINEAR = 0.05  # region I: mu / v changes by less than this between neighbouring velocities
 NEEDS_SLOPE = "not tested: the study has no output contact_slope"
 
@@ -106,7 +106,7 @@ def each(
     fit: Callable[[xr.Dataset], Variables],
     *outputs: str,
 ) -> xr.Dataset:
-    """Fit a law at every point of the dimensions along which its constants may vary.
+    """Fit a law separately at every point of the dimensions that the law itself does not contain.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ LINKED = 0.25
 NARROW = 0.25
 #: Exponents are rounded to halves or thirds if the spread of the product grows by at most this factor.
 ROUNDED = 1.15
-#: Probabilities of the intervals.
+#: Probabilities of the intervals, by the suffix of their names.
 LEVELS = {"": 0.95, "_68": 0.6827}
 #: Suffixes of the median and the ends of the intervals, and their quantiles.
 ENDS = ("", *(f"_{end}{kind}" for kind in LEVELS for end in ("low", "high")))
@@ -27,7 +27,7 @@ SHARES = (0.5, *(0.5 + sign * level / 2 for level in LEVELS.values() for sign in
 
 
 class Ends(NamedTuple):
-    """Whether the data leave the lower and the upper end of the axis of an unknown open."""
+    """Whether the lower and the upper end of the axis of an unknown are open (see `OPEN`)."""
 
     low: bool
     high: bool

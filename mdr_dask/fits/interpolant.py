@@ -115,7 +115,7 @@ def _spared(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.DataArray, xr.DataArray]:
-    """Interpolate the cases that adaptive axes left out, and add the error of this interpolation."""
+    """Interpolate the cases that adaptive axes left out, and include the error of this interpolation."""
     axes = [k for k, dim in enumerate(mean.dims) if _is_numeric(mean, str(dim))]
     table, error = scale.of_values(mean.to_numpy()).copy(), half.to_numpy().copy()
     for axis in axes * 2:  # twice, because values filled along one axis are used along the other axes

@@ -12,7 +12,7 @@ from scipy.stats import f as fisher
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import APPROXIMATE, DOUBTFUL, WITHIN
 
-#: A trend of the residuals that chance alone causes with a smaller probability counts against the model.
+#: A trend of the residuals counts against the model if the probability that it is due to chance is below this.
 TREND = 0.005
 #: Least number of points whose residuals can show a trend.
 FEWEST = 6

@@ -15,7 +15,7 @@ from mdr_dask.fits.prediction import Predicted, Prediction
 START = {1: 64, 2: 24, 3: 12, 4: 8}
 #: Least number of cells that are refined, by the number of unknowns; and largest number of cells after refinement.
 BEST, MOST = {1: 32, 2: 256, 3: 768, 4: 1536}, 160_000
-#: Cells with ln(density) further below the maximum are dropped: together they hold less than 1e-5 of the posterior.
+#: Cells with ln(density) more than this below the maximum are left out; together they have a probability below 1e-5.
 REACH = 14.0
 #: Refinement ends if ln(density) varies by less than this within a cell, on average.
 SMOOTH = 0.6
@@ -28,7 +28,7 @@ _STEP = 2**21
 
 
 class Noise(NamedTuple):
-    """Errors of measurement: one known size, or several sizes that are all considered.
+    """Errors of measurement, of one known size or of several possible sizes.
 
     Attributes
     ----------

@@ -63,7 +63,7 @@ def _contact_growth(data: xr.Dataset) -> Variables:
 
 
 def _balance(data: xr.Dataset, used: list[int]) -> Variables:
-    """Return the slope in contact over that of the line, and mu over eq. 3.12; empty if the store lacks an output."""
+    """Return the slope in contact over the slope of the line, and mu over eq. 3.12; empty if an output is missing."""
     if not {"contact_slope", "friction_coefficient"} <= set(data.data_vars):
         return {}
     slope = spectral_slope(data)
@@ -86,7 +86,7 @@ def _balance(data: xr.Dataset, used: list[int]) -> Variables:
 
 
 def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> FloatArray:
-    """Return the slope in contact over that of the line by eq. 3.21; NaN if the contact is below the shortest wave.
+    """Return the slope in contact over the slope of the line by eq. 3.21; NaN for contacts below the shortest wave.
 
     Parameters
     ----------

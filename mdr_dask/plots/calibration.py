@@ -17,9 +17,9 @@ from mdr_dask.plots import colours, labels
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 
-#: Samples of the posterior for the band of predictions, and bins of a density.
+#: Number of posterior samples for the band of predictions, and of bins of a density.
 SAMPLES, BINS = 400, 60
-#: Half width of a 95 % interval of a normal distribution in standard deviations.
+#: Half width of the 95 % interval of a normal distribution, in standard deviations.
 HALF = 1.96
 #: Weights of neighbouring bins with which a density is smoothed.
 SMOOTH = np.array([0.1, 0.2, 0.4, 0.2, 0.1])

@@ -29,7 +29,7 @@ def most() -> int:
 
 
 def colour(number: int) -> str:
-    """Return the colour of a curve: of the requested style, else of Okabe and Ito."""
+    """Return the colour of a curve from the requested style, or else from `COLOURS`."""
     from matplotlib.colors import to_hex
 
     colours = _cycle("color") or COLOURS

@@ -37,7 +37,7 @@ class Family(NamedTuple):
     Attributes
     ----------
     curves : list of Curve
-        Each with one dimension beside the realisations.
+        Curves; each has one dimension besides the realisations.
     keys : list of Key
         Entries of the legend.
     bar : Bar or None
@@ -130,7 +130,7 @@ def thin(data: xr.Dataset, dim: str, most: int) -> tuple[xr.Dataset, list[str]]:
 
 
 def family(data: xr.Dataset, output: str, along: str, by: str = "") -> Family:
-    """Split a series into curves along a parameter.
+    """Split a series into curves against a parameter.
 
     With `by`, the curves differ in this parameter alone, and other axes are fixed at their middle value. Without `by`,
     all curves are drawn if there are enough colours. Otherwise one axis is shown by colours, another axis with few

@@ -25,7 +25,7 @@ Kind = Literal["curve", "law", "band", "dots", "map", "absent"]
 
 
 class Mean(NamedTuple):
-    """Values with the ends of their 95 % intervals; ends are NaN where no error is known."""
+    """Values with the ends of their 95 % intervals; ends are NaN if the error is unknown."""
 
     value: Any
     low: Any

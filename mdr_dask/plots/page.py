@@ -58,7 +58,7 @@ class Page:
     cycle: tuple[Mapping[str, str], ...] = ()
 
     def unit(self, name: str) -> str | None:
-        """Return the unit in which a quantity is shown, None for that of the store."""
+        """Return the requested unit of a quantity, or None for the unit of the store."""
         self.used.add(name)
         return self.units.get(name)
 

@@ -45,7 +45,7 @@ DECADES = 15
 MANY_POINTS = 60
 #: Height of the marks for cases without a value above the lower edge, as a share of the panel.
 FOOT = 0.02
-#: Dots per inch of a picture for a screen, and of one for print.
+#: Dots per inch of pictures for a screen and for print.
 DPI, PRINTED_DPI = 150, 300
 
 

@@ -95,7 +95,7 @@ def figure_of(view: View) -> Plot:
 
 
 def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
-    """Return the figure of one output or several, one above the other.
+    """Return the figure of one output, or of several outputs one above the other.
 
     Raises
     ------
@@ -427,7 +427,7 @@ def _crossed_out(trace: Trace) -> list[Key]:
 
 
 def _effects(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
-    """Draw the mean of an output against every parameter of a series in turn, over all others."""
+    """Draw the mean of an output against each parameter of a series, averaged over all other parameters."""
     if len(found) > 1 or view.by or view.panels:
         raise DataError(
             f"expected one series, without --by and --panels, got {', '.join(found)}: effects fill a figure"

@@ -77,7 +77,7 @@ def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None =
 
 @dataclass(frozen=True)
 class _Members:
-    """All cases sorted by group, and the position where each group begins."""
+    """Indices of all cases, sorted by group, and the position of the first case of each group."""
 
     order: NDArray[np.intp]
     starts: NDArray[np.intp]

@@ -39,7 +39,7 @@ def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn
     Raises
     ------
     DataError
-        If a name is unknown, or the question asks for sorted rows.
+        If a name is unknown, or the question requests sorted rows.
     """
     if question.sort:
         raise DataError("expected a table (.csv, .jsonl or .parquet) with --sort, got labelled arrays")

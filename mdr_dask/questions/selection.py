@@ -59,7 +59,7 @@ def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings
 def select_all(
     datasets: Mapping[str, xr.Dataset], selections: Sequence[str], tell: Tell = warnings.warn
 ) -> dict[str, xr.Dataset]:
-    """Apply selections to every series that varies the selected parameter."""
+    """Apply selections to every series in which the selected parameter varies."""
     chosen = dict(datasets)
     for text in selections:
         name, _ = _parsed(text)
