@@ -357,7 +357,7 @@ def _counted(data: xr.Dataset, output: str) -> xr.Dataset:
 
 
 def _absent(curve: curves.Curve, x: xr.DataArray, output: str, marked: dict[str, str]) -> list[Trace]:
-    """Return marks at the lower edge of a panel for cases in which all or some realisations failed, with reasons."""
+    """Return marks at the lower edge of a panel for cases in which some realisations have no value, with reasons."""
     data = curve.data
     if "status" not in data:
         return []
