@@ -111,14 +111,11 @@ def test_two_groups_are_drawn_printed_and_referenced_anew(tmp_path, capsys):
     np.testing.assert_allclose(moved["second_factor"]["data"], [-0.2, 0, 0.2], atol=2e-3)
 
 
-def test_vertical_factors_of_two_groups_are_printed_and_drawn(tmp_path, capsys):
-    path, figure = tmp_path / "table.csv", tmp_path / "master.png"
+def test_vertical_factors_of_two_groups_are_refused(tmp_path, capsys):
+    path = tmp_path / "table.csv"
     table_of_two_groups(path)
-    assert main(["master-curve", str(path), "--vertical", "free", "--plot", str(figure), "--csv"]) == 0
-    printed = capsys.readouterr().out
-    assert ",vertical_factor," in printed
-    assert ",second_vertical_factor," in printed
-    assert figure.stat().st_size > 10_000
+    assert main(["master-curve", str(path), "--vertical", "free"]) == 2
+    assert "keep one value of 'temperature'" in capsys.readouterr().err
 
 
 def test_rows_of_a_table_are_selected_as_those_of_a_store(tmp_path, capsys):

@@ -112,12 +112,12 @@ def test_points_of_a_master_curve_are_its_table_shifted(capsys):
     points = dict(zip(lines[0], np.array(lines[1:], dtype=float).T, strict=True))
     groups = {name.split(" ")[0]: values for name, values in points.items()}
     measured = np.loadtxt(TABLE, delimiter=",", skiprows=2)
-    assert len(groups["point_group"]) == len(measured)
+    assert len(groups["T"]) == len(measured)
     assert main(["master-curve", str(TABLE), "--json"]) == 0
     curve = json.loads(capsys.readouterr().out)
     factors = dict(zip(curve["coords"]["T"]["data"], curve["data_vars"]["shift_factor"]["data"], strict=True))
-    shift = np.array([factors[group] for group in groups["point_group"]])
-    unshifted = np.sort(np.log10(groups["point_abscissa"]) - shift)
+    shift = np.array([factors[group] for group in groups["T"]])
+    unshifted = np.sort(np.log10(groups["t"]) - shift)
     np.testing.assert_allclose(unshifted, np.sort(np.log10(measured[:, 0])), atol=1e-4)
 
 

@@ -185,7 +185,7 @@ def _print_table(curve: xr.Dataset, part: str, form: str) -> None:
     if part == "factors":
         kept = ("shift_factor", "vertical_factor") if curve["vertical_factor"].any() else ("shift_factor",)
         columns = ("", "_error", "_low", "_high")
-        for names in (kept, ("second_factor", "second_vertical_factor")):
+        for names in (kept, ("second_factor",)):
             found = [f"{name}{column}" for name in names for column in columns if f"{name}{column}" in curve]
             shown.extend([curve[found]] if found else [])
     attrs = ("abscissa", "ordinate", "companion", "group")

@@ -67,15 +67,16 @@ def master_curve(
         ``point_abscissa``, ``point_ordinate``, ``point_group``: all points after shifting; ``curve_abscissa``,
         ``curve_ordinate``, ``curve_error``: the merged curve (the error in decades), with the range measured at the
         reference in its attrs; ``point_companion``, ``curve_companion``, ``curve_companion_error`` for a second
-        ordinate; constants of the laws that apply. With two kinds of groups also ``second_factor`` (and
-        ``second_vertical_factor``) over the second kind, the constants of its laws, and in the attrs ``second``,
-        ``second_reference``, ``chi_squared`` and ``probability`` of the sum of both factors. The attr ``vertical``
-        describes the vertical factors that were used.
+        ordinate; constants of the laws that apply. With two kinds of groups also ``second_factor``
+        over the second kind, the constants of its laws, and in the attrs ``second``, ``second_reference``,
+        ``chi_squared`` and ``probability`` of the sum of both factors. The attr ``vertical`` describes the vertical
+        factors that were used.
 
     Raises
     ------
     DataError
-        If a column is missing, not positive, or the curves do not overlap.
+        If a column is missing, not positive, or the curves do not overlap; if vertical factors are requested for two
+        kinds of groups, which do not determine them.
     """
     frame = frame_of(table)
     over, ordinates, by = columns_to_use(frame, abscissa, ordinate, group)
@@ -88,9 +89,13 @@ def master_curve(
     frame, left_out = finite_rows(frame, [over, *ordinates, by] + ([second] if second else []))
     kind = kind_of(over, ordinates, by, units) if vertical is None else vertical
     if second is not None:
-        kind = "none" if vertical is None else kind
-        dataset = _of_two_groups(frame, over, ordinates, (by, second), kind, reference)
-        return dataset.assign_attrs(left_out=left_out, not_used=not_used, vertical=_sentence(kind))
+        if vertical not in (None, "none"):
+            raise DataError(
+                f"expected no vertical factors for curves that differ in {by!r} and {second!r}, got {vertical!r}: "
+                f"keep one value of {second!r}"
+            )
+        dataset = _of_two_groups(frame, over, ordinates, (by, second), reference)
+        return dataset.assign_attrs(left_out=left_out, not_used=not_used, vertical=_sentence("none"))
     groups, curves = curves_of(frame, over, ordinates, by)
     zero = float(groups[groups.size // 2]) if reference is None else _inside(groups, reference)
     kelvin = kelvins(groups, units.get(by, "")) if kind in ("modulus", "compliance") else None
@@ -137,7 +142,6 @@ def _of_two_groups(
     over: str,
     ordinates: Sequence[str],
     by: tuple[str, str],
-    vertical: Vertical,
     reference: float | None,
 ) -> xr.Dataset:
     """Shift curves that differ in two parameters; the reference is a value of the first parameter."""
@@ -146,7 +150,7 @@ def _of_two_groups(
     first = np.unique(a)
     zero = float(first[first.size // 2]) if reference is None else _inside(first, reference)
     zeros = float(first[np.argmin(np.abs(first - zero))]), float(np.unique(b)[np.unique(b).size // 2])
-    found = two_shifts.superpose_twice(a, b, curves, zeros, vertical)
+    found = two_shifts.superpose_twice(a, b, curves, zeros)
     units = frame.attrs.get("units", {})
     attrs = {"second": by[1], "second_reference": found.second.reference}
     attrs |= {"chi_squared": found.chi_squared, "probability": found.probability}
@@ -158,8 +162,6 @@ def _of_two_groups(
     extra = _dataset(found.second, over, ordinates, by[1], units)
     for part in ("", "_error", "_low", "_high"):
         dataset[f"second_factor{part}"] = extra[f"shift_factor{part}"]
-        if vertical != "none":
-            dataset[f"second_vertical_factor{part}"] = extra[f"vertical_factor{part}"]
     verdicts: dict[str, str] = {}
     for one, name in zip((found.first, found.second), by, strict=True):
         laws, said = laws_of(

@@ -27,7 +27,7 @@ def draw_master_curve(curve: xr.Dataset) -> Figure:
     """
     shown = [(str(curve.attrs["group"]), "shift_factor", "vertical_factor", curve.attrs["reference"])]
     if "second" in curve.attrs:
-        second = str(curve.attrs["second"]), "second_factor", "second_vertical_factor", curve.attrs["second_reference"]
+        second = str(curve.attrs["second"]), "second_factor", "", curve.attrs["second_reference"]
         shown.append(second)
     rising = bool(curve["vertical_factor"].any())
     groups, keys, bar = _groups(curve)
@@ -42,7 +42,7 @@ def draw_master_curve(curve: xr.Dataset) -> Figure:
     panels[0].bar = panels[1].bar = bar
     for by, across, along, reference in shown:
         panels.append(_factors(curve, by, across, reference))
-        if rising:
+        if rising and along:
             panels.append(_factors(curve, by, along, reference))
     references = ", ".join(f"{by} = {reference:.4g} {_unit(curve, by)}".strip() for by, _, _, reference in shown)
     return Figure(

@@ -11,12 +11,12 @@ from scipy.stats import chi2
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.physics.superposition.master_curve import Superposition, Vertical, superpose
+from mdr_dask.physics.superposition.master_curve import Superposition, superpose
 
 
 @dataclass(frozen=True)
 class TwoShifts:
-    """Factors ``h(v, T) = a(v) + b(T)``, vertical factors of the same form if there are any, and the merged curve.
+    """Factors ``h(v, T) = a(v) + b(T)``, and the merged curve.
 
     Parameters
     ----------
@@ -41,7 +41,6 @@ def superpose_twice(
     second: ArrayLike,
     curves: Sequence[tuple[ArrayLike, ArrayLike]],
     references: tuple[float, float] | None = None,
-    vertical: Vertical = "none",
     seed: int = 0,
 ) -> TwoShifts:
     """Shift curves that differ in two quantities into one curve, and split each factor into a sum of two.
@@ -57,8 +56,6 @@ def superpose_twice(
         log10 of abscissa and ordinate.
     references : pair of float, optional
         Groups whose factors are zero; by default the middle ones.
-    vertical : {'none', 'free'}
-        Whether there are vertical factors, which are a sum as well.
     seed : int
         Seed of the draws of `superpose`.
 
@@ -78,8 +75,8 @@ def superpose_twice(
     columns = np.delete(np.arange(design.shape[1]), [zeros[0], groups[0].size + zeros[1]])
     if np.linalg.matrix_rank((design - design[0])[1:, columns]) < columns.size:
         raise DataError("the curves fall into parts that share neither group: measure one value of each with the other")
-    free = superpose(np.arange(order.size), [curves[k] for k in order], vertical, 0.0, seed)
-    return _split(free, groups, ordered, zeros, design, columns, 1 if vertical == "none" else 2)
+    free = superpose(np.arange(order.size), [curves[k] for k in order], "none", 0.0, seed)
+    return _split(free, groups, ordered, zeros, design, columns)
 
 
 def _split(
@@ -89,24 +86,21 @@ def _split(
     zeros: Sequence[int],
     design: FloatArray,
     columns: NDArray[np.intp],
-    axes: int,
 ) -> TwoShifts:
     """Fit the sum to the factors of all curves by least squares, weighted by their covariance.
 
     `design` maps the factors of both groups to those of the curves; `columns` are the factors that are not zero by
-    definition. `axes` is 2 if there are vertical factors, otherwise 1.
+    definition.
     """
     curves, both = free.groups.size, design.shape[1]
-    rows = np.kron(np.eye(axes), (design - design[0])[1:, columns])
-    moved = np.concatenate([curves * axis + np.arange(1, curves) for axis in range(axes)])
-    kept = np.concatenate([both * axis + columns for axis in range(axes)])
+    rows, moved = (design - design[0])[1:, columns], np.arange(1, curves)
     whiten = np.linalg.inv(np.linalg.cholesky(free.covariance[np.ix_(moved, moved)]))
     solve = np.zeros((2 * both, 2 * curves))
-    solve[np.ix_(kept, moved)] = np.linalg.pinv(whiten @ rows) @ whiten
+    solve[np.ix_(columns, moved)] = np.linalg.pinv(whiten @ rows) @ whiten
     target = np.append(free.horizontal, free.vertical)
     sums = solve @ target
-    freedom = moved.size - kept.size
-    misfit = float(np.sum((whiten @ (target[moved] - rows @ sums[kept])) ** 2))
+    freedom = moved.size - columns.size
+    misfit = float(np.sum((whiten @ (target[moved] - rows @ sums[columns])) ** 2))
     reduced = misfit / freedom if freedom else 0.0
     drawn = sums + np.sqrt(max(reduced, 1.0)) * (free.draws - target) @ solve.T
 
