@@ -169,6 +169,7 @@ KILLED = "noise: 0.02, shift: [-1, 0.5], shape: [smooth, jump]"
 MORE = "realisations: {at_least: 4, at_most: 12, until: {y: 1 %}}\nstore: {blocks: {x: 2, shift: 1, realisation: 2}}"
 
 
+@pytest.mark.slow
 def test_the_same_bytes_however_often_it_is_stopped_and_whoever_runs_it(study, tmp_path):
     campaign = study(KILLED, AXIS.replace("60", "14"), MORE)
     whole, stopped, parts = (str(tmp_path / name) for name in ("whole.zarr", "stopped.zarr", "parts.zarr"))

@@ -103,6 +103,7 @@ def test_every_case_goes_on_until_there_are_enough_lines_to_know_an_interval(own
     assert (found < 2 * FEWEST).all()
 
 
+@pytest.mark.slow
 def test_the_same_bytes_however_often_it_stops_and_whoever_works(own, toy, tmp_path):
     campaign = own(Tolerance(absolute=0.2))
     whole, broken, parts = (str(tmp_path / name) for name in ("a.zarr", "b.zarr", "c.zarr"))

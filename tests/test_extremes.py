@@ -194,6 +194,7 @@ def factors(groups, curves, vertical):
     return None
 
 
+@pytest.mark.slow
 @settings(max_examples=8, deadline=None)
 @given(
     seed=st.integers(0, 10**6),
@@ -221,8 +222,9 @@ def test_master_curves_know_no_unit_and_no_order(seed, points, noise, along, up,
         assert one is two
         return
     assert np.array_equal(two.groups, one.groups)
-    # two minima that are found apart: together to a few hundredths of the error that is stated
-    close = 3e-2 * np.maximum(one.horizontal_error, 1e-6) + 1e-7
+    # draws of chains that begin apart: together to a few hundredths of the error that is stated, unless the chains
+    # wander along a plateau
+    close = (1.0 if one.undetermined else 3e-2) * np.maximum(one.horizontal_error, 1e-6) + 1e-7
     assert np.all(np.abs(two.horizontal - one.horizontal) <= close)
     assert np.all(np.abs(two.vertical - one.vertical) <= close)
 

@@ -50,6 +50,7 @@ CRASH = """    if case.normal_force > 50 and case.sliding_distance > 10:
 """
 
 
+@pytest.mark.slow
 def test_a_case_that_crashes_the_process_has_failed_after_the_next_run(example):
     first = example("run", "pin.yaml", "--quiet", "--threads", "1", line=CRASH)
     assert first.returncode == -11

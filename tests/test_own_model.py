@@ -4,6 +4,7 @@ import importlib
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 from dataclasses import replace
@@ -292,6 +293,14 @@ def test_errors_that_are_zero_everywhere_are_not_printed(example, capsys):
 
 
 def test_ctrl_c_during_a_case_of_the_main_thread_is_no_failed_case():
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)  # workers of pytest ignore it
+    try:
+        interrupted()
+    finally:
+        signal.signal(signal.SIGINT, handler)
+
+
+def interrupted():
     with pytest.raises(KeyboardInterrupt):
         per_case(raises(KeyboardInterrupt()))(Block(None, {}, 1, (0,), 1, ("y",)))
 

@@ -197,6 +197,7 @@ def test_a_log_tells_what_happened_and_a_watch_until_nobody_is_at_work(toy, camp
     assert told[2:] == ["at work: nobody"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("alone", [False, True])
 def test_a_part_opens_no_port_as_a_cluster_does(toy, url, alone):
     campaign = replace(toy.campaign(toy.axis("position", [1.0, 2.0, 4.0])), blocks={"position": 1})

@@ -48,6 +48,7 @@ def test_what_is_planted_is_told(case, verdicts):
     assert all(verdict in sentence for verdict in verdicts[1:]), sentence
 
 
+@pytest.mark.slow
 def test_false_alarms_are_rare():
     """Two tests with a chance of 5 % each; Arrhenius does not hold, and WLF is enough."""
     told = [master_curve(modulus(seed, 0.02))["law_holds"].item() for seed in range(10)]

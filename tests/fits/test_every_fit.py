@@ -137,6 +137,7 @@ ODD = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("odd", ODD)
 @pytest.mark.parametrize("study", ["jumps", "jumps of three sizes on a scan", "lengths and points"])
 def test_fits_take_odd_numbers_without_a_warning(study, odd, tmp_path):

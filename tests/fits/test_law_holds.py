@@ -118,6 +118,7 @@ def friction(tmp_path_factory):
     return str(folder / "study.zarr")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["zone_one", "plateau", "interpolation", "contact_growth", "contact_slope", "collapse"]
 )

@@ -250,6 +250,7 @@ def test_few_points_of_a_curve_are_no_test():
     assert found["horizontal_low"].isnull().all()
 
 
+@pytest.mark.slow
 def test_a_collapse_is_no_worse_than_none():
     """Steep curves of few points: Newton's steps alone leave three times the distances that there were before."""
     axes = {"normal_force": np.geomspace(1e-3, 1e2, 5), "velocity": np.geomspace(1e-8, 1e2, 12)}

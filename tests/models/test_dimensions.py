@@ -218,6 +218,7 @@ def units_of(model, parameters):
     return known | (model.units(parameters) if model.units else {})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROWS)
 @settings(max_examples=1, deadline=None)
 @given(data=st.data())

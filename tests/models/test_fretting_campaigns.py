@@ -80,6 +80,7 @@ def test_a_grid_over_friction_and_stiffness_is_solved_once_for_each_distinct_sti
     assert " 6 solves (91.7% of the results" in streams.err
 
 
+@pytest.mark.slow
 def test_sliding_from_a_campaign(write):
     path = write(
         "  indenter: [{shape: parabola}, {shape: cone}]\n  hold: [depth, force]\n  path: [0, 1, 40]\n",

@@ -32,6 +32,7 @@ def run(folder, **environment):
     return subprocess.run(command, cwd=folder, env=kept | environment, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["nbi", "nbc"])
 @pytest.mark.parametrize("content", [b"", b"\x80\x04torn"])
 def test_a_torn_cache_file_is_compiled_again_with_a_warning(tmp_path, ending, content):

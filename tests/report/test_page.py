@@ -210,6 +210,7 @@ def test_a_page_is_made_while_half_of_the_study_is_missing(tmp_path, toy):
     assert "toy" in page([study])
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_page_of_several_studies(url, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["report", url, url, "-o", "both.html"]) == 0

@@ -31,6 +31,7 @@ def everywhere(line: PreparedLine) -> Reachable:
     return Reachable(np.array([[0, nodes - 1]]), np.full(nodes, -np.inf), 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("oversampling", [1, 4])
 @pytest.mark.parametrize("hurst", [0.0, 0.4, 0.8])
 @pytest.mark.parametrize("deborah", [1e-3, 0.3, 10.0, 1e3])

@@ -54,6 +54,7 @@ def tip(load, deborah):
     return 2 / 3 * np.sqrt(2 * load * 4 * np.pi**2 / deborah)
 
 
+@pytest.mark.slow
 def test_very_fast_sliding_is_on_one_parabolic_tip():
     """Region IV, on both sides of a jump, in the sweep and with every element followed."""
     place = 2 * np.pi * np.arange(2000) / 2000

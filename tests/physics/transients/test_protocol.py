@@ -137,6 +137,7 @@ def test_every_course_keeps_the_balance() -> None:
     assert np.all(np.diff(found.dissipated) > -1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("solid", "last"), [(STANDARD, 25.0), (SERIES, 40.0)])
 def test_ends_in_the_direct_steady_state(solid: Foundation, last: float) -> None:
     height, slope = rough()

@@ -10,6 +10,7 @@ from mdr_dask.physics.wear.exact import exact
 from mdr_dask.physics.wear.rules import limit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("exponent", "c"), [(2.0, 0.455), (0.6, 0.8), (1.0, 0.3), (4.0, 0.3), (8.0, 0.8), (2.0, 0.99)])
 def test_the_end_is_no_farther_than_the_bound(exponent, c, monkeypatch):
     profile = PowerProfile(exponent)
