@@ -25,7 +25,7 @@ class Parabola(Parameters):
 
     @property
     def power_law(self) -> tuple[float, float]:
-        """Coefficient (NaN if it is not given) and exponent of the body c r^n."""
+        """Coefficient c (NaN if it is not given) and exponent n of the body c r^n."""
         return (math.nan if self.radius is None else 0.5 / self.radius), 2.0
 
 
@@ -106,7 +106,10 @@ _OSCILLATION = ("effective_shear_modulus", "friction", "amplitude")
 
 
 class FrettingWear(Parameters):
-    """Parameters of fretting wear, dimensionless (no modulus) or dimensional; sliding if a `path` is given."""
+    """Parameters of fretting wear, or, if a `path` is given, of sliding wear.
+
+    A campaign without moduli is dimensionless.
+    """
 
     renamed: ClassVar[Mapping[str, str]] = {
         "shape": "write indenter: {shape: ...}, with radius, angle, coefficient and exponent inside",
@@ -182,7 +185,7 @@ class FrettingWear(Parameters):
 
     @property
     def dimensionless(self) -> bool:
-        """Whether the campaign is dimensionless: lengths over a0, heights over d0, and so on."""
+        """Whether the campaign is dimensionless, with lengths in units of a0, heights in units of d0, and so on."""
         return self.stick_radius is not None or (self.path is not None and self.contact_modulus is None)
 
     @model_validator(mode="after")
@@ -230,7 +233,7 @@ class FrettingWear(Parameters):
         return self
 
     def notes(self) -> tuple[str, ...]:
-        """Return a note if the rule is an approximation."""
+        """Return a note if the wear rule is an approximation."""
         if self.wear_rule != "fast":
             return ()
         return (
@@ -283,7 +286,7 @@ OUTPUTS = (
 
 
 def axis(parameters: FrettingWear) -> FloatArray:
-    """Return the radii or positions of the profiles, over a0."""
+    """Return the radii or positions of the profiles, divided by a0."""
     return np.linspace(0.0, parameters.extent, parameters.points)
 
 

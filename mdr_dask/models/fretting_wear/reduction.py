@@ -1,4 +1,7 @@
-"""Conversion of the parameters of a block to n, g_c and N of every case and realisation."""
+"""Conversion of the parameters of a block to dimensionless numbers for every case and realisation.
+
+These numbers are the exponent n, the image g_c at the stick border, and the number of cycles N.
+"""
 
 from __future__ import annotations
 
@@ -18,15 +21,15 @@ from mdr_dask.models.parts.indenter import Other
 if TYPE_CHECKING:
     from mdr_dask.physics.mdr.revolution import TableProfile
 
-LEAST = 1e-60  # smallest unit of length, height and force, and reciprocal of the largest: their cubes do not overflow
-MOST_CYCLES = 1e12  # largest N; wear has ended long before
+LEAST = 1e-60  # units of length, height and force must lie between LEAST and 1 / LEAST, so that cubes do not overflow
+MOST_CYCLES = 1e12  # largest N; wear has ended long before this N
 
 
 @dataclass(frozen=True)
 class Numbers:
     """The input of the physics for every case and realisation, and the units of the cases; shape (cases, realisations).
 
-    `level` is g_c = 1 - eta, the image at the stick border; `advance` is the factor from cycles to N.
+    `level` is g_c = 1 - eta, the image at the stick border; `advance` is the factor that converts cycles to N.
     """
 
     exponent: FloatArray
@@ -40,14 +43,14 @@ class Numbers:
 
 
 def indenters(block: Block[FrettingWear]) -> list[Indenter]:
-    """Return the indenter of every case, or a single one if all cases share it except for numbers that vary."""
+    """Return the indenter of every case, or one indenter if only its numbers vary between the cases."""
     if isinstance(block.parameters.indenter, Pressed) and any(path.startswith("indenter") for path in block.columns):
         return [block.case(case).indenter for case in range(block.cases)]
     return list(block.columns["indenter"]) if "indenter" in block.columns else [block.parameters.indenter]
 
 
 def _power_laws(block: Block[FrettingWear]) -> tuple[FloatArray, FloatArray]:
-    """Return coefficient and exponent of every case, NaN if they are not given."""
+    """Return coefficient and exponent of every case; a number that is not given is NaN."""
     none = np.nan, np.nan
     coefficient, exponent = np.array(
         [none if isinstance(one, Pressed) else one.power_law for one in indenters(block)]
@@ -92,7 +95,11 @@ def _factor(block: Block[FrettingWear], name: str, normal: FloatArray) -> FloatA
 
 
 def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str]]:
-    """Return n, g_c and N of every case, and its units a0, d0, E* d0 a0; for sliding g_c = 0, and N is the path s."""
+    """Return n, g_c and N of every case and its units a0, d0, E* d0 a0, with messages about cases that cannot be
+    solved.
+
+    For sliding g_c is 0, and N is the dimensionless path s.
+    """
     with np.errstate(all="ignore"):
         numbers, messages = _reduced(block)
     for case, position in np.argwhere(numbers.level >= 1):
@@ -143,7 +150,7 @@ def _first_contact(
     modulus: FloatArray,
     messages: dict[tuple[int, int], str],
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a0 and d0 of dimensional cases; if a table is too short for the depth, add a message."""
+    """Return a0 and d0 of the cases; add a message if the table of a measured body ends before the contact radius."""
     from mdr_dask.physics.mdr import power_law_contact as contact
 
     depth, force = _column(block, "depth"), _column(block, "normal_force")
@@ -162,7 +169,7 @@ def _first_contact(
 
 
 def table_profile(indenter: Indenter, depth: float) -> TableProfile:
-    """Return the contact of a body that is not a power law at a depth; cached by content."""
+    """Return the virgin contact, at a depth, of a body that is not a power law; cached by the content of its file."""
     if not isinstance(indenter, Pressed):
         raise ValueError("power laws and other profiles cannot be mixed along one axis")
     return _pressed_table(indenter.file, depth) if isinstance(indenter, Table) else _pressed_body(indenter, depth)

@@ -1,4 +1,7 @@
-"""Solution of a block of fretting wear: each distinct body, stick radius and rule is solved once for all cycles."""
+"""Solution of a block of fretting wear.
+
+Each different combination of body, stick radius and rule is solved once for all numbers of cycles.
+"""
 
 from __future__ import annotations
 
@@ -29,13 +32,16 @@ from mdr_dask.physics.wear.forced import SETTINGS as FORCED
 from mdr_dask.physics.wear.history import LoadBlock, history
 from mdr_dask.physics.wear.worn import Worn
 
-#: Outputs of the closed forms, which are computed for many cases at once.
+#: Outputs that have a closed form; the closed forms are computed for many cases at once.
 _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border")
-#: Outputs whose name differs from the attribute of `Worn`, because a parameter already has that name.
+#: Names of outputs, and the attributes of `Worn` that have the same meaning but another name. The output cannot be
+#: called `normal_force`, because a parameter has this name.
 _RENAMED = {"contact_force": "normal_force"}
-#: Error of the profile over eta d0 for which the evolution is solved: without an accuracy in the campaign; the least.
+#: Error of the profile, divided by eta d0, for which the evolution is solved: `_USUAL` if the campaign states no
+#: accuracy; no solution uses a value below `_FINEST`.
 _USUAL, _FINEST = 1e-3, 1e-5
-#: With an accuracy: first such error over the accuracy, and the factor for the next one if an output misses it.
+#: If the campaign states an accuracy, the first solution uses `_FIRST` times the accuracy as this error. If an output
+#: misses the accuracy, the next solution uses a smaller error, by the factor `_FINER`.
 _FIRST, _FINER = {"depth": 0.2, "force": 0.6}, 0.25
 
 #: Indices (case, realisation) in a block.
@@ -44,7 +50,7 @@ Places = list[tuple[int, int]]
 
 @dataclass(frozen=True)
 class Task:
-    """Input of a solution that several cases share: everything except the number of cycles and xi."""
+    """Input of a solution that several cases share: all data except the number of cycles and xi."""
 
     table: Pressed | None
     depth: float
@@ -101,14 +107,14 @@ def seconds(block: Block[FrettingWear]) -> float:
 
 
 def _followed(hold: str, accuracy: float) -> float:
-    """Return the estimated time of one evolution and its errors, without the evaluation at single times."""
+    """Return the estimated time, in seconds, of one evolution and its errors, without the evaluation at single N."""
     if hold == "force":
         return 0.09 * float(max(FORCED.coarsest / accuracy, 1.0) ** 1.1)
     return 0.012 * float((_USUAL / accuracy) ** 0.6)
 
 
 def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str], NDArray[np.int8]]:
-    """Return the numbers of a block, messages about invalid cases, and the status that follows from them."""
+    """Return the dimensionless numbers of a block, messages about invalid cases, and the status of every case."""
     numbers, messages = reduce_block(block)
     refuse_gross_slip(block, numbers, messages)
     status = np.full(numbers.level.shape, Status.DONE, dtype=np.int8)
@@ -118,20 +124,20 @@ def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int],
 
 
 def _plain_name(name: str) -> tuple[str, bool]:
-    """Return the name of a worn contact's output for an output of a campaign, and whether the latter is an error."""
+    """Return the name in `Worn` of an output of a campaign, and whether the output is the error of another output."""
     owners = {companion.name: owner for owner, companion in MODEL.companions.items()}
     plain = owners.get(name, name).removeprefix("block_")
     return _RENAMED.get(plain, plain), name in owners
 
 
 def _sizes(parameters: FrettingWear, name: str) -> tuple[int, ...]:
-    """Return the sizes of an output's own dimensions."""
+    """Return the sizes of the dimensions of an output, without those of cases and realisations."""
     lengths = {"block": max(len(parameters.history), 1)}
     return tuple(lengths.get(dim, parameters.points) for dim in MODEL.output(name).dims)
 
 
 def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
-    """Multiply the outputs by the units of their case, which are 1 for dimensionless cases."""
+    """Multiply the outputs by the units of length, height and force of each case; dimensionless cases have units 1."""
     units = {
         "contact_radius": numbers.length,
         "stick_border": numbers.length,
@@ -149,7 +155,11 @@ def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
 
 
 def _is_plain(block: Block[FrettingWear]) -> bool:
-    """Return whether closed forms suffice: power laws, scalars, limit or fast rule, constant depth, no history."""
+    """Return whether closed forms are sufficient for a block.
+
+    They exist for power-law bodies, constant depth without a history, the limit or the fast rule, and outputs that are
+    numbers.
+    """
     simple = set(block.columns.get("wear_rule", [block.parameters.wear_rule])) <= {"limit", "fast"}
     depth = set(block.columns.get("hold", [block.parameters.hold])) == {"depth"}
     wanted = {
@@ -163,7 +173,9 @@ def _is_plain(block: Block[FrettingWear]) -> bool:
 def _solve_plain(
     block: Block[FrettingWear], numbers: Numbers, values: dict[str, FloatArray], good: NDArray[np.bool_]
 ) -> int:
-    """Solve limits and fast rules of power laws, all at once; return the number of distinct ones."""
+    """Compute the limiting profiles or fast rules of all power-law cases together; return the number of different
+    cases.
+    """
     is_fast = np.asarray(block.column("wear_rule") == "fast")
     fast = np.broadcast_to(is_fast[:, None], good.shape)[good]
     cycles, xi = np.where(fast, numbers.cycles[good], np.inf), np.where(fast, numbers.xi[good], 0.0)
@@ -182,7 +194,7 @@ def _solve_plain(
 
 
 def _distinct(rows: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Return the distinct columns and the index of each column among them."""
+    """Return the different columns of an array and, for each column of the array, its index among them."""
     if rows.shape[1] == 0:
         return rows, np.zeros(0, dtype=np.intp)
     order = np.lexsort(rows)
@@ -204,7 +216,7 @@ def _solve_each(
     status: NDArray[np.int8],
     messages: dict[tuple[int, int], str],
 ) -> int:
-    """Solve one task after the other, each for all its cycles; return the number of solutions."""
+    """Solve the tasks one after another, each for all its numbers of cycles; return the number of solutions."""
     solves, places = 0, axis(block.parameters)
     for task, wanted in _tasks(block, numbers, status).items():
         try:
@@ -225,7 +237,9 @@ def _solve_each(
 
 
 def _answer(records: Sequence[Worn], name: str, places: FloatArray) -> float | FloatArray:
-    """Return one output of a solution; outputs of a history's blocks have a row for each block."""
+    """Return one output of a solution. Outputs whose name begins with `block_` have one row for each block of a
+    history.
+    """
     plain, is_error = _plain_name(name)
     answers = [
         one.error(plain, places) if is_error else one.value(plain, places)
@@ -248,7 +262,7 @@ class _Demand:
         self.errors = self.accuracy is not None or any(_plain_name(name)[1] for name in block.outputs)
 
     def missed(self, records: Sequence[Worn]) -> str:
-        """Return a message about the outputs that miss the relative accuracy, or an empty string."""
+        """Return a message about the outputs that miss the accuracy, or an empty string if all outputs reach it."""
         if self.accuracy is None:
             return ""
         values = {name: self._finite(records, name) for name in self.outputs}
@@ -256,13 +270,18 @@ class _Demand:
         return missed_accuracy(values, errors, self.accuracy).get(0, "")
 
     def _finite(self, records: Sequence[Worn], name: str) -> FloatArray:
-        """Return an output with a leading case axis, NaN where it is infinite, such as the pressure at a sharp tip."""
+        """Return an output with a first axis for the case. Infinite values, such as the pressure at a sharp tip, become
+        NaN.
+        """
         answer = np.asarray(_answer(records, name, self.places))
         return np.where(np.isfinite(answer), answer, np.nan)[None]
 
 
 def _solves_of(task: Task, wanted: Collection[tuple[float, float]]) -> int:
-    """Return the number of solutions of a task: one if all cycles belong to one march or if N does not matter."""
+    """Return the number of solutions of a task.
+
+    It is one if a single time integration gives all N, or if the result does not depend on N.
+    """
     marched = task.rule == "sliding" or (task.rule == "exact" and not task.blocks)
     return 1 if marched or task.rule == "limit" else len(wanted)
 
@@ -270,7 +289,7 @@ def _solves_of(task: Task, wanted: Collection[tuple[float, float]]) -> int:
 def _tasks(
     block: Block[FrettingWear], numbers: Numbers, status: NDArray[np.int8]
 ) -> dict[Task, dict[tuple[float, float], Places]]:
-    """Return, for each task, the positions of its cases by (N, xi)."""
+    """Return, for each task and each pair (N, xi) of the task, the positions of the cases in the block."""
     tasks: dict[Task, dict[tuple[float, float], Places]] = {}
     bodies = indenters(block)
     for case in range(block.cases):
@@ -309,15 +328,15 @@ def _task(parameters: FrettingWear, indenter: Indenter, numbers: Numbers, place:
 
 
 def _first_resolution(accuracy: float | None, hold: str) -> float:
-    """Return the resolution at which a case is solved first."""
+    """Return the error of the profile, divided by eta d0, for which a case is solved first."""
     return _USUAL if accuracy is None else max(_FIRST[hold] * accuracy, _FINEST)
 
 
 def _contacts(task: Task, wanted: Sequence[tuple[float, float]], demand: _Demand) -> list[tuple[Sequence[Worn], str]]:
-    """Solve a task for all its (N, xi), again at a finer resolution for outputs that miss the accuracy.
+    """Solve a task for all its pairs (N, xi), and repeat pairs whose outputs miss the accuracy at a finer resolution.
 
-    Return contacts, each with a message about outputs that still miss it. The final resolution of a result depends only
-    on its own case. Results with the same resolution are solved together.
+    Return the contacts, each with a message about the outputs that miss the accuracy at the last resolution. The final
+    resolution of a result depends only on its own case. Results with the same resolution are solved together.
     """
     resolution, left = _first_resolution(demand.accuracy, task.hold), list(range(len(wanted)))
     found: dict[int, tuple[Sequence[Worn], str]] = {}

@@ -1,4 +1,4 @@
-"""Positions and row numbers in tables of heights: their recognition, and the regular grid on which they lie."""
+"""Recognition of positions and row numbers in tables of heights, and the regular grid of these positions."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from mdr_dask.errors import DataError
 from mdr_dask.units import shown
 
 OFF_GRID = 0.5
-"""Largest deviation of a position from a regular grid, in steps; beyond it, the next grid point would be closer."""
+"""Largest deviation of a position from its grid point, in steps of the grid."""
 OUTER = 3
-"""Number of rows or columns on each side that may hold positions or numbers."""
+"""Largest number of rows or columns on each side of a table that may hold positions or row numbers."""
 BREAK = 3.0
 """Bend between a line of positions and the lines beside it, over the largest bend between lines of heights."""
 FAR_ALONE = 10.0
-"""A single number is not a height if it is farther from all others than this many times the range of these."""
+"""A single number is not a height if its distance from all other heights exceeds this many times their range."""
 FEW_LEVELS = 10
-"""Largest number of different heights of a profile that was designed, not measured."""
+"""A profile with at most this many different heights counts as designed, not measured."""
 
 
 class Outer(NamedTuple):
@@ -32,7 +32,10 @@ class Outer(NamedTuple):
 
 
 def rising(lines: FloatArray) -> NDArray[np.bool_]:
-    """Return which lines only rise or only fall; positions and row numbers do, rough lines do not."""
+    """Return which lines only rise or only fall.
+
+    Lines of positions and row numbers have this property; lines of rough heights do not.
+    """
     steps = np.diff(lines, axis=1)
     known = np.isfinite(steps)
     one_way = np.all((steps >= 0) | ~known, axis=1) | np.all((steps <= 0) | ~known, axis=1)
@@ -40,7 +43,7 @@ def rising(lines: FloatArray) -> NDArray[np.bool_]:
 
 
 def without_positions(rows: FloatArray) -> Outer:
-    """Remove the outermost rows and columns that hold positions or numbers.
+    """Remove the outermost rows and columns that hold positions or row numbers.
 
     Raises
     ------
@@ -62,10 +65,10 @@ def without_positions(rows: FloatArray) -> Outer:
 
 
 def _leading(lines: FloatArray) -> int:
-    """Return the number of first lines that hold positions or numbers.
+    """Return the number of lines at the beginning that hold positions or row numbers.
 
-    Such lines only rise or only fall. On a tilted or curved surface, lines of heights may do so as well; but positions
-    differ from the lines beside them much more than heights do.
+    Lines of positions only rise or only fall. On a tilted or curved surface, lines of heights may also only rise or
+    only fall. But a line of positions differs from the adjacent lines much more than a line of heights does.
     """
     inner = lines[:, OUTER:-OUTER]
     rises = rising(inner)
@@ -78,12 +81,12 @@ def _leading(lines: FloatArray) -> int:
 
 
 def is_numbered(line: FloatArray) -> bool:
-    """Return whether a line holds the numbers of its points: integers, each larger by one than the previous."""
+    """Return whether a line holds the numbers of its points: integers that increase by one from point to point."""
     return bool(np.all(np.diff(line) == 1) and np.all(line == np.rint(line)))
 
 
 def _common_step(lines: list[FloatArray], name: str) -> float | None:
-    """Return the common step of all lines of positions, or None if there are none except point numbers."""
+    """Return the common step of all lines of positions, or None if the lines hold point numbers only."""
     steps = [regular(line)[1] for line in lines if not is_numbered(line)]
     if any(abs(step - steps[0]) > 0.01 * steps[0] for step in steps):
         apart = " and ".join(f"{step:.4g}" for step in steps)
@@ -92,7 +95,7 @@ def _common_step(lines: list[FloatArray], name: str) -> float | None:
 
 
 def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
-    """Return the index of each position on a regular grid, from 0 on, and the step of the grid.
+    """Return the index, starting from 0, of each position on a regular grid, and the step of the grid.
 
     Positions with the same index may differ slightly, and indices may be missing.
 
@@ -134,11 +137,12 @@ def scattered(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, 
 
 
 def without_codes(height: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
-    """Replace numbers that cannot be heights, m, by NaN, such as the code 9999 for missing points.
+    """Replace numbers that cannot be heights by NaN, for example the code 9999 for missing points. Heights are in m.
 
-    Such a number is the largest or the smallest, and its distance from all other heights exceeds the range of these. If
-    it occurs only once, the distance must exceed `FAR_ALONE` times the range, because a single deep groove is possible.
-    There is no code if the other heights have at most `FEW_LEVELS` different values, as on a grating.
+    A number is replaced if it is the largest or the smallest, and if its distance from all other heights exceeds the
+    range of the other heights. If the number occurs only once, the distance must exceed `FAR_ALONE` times this range,
+    because a single deep groove is possible. No number is replaced if the other heights have at most `FEW_LEVELS`
+    different values, as on a grating.
     """
     height = np.where(np.isfinite(height), height, np.nan)
     found: list[str] = []

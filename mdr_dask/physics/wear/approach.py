@@ -1,9 +1,9 @@
 """Bound on the distance of a worn contact at constant depth from its limiting profile, in closed form.
 
-Let s be the slip over its amplitude: ds/dN = p s / eta. Wear at other radii increases the pressure at a given radius.
-Therefore, if s_1 <= s_2 everywhere and s_1 = s_2 at one radius, the pressure at this radius is at least as high in the
-second body as in the first (maximum principle of the half-space). So a function stays below the true slip if it starts
-below the virgin slip and grows no faster than its own pressure allows. One such function is the half-integral of
+Let s be the slip divided by its amplitude: ds/dN = p s / eta. Wear at other radii increases the pressure at a given
+radius. Therefore, if s_1 <= s_2 everywhere and s_1 = s_2 at one radius, the pressure at this radius is at least as high
+in the second body as in the first (maximum principle of the half-space). So a function stays below the true slip if it
+starts below the virgin slip and grows no faster than its own pressure allows. One such function is the half-integral of
 y = m min(y0 / y0(x_1), 1) for any x_1 > c, where dm/dN = m (1 - m) / (pi w), starting at m = y0(x_1):
 
 * its relative growth is at most (1 - m) / (pi w), with w^2 = a^2 - c^2;
@@ -26,12 +26,15 @@ from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.wear.rules import limit
 from mdr_dask.physics.wear.worn import Worn
 
-#: Decay rate of x_1 - c per N / (pi w), close to the best choice if y0 rises linearly; upper limit of N / (pi w).
+#: `LAYER` is the decay rate of x_1 - c with respect to N / (pi w); this value is close to the best if y0 rises
+#: linearly. `MOST` is the upper limit of N / (pi w), which avoids underflow.
 LAYER, MOST = 2.0 / 3.0, 600.0
 
 
 def nearly_limit(profile: Profile, stick_radius: float, cycles: Sequence[float], accuracy: float) -> dict[float, Worn]:
-    """Return the limiting profile for every N at which it already has the wanted accuracy, at constant depth.
+    """Return the limiting profile for every N at which it approximates the worn body with the wanted accuracy.
+
+    The depth is constant.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Time integration of a worn contact: backward differentiation along fixed radii, for any kind of slip.
+"""Time integration of a worn contact with backward differentiation formulas at fixed radii, for any kind of slip.
 
-Every radius accumulates a quantity, for example its worn depth (see `Problem`). The contact is mapped onto graded
+A quantity, for example the worn depth, accumulates at every radius (see `Problem`). The contact is mapped onto graded
 panels in r^2, which follow the moving edge. Each step is a stiff backward differentiation formula (BDF) of order 1 to
-3, solved for the image and the edge together by Newton iterations that keep their Jacobian as long as they converge.
+3. Newton's method solves it for the image and the edge together, and reuses its Jacobian as long as it converges.
 """
 
 from __future__ import annotations
@@ -19,32 +19,34 @@ from mdr_dask.physics.linear import Factors, factorise
 from mdr_dask.physics.mdr.half_integrals import Panels, graded_panels
 from mdr_dask.physics.outcome import Outcome
 
-#: Local error of a BDF step of order 1, 2, 3, as a fraction of its distance from the extrapolation of past steps.
+#: Local error of a BDF step of order 1, 2, 3, as a fraction of the difference between the step's result and the
+#: extrapolation of the past steps.
 _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
 
 
 class Settings(NamedTuple):
-    """Tuned numbers of the march; `python -m benchmarks accuracy wear` measures them.
+    """Tuned numbers of the time integration; `python -m benchmarks accuracy wear` measures their effect.
 
     Parameters
     ----------
     most_steps, most_iterations : int
-        Number of steps after which a march fails, and of Newton iterations after which a step fails.
+        Number of steps after which a march fails, and number of Newton iterations after which a step fails.
     growth : float
-        Largest ratio of a step to the previous one.
+        Largest ratio of a step to the previous step.
     slow : float
         Ratio of successive Newton corrections above which the Jacobian is renewed.
     theta_ratio : float
-        Largest ratio of the present theta to the theta of the Jacobian, or of the inverse, for which it is reused.
+        A Jacobian is reused if the ratio of the present theta to the theta of the Jacobian, and the inverse of this
+        ratio, are at most this value.
     difference : float
-        Step of the finite differences for the edge and the unknowns after it.
+        Step of the finite differences with respect to the edge and to the unknowns after the edge.
     first : float
-        Longest first step, relative to the time scale of the contact; with it, small amounts of wear are right to 2
-        %.
+        Longest first step, as a fraction of the time scale of the contact. With this value, the error of small amounts
+        of wear is at most 2 %.
     shortest, beginning : float
         The march fails if a step is shorter than `shortest` times the longest step so far (or times the first step, if
-        that is shorter), or than `beginning` times the first step. In marches that succeeded, no later step was below
-        0.13 of the longest one, but some first steps had to be reduced to 1e-5.
+        that is shorter), or than `beginning` times the first step. In marches that succeeded, no later step was
+        shorter than 0.13 times the longest step, but some first steps had to be reduced by a factor of 1e-5.
     """
 
     most_steps: int = 20000
@@ -69,21 +71,22 @@ class Resolution(NamedTuple):
     accuracy : float
         The accuracy for which the panels are chosen.
     wider : float
-        Factor on the error that is allowed in a step.
+        Factor on the allowed error of a step.
     fewer : int
-        Number by which the nodes of each panel, and the halvings at each end, are reduced.
+        Number by which the nodes of each panel and the halvings at each end are reduced, in a rougher solution.
     thinned : int
-        Largest reduction of the nodes of a panel.
+        Largest number of nodes by which a panel is reduced in a rougher solution.
     order : int, optional
         Nodes of a panel; by default four, or six for accuracies of 3e-5 and below.
     rough : tuple of float
-        Factors on the step tolerance of the two rougher solutions from which the error is estimated.
+        Factors on the step tolerance in the two rougher solutions, from which the error is estimated.
     slowness : float
-        Factor on the distances from the rougher solutions, if the error falls more slowly than usual.
+        Factor on the differences from the rougher solutions; above 1 if the error falls more slowly than usual.
     second : float
-        Weight of the distance from the second rougher solution, which matters where the first agrees by chance.
+        Weight of the difference from the second rougher solution. It matters where the first rougher solution agrees by
+        chance.
     newton : float
-        Under constant force: tolerance of Newton's method as a fraction of the step tolerance.
+        Tolerance of Newton's method as a fraction of the step tolerance; used only under constant force.
     """
 
     accuracy: float
@@ -103,11 +106,15 @@ class Resolution(NamedTuple):
 
     @property
     def first(self) -> float:
-        """The length of the first step, relative to the time scale of the contact."""
+        """The length of the first step, as a fraction of the time scale of the contact."""
         return min(0.1 * self.accuracy, SETTINGS.first) * self.wider
 
     def panels(self, near: int, fewest_digits: float = 2.0, sharpness: float = 1.0, coarser: float = 1.0) -> Panels:
-        """Return panels; the inner border has `near` more halvings than the edge, times `sharpness`."""
+        """Return graded panels.
+
+        The panels at the inner border are halved `near` times more often than those at the edge; this number of
+        halvings is multiplied by `sharpness`.
+        """
         digits = max(-np.log10(coarser * self.accuracy), fewest_digits)
         # with fewer halvings, the error of the panels at the moving edge would make the steps very short
         levels = round(2.7 * digits - 3.3)
@@ -116,7 +123,7 @@ class Resolution(NamedTuple):
         return graded_panels(round(sharpness * left), right, order - min(self.fewer, self.thinned))
 
     def panels_of_a_punch(self, sharpness: float) -> Panels:
-        """Return panels for a pressure that tends to a jump at the edge, and for a power-law profile at the axis."""
+        """Return panels for a pressure that jumps at the edge in the end, and for a power-law profile at the axis."""
         digits = max(-np.log10(self.accuracy), 2.0)
         halvings = round(2.0 * digits) - self.fewer
         # the error at the tip is the height in the innermost panel; under a cone, a halving divides it by sqrt(2)
@@ -124,11 +131,13 @@ class Resolution(NamedTuple):
         return graded_panels(round(sharpness * tip), halvings + 4, 4 - min(self.fewer, self.thinned))
 
     def finer(self, factor: float) -> Resolution:
-        """Return a finer resolution, for use after a march has failed; Newton's method is made more accurate, too."""
+        """Return a finer resolution with a smaller tolerance of Newton's method, for use after a march has failed."""
         return self._replace(accuracy=self.accuracy / factor, newton=0.01 * self.newton)
 
     def halfway_to(self, finer: Resolution) -> Resolution:
-        """Return this resolution with the step tolerance at the geometric mean of its own and that of `finer`."""
+        """Return this resolution, but with the geometric mean of its own step tolerance and the step tolerance of
+        `finer`.
+        """
         return self._replace(wider=float(np.sqrt(self.wider * finer.wider)))
 
     def rougher(self) -> tuple[Resolution, Resolution]:
@@ -150,8 +159,9 @@ class Moment:
     time : float
         Cycles N in partial slip, sliding path s in gross slip.
     unknowns : array, shape (n,)
-        The unknowns of the problem: values of the image at all nodes but the last, the width of the panels in squared
-        radii over that of the virgin contact, and in some problems further ones. All are of the order of one.
+        The unknowns of the problem: the values of the image at all nodes except the last, then the width of the panels
+        in squared radii, divided by its value in the virgin contact. Some problems have further unknowns. All unknowns
+        are of the order of one.
     accumulated : array, shape (n,)
         The quantity accumulated at the radii of the nodes; zero at the edge.
     """
@@ -185,7 +195,7 @@ class Problem(Protocol):
         """Return the moment at the end of a solved step."""
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return accumulated - known - theta * rate at every node, and the conditions at the edge."""
+        """Return accumulated quantity - known - theta * rate at every node, and the conditions at the edge."""
 
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
         """Return the derivatives of the residual with respect to the nodal unknowns."""
@@ -224,7 +234,7 @@ def march(
     Returns
     -------
     list of Moment
-        All accepted steps; the first is the start.
+        The start, and the moment at the end of every accepted step.
 
     Raises
     ------
@@ -254,7 +264,10 @@ def march(
 
 
 def settled(problem: Problem) -> Any:
-    """Return the virgin contact as a solution of the discrete equations, so the first step starts without a jump."""
+    """Return the virgin contact as a solution of the discrete equations.
+
+    So the first time step does not contain a jump from the exact to the discrete solution.
+    """
     virgin = problem.start()
     known = problem.memory([virgin], np.zeros(1))
     unknowns = _Newton(problem, 1e-9).solve(virgin.unknowns, 0.0, known)
@@ -262,7 +275,7 @@ def settled(problem: Problem) -> Any:
 
 
 class Dense:
-    """A march as a function of time, interpolated with the polynomial of the step that contains the time."""
+    """The results of a march as functions of time, interpolated with the polynomial of the step around the time."""
 
     def __init__(self, history: Sequence[Any]) -> None:
         self.history = history
@@ -278,7 +291,7 @@ class Dense:
         return self.history[max(last - 1, 0)], self.history[last]
 
     def near(self, time: float) -> tuple[Sequence[Any], FloatArray]:
-        """Return the moment at or after a time and up to three before it, with their interpolation weights."""
+        """Return the moment at or after a time and up to three earlier moments, with their interpolation weights."""
         last = self.steps(time)
         near = slice(max(last - 3, 0), last + 1)
         return self.history[near], _lagrange(self.times[near], time)
@@ -289,12 +302,12 @@ class Dense:
         return np.asarray(weights @ np.array([moment.unknowns for moment in moments]))
 
     def accumulated(self, time: float) -> FloatArray:
-        """Return the values accumulated at the nodes at a time."""
+        """Return the accumulated quantity at the nodes, at a time."""
         moments, weights = self.near(time)
         return np.asarray(weights @ np.array([moment.accumulated for moment in moments]))
 
     def number(self, time: float, numbers: FloatArray) -> float:
-        """Interpolate a number, given at all moments, to a time."""
+        """Return a number at a time, interpolated between its values `numbers` at all moments."""
         last = self.steps(time)
         near = slice(max(last - 3, 0), last + 1)
         return float(_lagrange(self.times[near], time) @ numbers[near])
@@ -312,7 +325,10 @@ def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatAr
 
 
 def _try_step(problem: Problem, newton: _Newton, history: Sequence[Moment], time: float) -> tuple[Moment | None, float]:
-    """Make one step of the highest order for which there are past moments; return None if Newton's method fails."""
+    """Make one step of the highest order for which there are enough past moments; return the moment and the error.
+
+    The moment is None if Newton's method fails.
+    """
     past = list(history[-1:-4:-1])
     order = len(past)
     shares = _backward_shares(np.array([time, *(m.time for m in past)]))
@@ -351,7 +367,10 @@ class _Newton:
     def _iterate(
         self, guess: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray], *, fresh: bool
     ) -> FloatArray | None:
-        """Iterate. If `fresh`, renew the Jacobian whenever convergence is slow; otherwise return None in this case."""
+        """Iterate until the unknowns converge; return None if they do not.
+
+        Where convergence is slow, renew the Jacobian if `fresh`; otherwise return None.
+        """
         unknowns, last, renew = guess.copy(), np.inf, fresh
         for _ in range(SETTINGS.most_iterations):
             residual = self.problem.residual(unknowns, theta, known(unknowns))
@@ -379,7 +398,7 @@ class _Newton:
     def _renew(
         self, unknowns: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray], residual: FloatArray
     ) -> None:
-        """Factorise the Jacobian; the columns of the edge and of the unknowns after it are finite differences."""
+        """Factorise the Jacobian; the columns of the edge and the unknowns after the edge are finite differences."""
         matrix = self.problem.jacobian(unknowns, theta)
         for column in range(self.problem.panels.nodes.size - 1, unknowns.size):
             moved = unknowns.copy()
@@ -391,7 +410,7 @@ class _Newton:
 
 @jit
 def _backward_shares(times: FloatArray) -> FloatArray:
-    """Return the weights that give the derivative at times[0] of the polynomial through all times."""
+    """Return the weights that give the derivative, at times[0], of the polynomial through values at all times."""
     weights = np.zeros(times.size)
     for j in range(1, times.size):
         weights[j] = 1.0 / (times[j] - times[0])
@@ -404,7 +423,7 @@ def _backward_shares(times: FloatArray) -> FloatArray:
 
 @jit
 def _lagrange(times: FloatArray, time: float) -> FloatArray:
-    """Return the weights that give the value at `time` of the polynomial through all times."""
+    """Return the weights that give the value, at `time`, of the polynomial through values at all times."""
     weights = np.ones(times.size)
     for j in range(times.size):
         for m in range(times.size):

@@ -1,7 +1,8 @@
-"""Worn contacts by the exact evolution, with their errors: fretting at constant depth or force, and sliding.
+"""Worn contacts by the exact evolution, with their errors: fretting at constant depth, fretting at constant force,
+sliding.
 
-This is the front end for all three conditions. Each contact is solved three times, with coarser panels and longer steps
-each time, and the error is estimated from the differences.
+Each contact is solved three times, with coarser panels and longer steps each time, and the error is estimated from the
+differences.
 """
 
 from __future__ import annotations
@@ -28,16 +29,20 @@ from mdr_dask.physics.wear.rules import limit, limit_radius
 from mdr_dask.physics.wear.slip import FixedBorder, GrossSlip, PartialSlip, partial_slip
 from mdr_dask.physics.wear.worn import Scar, Worn, check_stick_radius, contact_pressure, virgin_load, worn_image
 
-#: Accuracies above this value are computed with this value.
+#: Accuracies above this value are replaced by this value.
 COARSEST = 1e-2
-#: At constant depth: (accuracy, factor on the step tolerance); the width 1 - c of the slip annulus below which this
-#: factor tends to 1; and the weight of the second rougher solution. See ``python -m benchmarks accuracy wear``.
+#: For fretting at constant depth. `WIDER` has pairs of accuracy and factor on the step tolerance. `THIN` is the width
+#: 1 - c of the slip annulus below which this factor tends to 1. `SECOND` is the weight of the second rougher solution
+#: in the error. See ``python -m benchmarks accuracy wear``.
 WIDER, THIN, SECOND = ((1e-4, 1.0), (3e-4, 1.5), (1e-3, 4.0), (3e-3, 5.0), (1e-2, 3.0)), 0.1, 0.25
-#: At constant depth, panels are chosen for 1.6 times the accuracy, limited to 5e-3 unless the accuracy is larger.
+#: For fretting at constant depth, panels are chosen for `COARSER` times the accuracy. The product is limited to
+#: `COARSER_UNTIL`, or to the accuracy if the accuracy is larger.
 COARSER, COARSER_UNTIL = 1.6, 5e-3
-#: As `WIDER`, for gross slip at constant depth; with fine enough panels only the error of the edge remains.
+#: The pairs of `WIDER` for gross slip at constant depth. If the panels are fine enough, only the error of the edge
+#: remains.
 SLID_WIDER = (1e-3, 1.0), (3e-3, 3.0), (1e-2, 1.0)
-#: In gross slip: radius at which the exponent of a body is evaluated; largest factor on the halvings for sharp bodies.
+#: For gross slip. `NEAR_AXIS` is the radius, in units of a0, at which the exponent of a body is evaluated. `SHARPEST`
+#: is the largest factor on the number of halvings of the panels at the tip of a sharp body.
 NEAR_AXIS, SHARPEST = 1e-5, 8.0
 Solver = Callable[[Profile, float, Sequence[float], Resolution], dict[float, Worn]]
 
@@ -62,8 +67,8 @@ def exact(
     amounts : sequence of float
         Cycles N >= 0 in units of N0, or sliding paths s = k E* l / (sigma0 a0); any order.
     accuracy : float
-        Wanted error of f, relative to eta d0, the scale of the wear; below 1e-5, round-off accumulates over the
-        steps.
+        Wanted error of f, divided by eta d0, which is the order of magnitude of the wear. Values below 1e-5 are not
+        reached, because round-off accumulates over the steps.
     constant_force : bool
         Keep the force of the virgin contact instead of its depth.
     errors : bool
@@ -72,7 +77,7 @@ def exact(
     Returns
     -------
     list of Worn
-        In the order of `amounts`; each is independent of the others.
+        The contacts in the order of `amounts`. A contact does not depend on the other amounts.
 
     Raises
     ------
@@ -127,9 +132,9 @@ def _evolved(
 def limit_under_force(profile: Profile, stick_radius: float, accuracy: float = 1e-3, *, errors: bool = True) -> Worn:
     """Return the limiting profile under constant force.
 
-    Once the image jumps at the stick border, the border no longer moves and the shape inside it stays as it is. The
-    limit then follows from this shape, so the evolution is computed only up to the jump. Parameters and errors as in
-    `exact`.
+    Once the image jumps at the stick border, the border no longer moves, and the shape inside the border no longer
+    changes. The limiting profile follows from this shape, so the evolution is computed only up to the jump. Parameters
+    and exceptions are those of `exact`.
     """
     check_stick_radius(stick_radius)
     if not border_moves(stick_radius, accuracy):
@@ -145,7 +150,10 @@ def limit_under_force(profile: Profile, stick_radius: float, accuracy: float = 1
 def _solutions(
     solve: Callable[[Resolution], dict[float, Worn]], resolution: Resolution, errors: bool
 ) -> list[dict[float, Worn]]:
-    """Return the solutions at a resolution and at two rougher ones; one rougher solution may fail."""
+    """Return the solutions at a resolution and, if `errors`, at two rougher resolutions.
+
+    If one of the rougher solutions fails, it is left out; if both fail, NotConvergedError is raised.
+    """
     found = [_first_of(solve, (resolution, resolution.finer(2.0), resolution.finer(4.0)))]
     reasons = []
     for rough in resolution.rougher() if errors else ():
@@ -180,15 +188,15 @@ def _resolution(solve: Solver, stick_radius: float, accuracy: float) -> Resoluti
 
 
 def _wider(accuracy: float, table: tuple[tuple[float, float], ...], power: float = 1.0) -> float:
-    """Return the factor on the step tolerance at an accuracy, interpolated in a table in logarithms."""
+    """Return the factor on the step tolerance at an accuracy, by linear interpolation of the logarithms of a table."""
     return float(np.exp(power * np.interp(np.log(accuracy), *np.log(table).T)))
 
 
 def fretted_resolution(stick_radius: float, accuracy: float) -> Resolution:
-    """Return the resolution for an accuracy at constant depth: the error of f falls like the root of the step error.
+    """Return the resolution for an accuracy at constant depth.
 
-    Steep bodies need more nodes per panel. A thin slip annulus is worn off in few steps, so its step tolerance is
-    increased less.
+    The error of f is proportional to the square root of the step error. Steep bodies need more nodes per panel. A thin
+    slip annulus is worn off in few steps, so its step tolerance is increased less.
     """
     order = 4 if accuracy > 2e-3 else 5 if accuracy > 5e-4 else 6
     wider = _wider(accuracy, WIDER, min((1.0 - stick_radius) / THIN, 1.0))
@@ -274,7 +282,10 @@ def _slid(profile: Profile, c: float, wanted: Sequence[float], resolution: Resol
 
 
 def _slid_under_force(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
-    """Return the contacts after all wanted paths at constant force; the pressure tends to a jump at the edge."""
+    """Return the contacts after all wanted sliding paths, at constant force.
+
+    After a long path the pressure is uniform and jumps to zero at the edge.
+    """
     panels = resolution.panels_of_a_punch(_sharpness(profile))
     virgin = GrossSlip(profile, panels)
     problem = GrossSlip(profile, panels, virgin.normal_force(virgin.start().unknowns))
@@ -282,20 +293,23 @@ def _slid_under_force(profile: Profile, c: float, wanted: Sequence[float], resol
 
 
 def _sharpness(profile: Profile) -> float:
-    """Return the factor on the halvings at the axis, relative to a parabola: f is a power n/2 of r^2 at the axis."""
+    """Return the factor on the number of halvings at the axis, which is 1 for a parabola.
+
+    At the axis f is the power n/2 of r^2, so a body with a smaller exponent n needs smaller panels.
+    """
     near, far = profile.image(np.array([NEAR_AXIS, 2.0 * NEAR_AXIS]))
     return float(np.clip(2.0 / np.log2(far / near), 1.0, SHARPEST)) if near > 0.0 else 1.0
 
 
 def _slid_contacts(problem: GrossSlip, wanted: Sequence[float], step: float, first: float) -> dict[float, Worn]:
-    """Return the contacts after all wanted paths, from one march."""
+    """Return the contacts after all wanted sliding paths, from one time integration."""
     dense = Dense(march(problem, max(wanted), step, first))
     energy = integral_along(dense.history, [problem.wear_rate(moment.unknowns) for moment in dense.history])
     return {path: _slid_contact(problem, dense, path, dense.number(path, energy)) for path in wanted}
 
 
 def _slid_contact(problem: GrossSlip, dense: Dense, path: float, energy: float) -> Worn:
-    """Turn the nodal values after one path into a worn contact; its image is NaN beyond the contact."""
+    """Turn the nodal values after one sliding path into a worn contact, whose image is NaN beyond the contact."""
     profile, panels = problem.profile, problem.panels
     unknowns, worn = problem.start().unknowns, np.zeros(panels.nodes.size)
     if path > 0.0:

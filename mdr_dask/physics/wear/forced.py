@@ -1,4 +1,6 @@
-"""The exact evolution under constant force: while the stick border moves, after it has stopped, and the limit.
+"""The exact evolution of wear under constant force, and the limiting profile.
+
+The evolution has two parts: the stick border moves, and later stops.
 
 See `mdr_dask.physics.wear.forced_slip` for the equations. The constant force is the force of the virgin contact.
 """
@@ -26,28 +28,30 @@ class Settings(NamedTuple):
     Parameters
     ----------
     jump : float
-        The border stops when y exceeds this value in the panel next to it, or a tenth of it if the border moves
-        back.
+        The border stops when y in the panel next to the border exceeds this value. If the border moves back, a tenth
+        of this value is enough.
     nearest : float
         Stick radius below which the panels are not refined further, because the border soon moves away.
     finer : int
-        Number of halvings at the border in addition to those at constant depth.
+        Number of additional halvings of the panels at the border, compared with constant depth.
     latest_jump : float
         A number of cycles N much larger than the N at which the image jumps at the border.
     lowest : float
-        A step with y below minus this value is rejected, and the border stops at the moment before.
+        A step that gives y below minus this value is rejected, and the border stops at the moment before this step.
     coarsest : float
-        Accuracies above this value are computed with this value: longer steps do not follow the border, so that more of
-        them fail and the solution takes longer.
+        Accuracies above this value are replaced by this value. Longer steps do not follow the border, so that more
+        steps fail and the solution takes longer.
     rougher : tuple of float
-        Factors on the step tolerance of the two rougher solutions.
+        Factors on the step tolerance in the two rougher solutions.
     thinned : int
-        Largest reduction of the nodes of their panels: the border must be resolved even in the roughest solution.
+        Largest number of nodes by which each panel of the rougher solutions is reduced. The border must be resolved
+        even in the roughest solution.
     slowness : float
-        Factor on the distances from the rougher solutions, because the error falls more slowly than usual.
+        Factor on the differences from the rougher solutions. It exceeds 1, because the error falls more slowly than
+        usual.
     least_edge_error : float
-        Least error of the radii, relative to the accuracy times the width 1 - c of the virgin slip zone. Near full
-        stick the border stops at the same place in all three solutions, so their difference does not show the
+        Least stated error of the radii, as a fraction of the accuracy times the width 1 - c of the virgin slip zone.
+        Near full stick the border stops at the same place in all three solutions, so their difference does not show the
         error.
     """
 
@@ -93,8 +97,9 @@ def forced_contacts(
 def forced_end(profile: Profile, stick_radius: float, resolution: Resolution) -> Worn:
     """Return the limiting profile under constant force.
 
-    The shape of the stick zone no longer changes, and this zone carries the whole force: g = d beyond the border b,
-    with d = (F/2 + int_0^b g dx) / b. The radius of the scar follows from int_0^a (g - g0) / sqrt(a^2 - x^2) dx = 0.
+    In the limit the shape of the stick zone no longer changes, and this zone carries the whole force. So g = d beyond
+    the border b, where d = (F/2 + int_0^b g dx) / b is the depth. The radius of the scar follows from int_0^a (g - g0)
+    / sqrt(a^2 - x^2) dx = 0.
     """
     problem, moments = _until_jump(profile, stick_radius, resolution, SETTINGS.latest_jump)
     return _end(problem, moments[-1])
@@ -108,10 +113,13 @@ def forced_resolution(accuracy: float) -> Resolution:
 
 
 def border_moves(stick_radius: float, accuracy: float) -> bool:
-    """Return whether constant force differs from constant depth; near full stick the border hardly moves.
+    """Return whether wear under constant force must be distinguished from wear at constant depth.
 
-    The depth grows by up to (1 - c) eta / 2, the squared border by the same fraction (1 - c) / 2 of 1 - c^2, and f next
-    to the border by the square root of this fraction.
+    Near full stick the border hardly moves, and the two cases agree within the accuracy.
+
+    The depth grows by up to (1 - c) eta / 2, and the squared
+    radius of the border by up to (1 - c) / 2 times 1 - c^2. The relative change of f next to the border is the square
+    root of (1 - c) / 2.
     """
     return 0.5 * (1.0 - stick_radius) > accuracy**2
 
@@ -122,7 +130,10 @@ def least_edge_error(stick_radius: float, accuracy: float) -> float:
 
 
 def farthest_contact(profile: Profile, stick_radius: float) -> float:
-    """Return an upper bound of the contact radius: the end of a table, or the contact at the largest possible depth."""
+    """Return an upper bound of the contact radius.
+
+    The bound is the end of a table, or, for other bodies, the radius at the largest possible depth.
+    """
     if np.isfinite(profile.largest_radius):
         return profile.largest_radius
     abscissa, weight = gauss(64)
@@ -142,7 +153,7 @@ def _first(problem: ForcedSlip, resolution: Resolution) -> float:
 def _until_jump(
     profile: Profile, stick_radius: float, resolution: Resolution, end: float
 ) -> tuple[ForcedSlip, list[Pressed]]:
-    """March until the border stops or the time `end` is reached; return the problem and the moments."""
+    """March until the border stops or the time `end` is reached; return the problem and the accepted moments."""
     near = round(-2.0 * np.log2(max(stick_radius, SETTINGS.nearest)))
     panels = resolution.panels(near + SETTINGS.finer, fewest_digits=3.0)
     problem = forced_slip(profile, stick_radius, panels, farthest_contact(profile, stick_radius), resolution.newton)
@@ -163,13 +174,16 @@ def _until_jump(
 
 
 class _Frozen(NamedTuple):
-    """The image in the annulus that the border has passed, as pairs of radius and depth over d0."""
+    """The image in the annulus that the border has passed.
+
+    It follows from pairs of values: a radius that the border reached, and the depth, divided by d0, at that moment.
+    """
 
     reached: FloatArray
     depths: FloatArray
 
     def slope(self, x: FloatArray) -> FloatArray:
-        """Return the slope of this image."""
+        """Return the slope of the image in the annulus at x."""
         if self.reached.size == 1:
             return np.zeros_like(x)
         slopes = np.diff(self.depths) / np.diff(self.reached)
@@ -183,7 +197,7 @@ def _frozen(problem: ForcedSlip, path: FloatArray) -> _Frozen:
 
 
 def _end(problem: ForcedSlip, moment: Pressed) -> Worn:
-    """Return the limiting profile if the border stops at a moment."""
+    """Return the limiting profile of a contact whose stick border stops at `moment`."""
     profile, c, eta = problem.profile, problem.virgin.inner_radius, problem.eta
     border, frozen = problem.radius(moment.border), _frozen(problem, moment.path)
     # the stick zone takes over the load of the virgin slip zone: b d = ... - int_c^b (d' - eta) db'
@@ -279,7 +293,7 @@ def _edge(problem: ForcedSlip, moment: Pressed) -> float:
 
 
 def _breaks(c: float, border: float) -> tuple[float, ...]:
-    """Return integration limits that are dense below the border, where the frozen image becomes steep."""
+    """Return limits of integration that are dense inside the border, where the frozen image becomes steep."""
     if not border > c * (1.0 + 1e-12):
         return ()
     return (*(border - (border - c) * 0.25**k for k in range(1, 8)), border)

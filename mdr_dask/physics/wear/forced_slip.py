@@ -2,12 +2,12 @@
 
 The depth d grows, and the stick border b moves outwards until the image jumps there; then it no longer moves. Inside
 the border the image is frozen: g(b) = d - eta at the time when the border passed. The slip is s = (f - f_star) / eta.
-In the annulus between the first border c and the present one, the plateau f_star changes only by
+In the annulus between the virgin stick border c and the present border b, the plateau f_star changes only by
 df_star = (2/pi) arccos(b / r) dd. So only the path (b, d) has to be stored for this annulus.
 
-The accumulated quantity is the worn depth over eta. Squared radii are counted from c^2 in units of 1 - c^2, the width
-of the virgin slip zone, and the depth is counted from 1 in units of eta. So all unknowns are of the order of one, even
-near full stick.
+The accumulated quantity is the worn depth divided by eta. Squared radii are counted from c^2 in units of 1 - c^2, the
+width of the virgin slip zone, and the depth is counted from 1 in units of eta. So all unknowns are of the order of one,
+even near full stick.
 """
 
 from __future__ import annotations
@@ -30,19 +30,20 @@ from mdr_dask.physics.wear.slip import LogTable, PartialSlip, log_slip, partial_
 
 #: Weight of the border relative to the depth in the step error: f rises like a square root beyond the border.
 BORDER_WEIGHT = 30.0
-#: How far the rise of the plateau is stored, over the width of the slip zone; 1 is the edge.
+#: Position on the panels up to which the rise of the plateau is stored; the border is at 0, the edge at 1.
 BEYOND = 1.25
 
 
-#: Lower limit of (r^2 - c^2) / (1 - c^2), to take its logarithm.
+#: Lower limit of (r^2 - c^2) / (1 - c^2), so that the logarithm of this quantity is finite.
 SMALLEST = 1e-30
-#: A series is used if (r1 - r2) / (r1 + r2) is below this value, with the roots r1 and r2 at both ends of a piece.
+#: `_mean_angle` uses a series if (r1 - r2) / (r1 + r2) is below this value, where r1 and r2 are the values of
+#: sqrt(r^2 - b^2) at the two ends of a straight piece of the path.
 SHORT = 0.02
 _ABSCISSA, _WEIGHT = gauss(3)
 
 
 class VirginBody(NamedTuple):
-    """The virgin body: its slip, c^2 and 1 - c^2."""
+    """The virgin body: its slip `slip`, c^2 (`square`) and 1 - c^2 (`width`)."""
 
     slip: LogTable
     square: float
@@ -50,7 +51,10 @@ class VirginBody(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Border b and width of the slip zone in squared radii, and the depth minus 1 over eta."""
+    """Border and width of the slip zone, and the depth, in the units of the module.
+
+    `border` is (b^2 - c^2) / (1 - c^2), `width` is (a^2 - b^2) / (1 - c^2), and `depth` is (d - 1) / eta.
+    """
 
     border: float
     width: float
@@ -65,16 +69,16 @@ class Past(NamedTuple):
     shares, borders, widths : array, shape (m,)
         One entry for each moment: its weight, border and width.
     worn : array, shape (m, n)
-        Worn depth over eta at the nodes; if the border no longer moves, minus `frozen` and divided by the root of
-        z.
+        Worn depth divided by eta at the nodes. If the border no longer moves: this value minus `frozen`, divided by
+        sqrt(z), where z is the position on the panels.
     frozen : float
-        The worn depth at the border if it no longer moves, else NaN.
+        The worn depth divided by eta at a border that no longer moves; NaN while the border moves.
     moved : array, shape (n + order,)
-        `plateau_rise` along the path, at the nodes of the last moment and in one panel beyond the edge.
+        `plateau_rise` along the path, at the nodes of the newest past moment and at those of one panel beyond the edge.
     path : array, shape (2, k)
-        Border and depth up to where the border moved last.
+        Pairs of border and depth up to the last moment at which the border moved.
     carried : float
-        See `Pressed`.
+        The integral `carried` of the newest past moment, see `Pressed`.
     """
 
     shares: FloatArray
@@ -99,7 +103,7 @@ class Pressed(Moment):
         `plateau_rise` along the part of the path on which the border moved, at the nodes and in one panel beyond
         the edge.
     carried : float
-        int (1 - d) db along the path, with d counted from 1 and in units of eta.
+        int (1 - d) db along the path, where d is counted from 1 in units of eta, and b is the radius of the border.
     """
 
     path: FloatArray
@@ -108,7 +112,7 @@ class Pressed(Moment):
 
     @property
     def border(self) -> float:
-        """The border."""
+        """The stick border, (b^2 - c^2) / (1 - c^2)."""
         return float(self.path[0, -1])
 
 
@@ -116,10 +120,11 @@ class Pressed(Moment):
 class ForcedSlip:
     """Slip outside the stick border under constant force.
 
-    The unknowns are y = 1 - (d - g) / eta at all nodes but the last, the width of the panels, the depth, and the border
-    if it moves. If it no longer moves, it is given as `border`; `since` is then the index of the pair in the path at
-    which it stopped, and `frozen` the worn depth there. `newton` is the tolerance of Newton's method as a fraction of
-    the step tolerance. Loads are half forces over eta; `virgin_load` is the load of the virgin slip zone.
+    The unknowns are y = 1 - (d - g) / eta at all nodes except the last, the width of the slip zone, the depth, and the
+    border while it moves. A border that no longer moves is given as `border`. In this case `since` is the index of the
+    pair in the path at which the border stopped, and `frozen` is the worn depth divided by eta at the border. `newton`
+    is the tolerance of Newton's method as a fraction of the step tolerance. Loads are half forces over eta;
+    `virgin_load` is the load of the virgin slip zone.
     """
 
     virgin: PartialSlip
@@ -156,7 +161,7 @@ class ForcedSlip:
 
     @cached_property
     def mesh(self) -> Mesh:
-        """The panels, and one more beyond the edge."""
+        """The panels between border and edge, and one more panel beyond the edge."""
         return self.panels.mesh.extended(BEYOND)
 
     def image(self, unknowns: FloatArray) -> FloatArray:
@@ -197,7 +202,11 @@ class ForcedSlip:
         return still, replace(moment, unknowns=moment.unknowns[:-1])
 
     def memory(self, past: Sequence[Pressed], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """Return a function of the unknowns: past contributions to s and to the worn depth, and sticking load."""
+        """Return a function of the unknowns that gives the part of the residual that follows from the past moments.
+
+        These are the past contributions to s and to the worn depth at the nodes, and the additional load of the stick
+        zone.
+        """
         places = [self.place(moment.unknowns) for moment in past]
         worn = np.array([moment.accumulated for moment in past])
         earlier = Past(
@@ -219,13 +228,13 @@ class ForcedSlip:
         return known
 
     def plateau_rise(self, path: FloatArray, place: FloatArray) -> FloatArray:
-        """Return (2/pi) int arccos(b / r) dd along a path, at positions beyond the path."""
+        """Return (2/pi) int arccos(b / r) dd along a path, at radii r outside all borders b of the path."""
         result = np.empty_like(place)
         plateau_rise(self.body, np.ascontiguousarray(path), place, result)
         return result
 
     def frozen_depth(self, path: FloatArray, place: FloatArray) -> FloatArray:
-        """Return the worn depth over eta at positions that the border has passed."""
+        """Return the worn depth divided by eta at positions that the border has passed."""
         result = np.empty_like(place)
         frozen_depth(self.body, np.stack(rising(path)), place, result)
         return result
@@ -235,7 +244,7 @@ class ForcedSlip:
         return path.shape[1] - 1 if self.border is None else self.since
 
     def worn_depth(self, moment: Pressed, q: FloatArray) -> FloatArray:
-        """Return the worn depth over eta between border and edge at a moment, 0 beyond the edge."""
+        """Return the worn depth divided by eta at a moment, at positions between border and edge; 0 beyond the edge."""
         place = self.place(moment.unknowns)
         z = (q - place.border) / place.width
         if self.border is None:
@@ -269,7 +278,10 @@ class ForcedSlip:
         return shares
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return s - known - theta (p / eta) s at the nodes; then the error of the force, and y at a moving border."""
+        """Return s - known - theta (p / eta) s at the nodes, then the deviation of the force.
+
+        If the border moves, the last row is y at the border, which has to be zero.
+        """
         size, y, place = self.size, self.image(unknowns), self.place(unknowns)
         root, factor = math.sqrt(self.body.width * place.width), self._factor(place)
         slip, rate = self.panels.inner @ (y * factor), self.panels.outer @ y
@@ -296,18 +308,23 @@ class ForcedSlip:
         return result
 
     def sticking_load(self, before: Pressed, place: Place) -> float:
-        """Return int_0^b (d - g) dx - int_0^c (1 - g) dx over eta, for a border and depth reached after `before`."""
+        """Return (int_0^b (d - g) dx - int_0^c (1 - g) dx) / eta, the additional load of the stick zone.
+
+        The moment `before` precedes the border and depth of `place`.
+        """
         border, depth = before.path[:, -1]
         return float(sticking_load(self.body, border, depth, before.carried, place))
 
     def slipping_load(self, unknowns: FloatArray) -> float:
-        """Return int_b^a (d - g) dx over eta, the load of the slip zone."""
+        """Return int_b^a (d - g) dx / eta, the load of the slip zone."""
         place = self.place(unknowns)
         share = (1.0 - self.image(unknowns)) * self._factor(place)
         return float(0.5 * np.sqrt(self.body.width * place.width) * self.panels.weights @ share)
 
     def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return the quantities with a controlled step error: s at the nodes, depth, and border if it moves."""
+        """Return the quantities whose step error is controlled: s at the nodes, the depth, and the border while it
+        moves.
+        """
         weight = BORDER_WEIGHT * (1.0 - self.virgin.inner_radius) / self.eta
         tail = unknowns[self.size :] * ([1.0, weight] if self.border is None else 1.0)
         return np.append(self.slip(unknowns), tail)
@@ -315,7 +332,9 @@ class ForcedSlip:
     def moment(
         self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Pressed]
     ) -> Pressed:
-        """Return the moment at the end of a solved step; its worn depth is the past one plus the wear in the step."""
+        """Return the moment at the end of a solved step; its worn depth is the past contribution plus the wear in the
+        step.
+        """
         size, place, before = self.size, self.place(unknowns), past[0]
         worn = known[size : 2 * size] + theta * self.rate(unknowns) * self.slip(unknowns)
         path = onward(before.path, place)
@@ -325,7 +344,7 @@ class ForcedSlip:
         return Pressed(time, unknowns, worn, path, moved, carried)
 
     def wear_rate(self, unknowns: FloatArray) -> float:
-        """Return dV/dN = 2 int_b^a (d - g) y dx, the energy dissipated per cycle over mu."""
+        """Return dV/dN = 2 int_b^a (d - g) y dx, the energy dissipated per cycle, divided by mu."""
         y, place = self.image(unknowns), self.place(unknowns)
         root = np.sqrt(self.body.width * place.width)
         return float(self.eta * root * self.panels.weights @ (y * (1.0 - y) * self._factor(place)))
@@ -334,7 +353,7 @@ class ForcedSlip:
 def forced_slip(
     profile: Profile, stick_radius: float, panels: Panels, reach: float, newton: float = 1e-5
 ) -> ForcedSlip:
-    """Prepare partial slip under the constant force of the virgin contact."""
+    """Return the problem of partial slip under the constant force of the virgin contact."""
     virgin = partial_slip(profile, stick_radius, panels, reach)
     y, factor = virgin.image(settled(virgin).unknowns)
     load = 0.5 * np.sqrt(virgin.virgin_width) * panels.weights @ ((1.0 - y) * factor)
@@ -349,7 +368,7 @@ def rising(path: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def onward(path: FloatArray, place: Place) -> FloatArray:
-    """Return the path with one more pair."""
+    """Return the path with the border and depth of `place` appended."""
     return np.append(path, [[place.border], [place.depth]], axis=1)
 
 
@@ -378,7 +397,7 @@ def fill_known(mesh: Mesh, body: VirginBody, past: Past, place: Place, result: F
 
 @jit_inline
 def sticking_load(body: VirginBody, border: float, depth: float, carried: float, place: Place) -> float:
-    """Return int_0^b (d - g) dx - int_0^c (1 - g) dx over eta, the additional load of the stick zone."""
+    """Return (int_0^b (d - g) dx - int_0^c (1 - g) dx) / eta, the additional load of the stick zone."""
     radius = math.sqrt(body.square + body.width * border)
     further = body.width * (place.border - border) / (radius + math.sqrt(body.square + body.width * place.border))
     return radius * place.depth + carried + further * (0.5 * (place.depth - depth) + 1.0)
@@ -386,14 +405,17 @@ def sticking_load(body: VirginBody, border: float, depth: float, carried: float,
 
 @jit
 def plateau_rise(body: VirginBody, path: FloatArray, place: FloatArray, result: FloatArray) -> None:
-    """Write (2/pi) int arccos(b / r) dd along a path of straight pieces, at positions beyond the path, to `result`."""
+    """Write (2/pi) int arccos(b / r) dd along a path of straight pieces to `result`, at radii outside all borders."""
     for i in range(place.size):
         result[i] = _rise(body, path, path.shape[1] - 1, place[i])
 
 
 @jit
 def frozen_depth(body: VirginBody, path: FloatArray, place: FloatArray, result: FloatArray) -> None:
-    """Write the worn depth over eta at positions that the border has passed, on a path without moves back."""
+    """Write the worn depth divided by eta, at positions that the border has passed, to `result`.
+
+    The border must only grow along the path.
+    """
     for i in range(place.size):
         q = place[i]
         if q <= 0.0:
@@ -410,7 +432,7 @@ def frozen_depth(body: VirginBody, path: FloatArray, place: FloatArray, result: 
 
 @jit
 def _rise(body: VirginBody, path: FloatArray, last: int, q: float) -> float:
-    """Return the rise of the plateau along the path up to the pair `last`."""
+    """Return the rise of the plateau at the position q, along the path up to the pair with the index `last`."""
     square, total = body.square + body.width * q, 0.0
     first = _root(q, path[0, 0])
     for k in range(1, last + 1):
@@ -427,7 +449,11 @@ def _root(q: float, border: float) -> float:
 
 @jit_inline
 def _mean_angle(square: float, width: float, first: float, last: float) -> float:
-    """Return the mean of arccos(b / r) along a straight piece, integrated over the smooth variable sqrt(r^2 - b^2)."""
+    """Return the mean of arccos(b / r) along a straight piece of the path.
+
+    The integration variable is sqrt(r^2 - b^2), because the integrand is smooth in it; `first` and `last` are its
+    values at the ends of the piece.
+    """
     scale = math.sqrt(width / square)
     whole = first + last
     spread = (first - last) / whole if whole > 0.0 else 0.0

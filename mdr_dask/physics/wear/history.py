@@ -21,16 +21,18 @@ from mdr_dask.physics.wear.worn import Worn
 
 
 class Settings(NamedTuple):
-    """Tuned numbers of histories; `tests/physics/wear/test_errors.py` checks the stated errors.
+    """Tuned numbers of load histories; `tests/physics/wear/test_errors.py` checks the stated errors.
 
     Parameters
     ----------
     step_share : float
-        Time step as a fraction of the largest stable explicit step, 1.7 h, with the grid spacing h.
+        Time step as a fraction of the largest stable explicit step, which is 1.7 grid spacings.
     slowness : float
-        Factor on the distances from the solutions on coarser grids, because the error falls more slowly than usual.
+        Factor on the differences from the solutions on coarser grids. It exceeds 1, because the error falls more slowly
+        with the grid spacing than usual.
     least_edge_error : float
-        Least error of the radii, in cells: borders between nodes are uncertain, and grids may agree by chance.
+        Least stated error of the radii, in cells of the grid. A border between two nodes is uncertain, and the results
+        of two grids may agree by chance.
     """
 
     step_share: float = 0.45
@@ -50,8 +52,8 @@ class LoadBlock:
     cycles : float
         N in units of N0 of this block's own amplitude: the sliding path 4 U0 n k E* / (sigma0 a0).
     slip_share : float
-        eta = G* U0 / (mu E* d0) > 0 with the first depth d0; gross slip if it exceeds the depth, infinite for
-        sliding.
+        eta = G* U0 / (mu E* d0) > 0 with the first depth d0. The slip is gross if eta exceeds the depth in units of
+        d0; an infinite eta means sliding.
     depth, force : float, optional
         The quantity that is constant during the block, in units of d0 or E* d0 a0; give exactly one of them.
     """
@@ -84,9 +86,10 @@ def history(
     blocks : sequence of LoadBlock
         The blocks in their order in time.
     cells : int
-        Cells of the grid; the error is about proportional to their width, or to its root once the image has jumped.
+        Number of cells of the grid. The error is about proportional to the cell width, and, once the image has a jump,
+        to the square root of the cell width.
     reach : float
-        Radius that the grid covers.
+        Largest radius of the grid, in units of a0.
     errors : bool
         Whether to estimate the errors by further solutions on grids of half and a quarter as many cells.
 
@@ -134,7 +137,7 @@ def _run(profile: Profile, blocks: Sequence[LoadBlock], grid: UniformGrid) -> li
 
 
 def _advance(grid: UniformGrid, image_0: FloatArray, worn: FloatArray, block: LoadBlock) -> tuple[FloatArray, float]:
-    """Step through a block with Heun's method; return the worn depth and the dissipated energy over mu."""
+    """Step through a block with Heun's method; return the worn depth and the dissipated energy divided by mu."""
     done, energy = 0.0, 0.0
     while done < block.cycles:
         step = min(SETTINGS.step_share * 1.7 * grid.spacing, block.cycles - done)
@@ -163,7 +166,9 @@ def _state(grid: UniformGrid, image: FloatArray, block: LoadBlock) -> _State:
 def _record(
     grid: UniformGrid, profile: Profile, worn: FloatArray, state: _State, block: LoadBlock, energy: float
 ) -> Worn:
-    """Turn the state at the end of a block into a worn contact; beyond the grid, image is NaN and pressure zero."""
+    """Turn the state at the end of a block into a worn contact; beyond the grid, its image is NaN and its pressure
+    zero.
+    """
     stuck = np.flatnonzero(state.depth - state.image < block.slip_share)
     k = int(stuck[0]) if stuck.size else 0
     border = 0.0

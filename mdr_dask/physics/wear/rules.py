@@ -1,9 +1,11 @@
-"""The fast rule of the thesis at constant depth, and the limiting profile in which it ends, compiled, for any body.
+"""The fast rule of the thesis for wear at constant depth, and its limiting profile, for any body of revolution.
 
-The fast rule (thesis eq. 6.11) has a closed form. Inside the first contact y = (g - g_c) / eta follows a logistic law;
-outside it g - 1 decays; the exponent of both is xi N / a(c). The rule needs only the remaining fraction
-exp(-xi N / a(c)), which is zero in the limit (thesis eqs. 6.8-6.10). Where the rule would give a profile below the
-virgin one, the virgin profile is used.
+The functions are compiled.
+
+The fast rule (thesis eq. 6.11) has a closed form. Inside the first contact, y = (g - g_c) / eta follows a logistic law;
+outside it, g - 1 decays. Both change with the exponent xi N / a(c), so the rule needs only the remaining fraction
+exp(-xi N / a(c)). This fraction is zero in the limiting profile (thesis eqs. 6.8-6.10). Where the rule would give a
+profile below the virgin one, the virgin profile is used.
 """
 
 from __future__ import annotations
@@ -39,15 +41,15 @@ class Settings(NamedTuple):
     nodes : int
         Gauss nodes in each of four pieces.
     layer_growth : float
-        Ratio of the widths of successive pieces at the stick border; the first is as wide as the layer left by the
-        rule.
+        Ratio of the widths of successive pieces of integration at the stick border. The piece next to the border is as
+        wide as the layer in which the fast rule has not yet flattened the image.
     least : float
         Smallest remaining fraction, so that the layer at the stick border does not become thinner than round-off.
     scar, end : float
-        Tolerance of the integral that vanishes at the radius of the scar, over eta: in the fast rule, and in the
-        limit.
+        Tolerances of the integral that vanishes at the radius of the scar, divided by eta: `scar` for the fast rule,
+        `end` for the limiting profile.
     error : float
-        Numerical error of every output over its largest value; it excludes the approximation of the fast rule.
+        Numerical error of every output divided by its largest value. The error of the fast rule itself is not included.
     """
 
     nodes: int = 16
@@ -63,7 +65,7 @@ _NO_TABLE = PowerProfile(1.0).pieces()
 
 
 class Rule(NamedTuple):
-    """One body under the rule: its image, c, g0(c), eta, and the remaining fraction."""
+    """One case of the rule: virgin image, stick radius c, `level` = g0(c), eta, remaining fraction `rest`."""
 
     image: Image
     c: float
@@ -81,7 +83,10 @@ class Quadrature(NamedTuple):
 
 
 class Bracket(NamedTuple):
-    """Interval with a root of a falling function: ends, values, and the newer end (-1 low, 1 high)."""
+    """Interval with a root of a falling function: its ends, the values at the ends, and the end computed last.
+
+    `newer` is -1 if the lower end was computed last, 1 for the higher end, and 0 at the start.
+    """
 
     low: float
     low_value: float
@@ -169,12 +174,12 @@ def fast_cases(
     Parameters
     ----------
     exponent, stick_radius, cycles, xi, limit_radius : array_like, broadcast together
-        n, c, N, xi and a(c), the last from `limit_cases`.
+        n, c, N, xi and the limiting radius a(c), which is the contact radius from `limit_cases`.
 
     Returns
     -------
     contact_radius, wear_volume, normal_force : array
-        The same as in the result of :func:`fast`.
+        The same quantities as in the result of :func:`fast`.
     """
     parts = np.broadcast_arrays(exponent, stick_radius, cycles, xi, limit_radius)
     cases = np.array([np.array(part, dtype=float).ravel() for part in parts])
@@ -235,14 +240,14 @@ def _worn(profile: Profile, rule: Rule, radius: float, edge: float) -> Worn:
 
 @jit_inline
 def _between(bracket: Bracket) -> float:
-    """Return the root of the straight line through both values."""
+    """Return the root of the straight line through the values at both ends."""
     low, low_value, high, high_value, _ = bracket
     return (low * high_value - high * low_value) / (high_value - low_value)
 
 
 @jit_inline
 def _narrowed(bracket: Bracket, x: float, value: float) -> Bracket:
-    """Return the bracket narrowed by one value, by the rule of Anderson and Björck."""
+    """Return the bracket narrowed by the value at x, with the rule of Anderson and Björck."""
     low, low_value, high, high_value, newer = bracket
     before = low_value if value > 0.0 else high_value
     share = 1.0 - value / before
@@ -294,7 +299,7 @@ def _put_cuts(rule: Rule, cuts: FloatArray) -> None:
 
 @jit
 def _scar_integral(rule: Rule, radius: float, moment: int, quadrature: Quadrature) -> float:
-    """Return int_c^R (g - g0) (R^2 - x^2)^(moment - 1/2) dx, piece by piece between the cuts."""
+    """Return int_c^R (g - g0) (R^2 - x^2)^(moment - 1/2) dx for R = `radius`, piece by piece between the cuts."""
     abscissa, weight, cuts = quadrature
     total, end = 0.0, _angle(cuts[0], radius)
     for piece in range(cuts.size):
@@ -331,7 +336,7 @@ def _heights(rule: Rule, radii: FloatArray, quadrature: Quadrature, result: Floa
 
 @jit
 def _scar_radius(rule: Rule, bracket: Bracket, quadrature: Quadrature) -> float:
-    """Return the root of the scar's integral in a bracket, or the upper end if there is no root."""
+    """Return the radius in a bracket at which `_scar_integral` vanishes, or the upper end if there is none."""
     if not bracket.high_value < 0.0 < bracket.low_value:
         return bracket.high
     error = SETTINGS.end if rule.rest == 0.0 else SETTINGS.scar
@@ -361,7 +366,7 @@ def _limit_radius(rule: Rule, largest: float, quadrature: Quadrature) -> float:
 
 @jit
 def _numbers(rule: Rule, limit: float, quadrature: Quadrature) -> tuple[float, float, float]:
-    """Return scar radius, volume and normal force; write the cuts."""
+    """Return scar radius, volume and normal force, and write the ends of the pieces to the cuts of the quadrature."""
     abscissa, weight, cuts = quadrature
     _put_cuts(rule, cuts)
     radius = limit

@@ -1,7 +1,8 @@
 """Partial slip at constant depth, and gross slip, as the equations of one step for `evolution.march`.
 
 Nodes lie at r^2 = c^2 + z (a^2 - c^2), where z is the position on the panels, from 0 to 1. The unknown for the edge is
-the width a^2 - c^2 over the width of the virgin contact, so that contacts near full stick are also well conditioned.
+the width a^2 - c^2 divided by its value in the virgin contact. So the equations are well conditioned even near full
+stick.
 """
 
 from __future__ import annotations
@@ -24,7 +25,10 @@ from mdr_dask.physics.wear.evolution import Moment
 
 
 class FixedBorder(ABC):
-    """Base of the problems with a fixed inner border; accumulated values are interpolated on the panels."""
+    """Base of the problems in which the inner border of the slip zone does not move.
+
+    Accumulated values are interpolated on the panels.
+    """
 
     panels: Panels
     inner_radius: float
@@ -65,7 +69,7 @@ class FixedBorder(ABC):
     def moment(
         self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Moment]
     ) -> Moment:
-        """Return the moment at the end of a solved step: `known` is the contribution of past moments."""
+        """Return the moment at the end of a solved step; `known` is the contribution of the past moments."""
         accumulated = known + theta * self.rate(unknowns)
         accumulated[-1] = 0.0
         return Moment(time, unknowns, accumulated)
@@ -74,8 +78,8 @@ class FixedBorder(ABC):
 class LogTable(NamedTuple):
     """The slip of the virgin body, ln s0 as a function of ln(r^2 - c^2).
 
-    s0(r) = (2/pi) int_c^r (g0 - g_c) / (eta sqrt(r^2 - x^2)) dx. The coefficients belong to a cubic spline whose knots
-    begin at `first` and have the distance `step`.
+    s0(r) = (2/pi) int_c^r (g0 - g_c) / (eta sqrt(r^2 - x^2)) dx. The coefficients belong to a cubic spline in
+    ln(r^2 - c^2), whose first knot is `first` and whose knot spacing is `step`.
     """
 
     first: float
@@ -91,7 +95,7 @@ class LogTable(NamedTuple):
 
 @jit_inline
 def log_slip(table: LogTable, square: float) -> float:
-    """Return ln s0 at one r^2 - c^2."""
+    """Return ln s0 for one value `square` of r^2 - c^2."""
     place = math.log(square) - table.first
     cell = min(max(int(place / table.step), 0), table.coefficients.shape[1] - 1)
     local, k = place - cell * table.step, table.coefficients
@@ -105,7 +109,11 @@ def _look_up(table: LogTable, squares: FloatArray, result: FloatArray) -> None:
 
 
 class _Step(NamedTuple):
-    """One step of `PartialSlip`: theta over the root of the width, r^2 - c^2 at the nodes, past contributions."""
+    """The data of one time step of `PartialSlip`.
+
+    `share` is theta divided by sqrt(a^2 - c^2), `squares` is r^2 - c^2 at the nodes, and `known` is the contribution of
+    the past moments at the nodes.
+    """
 
     share: float
     squares: FloatArray
@@ -114,7 +122,9 @@ class _Step(NamedTuple):
 
 @jit
 def _slip_rows(table: LogTable, step: _Step, stress: FloatArray, slip: FloatArray) -> None:
-    """Replace the slip by the residual of `PartialSlip`; the last row demands that s is continuous at the edge."""
+    """Replace the slip by the residual of `PartialSlip`; the last row is the condition that s is continuous at the
+    edge.
+    """
     last = slip.size - 1
     for i in range(slip.size):
         slip[i] = math.log(max(slip[i], 1e-300)) - log_slip(table, step.squares[i])
@@ -124,10 +134,12 @@ def _slip_rows(table: LogTable, step: _Step, stress: FloatArray, slip: FloatArra
 
 @dataclass(frozen=True, eq=False)
 class PartialSlip(FixedBorder):
-    """Slip outside the stick radius c at constant depth; unknowns are y = (g - g_c) / eta at nodes, and the edge.
+    """Slip outside the stick radius c at constant depth.
 
-    The slip is s = (f - f_star) / eta, where f_star is the profile whose image is the plateau g = g_c beyond c. The
-    accumulated quantity is ln(s / s0) = int p dN / eta, where s0 is the slip of the virgin body.
+    The unknowns are y = (g - g_c) / eta at all nodes except the last, where y = 1, and the relative width of the slip
+    zone, which gives the edge. The slip is s = (f - f_star) / eta, where f_star is the profile whose image is the
+    plateau g = g_c beyond c. The accumulated quantity is ln(s / s0) = int p dN / eta, where s0 is the slip of the
+    virgin body.
     """
 
     profile: Profile
@@ -160,7 +172,7 @@ class PartialSlip(FixedBorder):
         return np.asarray(self.panels.outer @ y / np.sqrt(self.width(unknowns)))
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return ln s - ln s0 - known - theta p / eta; the last row demands that s is continuous at the edge."""
+        """Return ln s - ln s0 - known - theta p / eta; the last row makes s continuous at the edge."""
         y, factor = self.image(unknowns)
         slip, stress, width = self.panels.inner @ (y * factor), self.panels.outer @ y, self.width(unknowns)
         _slip_rows(self.virgin_slip, _Step(theta / np.sqrt(width), width * self.panels.nodes, known), stress, slip)
@@ -174,17 +186,20 @@ class PartialSlip(FixedBorder):
         return result
 
     def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return the slip s, which is the part of f that wear changes, over eta."""
+        """Return the slip s = (f - f_star) / eta; wear changes f, but not f_star."""
         return self.slip(unknowns)
 
     def wear_rate(self, unknowns: FloatArray) -> float:
-        """Return dV/dN = 2 int_c^a (1 - g)(g - g_c) / eta dx, the energy dissipated per cycle over mu."""
+        """Return dV/dN = 2 int_c^a (1 - g)(g - g_c) / eta dx, the energy dissipated per cycle, divided by mu."""
         y, factor = self.image(unknowns)
         return float(self.eta * np.sqrt(self.width(unknowns)) * self.panels.weights @ (y * (1.0 - y) * factor))
 
 
 def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: float) -> PartialSlip:
-    """Prepare partial slip: tabulate the virgin slip up to the radius `reach`, without cancellation next to c."""
+    """Return the problem of partial slip, with the virgin slip tabulated up to the radius `reach`.
+
+    The table is computed without cancellation next to c.
+    """
     c = stick_radius
     eta = float(profile.rise(np.array(1.0 - c), c))
     smallest = 0.5 * panels.nodes[0] * (1.0 - c) * (1.0 + c)
@@ -203,9 +218,10 @@ def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: f
 
 @dataclass(frozen=True, eq=False)
 class GrossSlip(FixedBorder):
-    """Slip everywhere. The unknowns are g at all nodes but the last, the edge, and the depth d if the force is given.
+    """Slip in the whole contact.
 
-    The accumulated quantity is the worn depth, int p ds.
+    The unknowns are the image g at all nodes except the last (at the edge, g equals the depth d), the relative width
+    a^2 of the contact, and, if the force is given, the depth d. The accumulated quantity is the worn depth, int p ds.
     """
 
     profile: Profile
@@ -243,7 +259,10 @@ class GrossSlip(FixedBorder):
     wear_rate = normal_force
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return f - f0 - known - theta p, with continuity at the edge in the last row; then the force error."""
+        """Return f - f0 - known - theta p at the nodes, then the deviation of the force if the force is given.
+
+        The row of the last node is the condition that f is continuous at the edge.
+        """
         accumulated = known + theta * self.rate(unknowns)
         accumulated[-1] = 0.0
         rows = self.worn(unknowns) - self.profile.height(self.radii(unknowns)) - accumulated

@@ -1,4 +1,4 @@
-"""A worn contact, the result of every rule and evolution: its error, and the transforms that give its shape.
+"""The worn contact, which every rule and evolution returns, with its error and the integral transforms of its shape.
 
 Units: lengths a0, heights d0, pressure E* d0 / a0, volume a0^2 d0, cycles N0 = a0 sigma0 / (4 U0 k E*), where a0 and d0
 belong to the virgin contact. Wear increases f, the profile height measured upwards from the virgin apex.
@@ -24,10 +24,11 @@ Function = Callable[[FloatArray], FloatArray]
 FUNCTIONS = {"worn_profile": "height", "worn_image": "image", "pressure": "pressure"}
 
 VOLUMES = ("wear_volume", "energy_volume")
-#: Outputs on which solutions of different shape may agree by chance, if the depth is that of the virgin contact.
+#: `SHAPED` are outputs in which solutions of different shape may agree by chance if the depth is constant.
+#: `KEPT_DEPTH` is the depth of the virgin contact in units of d0.
 SHAPED, KEPT_DEPTH = ("normal_force", "worn_depth"), 1.0
 NOWHERE = np.zeros(0)
-#: Distance from a border, over its radius, within which a change of the image is treated as a jump.
+#: Distance from a border, as a fraction of the border's radius, within which a change of the image counts as a jump.
 JUMP_WIDTH = 1e-9
 
 
@@ -37,18 +38,20 @@ class Settings(NamedTuple):
     Parameters
     ----------
     safety : float
-        Ratio of the stated error to the distance from the rougher solutions.
+        Ratio of the stated error to the difference from the rougher solutions.
     step : float
-        Least error of the contact radius, as a fraction of its change in the last step.
+        Least stated error of the contact radius, as a fraction of the change of this radius in the last step.
     shape : float
-        Least error of force and worn depth at constant depth, as a fraction of the profile's largest error.
+        Least stated error of normal force and worn depth at constant depth, as a fraction of the largest error of the
+        profile. Lengths are in a0, heights in d0.
     volumes : float
-        For volumes: this fraction of the distances of both volumes is added to the difference of wear volume and
-        energy.
+        The error of a volume is the difference of wear volume and energy volume, plus this fraction of the differences
+        of both volumes from the rougher solutions.
     reach : int
-        A distance is replaced by the largest one among this many neighbouring positions on each side.
+        The difference of a function from the rougher solutions is replaced by the largest difference among this many
+        neighbouring positions on each side.
     floor : float
-        Least error of a function, as a fraction of its largest error.
+        Least stated error of a function at any position, as a fraction of the largest error of the function.
     """
 
     safety: float = 1.5
@@ -73,27 +76,29 @@ class Worn:
     stick_border : float
         Radius up to which the contact sticks; 0 in gross slip.
     depth, normal_force : float
-        d, and F_N = 2 int (d - g) dx.
+        Indentation depth d, and normal force F_N = 2 int (d - g) dx.
     wear_volume, worn_depth : float
-        V, and the largest f - f0.
+        Wear volume V, and the largest value of f - f0.
     height, image, pressure : callable, array -> array
         f(r), g(x) and p(r), for any position.
     energy_volume : float
-        The dissipated energy over mu, in units in which it equals the wear volume; NaN if it is unknown.
+        The dissipated energy divided by mu, in the unit of volume: by the wear law it equals the wear volume. NaN if
+        it is unknown.
     steps : int
         Time steps taken.
     rougher : tuple of Worn
         Two rougher solutions of the same contact, from which its error is estimated.
     slowness : float
-        Factor on the distances from the rougher solutions, if the error falls more slowly than usual.
+        Factor on the differences from the rougher solutions; above 1 if the error falls more slowly than usual.
     second : float
-        Weight of the distance from the second rougher solution, which matters where the first agrees by chance.
+        Weight of the difference from the second rougher solution. It matters where the first rougher solution agrees by
+        chance.
     least_edge_error : float
-        Least error of the radii of scar and stick zone, because rougher solutions may agree on them by chance.
+        Least stated error of the radii of scar and stick zone, in which the rougher solutions may agree by chance.
     edge_step : float
-        Distance by which the contact radius moved in the last time step; its error is of the same order.
+        Change of the contact radius in the last time step. The error of the contact radius is of the same order.
     relative_error : float
-        Error of every output over its largest value, used if there is no rougher solution.
+        Error of every output divided by the largest value of the output; used if there is no rougher solution.
     """
 
     contact_radius: float
@@ -123,9 +128,9 @@ class Worn:
     def error(self, output: str, places: FloatArray) -> float | FloatArray:
         """Return the expected absolute error of an output; for functions, at the positions `places`.
 
-        The error is the distance from two rougher solutions, or, without them, a fraction of the largest value. For
-        functions, the largest distance at neighbouring positions is used; these are dense at the borders of stick and
-        contact.
+        The error follows from the differences from the rougher solutions. Without rougher solutions, it is a fraction
+        of the largest value. For functions, the largest difference among neighbouring positions is used. These
+        positions are dense at the borders of stick zone and contact.
         """
         if not self.rougher:
             value = np.asarray(self.value(output, places), dtype=float)
@@ -141,11 +146,15 @@ class Worn:
 
     @property
     def _last_change(self) -> float:
-        """The radius beyond which no solution has worn anything."""
+        """The radius beyond which no solution has any wear."""
         return max(one.contact_radius for one in (self, *self.rougher))
 
     def _error_of_number(self, output: str) -> float:
-        """Return the error of a number; volumes in partial slip follow both from the shape and from the energy."""
+        """Return the error of an output that is a number.
+
+        In partial slip, the wear volume follows from the shape and also from the dissipated energy. The difference of
+        these two volumes is a part of the error.
+        """
         if output in VOLUMES and self.stick_border > 0.0:
             apart = sum(float(self._distance(name)) for name in VOLUMES)
             return self.slowness * abs(self.wear_volume - self.energy_volume) + SETTINGS.volumes * apart
@@ -162,7 +171,7 @@ class Worn:
         return SETTINGS.safety * float(np.max(self._distance("worn_profile", self._crowd(0.0))))
 
     def _distance(self, output: str, places: FloatArray = NOWHERE) -> FloatArray:
-        """Return the distance from the rougher solutions; if there are two, the larger one."""
+        """Return the largest weighted difference of an output from the rougher solutions."""
         value = self.value(output, places)
         with np.errstate(invalid="ignore"):
             gaps = [np.abs(value - one.value(output, places)) for one in self.rougher]
@@ -170,7 +179,7 @@ class Worn:
         return np.asarray(self.slowness * np.max(weighted, axis=0))
 
     def _crowd(self, last: float) -> FloatArray:
-        """Return positions that are dense at the borders of stick and contact."""
+        """Return positions that are dense at the borders of stick zone and contact, up to at least `last`."""
         cuts = sorted({0.0, self.stick_border, self.contact_radius, max(last, self._last_change)})
         steps = np.sin(0.5 * np.pi * np.arange(1, 40) / 40.0) ** 2
         return np.concatenate([low + (high - low) * steps**1.5 for low, high in pairwise(cuts)])
@@ -231,7 +240,7 @@ def worn_volume(scar: Scar) -> float:
 
 
 def worn_image(profile: Profile, scar: Scar) -> Function:
-    """Return the worn image g(x); beyond the scar it is continued such that f = f0 there."""
+    """Return the worn image g(x). Beyond the scar, the image is continued such that f = f0."""
 
     def image(position: FloatArray) -> FloatArray:
         x = np.abs(position)
@@ -298,7 +307,7 @@ def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, bo
 
 
 def worn_by(profile: Profile, scar: Scar, border: float, edge: float, depth: float, normal_force: float) -> Worn:
-    """Return the worn contact for a scar that sticks up to `border` and carries load up to `edge`."""
+    """Return the worn contact for a scar, if the contact sticks up to `border` and carries load up to `edge`."""
     return Worn(
         contact_radius=scar.radius,
         stick_border=border,
@@ -342,7 +351,7 @@ def _change_beyond(scar: Scar, position: FloatArray) -> FloatArray:
 
 
 def check_stick_radius(stick_radius: float) -> None:
-    """Raise ValueError unless the stick radius is between 0 and 1, that is, partial slip."""
+    """Raise ValueError unless the stick radius is between 0 and 1, so that the contact is in partial slip."""
     if not 0.0 < stick_radius < 1.0:
         raise ValueError(
             f"the stick radius must lie between 0 and 1 for partial slip, got {stick_radius!r}; "
@@ -351,7 +360,10 @@ def check_stick_radius(stick_radius: float) -> None:
 
 
 def virgin_load(profile: Profile, radius: float) -> float:
-    """Return int_0^c (1 - g0) dx; the substitution x = c t^4 makes a power law smooth at the axis."""
+    """Return int_0^c (1 - g0) dx for c = `radius`.
+
+    With the substitution x = c t^4, the integrand of a power-law body is smooth at the axis.
+    """
     abscissa, weight = gauss(64)
     return 4.0 * radius * float(((1.0 - profile.image(radius * abscissa**4)) * abscissa**3) @ weight)
 
