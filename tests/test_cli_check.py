@@ -9,7 +9,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mdr_dask.campaign import load
 from mdr_dask.campaign.measured import read_measured
 from mdr_dask.cli import main
 from mdr_dask.errors import DataError
@@ -148,14 +147,6 @@ def test_bare_numbers_far_from_usual_are_asked_about(kind, files, capsys):
         (line,) = capsys.readouterr().err.splitlines()
         assert line.startswith("bare.yaml:")
         assert question in line
-
-
-SHIPPED = sorted((Path(__file__).parents[1] / "campaigns").glob("*.yaml"))
-
-
-@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
-def test_no_shipped_campaign_is_asked_about(path):
-    assert load(path).remarks == ()
 
 
 @pytest.mark.parametrize(("unit", "ends"), [("mPa", "1.079 mPa to 35.62 mPa"), ("TPa", "1.079 TPa to 35.62 TPa")])

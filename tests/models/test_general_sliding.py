@@ -20,6 +20,7 @@ def block(parameters, columns, realisations=(0, 1), accuracy=None):
     return Block(SlidingFriction.model_validate(parameters), arrays, cases, realisations, 7, ALL, accuracy)
 
 
+@pytest.mark.slow
 def test_kelvin_as_a_material_is_the_kelvin_body():
     columns = {"velocity": [1e-3, 0.1, 1.0], "normal_force": [0.1, 1.0, 10.0]}
     ours = MODEL.compute(block(LINE | LOAD | {"material": {"kelvin": KELVIN}}, columns, accuracy=1e-3))
@@ -29,6 +30,7 @@ def test_kelvin_as_a_material_is_the_kelvin_body():
     np.testing.assert_allclose(ours.values["indentation_depth"], theirs.values["indentation_depth"], rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_a_value_does_not_depend_on_its_neighbours():
     parameters = (
         LINE | LOAD | {"material": {"standard_solid": SOLID}, "indenter": {"shape": "parabola", "radius": 0.01}}

@@ -55,6 +55,7 @@ def test_contact_long_after_a_jump_is_that_of_the_steady_sweep(hurst: float, ove
         assert work.sums[patches.DRAG] == pytest.approx(sums[DRAG], rel=2e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hurst", [0.0, 0.5, 1.0])
 def test_skipped_cells_change_nothing(hurst: float, monkeypatch: pytest.MonkeyPatch) -> None:
     line = rough(400, hurst, seed=31)

@@ -57,6 +57,7 @@ def jump(
     return moments, found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", [1e-3, 0.04])
 def test_a_light_load_has_a_steady_start(load: float) -> None:
     state, depth, status = steady_start(periodic_line(*rough()), KELVIN, 0.05, load)
@@ -71,6 +72,7 @@ def missing(found: Response) -> float:
     return abs(work - dissipated - stored) / work
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solid", [KELVIN, STANDARD, SERIES])
 @pytest.mark.parametrize("indenter", [False, True])
 def test_work_is_stored_or_lost(solid: Foundation, indenter: bool) -> None:
