@@ -1,8 +1,9 @@
 """Choose the values of an adaptive axis, stage after stage, until interpolation meets every tolerance.
 
 Outputs are interpolated by monotone cubics on the linear or logarithmic scale of the axis. Every new value lies halfway
-between two older ones, so that neighbouring cases use the same values. An interval is accepted if the values that are
-older than its newer end predict the output in the interval within the tolerance. Otherwise it is halved.
+between two older values, so that neighbouring cases use the same values. To test an interval, the output in it is
+predicted from the values that are older than both the interval and its newer end. If the prediction meets the
+tolerance, the interval is accepted. Otherwise the interval is halved.
 """
 
 from __future__ import annotations
@@ -19,32 +20,35 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import BoolArray, FloatArray, IntArray
 from mdr_dask.campaign import Campaign, Refinement, Series, Tolerance
 
-#: Number of groups of realisations that are left out one after the other, to estimate the scatter of a mean.
+#: Number of groups of realisations for the jackknife: one group after the other is left out, to estimate the scatter of
+#: a mean.
 GROUPS = 20
 #: Probability that an interval is halved because of scatter alone.
 CHASED = 0.05
-#: Smallest width of an interval, relative to the axis; discontinuities are not resolved more finely.
+#: Width of the smallest interval that is halved, as a fraction of the axis. It limits the number of values that are
+#: spent on a discontinuity.
 FINEST = 2.0**-10
-#: Smallest number of values for an interpolation.
+#: Smallest number of values along an axis from which the output is predicted.
 FEWEST = 3
-#: Lowest level of values whose prediction is a test of an interval: eighths of the axis. Quarters are predicted from
-#: only three values, and such a prediction may be right by chance.
+#: Coarsest subdivision of the axis at which comparing a predicted with a computed value counts as a test of an
+#: interval: level 3, the eighths of the axis. Values at the quarters are predicted from only three values, and such a
+#: prediction may be right by chance. Longer intervals are therefore halved without a test.
 TESTED = 3
-#: Positions in an interval at which predictions are compared: 0 is the newer end, 1 the older end.
+#: Positions in an interval at which predictions are compared, as fractions of its length from the newer end (0).
 COMPARED = (0.0, 0.25, 0.5, 0.75)
 
 
 @dataclass(frozen=True)
 class Mean:
-    """Means of an output over realisations, with the data for their errors.
+    """Means of an output over realisations, with the data from which their errors are estimated.
 
     Parameters
     ----------
     groups : array, shape (1 + groups, cases...)
-        First the mean over all realisations, then the means that leave out one group of realisations each; NaN where a
-        case has no value.
+        Row 0 holds the means over all realisations. Each further row leaves out one group of realisations. NaN for a
+        case without a successful realisation.
     error : array, shape (cases...)
-        Discretisation error; 0 where it is unknown.
+        Discretisation error of the mean of each case; 0 for a case whose error is unknown.
     """
 
     groups: FloatArray
@@ -52,7 +56,7 @@ class Mean:
 
     @classmethod
     def of(cls, values: FloatArray, done: BoolArray, error: FloatArray | None) -> Mean:
-        """Return the means over the last axis (realisations) of the results that are done."""
+        """Return the means over the realisations (last axis), using only the results that are done."""
         number = np.arange(values.shape[-1]) % min(GROUPS, values.shape[-1])
         kept = [done, *(done & (number != group) for group in range(number.max() + 1))]
         mean = _mean(values, done)
@@ -74,16 +78,17 @@ def _mean(values: FloatArray, some: BoolArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Mesh:
-    """The cases of a series: the values that every axis has so far, and a mask of the cases that are needed.
+    """The cases of a series in one stage: the values of every axis, and which of their combinations are needed.
 
     Parameters
     ----------
     series : Series
         The series, with the values of adaptive axes in the order in which they were added.
     shares : mapping of int to array, shape (values,)
-        For each adaptive axis, by its index, the positions of its values in its interval, as fractions from 0 to 1.
+        For each adaptive axis, by its index: the positions of its values, as fractions of its range from 0 to 1.
     used : mapping of int to bool array, shape (values of the other axes that are not adaptive..., values)
-        For each adaptive axis, the values that are needed at each combination of the non-adaptive axes.
+        For each adaptive axis, by its index: whether each of its values is needed, for each combination of values of
+        the non-adaptive axes.
     """
 
     series: Series
@@ -119,12 +124,12 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Stage:
-    """A campaign with the values that its adaptive axes have so far.
+    """One step of an adaptive campaign: the campaign with the values that its adaptive axes have in this step.
 
     Parameters
     ----------
     campaign : Campaign
-        The campaign with these values.
+        The campaign with the values of this stage.
     meshes : tuple of Mesh
         The cases of each series.
     new : tuple of bool array
@@ -147,7 +152,7 @@ class Stage:
         return any(mesh.used for mesh in self.meshes)
 
     def after(self, meshes: tuple[Mesh, ...]) -> Stage | None:
-        """Return the next stage with these meshes, or None if they have no new cases."""
+        """Return the next stage, which has the given meshes; None if the meshes contain no new case."""
         new = tuple(_beyond(mesh.cases, before.cases) for mesh, before in zip(meshes, self.meshes, strict=True))
         if not any(cases.any() for cases in new):
             return None
@@ -163,7 +168,11 @@ def _beyond(cases: BoolArray, before: BoolArray) -> BoolArray:
 
 @dataclass(frozen=True)
 class _Interval:
-    """An interval between two values that misses its tolerance, for one combination of the non-adaptive axes."""
+    """An interval of an adaptive axis whose interpolation error exceeds the tolerance or was not tested.
+
+    `case` is the index of the combination of non-adaptive values, `share` the middle of the interval and `width` its
+    length, both as fractions of the axis, and `excess` the interpolation error divided by the tolerance (at least 1).
+    """
 
     case: tuple[int, ...]
     share: float
@@ -172,7 +181,7 @@ class _Interval:
 
 
 def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]]:
-    """Add values in intervals in which interpolation was not shown to meet the tolerance.
+    """Halve the intervals in which a test has not yet shown that interpolation meets the tolerance.
 
     Parameters
     ----------
@@ -186,7 +195,8 @@ def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]
     Mesh
         The mesh with more values; unchanged if no value is needed or allowed.
     dict of str to int
-        For each adaptive axis, the number of cases of the other axes that miss a tolerance and cannot be refined.
+        For each adaptive axis, the number of combinations of the non-adaptive axes for which interpolation misses a
+        tolerance although no further value is allowed.
     """
     found, short = mesh, {}
     for number in mesh.used:
@@ -201,7 +211,10 @@ def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]
 
 
 def _chosen(used: BoolArray, intervals: list[_Interval], at_most: int) -> list[_Interval]:
-    """Return the intervals to halve: the widest first, so that one discontinuity does not use up all values."""
+    """Return the intervals to halve.
+
+    The widest intervals are chosen first, so that one discontinuity does not use up all values that are allowed.
+    """
     ordered = sorted(intervals, key=lambda interval: (-interval.width, -interval.excess, interval.share))
     count = np.array(used.sum(axis=-1))
     chosen = []
@@ -227,7 +240,7 @@ def _halved(mesh: Mesh, number: int, intervals: list[_Interval]) -> Mesh:
 
 
 def _intervals(mesh: Mesh, number: int, means: Mapping[str, Mean]) -> Iterator[_Interval]:
-    """Yield the intervals of an adaptive axis that were not shown to meet every tolerance."""
+    """Yield the intervals of an adaptive axis that were not tested or miss a tolerance."""
     refinement = mesh.refinement(number)
     for case in np.ndindex(mesh.used[number].shape[:-1]):
         used = {k: np.flatnonzero(mask[case]) for k, mask in mesh.used.items()}
@@ -261,10 +274,10 @@ def _lines(mean: Mean, number: int) -> Mean:
 
 
 def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolerance) -> FloatArray:
-    """Return the largest ratio of interpolation error and tolerance over all lines, for each interval.
+    """Return for each interval the interpolation error divided by the tolerance; the largest value over all lines.
 
-    Failed cases are left out of their line. Next to failed cases, and where no line has a value, the ratio is minus
-    infinity.
+    Failed cases are left out of their line. The ratio is minus infinity for an interval that has a failed case at an
+    end in every line.
     """
     worst = np.full(places.size - 1, -np.inf)
     known = np.isfinite(lines.groups[0])
@@ -282,19 +295,19 @@ def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolera
 
 
 def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray, error: FloatArray) -> FloatArray:
-    """Return the error of predicting the output in each interval from values that are older than its newer end.
+    """Return for each interval the error of a prediction from the values that are older than the newer end.
 
-    A value of level n lies halfway between two values of lower levels. The intervals next to it are predicted from all
-    values of lower levels, by a monotone cubic and by a cubic spline. These predictions are compared with the monotone
-    cubic through all values. They are compared at the newer end and at the quarters of the interval, because a
-    prediction may be right by chance at one point.
+    A value of level n lies halfway between two values of lower levels. In the two intervals next to this value, the
+    output is predicted from all values of lower levels, once by a monotone cubic and once by a cubic spline. Both
+    predictions are compared with the monotone cubic through all values, at the newer end and at the quarters of the
+    interval. One point would not suffice, because a prediction may be right there by chance.
 
     Parameters
     ----------
     places : array, shape (values,)
         Positions of the values along the axis, ascending.
     levels : int array, shape (values,)
-        The ends of the axis have level 0, its middle 1, the quarters 2, ...
+        Level of each value: 0 for the ends of the axis, 1 for its middle, 2 for the quarters, ...
     groups : array, shape (1 + groups, lines, values)
         Means as in `Mean.groups`.
     error : array, shape (lines, values)
@@ -303,7 +316,8 @@ def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray
     Returns
     -------
     array, shape (lines, values - 1)
-        The largest difference, minus the part that scatter of realisations and discretisation errors can explain.
+        Largest absolute difference between prediction and interpolation, minus the part that scatter of the
+        realisations and discretisation errors can explain. Negative if these explain the whole difference.
     """
     from scipy.interpolate import CubicSpline, PchipInterpolator
     from scipy.special import ndtri

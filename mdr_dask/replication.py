@@ -1,4 +1,4 @@
-"""Find the number of realisations of each case: rounds are added until its standard errors meet all tolerances."""
+"""Find the number of realisations of each case: add rounds until its standard errors meet all tolerances."""
 
 from __future__ import annotations
 
@@ -12,16 +12,19 @@ from numpy.typing import NDArray
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.models.base import Model, Status
 
-#: A round raises the number of realisations so that half of the cases probably have enough; limits of this factor.
+#: A round multiplies the number of realisations by a factor at which half of the cases will probably have enough. The
+#: factor is limited to this range.
 LEAST_GROWTH, MOST_GROWTH = 1.25, 4.0
-#: Growth factor in rounds for a fitted constant, because the number of realisations that it needs is unknown.
+#: Factor by which a round for a fitted constant multiplies the number of realisations. It is fixed, because the number
+#: of realisations that such a constant needs cannot be estimated.
 GROWTH = 1.5
-#: With `FEWEST` or more results, the estimated standard error is used as it is. With fewer results this estimate is
-#: poor: if cases stopped by it, 95 % intervals could have a coverage of only 89 %. So a case with fewer results stops
-#: only if it has at least `FEW` results, and if `DOUBT` times the variance would also meet the tolerance. The coverage
-#: was measured with ``python -m benchmarks campaigns``.
+#: A case with `FEWEST` or more results stops if its estimated standard error meets the tolerance. With fewer results
+#: this estimate is poor: if cases stopped because of it, 95 % intervals could have a coverage of only 89 %. So a case
+#: with fewer results stops only if it has at least `FEW` results and would meet the tolerance even if the variance were
+#: `DOUBT` times as large. The coverage was measured with ``python -m benchmarks campaigns``.
 FEWEST, FEW, DOUBT = 12, 7, 2.0
-#: With even fewer results, the standard error must be below this fraction of the tolerance: all results are then equal.
+#: A case with fewer than `FEW` results stops only if its standard error is below this fraction of the tolerance. This
+#: happens only if its results are practically equal.
 NEGLIGIBLE = 1e-3
 
 
@@ -35,7 +38,8 @@ def next_round(replication: Replication, count: int, growth: NDArray[np.float64]
     count : int
         Number of realisations so far.
     growth : float array, shape (cases,)
-        Factor by which the number of realisations of each case must grow; at most 1 if it has enough.
+        Factor by which the number of realisations of each case must grow; at most 1 for a case with enough
+        realisations.
     """
     more = np.minimum(growth[growth > 1], MOST_GROWTH)
     if not more.size:
@@ -59,17 +63,21 @@ def growth_needed(
     status : int8 array, shape (..., realisations)
         The ledger; only cases that are done count.
     until : mapping of str to Tolerance
-        Largest standard error of the mean, by output.
+        Largest allowed standard error of the mean, by output.
     scatter : mapping of str to array, shape (..., realisations), optional
-        Standard errors that are estimated from each single realisation, for outputs with such an estimate.
+        For some outputs, each realisation contains an estimate of its own standard error; these estimates.
 
     Returns
     -------
     float array, shape (...)
-        At most 1 if the case has enough results for every tolerance, 0 for a case without a successful result. One of
-        these conditions is sufficient for a tolerance: the standard error meets it with at least `FEWEST` results; it
-        would meet it with at least `FEW` results and `DOUBT` times the variance; it is below the fraction `NEGLIGIBLE`
-        of it; or both the standard error and the estimates in `scatter` meet it.
+        At most 1 if the case has enough results for every tolerance, 0 for a case without a successful result. A case
+        has enough results for a tolerance if at least one of these conditions holds:
+
+        * There are at least `FEWEST` results, and the standard error is within the tolerance.
+        * There are at least `FEW` results, and the standard error would be within the tolerance even if the variance
+          were `DOUBT` times as large.
+        * The standard error is below the fraction `NEGLIGIBLE` of the tolerance.
+        * Both the standard error and the standard error from the estimates in `scatter` are within the tolerance.
     """
     done = status == Status.DONE
     count = np.maximum(done.sum(axis=-1), 1)
@@ -97,7 +105,7 @@ def known_scatter(model: Model[Any], until: Collection[str], outputs: Collection
 
 
 def _times(error: NDArray[np.float64], allowed: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the factor by which the number of results must grow to reach the allowed error; infinite for NaN."""
+    """Return the factor by which the number of results must grow to reach the allowed error; infinite if it is NaN."""
     known = np.where(error > 0, error, 0.0)
     with np.errstate(divide="ignore", over="ignore"):
         found = np.divide(known, allowed, out=np.zeros(known.shape), where=known > 0) ** 2
@@ -113,7 +121,10 @@ def _error_from_within(scatter: NDArray[np.float64], done: NDArray[np.bool_]) ->
 def mean_and_error(
     values: NDArray[np.float64], valid: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return mean and standard error over the last axis of the valid values; NaN where there are too few."""
+    """Return mean and standard error of the valid values along the last axis.
+
+    The mean is NaN without a valid value, the standard error with fewer than two valid values.
+    """
     count = valid.sum(axis=-1)
     mean = np.where(valid, values, 0.0).sum(axis=-1) / np.maximum(count, 1)
     squares = np.where(valid, values - mean[..., None], 0.0) ** 2

@@ -12,15 +12,16 @@ from mdr_dask.errors import CampaignError, FitError, did_you_mean
 from mdr_dask.fits import available
 from mdr_dask.fits.base import Fit
 
-#: Means are shifted by this fraction of their standard error to find the constants that depend on them. The shift is so
-#: small that the fit still selects the same cases.
+#: To find out whether a constant depends on a case, the mean of the case is shifted by this fraction of its standard
+#: error. The shift is so small that the fit still selects the same cases.
 STEP = 1e-3
 #: Largest number of groups of neighbouring values along a dimension; the groups are shifted one after the other.
 GROUPS = 32
 #: A group of cases is left out if a shift by one standard error changes the constant by less than this share of the
 #: half width of its interval.
 NEGLIGIBLE = 0.01
-#: Relative change of the scatter for the extrapolation to zero scatter.
+#: Relative change of the scatter. The half widths for the original and for the changed scatter are extrapolated
+#: linearly to zero scatter.
 LESS = 0.01
 
 
@@ -70,7 +71,7 @@ def half_widths(
 
 
 def is_wide(value: xr.DataArray, half: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
-    """Return where an interval is too wide; an interval without finite ends (the law does not hold) does not count."""
+    """Return where an interval is too wide. Intervals without finite ends do not count: there the law does not hold."""
     return (half > _allowed(value, tolerance)) & np.isfinite(half)
 
 
@@ -82,9 +83,10 @@ def _allowed(value: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
 def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.DataArray]:
     """Return the half width that an interval would have without scatter of the realisations, by series.
 
-    This half width comes from grid errors and from the misfit of the law; more realisations do not reduce it. It is
-    extrapolated from a slightly smaller and from a slightly larger scatter. The smaller result is returned, because the
-    verdict on the law may change at one of these two.
+    This half width comes from grid errors and from the misfit of the law; more realisations do not reduce it. The fit
+    is repeated with the scatter multiplied by ``1 - LESS`` and by ``1 + LESS``, and the change of the half width is
+    extrapolated linearly to zero scatter. The smaller of the two results is returned, because the verdict on the law,
+    and with it the half width, may jump at one of the two changes of the scatter.
     """
     now = half_widths(fit, constant, groups)
 
@@ -134,11 +136,12 @@ def still_wide(
 def cases_behind(
     fit: Fit, constant: str, groups: Mapping[str, xr.Dataset], name: str, wide: xr.DataArray
 ) -> xr.DataArray:
-    """Return the cases of a series on which a constant depends whose interval is too wide.
+    """Return the cases of a series that affect a constant with too wide an interval.
 
-    The results of the cases are shifted by a small part of their standard error, group by group along every dimension
-    that the constant itself does not have. A case is chosen if the constant depends on the group of each of its
-    coordinates. Whole rows and columns are therefore chosen, and all cases that a fit compares get the same lines.
+    Along every dimension that the constant itself does not have, neighbouring values form groups. The results of one
+    group after the other are shifted by a small fraction of their standard error, and the fit is repeated. If the
+    constant changes, the group matters. A case is chosen if its group matters along each of these dimensions. Therefore
+    whole rows and columns are chosen, and all cases that a fit compares get the same generated lines.
 
     Parameters
     ----------
@@ -147,9 +150,9 @@ def cases_behind(
     groups : mapping of str to Dataset
         The series that are fitted.
     name : str
-        The series of the cases.
+        Name of the series whose cases are returned.
     wide : bool array
-        Where the interval of the constant is too wide, over the dimensions of the result.
+        For each element of the constant, whether its interval is too wide.
 
     Returns
     -------
@@ -188,7 +191,10 @@ def cases_behind(
 
 
 def _is_own(data: xr.Dataset, wide: xr.DataArray, dim: str) -> bool:
-    """Return whether a dimension of a result has the values of the study, without an extra row for all values."""
+    """Return whether a dimension of a result has the same values as in the study.
+
+    It does not if the result has an additional element for all values together.
+    """
     if dim in data.coords and dim in wide.coords:
         return data[dim].equals(wide[dim])
     return data.sizes[dim] == wide.sizes[dim]

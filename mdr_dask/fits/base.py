@@ -2,9 +2,10 @@
 
 Every result has a variable ``law_holds``: a sentence about the law with the constants that its source states. The
 sentence begins with *yes*, *approximately*, *no* or *not tested*. If constants are fitted, ``fitted_law_holds`` is the
-corresponding sentence about the law with the fitted constants. If the fitted law does not hold either, its departures
-enter the intervals as an error of every case (`fitted`), or the ends of the intervals are NaN. A constant that the data
-do not determine (`undetermined`) is NaN.
+corresponding sentence about the law with the fitted constants. If scatter and errors do not explain the departures of
+the data from the fitted law, these departures count as an error of every case and widen the intervals (`fitted`). Some
+fits then give NaN for the ends of the intervals instead. A constant that the data do not determine (`undetermined`) is
+NaN.
 """
 
 from __future__ import annotations
@@ -41,14 +42,15 @@ class Fit:
     summary : str
         The law, in one line.
     compute : callable, mapping of str to Dataset -> Dataset
-        Takes the groups of a store by the name of the series (``""`` without series). Each group has the dimensions
-        (axes..., realisation, ...) and all scalar parameters as coordinates, varied or not. Returns every constant
-        with ``<name>_low`` and ``<name>_high`` (95 % interval), measures of the goodness of fit, and ``law_holds``;
-        units in attrs.
+        Takes the groups of a store by the name of the series (``""`` for a store without series). Each group has the
+        dimensions (axes..., realisation, ...) and all scalar parameters as coordinates, both varied and fixed
+        parameters. Returns every constant with the ends of its 95 % interval, ``<name>_low`` and ``<name>_high``,
+        measures of the goodness of fit, and ``law_holds``. Units are in the attrs.
     apart : bool
         Whether each series of a store is fitted separately. ``compute`` then gets a mapping with one series.
     constants : tuple of str, or callable, Campaign -> tuple of str
-        Constants whose interval may determine the number of realisations (``until: {name.constant: 1 %}``).
+        Constants with an interval. A campaign may add realisations until such an interval is narrow enough
+        (``until: {name.constant: 1 %}``).
     """
 
     name: str
@@ -59,16 +61,16 @@ class Fit:
     constants: tuple[str, ...] | Callable[[Campaign], tuple[str, ...]] = ()
 
     def constants_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """Return the constants that may determine the number of realisations of a campaign."""
+        """Return the constants that a campaign may name in ``until``, to choose its number of realisations."""
         return self.constants(campaign) if callable(self.constants) else self.constants
 
     def results(self, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
-        """Fit a store: one result for each series that has the necessary data, or one for all series together.
+        """Fit a store, and return one result for each series with the necessary data, or one for all series together.
 
         Raises
         ------
         FitError
-            If no series has the data. The message gives the reason for each series.
+            If no series has the necessary data. The message gives the reason for each series.
         """
         if not self.apart:
             return {"": _judged(self.compute(groups))}
@@ -110,7 +112,7 @@ class Fitted:
     Attributes
     ----------
     constants : array, shape (1 + RESAMPLES + 2 groups, p)
-        Stack of the constants, for `mdr_dask.bootstrap.interval`; NaN for those that the data do not determine.
+        Stack of the constants, for `mdr_dask.bootstrap.interval`; NaN for constants that the data do not determine.
     residuals : array, shape (1 + RESAMPLES + 2 groups, cases)
         Stack of data minus law.
     count : int
@@ -145,16 +147,16 @@ def fitted(
     Parameters
     ----------
     fit : callable
-        From data, shape (rows, cases), to constants, shape (rows, p): exponents, or logarithms of factors.
+        Takes data, shape (rows, cases), and returns constants, shape (rows, p): exponents, or logarithms of factors.
     left : callable
-        From data and constants to data minus law, shape (rows, cases).
+        Takes data and constants, and returns data minus law, shape (rows, cases).
     data : array, shape (1 + RESAMPLES + 2 groups, cases)
         Stack of the data.
     count : int
         Realisations that were resampled.
     stated : array, shape (p,), optional
-        Constants that the source states. A constant also counts as undetermined if the data would not determine it
-        near these values.
+        Constants that the source of the law states. A constant also counts as undetermined if the data would not
+        determine it for constants equal to the stated values.
     """
     constants = fit(data)
     residuals = left(data, constants)
@@ -172,13 +174,15 @@ def fitted(
 def undetermined(effects: FloatArray) -> BoolArray:
     """Return which constants of a law the data do not determine.
 
-    A constant is undetermined if a change of it by one, with the other constants refitted, changes the law by less than
-    `WITHIN` in every case. Its fitted value would only reflect departures that are allowed for a law that holds.
+    The constant is changed by one, and the other constants are fitted again. If the law then changes by less than
+    `WITHIN` in every case, the constant is undetermined. Its fitted value would only reflect departures that are
+    allowed for a law that holds.
 
     Parameters
     ----------
     effects : array, shape (cases, p)
-        Derivatives of the logarithm of the law by its constants, which are exponents or logarithms of factors.
+        Derivatives of the logarithm of the law with respect to its constants, which are exponents or logarithms of
+        factors.
     """
     largest = np.empty(effects.shape[1])
     for k in range(largest.size):
@@ -236,21 +240,22 @@ def law_holds(
 ) -> str:
     """Return a sentence on whether a law holds.
 
-    Scatter never improves a verdict. If it may hide a departure beyond a limit, the limit counts as exceeded. If it may
-    hide any departure up to the largest limit, the law is not tested.
+    Scatter never improves a verdict. If scatter may hide a departure beyond a limit, the limit counts as exceeded. If
+    scatter may hide any departure up to the largest limit, the law is not tested.
 
     Parameters
     ----------
     departures : array
         Relative departures of the data from the law.
     chance : float or None
-        Probability that scatter and errors alone cause departures of this size; NaN if unknown, None if they cannot.
+        Probability that scatter and errors alone cause departures of this size; NaN if it is unknown, None if scatter
+        and errors cannot cause such departures.
     constants : int
         Number of constants fitted to these data.
     where : str
         Description of the case with the largest departure.
     scatter : float
-        Rms departure that scatter and errors alone exceed with a probability of 5 %; NaN if unknown.
+        Rms departure that scatter and errors alone exceed with a probability of 5 %; NaN if it is unknown.
     """
     if departures.size <= constants:
         return f"not tested: {departures.size} cases for {constants} constants leave nothing to compare"
@@ -290,7 +295,7 @@ def _signed(number: float, digits: str) -> str:
 
 
 def _plain(number: str) -> str:
-    """Return a percentage without an exponent; less than 1e-4 % is 0."""
+    """Return a percentage written without an exponent; a percentage below 1e-4 % becomes 0."""
     if "e-" in number:
         return "0"
     return f"{float(number):.0f}" if "e+" in number else number

@@ -26,7 +26,7 @@ from mdr_dask.tables import decoded
 
 #: Smallest error of measurement that is considered, relative to the rms residual of the best prediction.
 LEAST = 0.2
-#: Smallest relative residual; smaller ones may be due to rounding.
+#: Smallest residual that is used, relative to the values; smaller residuals may be due to rounding.
 _ROUNDING = 1e-9
 
 
@@ -45,8 +45,9 @@ class Calibration:
     units : dict of str to str
         Units of the unknowns, the conditions and the output.
     contradicted : Residuals or None
-        Residuals that the errors of the table do not explain. In this case the posterior is that for larger errors of
-        measurement, which do explain the residuals, so that the intervals include the misfit.
+        Residuals that the errors in the table do not explain, or None if these errors explain the residuals. In the
+        first case the posterior is computed with larger errors of measurement, which do explain the residuals, so that
+        the intervals include the misfit.
     """
 
     measured: Measured
@@ -154,7 +155,10 @@ def _posterior(predicted: Prediction, measured: Measured, noises: list[Noise]) -
 
 
 def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
-    """Return errors of measurement about as large as the residuals: equal ones, and ones proportional to the values."""
+    """Return possible errors of measurement, about as large as the residuals.
+
+    There are two kinds: equal errors for all points, and errors proportional to the values if all values are positive.
+    """
     values, count = measured.values, measured.values.size
     unknowns = len(predicted.unknowns)
     if count <= unknowns:
@@ -181,7 +185,11 @@ def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
 
 
 def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
-    """Return sizes of the error of measurement, from `LEAST` times the rms residual to its upper limit (99.9 %)."""
+    """Return possible sizes of the error of measurement.
+
+    The smallest size is `LEAST` times the rms residual. The largest is the upper end of the one-sided 99.9 % interval
+    of the error that follows from the residuals.
+    """
     spare = max(1, count - unknowns)
     most = min(100.0, float(np.sqrt(count / chi2.ppf(0.001, spare))))
     return np.asarray(residual * np.geomspace(LEAST, most, DEVIATIONS))
@@ -300,7 +308,7 @@ def _intervals(values: FloatArray, weights: FloatArray) -> dict[str, float]:
 
 
 def _bound(found: Calibration, k: int) -> dict[str, float]:
-    """Return the one-sided interval of an unknown if all other unknowns are determined; empty otherwise."""
+    """Return the one-sided interval of an unknown with one open end; empty unless all other unknowns are determined."""
     low, high = found.ends[k]
     if found.free != [k] or low == high:
         return {}

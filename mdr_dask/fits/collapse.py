@@ -99,7 +99,8 @@ def _constants(law: shift_laws.ShiftLaw) -> dict[str, xr.Variable]:
 def with_verdict(curve: xr.Dataset, verdicts: dict[str, str]) -> xr.Dataset:
     """Return a master curve with ``law_holds``: whether its curves collapse, and which law its shift factors follow.
 
-    If the curves do not determine all shift factors, the collapse is not tested: plateaus coincide for any shift.
+    If the curves do not determine all shift factors, the collapse is not tested. For example, two plateaus of the same
+    height coincide for any shift.
     """
     open_steps = curve.attrs.get("undetermined", "")
     collapse = f"not tested: shift factors are {open_steps.partition(':')[0]}" if open_steps else _collapse(curve)
@@ -120,7 +121,7 @@ def _collapse(curve: xr.Dataset) -> str:
     """Return a sentence on whether the curves collapse.
 
     The scatter about the merged curve is compared with the scatter of each curve about its own polynomial. If two
-    ordinates were shifted together, the sentence is that of the ordinate that collapses less well.
+    ordinates were shifted together, the sentence describes the ordinate that collapses less well.
     """
     names = [name for name in ("ordinate", "companion") if f"point_{name}" in curve]
     answers = [_collapse_of(curve, name) for name in names]

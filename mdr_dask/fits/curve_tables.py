@@ -21,7 +21,7 @@ ALIASES = {"normal_force": "normal force", "friction_coefficient": "friction coe
 }
 """Names of columns in a study, and the names that tables use for them (`mdr_dask.tables.SYNONYMS`)."""
 
-LEAST_JUMP = 3.0  # least ratio of a gap between two groups to a gap within a group of scattered values
+LEAST_JUMP = 3.0  # a gap that separates two groups of scattered values is at least this many times a gap within a group
 
 
 def read_table(path: str | Path) -> pd.DataFrame:
@@ -85,7 +85,7 @@ def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
 
 
 def _joined(column: str, wanted: str) -> bool:
-    """Return whether a column has the wanted name followed by a unit, such as ``freq_hz``."""
+    """Return whether the name of a column is the wanted name followed by a unit, such as ``freq_hz``."""
     front, _, behind = column.rpartition("_")
     unit = JOINED.get(behind.casefold(), behind)
     return bool(front) and is_unit(unit) and is_called(front, wanted, ALIASES.get(wanted, wanted))
@@ -218,9 +218,10 @@ def pairs_of(
 def clusters(values: FloatArray, abscissa: FloatArray | None = None) -> NDArray[np.intp]:
     """Return the index of the group of each value.
 
-    Measured values that scatter about a few set values are divided at the wide gaps between them. Each distinct value
-    is a group of its own if the gaps are nearly equal, or if most values occur several times. An exception are values
-    that alternate within one sweep of the abscissa: these are rounded readings of one set value.
+    Measured values that scatter about a few set values are divided into groups at the wide gaps. If the gaps between
+    distinct values are nearly equal, or if most values occur several times, each distinct value is a group of its own.
+    Values that alternate within one sweep of the abscissa are an exception: they are rounded readings of one set value
+    and form one group.
     """
     distinct, place, times = np.unique(values, return_inverse=True, return_counts=True)
     if distinct.size < 3:

@@ -62,7 +62,7 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     residuals = table[3] - design[:, varied] @ solution
     inverse = np.linalg.pinv(design[:, varied])
     width[varied] = t.ppf(0.975, freedom) * np.sqrt(np.sum(inverse**2, axis=1) * np.sum(residuals**2) / freedom)
-    if np.sqrt(np.mean(residuals**2)) > WITHIN:  # a misfit is systematic: it does not average out like scatter
+    if np.sqrt(np.mean(residuals**2)) > WITHIN:  # a misfit is systematic and does not average out like scatter
         width[varied] += np.abs(inverse) @ np.abs(residuals)
     constants[varied] = np.where(undetermined(design[:, varied]), np.nan, solution)
     return constants, width, residuals
@@ -82,8 +82,9 @@ def film_exponents(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
     -------
     Dataset, dims (series,)
         ``<film>_factor``, ``<film>_load``, ``<film>_speed``, ``<film>_material`` for the central and the minimum film,
-        with ``_low`` and ``_high``. An exponent is NaN if its number (W, U or G) does not vary, or varies only together
-        with the other numbers. ``<film>_rms`` and ``<film>_worst`` are the rms and the largest residual of ``ln h``.
+        and the ends of their intervals, ``_low`` and ``_high``. An exponent is NaN if its parameter (W, U or G) does
+        not vary, or varies only together with the other two. ``<film>_rms`` and ``<film>_worst`` are the rms and the
+        largest residual of ``ln h``.
         Films have no scatter, so the intervals measure the misfit of the formula. ``law_holds`` refers to the formula
         of Pan and Hamrock with its published constants, ``fitted_law_holds`` to the formula with the fitted constants.
 

@@ -24,7 +24,7 @@ Variables = dict[str, xr.Variable]
 
 MODELS = ("sliding_friction",)
 ZONE_ONE = (0.01, 0.3)  # range of F_N / (G h L) in zone 1; other limits change alpha by up to 0.02, beta by up to 0.14
-LINEAR = 0.05  # region I: mu / v changes by less than this between neighbouring velocities
+LINEAR = 0.05  # region I: mu / v changes by less than this fraction between neighbouring velocities
 NEEDS_SLOPE = "not tested: the study has no output contact_slope"
 
 
@@ -234,10 +234,11 @@ def at_load(force: FloatArray) -> Callable[[int], str]:
 
 
 def _first_linear(friction: FloatArray, velocity: FloatArray) -> int | None:
-    """Return the index of the lowest velocity from which friction is proportional to velocity; None if there is none.
+    """Return the index of the lowest velocity at which friction is proportional to velocity.
 
-    Two neighbouring velocities are compared by the realisations that succeeded at both. The index is not always 0,
-    because the time stepping of the papers gives a spurious lower limit of friction at low velocity.
+    Friction at two neighbouring velocities is compared, using the realisations that succeeded at both velocities. The
+    index is not always 0, because the time stepping of the papers gives a spurious lower limit of friction at low
+    velocity. None if friction is not proportional to velocity anywhere.
     """
     if velocity.size == 1:
         return 0
@@ -286,7 +287,10 @@ def _zone_one(data: xr.Dataset) -> Variables:
 
 
 def _velocity_of(place: FloatArray, x: FloatArray, count: int, meaning: str, unit: str) -> Variables:
-    """Return the velocity of the largest friction from a stack of its logarithms; NaN if it may be out of range."""
+    """Return the velocity of the largest friction, from a stack of the logarithms of this velocity.
+
+    It is NaN if the maximum may lie outside the range of velocities.
+    """
     outside = np.isinf(place[~np.isnan(place)])
     if outside[0] or outside.mean() > bootstrap.TAILS[0]:
         place = np.full_like(place, np.nan)

@@ -1,4 +1,4 @@
-"""Find the unknowns that the data determine, and the determined products of powers of the other unknowns."""
+"""Find the unknowns that the data determine, and products of powers of the other unknowns that are determined."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.posterior import Posterior
 
-#: An end of an axis is open if ln(density) there is less than this below its maximum, i.e. within two standard errors.
+#: The data leave an end of an axis open if ln(density) at this end is less than this below its maximum. For a normal
+#: density, the end then lies within two standard errors of the maximum.
 OPEN = 2.0
 #: An unknown is not determined if unknowns with an open end explain more than this share of its variance.
 LINKED = 0.25
@@ -19,9 +20,9 @@ LINKED = 0.25
 NARROW = 0.25
 #: Exponents are rounded to halves or thirds if the spread of the product grows by at most this factor.
 ROUNDED = 1.15
-#: Probabilities of the intervals, by the suffix of their names.
+#: Probability of each interval, by the suffix of the names of its ends.
 LEVELS = {"": 0.95, "_68": 0.6827}
-#: Suffixes of the median and the ends of the intervals, and their quantiles.
+#: Suffixes of the names of the median and of the ends of the intervals; `SHARES` has the corresponding quantiles.
 ENDS = ("", *(f"_{end}{kind}" for kind in LEVELS for end in ("low", "high")))
 SHARES = (0.5, *(0.5 + sign * level / 2 for level in LEVELS.values() for sign in (-1, 1)))
 
@@ -44,7 +45,11 @@ def open_ends(found: Posterior) -> list[Ends]:
 
 
 def undetermined(found: Posterior, ends: Sequence[Ends]) -> list[int]:
-    """Return the unknowns that the data do not determine: with an open end, or dependent on an unknown with one."""
+    """Return the indices of the unknowns that the data do not determine.
+
+    These are the unknowns with an open end of their axis (see `OPEN`), and the unknowns whose posterior depends
+    strongly on an unknown with an open end (see `LINKED`).
+    """
     free = [k for k, end in enumerate(ends) if any(end)]
     if not free:
         return []
@@ -70,7 +75,7 @@ class Product(NamedTuple):
     Attributes
     ----------
     exponents : array, shape (unknowns,)
-        Powers; zero for unknowns that are not part of the product.
+        Exponent of each unknown; zero for unknowns that are not part of the product.
     values : array, shape (cells,)
         Value of the product in each cell of the posterior.
     """

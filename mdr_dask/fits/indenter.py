@@ -27,7 +27,7 @@ from mdr_dask.fits.friction import (
 from mdr_dask.physics.sliding import laws
 from mdr_dask.physics.surfaces import shapes as indenter
 
-BODY = 0.3  # the law is meant for bodies whose rms slope in contact is at most this times that of the roughness
+BODY = 0.3  # the law applies to bodies whose rms slope in contact is at most this fraction of that of the roughness
 
 
 def _body(data: xr.Dataset) -> tuple[Any, float]:
@@ -50,7 +50,7 @@ def _half_width(data: xr.Dataset) -> Any:
 
 
 def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
-    """Return mu at low velocity over sqrt 2 slope, the argument of the law of rough indenters (eq. 3.34, 3.38)."""
+    """Return the argument of the law of rough indenters: mu at low velocity / (sqrt 2 slope) (eqs. 3.34, 3.38)."""
     require(data, *KELVIN)
     low = laws.indenter_low(
         _half_width(data),
@@ -64,10 +64,10 @@ def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
 
 
 def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
-    """Return the cases in which the law of rough indenters is meant to hold.
+    """Return the cases to which the law of rough indenters applies.
 
-    In these cases the body is flat compared with the roughness and is pressed in by more than the rms height, and the
-    velocity does not exceed that of the largest friction, above which region IV begins.
+    In these cases the body is flat compared with the roughness, it is pressed in by more than the rms height, and the
+    velocity does not exceed the velocity of the largest friction, at which region IV begins.
     """
     coefficient, exponent = _body(data)
     width = _half_width(data)
@@ -81,7 +81,7 @@ def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
 
 
 def _indenter(data: xr.Dataset) -> Variables:
-    """Fit the exponent of eq. 3.40; the constants are NaN if fewer than three cases lie within the law."""
+    """Fit the exponent of eq. 3.40; the constants are NaN if the law applies to fewer than three cases."""
     slope = spectral_slope(data)
     table = table_of(data, np.sqrt(2) * slope, indenter_xi(data, slope), within_indenter_law(data, slope))
     xi, within = table.columns

@@ -1,4 +1,4 @@
-"""The law of a study: a dense table of an output for linear interpolation in any program, with its error."""
+"""A dense table of an output of a study and of its error, which any program can interpolate linearly."""
 
 from __future__ import annotations
 
@@ -31,15 +31,16 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     Parameters
     ----------
     dataset : Dataset
-        A group of a study that is a grid. Axes of one value become fixed parameters; axes of words are kept.
+        A group of a study that is a grid. An axis with a single value becomes a fixed parameter. Axes whose values are
+        words are kept.
     output : str
         One of its outputs.
 
     Returns
     -------
     Dataset
-        ``<output>`` and ``<output>_error``: the sum of half of the 95 % interval of the mean (scatter and grid) and of
-        the error of interpolation.
+        ``<output>`` and ``<output>_error``. The error is the half width of the 95 % interval of the mean (scatter and
+        grid) plus the error of interpolation.
 
     Raises
     ------
@@ -90,7 +91,7 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
 
 
 def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray]:
-    """Return the mean of an output and the half width of its interval, or its grid error if there is no interval."""
+    """Return the mean of an output, and the half width of its interval or, without an interval, its grid error."""
     if "realisation" not in dataset[output].dims:
         return dataset[output], xr.zeros_like(dataset[output])
     kept = [name for name in (output, dataset[output].attrs.get("ancillary_variables")) if name in dataset]
@@ -129,12 +130,12 @@ def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.Da
 
 
 def _between(scale: Scale, places: FloatArray, line: FloatArray, error: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return values along an axis with the missing ones interpolated, and their errors."""
+    """Return values along an axis, with missing values interpolated, and the errors of all values."""
     known = np.isfinite(line)
     filled = cubic(places[known], line[known], places, 0, Scale.of(places))
     left_out = (
         left_out_error(scale, line[known], places[known], 0) / LEFT
-    )  # LEFT does not apply: the gaps are as wide as with values left out
+    )  # without the factor LEFT: the gaps are as wide as the gaps that leaving out every second value makes
     between = np.interp(places, places[known], error[known] + left_out)
     inside = (places >= places[known][0]) & (places <= places[known][-1])
     return np.where(inside, filled, np.nan), np.where(known, error, between)

@@ -8,9 +8,10 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 
-#: Least number of values of an axis: without every second one, enough values for a curve must remain.
+#: Least number of values of an axis. If every second value is left out, enough values for a curve must remain.
 FEWEST = 4
-#: Ratio of the error of interpolation to the error without every second value: 1/4 at second order (1/2 at kinks).
+#: Ratio of the error of interpolation from all values to the error from every second value. It is 1/4 for an error of
+#: second order; at a kink it would be 1/2.
 LEFT = 0.25
 
 
@@ -44,7 +45,7 @@ class Scale:
 
 
 def dense(places: FloatArray, pieces: int) -> FloatArray:
-    """Return places with each interval divided into pieces that are equal on their scale; all given places are kept."""
+    """Return places with each interval divided into equal pieces on their scale; the given places are kept."""
     scale = Scale.of(places)
     cut = [np.linspace(a, b, pieces, endpoint=False) for a, b in pairwise(scale.of_values(places))]
     grid = scale.back(np.concatenate([*cut, scale.of_values(places[-1:])]))

@@ -82,7 +82,7 @@ def _constant(before: FloatArray, jump: FloatArray, count: int) -> dict[str, flo
     logs = np.log(jump)
 
     def before_of(rows: FloatArray) -> FloatArray:
-        return before if len(rows) == len(before) else before[:1]  # data shifted by departures have mu_1 of row 0
+        return before if len(rows) == len(before) else before[:1]  # rows shifted by departures use mu_1 of row 0
 
     def left(rows: FloatArray, constant: FloatArray) -> FloatArray:
         return rows - np.log(jump_law(before_of(rows), np.exp(constant)))
@@ -200,7 +200,7 @@ def _lines(numbers: FloatArray, change: FloatArray, count: int) -> dict[str, Any
 
     flat = fitted(levels, left, both / scale, count)
     line = numbers @ np.linalg.pinv(np.vstack([np.ones(change.size), change]))
-    moved = scale * (flat.constants[len(numbers) :] - flat.constants[0])  # departures from a constant count as errors
+    moved = scale * (flat.constants[len(numbers) :] - flat.constants[0])  # departures from the mean count as errors
     level = np.concatenate([line[:, :, 0], line[0, :, 0] + moved])
     with np.errstate(divide="ignore", invalid="ignore"):  # zeta may be zero within its error
         trend = line[:, :, 1] / line[:, :1, 0]

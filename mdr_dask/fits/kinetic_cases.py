@@ -28,9 +28,9 @@ class Cases:
     Attributes
     ----------
     data : Dataset
-        The series; the realisation is the last dimension, or the last before the times.
+        The series. The last dimension is the realisation, or for transients the time, after the realisation.
     template : DataArray
-        An array with the axes of the series, which results get back.
+        An array with the axes of the series; results get these axes.
     """
 
     data: xr.Dataset

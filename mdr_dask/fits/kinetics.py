@@ -18,9 +18,9 @@ from mdr_dask.fits.relaxation import RATE_FIELDS, Relaxation, relaxation_of, win
 
 Series = Mapping[str, xr.Dataset]
 
-TRUSTED = 0.5  # a rate enters the power law if the half width of the interval of ln(rate) is below this
-SURE = 0.1  # error of ln(rate) that is added in quadrature in the weights, so that no single rate dominates
-INSTANT = 1e-9  # relaxing part over rms slope below which there is no relaxation to fit
+TRUSTED = 0.5  # a rate is used to fit the power law if the half width of the interval of ln(rate) is below this
+SURE = 0.1  # added in quadrature to the error of ln(rate) in the weights, so that no single rate dominates the fit
+INSTANT = 1e-9  # no relaxation is fitted if the relaxing part of friction is below this times the rms slope
 WINDOW_TEXT = (
     "one exponential over 0 <= (t - t_0) / tau <= 8 / b_law; weights: duration of every moment over the "
     "variance of the mean trace, to which the square of a hundredth of its largest value is added for the grid"
@@ -77,7 +77,7 @@ def _relaxations(cases: Cases) -> list[Relaxation | None]:
 
 
 def _stacked(stacks: list[FloatArray | None]) -> FloatArray:
-    """Return stacks of different length as columns of one array; missing rows repeat the first row."""
+    """Return stacks of different length as columns of one array; missing rows of a column repeat its first row."""
     rows = max((stack.size for stack in stacks if stack is not None), default=1 + bootstrap.RESAMPLES)
     columns = np.full((rows, len(stacks)), np.nan)
     for k, stack in enumerate(stacks):
@@ -112,7 +112,8 @@ def _closed_laws(cases: Cases) -> tuple[FloatArray, FloatArray, list[str]]:
     Returns
     -------
     whole, of_rate : array, shape (cases,)
-        Rms departure over all times in units of d_mu_0: of the law, and of the law with the computed jump.
+        Rms difference between law and computed transient over all times, divided by d_mu_0. For `whole`, the law has
+        the jump of eq. 4.11. For `of_rate`, it has the computed jump, so that only the rate of eq. 4.12 is tested.
     sentences : list of str
         For each case, whether the law holds.
     """

@@ -24,16 +24,15 @@ class Residuals(NamedTuple):
     Attributes
     ----------
     scaled : array, shape (points,)
-        Measured minus predicted value over the standard deviation of both.
+        Measured minus predicted value, divided by the standard deviation of this difference.
     relative : float
-        Root mean square of measured minus predicted values, over the root mean square of the measured values.
+        Rms of measured minus predicted values, divided by the rms of the measured values.
     chi_squared : float
         Chi squared, including correlations of the errors; NaN if the errors of measurement are unknown.
     freedom : int
         Degrees of freedom: points minus determined combinations of unknowns.
     errors : float
-        Root mean square of the standard deviations of measured minus predicted values, over the root mean square of the
-        measured values.
+        Rms of the standard deviations of measured minus predicted values, divided by the rms of the measured values.
     """
 
     scaled: FloatArray
@@ -73,10 +72,10 @@ def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str
 
 
 def trend(scaled: FloatArray, conditions: Mapping[str, FloatArray]) -> tuple[float, str]:
-    """Return the probability that a trend of the residuals is due to chance, and the condition with this trend.
+    """Return the probability that a trend of the residuals is due to chance, and the condition that shows the trend.
 
-    A parabola is fitted to the residuals against the rank of each condition. The smallest probability of all conditions
-    is multiplied by their number.
+    For each condition, a parabola is fitted to the residuals against the rank of the condition. The smallest
+    probability of all conditions is multiplied by the number of conditions.
     """
     worst, along = 1.0, ""
     for name, values in conditions.items():

@@ -13,11 +13,12 @@ from mdr_dask.fits.prediction import Predicted, Prediction
 
 #: Cells along each unknown at the start, by the number of unknowns.
 START = {1: 64, 2: 24, 3: 12, 4: 8}
-#: Least number of cells that are refined, by the number of unknowns; and largest number of cells after refinement.
+#: `BEST`: least number of cells that are refined, by the number of unknowns. `MOST`: largest number of cells after a
+#: refinement.
 BEST, MOST = {1: 32, 2: 256, 3: 768, 4: 1536}, 160_000
 #: Cells with ln(density) more than this below the maximum are left out; together they have a probability below 1e-5.
 REACH = 14.0
-#: Refinement ends if ln(density) varies by less than this within a cell, on average.
+#: Refinement ends if ln(density) varies within a cell by less than this, on average over the cells.
 SMOOTH = 0.6
 #: Largest number of refinements.
 LEVELS = 16
@@ -33,9 +34,9 @@ class Noise(NamedTuple):
     Attributes
     ----------
     sizes : array, shape (sizes,)
-        Factors of the pattern; a single factor 1 if the errors are known.
+        Factors by which `pattern` is multiplied; a single factor 1 if the errors are known.
     pattern : array, shape (points,), or None
-        Standard deviations of the points for the factor 1; None if they are proportional to the predicted values.
+        Standard deviations of the points for the factor 1; None for errors proportional to the predicted values.
     """
 
     sizes: FloatArray
@@ -49,7 +50,7 @@ class Noise(NamedTuple):
 
 
 class Likelihood:
-    """The likelihood of measured values for a prediction, with all its errors.
+    """The likelihood of measured values for a prediction, including the errors of the prediction.
 
     Parameters
     ----------
@@ -57,7 +58,7 @@ class Likelihood:
     values : array, shape (points,)
         Measured values.
     noises : sequence of Noise
-        Possible errors of measurement. All are equally likely a priori, and so are the sizes of each.
+        Possible errors of measurement. All have the same prior probability, and so have all sizes of one element.
     """
 
     def __init__(self, prediction: Prediction, values: FloatArray, noises: list[Noise]) -> None:
@@ -136,7 +137,7 @@ def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> 
     Parameters
     ----------
     likelihood : callable
-        From places, shape (sets, unknowns), to logarithms of the likelihood, shape (sets, sizes of errors).
+        Takes places, shape (sets, unknowns), and returns logarithms of the likelihood, shape (sets, sizes of errors).
     unknowns : int
         Dimensions of the cube.
     """
@@ -159,7 +160,10 @@ def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> 
 
 
 def _kept(density: FloatArray, fewest: int, most: int) -> NDArray[np.intp]:
-    """Return the cells to refine: all of high density, at least `fewest`; a random part if more than `most`."""
+    """Return the cells to refine: all cells of high density, but at least `fewest`.
+
+    If there are more than `most` such cells, a random selection of them is refined.
+    """
     order = np.argsort(density)[::-1]
     number = max(int((density > density.max() - REACH).sum()), min(fewest, density.size))
     if number <= most:

@@ -18,13 +18,15 @@ from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.interpolation import FEWEST, Scale, cubic, dense, left_out_error, linear
 from mdr_dask.questions.selection import written_apart
 
-#: Largest number of unknowns, and largest number of values of the dense table that is interpolated linearly.
+#: `MOST`: largest number of unknowns. `LARGEST`: largest number of values of the dense table that is interpolated
+#: linearly.
 MOST, LARGEST = 4, 4e6
 #: Largest number of table intervals per interval of the study.
 PIECES = 16
 #: Relative difference up to which a measured and a computed value of a parameter are the same.
 SAME = 1e-6
-#: Largest number of common modes of the scatter of the lines, and the share of the variance that they must contain.
+#: The scatter that all cases share, because they use the same lines, is represented by a few modes. `MODES` is their
+#: largest number, `SHARE` the share of the variance that is enough.
 MODES, SHARE = 6, 0.999
 
 
@@ -35,7 +37,8 @@ class Predicted(NamedTuple):
     ----------
     mean : array, shape (sets, points)
     together : array, shape (sets, points, modes)
-        Errors that all points share, one standard deviation each: scatter of lines, grid and interpolation.
+        Errors that all points share, as one standard deviation for each mode. They are due to the scatter of the lines,
+        the grid and the interpolation.
     alone : array, shape (sets, points)
         Variance of the errors that are independent for each point.
     """
@@ -95,7 +98,8 @@ def prediction(dataset: xr.Dataset, measured: Measured) -> Prediction:
     Raises
     ------
     FitError
-        If the study is not a grid, has no unknowns or too many, too few values of an axis, or cases without a value.
+        If the study is not a grid, has no unknowns or too many of them, has too few values of an axis, or has cases
+        without a value.
     DataError
         If a measured point lies outside the study.
     """
@@ -224,8 +228,8 @@ def _long_enough(dataset: xr.Dataset, axis: str) -> FloatArray:
 def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the independent standard error, and the common modes of the scatter.
 
-    All cases share their lines, so the errors of their means are correlated. The scatter is widened by Student's t,
-    because a few lines do not determine it well.
+    The errors of the means of different cases are correlated, because all cases are computed on the same lines. The
+    scatter is multiplied by a factor from Student's t, because a few lines do not determine it well.
     """
     count = deviations.shape[-1]
     if count < 2:
@@ -243,7 +247,7 @@ def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray)
 
 
 def _widened(number: NDArray[np.intp]) -> FloatArray:
-    """Return the ratio of Student's t to the normal z for a number of lines."""
+    """Return the 97.5 % quantile of Student's t divided by that of the normal distribution, for a number of lines."""
     few = np.maximum(number, 2)
     widened: FloatArray = bootstrap.widening(few) * np.sqrt((few - 1) / few)
     return widened

@@ -10,8 +10,8 @@ from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import DOUBTFUL, law_holds
 
-WINDOW = 8.0  # length of the fitted part, in units of 1 / (rate of the law)
-FLOOR = 0.01  # grid error at every moment, relative to the largest relaxing part (docs/kinetics.md)
+WINDOW = 8.0  # length of the fitted part of a trace, in units of 1 / (rate by eq. 4.12)
+FLOOR = 0.01  # assumed grid error at every moment, as a fraction of the largest value of the trace (docs/kinetics.md)
 GRID = 400  # rates that are tried, evenly spaced on a logarithmic scale
 
 RATE_FIELDS = {
@@ -26,8 +26,8 @@ class Relaxation(NamedTuple):
     Attributes
     ----------
     rate, amplitude, integral_rate : array, shape (rows,)
-        Stacks. If scatter and errors do not explain the departures of the trace from one exponential, the last rows
-        of the rate are fits to the trace shifted by these departures, and the integral rate.
+        Stacks. If scatter and errors do not explain the departures of the trace from one exponential, `rate` has
+        additional rows at its end: rates fitted to the trace shifted by these departures, and the integral rate.
     holds : str
         Whether one exponential fits; departures are relative to the largest relaxing part.
     """
@@ -108,7 +108,7 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
     count : int
         Realisations.
     expected : float
-        Rate of the law. It sets the fitted part, t' <= 8 / expected.
+        Rate by the law. It determines the fitted part of the trace, t' <= 8 / expected.
     """
     inside = time <= window(time, expected)
     t, y = time[inside], traces[:, inside]
@@ -122,7 +122,7 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
     if not chance >= DOUBTFUL:
         rates, amplitudes = exponential(t, bootstrap.moved(y[0], residuals[0]), weights)
         rate, amplitude = np.concatenate([rate, rates, integral[:1], rate[:1]]), np.concatenate([amplitude, amplitudes])
-    if outside[0] or outside.mean() > bootstrap.TAILS[0]:  # a rate at an end of the tried range says nothing
+    if outside[0] or outside.mean() > bootstrap.TAILS[0]:  # a rate at an end of the tried range is no estimate
         rate = np.full_like(rate, np.nan)
     relative = residuals / np.abs(y[0]).max()
     holds = law_holds(relative[0], chance, 2, scatter=bootstrap.scatter(relative, count))

@@ -63,7 +63,7 @@ def _contact_growth(data: xr.Dataset) -> Variables:
 
 
 def _balance(data: xr.Dataset, used: list[int]) -> Variables:
-    """Return the slope in contact over the slope of the line, and mu over eq. 3.12; empty if an output is missing."""
+    """Return (slope in contact) / (slope of the line) and mu / (mu by eq. 3.12); empty if an output is missing."""
     if not {"contact_slope", "friction_coefficient"} <= set(data.data_vars):
         return {}
     slope = spectral_slope(data)
@@ -86,17 +86,17 @@ def _balance(data: xr.Dataset, used: list[int]) -> Variables:
 
 
 def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> FloatArray:
-    """Return the slope in contact over the slope of the line by eq. 3.21; NaN for contacts below the shortest wave.
+    """Return (slope in contact) / (slope of the line) by eq. 3.21; NaN for a contact shorter than the shortest wave.
 
     Parameters
     ----------
     fraction : array
-        Length in contact over the length of the line.
+        Length in contact divided by the length of the line.
     hurst, points : float
         Hurst exponent and number of Nyquist points of the line.
     """
     power = 2 * (1 - hurst)
-    longest, shortest = 1 / np.clip(fraction, 1e-300, 1.0), points / 2  # 2 pi / L_cont and q_max over 2 pi / L
+    longest, shortest = 1 / np.clip(fraction, 1e-300, 1.0), points / 2  # 2 pi / L_cont and q_max, both in 2 pi / L
     if power < 1e-9:
         share = np.log(shortest / longest) / np.log(shortest)
     else:
@@ -106,7 +106,7 @@ def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> Floa
 
 
 def _contact_slope(data: xr.Dataset) -> Variables:
-    """Compare the slope in contact with eq. 3.21, which leaves a factor open, and friction with this slope."""
+    """Compare the slope in contact with eq. 3.21, whose factor is fitted, and compare friction with this slope."""
     hurst, points = one_value(data, "hurst"), one_value(data, "points")
     slopes = table_of(data, spectral_slope(data), output="contact_slope")
     fractions = table_of(data, 1.0, output="contact_fraction")
@@ -123,7 +123,7 @@ def _contact_slope(data: xr.Dataset) -> Variables:
     )
     fraction = fractions.mean()[used]
     holding = found.holds(lambda k: f"L_cont / L = {fraction[k]:.2g}")
-    if np.ptp(np.log(fraction)) < WITHIN:  # with a fitted factor, equal lengths cannot contradict the law
+    if np.ptp(np.log(fraction)) < WITHIN:  # because the factor is fitted, equal lengths cannot contradict the law
         holding = f"not tested: the lengths in contact of these cases differ by less than {WITHIN:.0%}"
     return {
         **constant("factor", np.exp(found.constants[:, 0]), count, "slope in contact over eq. 3.21", positive=True),
@@ -170,13 +170,14 @@ class Collapse(NamedTuple):
     Attributes
     ----------
     shifts : array, shape (rows, 2, curves)
-        Stack of the shifts along ln velocity and ln friction; those of the reference curve are 0.
+        Stack of the shifts along ln velocity and ln friction; the shifts of the reference curve are 0.
     residuals : array, shape (rows, points)
         Stack of the distances of the points from the common curve.
     constants : int
-        Number of fitted heights of the common curve and fitted shifts.
+        Number of fitted constants: heights of the common curve at its knots, and shifts.
     vague : array, shape (curves,)
-        Whether the data do not determine a shift of the curve, because it or its neighbour is a straight line.
+        Whether the data do not determine a shift of the curve. This happens to straight curves and to curves next to a
+        straight curve.
     """
 
     shifts: FloatArray
@@ -190,7 +191,8 @@ def collapse(
 ) -> Collapse:
     """Shift curves onto a common curve, a natural cubic spline, by least squares.
 
-    The shifts of the other rows of the stack follow from those of the first row by linearisation.
+    The least-squares problem is solved for the first row of the stack. The shifts of the other rows follow from this
+    solution by linearisation.
 
     Parameters
     ----------
@@ -245,7 +247,11 @@ def collapse(
 
 
 def _natural(knots: FloatArray, place: FloatArray) -> FloatArray:
-    """Return natural cubic splines of unit height at each knot, continued by straight lines, shape (places, knots)."""
+    """Return the cardinal splines of some knots at some places, shape (places, knots).
+
+    Cardinal spline k is the natural cubic spline that is 1 at knot k and 0 at every other knot. Outside the range of
+    the knots it continues as a straight line.
+    """
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(knots, np.eye(knots.size), bc_type="natural")

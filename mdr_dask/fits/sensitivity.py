@@ -132,7 +132,10 @@ def _is_saltelli(columns: FloatArray) -> bool:
 
 
 def _product(left: FloatArray, right: FloatArray) -> FloatArray:
-    """Return for each point the mean product over pairs of different realisations; with one, the plain product."""
+    """Return for each point the mean product over pairs of different realisations.
+
+    With only one realisation, return the product of the two outputs.
+    """
     count = len(left)
     if count == 1:
         return np.asarray(left[0] * right[0])
@@ -141,7 +144,10 @@ def _product(left: FloatArray, right: FloatArray) -> FloatArray:
 
 
 def _exchanged(values: FloatArray) -> FloatArray:
-    """Return first-order and total index from outputs (lines, points, 3) at a, at b, and at a with one input of b."""
+    """Return the first-order and the total index of one input, from outputs of shape (lines, points, 3).
+
+    The last dimension has the output at point a, at point b, and at point a with this input taken from b.
+    """
     a, b, mixed = np.moveaxis(values[:, np.isfinite(values).all(axis=(0, 2))], 2, 0)
     if a.shape[1] < FEWEST:
         raise FitError(f"expected at least {FEWEST} base points without a failed case, got {a.shape[1]}")
@@ -154,9 +160,10 @@ def _exchanged(values: FloatArray) -> FloatArray:
 def _of_neighbours(values: FloatArray) -> FloatArray:
     """Return the first-order index with the ends of its interval, and NaN for the total index, shape (3, 2).
 
-    There are two estimates. Products of neighbours alone are right for random points. If the points fill space evenly,
-    as in a Sobol sequence, the other inputs of neighbours differ systematically; then the mean that includes the
-    product of each point with itself is right. The index is the middle of both estimates. The interval contains both.
+    There are two estimates. The first uses only products of neighbours; it is right for random points. The second also
+    includes the product of each point with itself; it is right for points that fill space evenly, such as a Sobol
+    sequence, because the other inputs of neighbours then differ systematically. The index is the middle of both
+    estimates, and the interval contains both.
     """
     (without, with_itself), (low, _), (_, high) = _with_interval(values, _neighbours)
     first = [(without + with_itself) / 2, low, high]

@@ -11,9 +11,9 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import DOUBTFUL
 from mdr_dask.fits.interpolation import Scale, cubic
 
-TOPS = (0.3, 0.2, 0.1, 0.05)  # a parabola is fitted to points within this share below the maximum: the first that fits
-FLAT = 0.05  # points within this share below the maximum count as plateau
-UPPER = 0.5  # the cubic for the place of the maximum is fitted above this share of the maximum
+TOPS = (0.3, 0.2, 0.1, 0.05)  # points at most this fraction below the maximum; the first range that a parabola fits
+FLAT = 0.05  # points at most this fraction below the maximum count as plateau
+UPPER = 0.5  # the cubic for the place of the maximum is fitted to points above this fraction of the maximum
 PLACES = 96  # number of points, evenly spaced in the logarithm of velocity, to which the cubic is fitted
 
 
@@ -26,7 +26,7 @@ def smoothed(mean: FloatArray) -> FloatArray:
 
 
 class Top(NamedTuple):
-    """The maximum of a parabola through the points about the largest friction.
+    """The maximum of a parabola that is fitted to the points about the largest friction.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
     unbiased = top[0] + np.nanmean(top[0] - resamples) if count > 1 else top[0]
     if left.shape[1] > 3:
         errors = _parabola(x[near], bootstrap.moved(stack[0, near], left[0]))[0]
-    else:  # three points have no residuals: the error is what the parabola adds to the highest point
+    else:  # a parabola through three points has no residuals; the error is its maximum minus the highest point
         errors = bootstrap.moved(top[:1], top[:1] - stack[0, near].max()).ravel()
     return Top(np.concatenate([top, errors]) + (unbiased - top[0]), at, rise)
 
@@ -99,9 +99,9 @@ def _parabola(x: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, 
 def place(x: FloatArray, stack: FloatArray) -> FloatArray:
     """Return a stack of ln(velocity) of the maximum of friction; infinite if it lies outside the velocities.
 
-    It is the maximum of a cubic polynomial through ln(friction) in the upper half of the curve. The polynomial is
-    fitted at evenly spaced places on a monotone cubic through the points, so that the result does not depend on their
-    spacing. The difference from a polynomial of degree four is the error, in the last two rows.
+    It is the maximum of a cubic polynomial fitted to ln(friction) in the upper half of the curve. The polynomial is
+    fitted at evenly spaced places on a monotone cubic through the points, so that the result does not depend on the
+    spacing of the points. The last two rows hold the error: the difference from a polynomial of degree four.
 
     Parameters
     ----------
