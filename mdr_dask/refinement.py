@@ -25,8 +25,8 @@ from mdr_dask.campaign import Campaign, Refinement, Series, Tolerance
 GROUPS = 20
 #: Probability that an interval is halved because of scatter alone.
 CHASED = 0.05
-#: Width of the smallest interval that is halved, as a fraction of the axis. It limits the number of values that are
-#: spent on a discontinuity.
+#: Intervals of this width, as a fraction of the axis, are not halved any further. This limits the number of values that
+#: are spent on a discontinuity.
 FINEST = 2.0**-10
 #: Smallest number of values along an axis from which the output is predicted.
 FEWEST = 3

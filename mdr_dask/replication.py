@@ -21,10 +21,11 @@ GROWTH = 1.5
 #: A case with `FEWEST` or more results stops if its estimated standard error meets the tolerance. With fewer results
 #: this estimate is poor: if cases stopped because of it, 95 % intervals could have a coverage of only 89 %. So a case
 #: with fewer results stops only if it has at least `FEW` results and would meet the tolerance even if the variance were
-#: `DOUBT` times as large. The coverage was measured with ``python -m benchmarks campaigns``.
+#: `DOUBT` times as large. `growth_needed` lists two further conditions. The coverage was measured with
+#: ``python -m benchmarks campaigns``.
 FEWEST, FEW, DOUBT = 12, 7, 2.0
-#: A case with fewer than `FEW` results stops only if its standard error is below this fraction of the tolerance. This
-#: happens only if its results are practically equal.
+#: A case with two or more results also stops if its standard error is below this fraction of the tolerance, because its
+#: results are then practically equal.
 NEGLIGIBLE = 1e-3
 
 

@@ -1,4 +1,4 @@
-"""Run a campaign: rounds, resumed runs, failures, progress. Only this package uses Dask to compute."""
+"""Run a campaign: rounds, resumed runs, failures and progress. Only this package computes with Dask."""
 
 from mdr_dask.execute.events import Event, Tell
 from mdr_dask.execute.progress import Progress

@@ -24,14 +24,15 @@ FEWEST = 10
 def cases_that_narrow(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, taken: Sequence[IntArray]
 ) -> list[BoolArray]:
-    """Return the cases that need more realisations, because constants with too wide intervals were fitted to them.
+    """Return the cases that need more realisations, because a constant that depends on them has too wide an interval.
 
     Parameters
     ----------
     url, stage, layout, places
-        The store, the campaign, and the positions of its cases in the store.
+        The URL of the store, the stage of the campaign, the groups of the store, and the positions of the cases of the
+        stage in the store.
     taken : sequence of int array
-        For each group, the number of realisations of every case to use; further stored realisations are ignored.
+        For each group, the number of realisations of every case that are used. Further stored realisations are ignored.
     """
     answers = stage.campaign.replication.answers
     if max(int(each.max()) for each in taken) < FEWEST:

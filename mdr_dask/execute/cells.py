@@ -19,7 +19,7 @@ from mdr_dask.task import Work, versions
 
 @dataclass(frozen=True)
 class Cells:
-    """The results of a group that a round has to compute, and those that it has to mark as not needed.
+    """The results of a group that a round has to compute, and the results that it has to mark as not needed.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class Cells:
     wanted, spared : bool array, shape of the group
         Results to compute, and results to mark as not needed.
     kept, failed : int
-        Number of results of the round that are already in the store, and number of failed ones among them.
+        Number of results of the round that are already in the store, and how many of these have failed.
     """
 
     template: Template
@@ -59,8 +59,8 @@ def find_cells(
 ) -> Cells:
     """Compare a round with the ledger.
 
-    `asked` marks the cases of the round, `needed` those that need its `realisations` (first, last + 1), and `own` the
-    results that belong to a part.
+    `asked` marks the cases of the stage and `needed` the cases that need the realisations of the round. `realisations`
+    is the first realisation of the round and the last plus one. `own` marks the results that belong to this part.
     """
     status = store.ledger(url, template.series.name, template.shape)
     open_states = [Status.MISSING, Status.NOT_NEEDED]
@@ -79,7 +79,7 @@ def find_cells(
 
 
 def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]]:
-    """Yield for each group the number of the part of each result, for a division into `count` parts."""
+    """Yield for each group an array with the number of the part that computes each result; there are `count` parts."""
     position = itertools.count()
     for template in layout:
         numbers = np.zeros(template.shape, dtype=np.int32)
@@ -89,7 +89,7 @@ def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]
 
 
 def tasks(url: str, groups: Iterable[Cells], lock: Lock) -> Iterator[Work]:
-    """Yield the tasks of a round one by one, so that only the tasks of the window exist at the same time."""
+    """Yield the tasks of a round one by one, so that only the submitted tasks exist at the same time."""
     laid_out = store.layout_mark(url)
     if laid_out is None:
         raise StoreError(f"{url}: removed since it was laid out")

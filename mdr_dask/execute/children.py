@@ -30,9 +30,10 @@ from mdr_dask.task import Outcome, Work, kind, one_blas_thread, run_block, write
 
 #: Code of the server process.
 COMMAND = "import sys; from mdr_dask.execute.children import serve; serve(sys.argv[1], [int(x) for x in sys.argv[2:]])"
-#: Seconds beyond the time limit of a case after which its process is killed. Python code raises TimeoutError before.
+#: A process is killed this number of seconds after the time limit of its case. A case in plain Python raises
+#: TimeoutError at the limit, before the process is killed.
 GRACE = 1.0
-#: Number of results of a case that must crash before its other results are marked as failed.
+#: After this number of results of a case have crashed, its other results are marked as failed.
 CONVICTED = 2
 
 
@@ -50,7 +51,7 @@ class Child:
     pipe: Connection
 
     def run(self, work: Work, limit: float | None = None) -> Outcome | Death:
-        """Compute a block in the child process; `limit` is the largest time of each result in seconds.
+        """Compute a block in the child process; each result may take at most `limit` seconds.
 
         Raises
         ------
@@ -95,7 +96,9 @@ def children(count: int, model: str) -> Iterator[list[Child]]:
 
 
 def compute_apart(child: Child, work: Work, limit: float | None = None) -> Iterator[tuple[Work, Outcome]]:
-    """Compute a block that may crash. If it does, compute its halves, down to single results, which then have failed.
+    """Compute a block that may crash its process. If it does, its halves are computed, down to single results.
+
+    A single result that crashes its process has failed.
 
     After `CONVICTED` results of a case have crashed, its other results are marked as failed without computing them.
     """
@@ -124,7 +127,7 @@ def compute_apart(child: Child, work: Work, limit: float | None = None) -> Itera
 
 def serve(model: str, numbers: list[int]) -> None:
     """Import the modules that blocks need, fork a keeper for each pipe, and return when all keepers have ended."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all processes; the driver decides
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal sends Ctrl-C to all processes; only the driver reacts
     one_blas_thread()
     kind()
     with suppress(Exception):  # the first block reports this error

@@ -26,16 +26,17 @@ from mdr_dask.task import one_blas_thread
 
 #: Seconds to wait for the answer of a scheduler.
 SCHEDULER_PATIENCE = 10
-#: Address of the web page of a scheduler: only this machine can open it.
+#: Address of the web page of a scheduler; only programs on this machine can open it.
 DASHBOARD = "127.0.0.1:0"
-#: Time in which an adaptive cluster should finish all waiting tasks; Dask starts workers accordingly. About one block.
+#: Time in which an adaptive cluster should finish all waiting tasks. Dask starts as many workers as this requires. It
+#: is about the time of one block.
 TARGET_DURATION = "1s"
 #: Loggers whose messages explain why workers cannot be started; messages of the run quote them.
 STARTING = ("distributed.deploy", "dask_jobqueue", "tornado")
 #: Loggers whose messages are discarded, because they only repeat errors that are reported anyway.
 ECHOES = ("distributed", "asyncio")
-#: Settings of a cluster on this machine. A block is suspected as soon as one worker dies while computing it, and the
-#: nanny process restarts the worker. Profiling is off, because it takes 4 % of a core for each worker.
+#: Settings of a cluster on this machine. If one worker dies while it computes a block, the block is suspected to be the
+#: cause, and the nanny process restarts the worker. Profiling is off, because it takes 4 % of a core for each worker.
 ON_THIS_MACHINE = {
     "distributed.deploy.lost-worker-timeout": "1 day",
     "distributed.scheduler.allowed-failures": 0,
@@ -175,7 +176,7 @@ def cluster_class(name: str) -> type[Cluster]:
 
 
 def _closed_to_others(kind: type[Cluster], arguments: Mapping[str, Any], stack: ExitStack) -> dict[str, Any]:
-    """Add arguments that exclude other users, unless set already: TLS, and a web page for this machine only."""
+    """Add arguments that exclude other users, unless they are set: TLS, and a web page that only this machine can open."""
     own = dict(arguments)
     if issubclass(kind, LocalCluster):
         own["dashboard_address"] = own.get("dashboard_address") or DASHBOARD
@@ -202,7 +203,7 @@ def _in_files(keys: Security, folder: Path) -> Security:
 
 
 def _most(plan: Mapping[str, Any]) -> int:
-    """Return the largest number of threads of an adaptive cluster according to its cluster file, otherwise 0."""
+    """Return the largest number of threads that a cluster file allows for an adaptive cluster; 0 for other clusters."""
     arguments = plan.get("arguments", {})
     adapt = plan.get("adapt", {})
     each = arguments.get("cores", 1) if "maximum_jobs" in adapt else arguments.get("threads_per_worker", 1)

@@ -19,7 +19,7 @@ class Event:
     name : str
         Name of the event, such as ``laid out`` or ``block done``.
     facts : mapping
-        Details, in a form that JSON can hold.
+        Details, as values that JSON can represent.
     sentence : str
         A message for the user; empty if there is none.
     """

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
 #: Number of blocks submitted for each thread, so that no thread is idle.
 AHEAD = 2
-#: Seconds for which a plain Python model is computed in this process; starting others pays off only for longer runs.
+#: Seconds for which a plain Python model is first computed in this process. Starting further processes pays off only
+#: for longer runs.
 SHORT = 2.0
 
 Compute = Callable[[Work], list[tuple[Work, Outcome]]]
@@ -40,7 +41,7 @@ def check(resources: Resources) -> None:
 
 
 class Executor(AbstractContextManager["Executor"]):
-    """Computes blocks on the given resources. Processes and clusters are started when there is work for them.
+    """Compute blocks on the given resources. Processes and clusters are started when there is work for them.
 
     Parameters
     ----------
@@ -72,7 +73,7 @@ class Executor(AbstractContextManager["Executor"]):
         self._stack.close()
 
     def hold(self, lock: Lock) -> None:
-        """Set the lock of the run. Blocks that a crashed run had begun will be computed in a child process."""
+        """Set the lock of the run. Blocks that a crashed run had started will be computed in a child process."""
         self._lock = lock
         self._suspects, self._begun = set(lock.begun), set(lock.begun)
 
@@ -106,7 +107,7 @@ class Executor(AbstractContextManager["Executor"]):
             self._in_pool(ordinary, self._here, settle)
 
     def _without_suspects(self, works: Iterator[Work], settle: Settle) -> Iterator[Work]:
-        """Yield the ordinary blocks; compute blocks that a crashed run had begun in a child process instead."""
+        """Yield all blocks except those that a crashed run had started; compute these in a child process."""
         for work in works:
             if (key := work.key) in self._suspects and self._may_fork:
                 sentence = f"an earlier run ended while it computed block {key}: it is computed in a process of its own"
@@ -128,7 +129,7 @@ class Executor(AbstractContextManager["Executor"]):
         self._window.run(works, settle)
 
     def _in_pool(self, works: Iterable[Work], compute: Compute, settle: Settle) -> None:
-        """Compute a window of blocks in threads. Even after an error, the blocks that have begun are finished."""
+        """Compute blocks in threads. After an error, the blocks that have started are still finished."""
         remaining = iter(works)
         running: set[Future[list[tuple[Work, Outcome]]]] = set()
         with ThreadPoolExecutor(self._threads) as pool:

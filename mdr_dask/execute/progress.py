@@ -15,19 +15,19 @@ class Progress:
     Parameters
     ----------
     total, kept, done, failed, not_needed : int
-        Numbers of results: in all rounds so far; in the store before the run; done, failed (or not converged), and
-        marked as not needed in this run.
+        Numbers of results: `total` in all rounds so far; `kept` in the store before the run; `done`, `failed` (or not
+        converged) and `not_needed` in this run.
     kept_failed : int
         Number of failed results among `kept`.
     warned : int
-        Results of this run that are done and have a warning, such as a missed accuracy.
+        Number of results of this run that are done but have a warning, for example because they miss the accuracy.
     blocks, solves : int
-        Number of blocks and of solutions that this run computed; results that share a solution count once.
+        Number of blocks and number of solutions that this run computed. Several results may share one solution.
     estimated, finished : float
-        Time that the model estimates for all rounds so far, and for the finished blocks, in seconds.
+        Seconds that the model estimates for all rounds so far, and for the finished blocks.
     compute_seconds, compile_seconds, write_seconds, wall_seconds : float
-        Time in models, the part of it spent compiling kernels, and time for writing, each summed over threads; and time
-        since the start.
+        In seconds: time in models, its part that was spent compiling kernels, and time for writing, each summed over
+        threads; and time since the start of the run.
     """
 
     total: int = 0
@@ -53,7 +53,10 @@ class Progress:
 
     @property
     def seconds_left(self) -> float | None:
-        """Time to the end of this round, from the pace of the blocks so far without compiling; None without a block."""
+        """Estimated seconds to the end of this round, from the pace of finished blocks; None before the first block.
+
+        The time for compiling kernels is not included in the pace.
+        """
         busy = self.compute_seconds + self.write_seconds
         if not (self.finished > 0 and busy > 0 and self.wall_seconds > 0):
             return None

@@ -9,20 +9,22 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Resources:
-    """Where a run computes. The default is all cores of this machine: in threads, or processes for plain Python models.
+    """The threads, processes or cluster that a run uses; by default all cores of this machine.
+
+    Compiled models are computed in threads by default, plain Python models in processes.
 
     Parameters
     ----------
     threads : int or None
         Number of threads of this process.
     workers : int or None
-        Number of processes of this machine to use instead; threads if the system cannot fork.
+        Number of processes of this machine to use instead of threads. Threads are used if the system cannot fork.
     scheduler : str or None
-        Address of a running Dask scheduler to use instead.
+        Address of a running Dask scheduler, whose workers compute the blocks.
     cluster : mapping or None
-        Content of a cluster file, as `mdr_dask.campaign.cluster.load_cluster` returns it, of a Dask cluster to start.
+        Description of a Dask cluster to start, as `mdr_dask.campaign.cluster.load_cluster` returns it.
     client : distributed.Client or None
-        A Dask client to use instead; it is not closed.
+        A Dask client whose workers compute the blocks; it is not closed.
     patience : float
         Seconds without any worker after which a run on a cluster ends with an error.
     case_timeout : float or None

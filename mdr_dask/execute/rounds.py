@@ -60,7 +60,7 @@ class _Round:
     asked, needed : list of bool array, shape of the cases
         For each group, the cases of the stage, and the cases that need the realisations of this round.
     realisations : tuple of int
-        First realisation of the round, and the one after its last.
+        First realisation of the round, and the last plus one.
     taken : tuple of int array, shape of the cases
         For each group, the number of realisations of each case after the round.
     """
@@ -154,10 +154,10 @@ def _merge(job: _Job) -> None:
 
 
 def outlook(campaign: Campaign, url: str) -> Progress:
-    """Return how many results of a campaign are in a store and how many are missing; the store is only read.
+    """Return how many results of a campaign are in a store and how many are missing, without changing the store.
 
-    If realisations are added in rounds, only the first round counts. On adaptive axes, all values count that are known
-    to be needed.
+    If realisations are added in rounds, only the results of the first round are counted. On adaptive axes, all values
+    that are known to be needed are counted.
 
     Raises
     ------
@@ -243,7 +243,7 @@ def _run_rounds(
 
 
 def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], None], realisations: int) -> None:
-    """Run the rounds for fitted constants, with all values of the axes; then mark the unused results as not needed."""
+    """Run the rounds for fitted constants, with all values of the adaptive axes; mark unused results as not needed."""
     layout, places = stored_layout(job.stage, job.url)
     if job.stage.campaign.replication.answers:
         job = replace(job, stage=replace(job.stage, new=tuple(mesh.cases for mesh in job.stage.meshes)))
@@ -262,7 +262,7 @@ def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], None], rea
 
 
 def _without_answers(job: _Job) -> _Job:
-    """Return the job without tolerances of fitted constants, because fits need all values of the adaptive axes."""
+    """Return the job without tolerances of fitted constants; it is used until all adaptive values are known."""
     campaign = job.stage.campaign
     campaign = replace(campaign, replication=replace(campaign.replication, answers={}))
     return replace(job, stage=replace(job.stage, campaign=campaign))

@@ -1,7 +1,7 @@
 """Stages of a campaign with adaptive axes: the cases of a stage in the store, and the values of the next stage.
 
-A stage depends only on the results of the previous stage. So it can be determined again at any time, whatever other
-results the store holds.
+A stage depends only on the results of the previous stage. So it can be determined again at any time, even if the store
+holds further results.
 """
 
 from __future__ import annotations
@@ -59,7 +59,10 @@ def cases_of(stage: Stage, layout: Sequence[Template], places: Places, cases: Se
 def following(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, realisations: int
 ) -> tuple[Stage | None, Event]:
-    """Return the next stage after a finished one, or None if no values are needed; use the first `realisations`."""
+    """Return the stage that follows a finished stage, or None if no values are needed.
+
+    Only the first `realisations` realisations are used.
+    """
     meshes, short = [], []
     facts: dict[str, int] = {}
     for mesh, template, place in zip(stage.meshes, layout, places, strict=True):

@@ -36,7 +36,7 @@ Outcomes = list[tuple[Work, Outcome]]
 
 
 class TaskWindow:
-    """The blocks that are submitted to a cluster at the same time, a few more than it computes.
+    """The blocks that are submitted to a cluster at the same time: a few more than the cluster can compute at once.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class TaskWindow:
     patience : float
         Seconds without any worker after which the run ends with an error.
     most : int
-        Largest number of threads of an adaptive cluster, 0 for any other.
+        Largest number of threads of an adaptive cluster; 0 for other clusters.
     replace_lost : callable
         Requests new workers in place of lost ones.
     last_message : callable
@@ -129,7 +129,7 @@ class TaskWindow:
         future.add_done_callback(self._ended.put)
 
     def _look(self) -> None:
-        """Check the cluster: raise ClusterError if the scheduler is gone or there was no worker for too long."""
+        """Raise ClusterError if the scheduler has disappeared or there was no worker for too long."""
         if self._client.status != "running":
             raise ClusterError(f"the scheduler went away; {KEPT}")
         self._replace_lost()
@@ -164,7 +164,7 @@ class TaskWindow:
 
 
 def _outcomes(future: Future) -> Outcomes | None:
-    """Return the result of a task, or None if its workers died; raise other errors, with one sentence."""
+    """Return the result of a task, or None if its workers died; raise any other error with a one-sentence message."""
     from concurrent.futures import CancelledError
 
     try:

@@ -2,9 +2,9 @@
 
 A group holds one array for every output, the array ``status`` (the ledger), and a coordinate for every parameter. The
 dimensions of the arrays are the axes, ``realisation``, and further dimensions of an output. The driver creates the
-arrays. The process that computes a block also writes it: first its record with the digest of every chunk, then one
-whole chunk of every array, and its chunk of ``status`` last. Readers see consolidated metadata, which are replaced in
-one write.
+arrays. The process that computes a block also writes it in this order: its record with the digest of every chunk, one
+whole chunk of every output, and its chunk of ``status``. Readers see consolidated metadata, which are replaced in one
+write.
 """
 
 from mdr_dask.store.blocks import Place, is_written, layout_mark, read_block, values, write_block

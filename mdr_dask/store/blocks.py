@@ -69,7 +69,7 @@ def write_block(
     place : Place
         Where to write it.
     attempt : int
-        How often the computation of the block has been begun, including this time.
+        Number of the attempt: how often the computation of the block has been started, including this time.
     values : mapping of str to float array
         The outputs, each with the shape of the region and further dimensions last; empty if only the ledger changes.
     status : int8 array, shape of the region
@@ -151,7 +151,7 @@ def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict
 
 
 def _whole_chunks(array: Any) -> dict[str, Any]:
-    """Return the metadata of an array with its shape rounded up to whole chunks, because a block may exceed it."""
+    """Return the metadata of an array with its shape rounded up to whole chunks, because a block may be larger."""
     shape = [-(-size // length) * length for size, length in zip(array.shape, array.chunks, strict=True)]
     return {**array.metadata.to_dict(), "shape": shape}
 
@@ -164,6 +164,6 @@ def _other_store(seen: str | None) -> str:
 
 
 def layout_mark(url: str) -> str | None:
-    """Return a mark that differs between two layouts of a store; None if there is no store."""
+    """Return a text that changes whenever a study is laid out again; None if there is no store."""
     content = read_bytes(url, "zarr.json")
     return None if content is None else hashlib.blake2b(content, digest_size=16).hexdigest()

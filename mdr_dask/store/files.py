@@ -24,13 +24,13 @@ from mdr_dask.errors import MdrDaskError, StoreError
 
 T = TypeVar("T")
 
-#: Name of the results without series in a store that also has series.
+#: Name under which readers find the results at the root of a store, if the store also has series.
 ROOT = "-"
 #: Folder of claims in a store whose file system, or server, has no locks.
 CLAIMS = ".claims/"
-#: Ending of files that were set aside.
+#: Suffix of files that were set aside: they are kept but no longer read.
 ASIDE = ".aside"
-#: Entries that remain when an unfinished layout is cleared: the first metadata file, and the claims of the run.
+#: Files that remain when an unfinished layout is cleared: the metadata file of the root, and the claims of the run.
 KEPT = ("zarr.json", CLAIMS.rstrip("/"))
 #: Number of simultaneous requests to a server.
 AT_ONCE = 64
@@ -88,7 +88,7 @@ def absolute(url: str) -> str:
 
 @contextmanager
 def guarded(url: str, doing: str) -> Iterator[None]:
-    """Turn errors of the file system or the network into a StoreError with one sentence."""
+    """Turn errors of the file system or the network into a StoreError whose message is one sentence."""
     try:
         yield
     except MdrDaskError:
@@ -101,7 +101,7 @@ def guarded(url: str, doing: str) -> Iterator[None]:
 
 
 def read_bytes(url: str, name: str) -> bytes | None:
-    """Return the content of a file, or None if there is none."""
+    """Return the content of a file, or None if the file does not exist."""
     path = local(url)
     with guarded(url, f"reading {name}"):
         if path is None:
@@ -170,8 +170,8 @@ def write_bytes(url: str, name: str, content: bytes) -> None:
 def write_stages(url: str, stages: Iterable[Mapping[str, bytes]]) -> None:
     """Write files in stages: each file is replaced in one step, after all files of the stages before it.
 
-    On a disk, all contents are first written and flushed under temporary names. Then the files of all stages but the
-    last are renamed, and their folders flushed. The files of the last stage are renamed after that.
+    On a disk, all contents are first written and flushed under temporary names. Then the files of all stages except the
+    last stage get their final names, and their folders are flushed. Finally the files of the last stage get theirs.
     """
     stages = [stage for stage in stages if stage]
     path = local(url)
@@ -261,7 +261,7 @@ def _flushers() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(FLUSHERS, thread_name_prefix="flush")
 
 
-if hasattr(os, "register_at_fork"):  # the threads of a pool do not exist in a forked process
+if hasattr(os, "register_at_fork"):  # a forked process has a copy of the pool, but not its threads
     os.register_at_fork(after_in_child=_flushers.cache_clear)
 
 
@@ -361,7 +361,7 @@ def _raise_unless_gone(error: OSError) -> None:
 
 
 def group_name(series: str, member: str = "") -> str:
-    """Return the path of the group of a series, or of a member of it; without series, arrays are at the root."""
+    """Return the path of the group of a series, or of an array in it; without series, arrays are at the root."""
     return "/".join(part for part in ("" if series == ROOT else series, member) if part)
 
 
@@ -373,6 +373,7 @@ def chunk_name(series: str, array: str, block: Iterable[int], further: int = 0) 
 def digest(content: bytes) -> str:
     """Return the digest of a file.
 
-    A CRC would not do: chunks end with their own CRC, and the CRC of bytes followed by their CRC is a constant.
+    A CRC would not distinguish chunks: each chunk ends with its own CRC, and the CRC of any bytes followed by their CRC
+    is the same constant.
     """
     return hashlib.blake2b(content, digest_size=8).hexdigest()

@@ -30,13 +30,13 @@ class Stored:
     Parameters
     ----------
     campaign : Campaign
-        The campaign with its own and all stored values on every axis: first the stored ones, in their order.
+        The campaign, extended on every axis: first the stored values in their order, then the new values.
     chunks : mapping of series name to chunk lengths
         Chunk lengths of the stored groups.
     realisations : int
         Number of stored realisations.
     places : mapping of series name to (mapping of dimension to int array)
-        For each stored group, the positions of the campaign's own entries along each extended dimension.
+        For each stored group, the positions of the entries of the original campaign along each extended dimension.
     """
 
     campaign: Campaign
@@ -48,7 +48,7 @@ class Stored:
 def reconcile(url: str, campaign: Campaign) -> Stored:
     """Compare a campaign with the store that it resumes or extends.
 
-    Results without series stay at the root of the store when series are added. A series of the campaign with the same
+    If a store without series gets series, its first results stay at the root. A series of the campaign with the same
     parameters and axes as these results is continued at the root.
 
     Parameters
@@ -198,7 +198,10 @@ def _by_digest(value: Any) -> Any:
 
 
 def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, IntArray]]:
-    """Append new entries to the stored ones; return the series and, by dimension, the positions of its own entries."""
+    """Append the new entries of a series to the stored entries.
+
+    Return the extended series and, for each dimension, the positions of the original entries in it.
+    """
     places = {}
     axes = []
     for dim in dict.fromkeys(axis["dim"] for axis in held["axes"]):

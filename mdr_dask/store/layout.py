@@ -30,7 +30,8 @@ from mdr_dask.store.study import document, only_claimed
 from mdr_dask.version import __version__
 
 _COORDINATE_CHUNK = 4096
-#: Attributes that `_series_attributes` writes. Those at the root are kept when series are added.
+#: Attributes that `_series_attributes` writes. If series are added to a store without series, these attributes stay at
+#: the root.
 OF_SERIES = ("series", "parameters", "axes", "outputs", "blocks", "notes")
 _Coordinate = tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]
 
@@ -110,29 +111,32 @@ def _has_shape(url: str, root: Mapping[str, Any], template: Template) -> bool:
 class Copy:
     """A copy of the layout of a group: metadata and coordinates.
 
-    The copy is written before the files themselves. A file is intact if it equals the copy or the previous file,
-    because a run may have been killed while it was writing the layout.
+    The copy is written before the files of the layout. A run may be killed between these writes, so a file is intact if
+    it equals its copy or if it is still the previous version.
 
     Parameters
     ----------
     files : mapping of str to bytes
         Contents of the files, including the metadata of the study, by their names in the store.
     before : mapping of str to str
-        Digests of the previous files.
+        Digests of the previous versions of the files.
     """
 
     files: Mapping[str, bytes]
     before: Mapping[str, str]
 
     def accepts(self, name: str, content: bytes | None, root: bytes | None) -> bool:
-        """Return whether a file is intact; a new file may be missing as long as `root` is the previous metadata."""
+        """Return whether a file is intact.
+
+        A new file may be missing as long as `root`, the metadata of the study, is still the previous version.
+        """
         if content is None:
             return name not in self.before and root is not None and digest(root) == self.before.get("zarr.json")
         return content == self.files[name] or digest(content) == self.before.get(name)
 
     @property
     def age(self) -> int:
-        """How often the study had been laid out when the copy was made."""
+        """Number of times that the study had been laid out when the copy was made."""
         return len(json.loads(self.files["zarr.json"])["attributes"]["history"])
 
 

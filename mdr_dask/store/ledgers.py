@@ -35,7 +35,7 @@ class Blocks:
     grid, lengths : tuple of int
         Number of blocks along each dimension, and length of a block.
     further : mapping of str to int
-        Number of dimensions of each array beyond those of the ledger; the first array is the ledger itself.
+        For each array, the number of dimensions that the ledger does not have. The first array is the ledger itself.
     """
 
     series: str
@@ -70,8 +70,8 @@ class Blocks:
 def ledger(url: str, series: str, shape: tuple[int, ...] | None = None) -> NDArray[np.int8]:
     """Return the current ``status`` array of a group.
 
-    With a `shape`, the array is padded with "missing" or cut to this shape; the run of another part may have extended
-    the stored array beyond it.
+    If a `shape` is given, the array is padded with "missing" or cut to this shape. It may have to be cut, because the
+    run of another part may have extended the stored array.
     """
     metadata = document(url, series)
     if metadata is None:
@@ -90,7 +90,7 @@ def ledger(url: str, series: str, shape: tuple[int, ...] | None = None) -> NDArr
 
 
 def _read(url: str, blocks: Blocks, metadata: Mapping[str, Any]) -> NDArray[np.int8]:
-    """Read the ledger. Equal chunks are decoded once, because most are equal and decoding in Zarr is slow."""
+    """Read the ledger. Equal chunks are decoded only once: most chunks are equal, and decoding in Zarr is slow."""
     different: dict[bytes | None, int] = {None: 0}
     names = (blocks.chunk("status", block) for block in blocks.indices)
     numbers = [different.setdefault(content, len(different)) for _, content in read_many(url, names)]

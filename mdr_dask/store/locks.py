@@ -46,16 +46,20 @@ try:
 except ImportError:  # this system has no such locks: runs make claims instead
     fcntl = None  # type: ignore[assignment]
 
-#: Seconds between two signs of life of a run with a claim, and seconds without any after which it counts as ended.
+#: `BEAT`: seconds between two signs of life of a run with a claim. `SILENCE`: seconds without a sign of life after
+#: which the run counts as ended.
 BEAT = 10.0
 SILENCE = 60.0
-#: Largest number of attempts to list the claims, if the last one disappears before it is read.
+#: Largest number of times that the claims are listed. They are listed again if the last claim in the list was deleted
+#: before it could be read.
 LISTINGS = 10
-#: Seconds during which acquiring a lock is tried again: another process may only be checking whether it is held.
+#: Seconds for which a process tries again to acquire a lock that is held. Another process may hold the lock only for an
+#: instant, to check whether it is free.
 GLANCE = 0.5
-#: Seconds between two attempts to acquire the gate, and seconds of waiting after which a message is logged.
+#: `KNOCK`: seconds between two attempts to acquire the gate. `PATIENCE`: seconds of waiting after which a message is
+#: logged.
 KNOCK, PATIENCE = 0.1, 4.0
-#: Errors of a file system without locks, and errors of a file system that can only be read.
+#: Error numbers of a file system without locks, and error numbers of a read-only file system.
 NO_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP}
 READ_ONLY = {errno.EACCES, errno.EPERM, errno.EROFS}
 
@@ -112,8 +116,9 @@ class Part:
     def of(cls, position: int, count: int) -> Part:
         """Return the part that a block belongs to, by its position among all blocks.
 
-        Blocks are assigned to the parts 1, 2, ..., then to 2, 3, ..., 1, and so on. Without this shift, all blocks at
-        one value of an axis would belong to the same part if the axis has as many blocks as there are parts.
+        With n parts, the first n blocks are assigned to the parts 1, 2, ..., n, the next n blocks to 2, 3, ..., n, 1,
+        and so on. Without this shift, if an axis has n blocks, all blocks at one value of the axis would belong to the
+        same part.
         """
         return cls((position + position // count) % count + 1, count)
 
@@ -184,7 +189,10 @@ def gate(url: str) -> Iterator[None]:
 
 
 def at_work(url: str) -> tuple[str | None, list[Part]]:
-    """Return the active runs of a study: the holder of the exclusive lock (or None), and the parts; write nothing."""
+    """Return the active runs of a study: the holder of the exclusive lock or None, and the active parts.
+
+    Nothing is written.
+    """
     return (_holder(url) if _is_held(url) else None), _parts(url)
 
 
@@ -230,7 +238,7 @@ def acquire(url: str, name: str = "") -> Iterator[Lock]:
 
 @contextmanager
 def while_locked(url: str, lock: Lock) -> Iterator[None]:
-    """Check that a run still holds its lock, and make the next run wait until the body of this context has ended.
+    """Check that a run still holds its lock, and make the next run wait until this context has ended.
 
     Raises
     ------
@@ -382,7 +390,7 @@ def _runners(url: str, name: str) -> list[Path]:
 
 @contextmanager
 def _registered(url: str, name: str) -> Iterator[Lock]:
-    """Write the holder of a lock to a runner file, and remove the runner files of earlier holders.
+    """Write a runner file, which names the holder of a lock, and remove the runner files of earlier holders.
 
     Tasks hold a shared lock on the runner file while they write.
     """
@@ -503,7 +511,7 @@ def _is_alive(url: str, name: str, number: int) -> bool:
 
 
 def _told(url: str, name: str) -> dict[str, Any]:
-    """Return the content of a claim or of a sign of life; an empty dictionary if it is missing or being written."""
+    """Return the content of a claim or of a sign of life; empty if the file is missing or not yet complete."""
     try:
         return read_json(url, name) or {}
     except StoreError:

@@ -21,7 +21,8 @@ def contents(url: str) -> Iterator[tuple[str, bytes]]:
             yield name, content
 
 
-#: Largest accepted compression ratio of a file: chunks are compressed already, and metadata shrink to a tenth.
+#: Largest accepted compression ratio of a file. Chunks are compressed already, and compression reduces metadata to
+#: about a tenth.
 LARGEST_RATIO = 100
 #: File size below which any ratio is accepted, and size of the pieces in which files are read; both in bytes.
 SMALL, PIECE = 2**20, 2**20

@@ -20,13 +20,14 @@ from mdr_dask.store.study import document, series_names
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Groups larger than this are read through Dask, which is several times slower but also works beyond the memory.
+#: Groups larger than this number of bytes are read through Dask, which is several times slower but can handle groups
+#: that do not fit into memory.
 LAZY_BYTES = 2**30
 
 
 @contextmanager
 def readable(url: str) -> Iterator[None]:
-    """Turn errors of Zarr while arrays are loaded into a StoreError with one sentence."""
+    """Turn errors of Zarr while arrays are loaded into a StoreError whose message is one sentence."""
     try:
         yield
     except Exception as error:
@@ -53,9 +54,9 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
     Returns
     -------
     dict of str to Dataset
-        Every group by series name (``""`` for a study without series, ``"-"`` if series were added to it), numeric
-        axes in ascending order. Arrays are loaded when used. In a group larger than `LAZY_BYTES` they are Dask arrays,
-        which are reduced chunk by chunk.
+        Every group by the name of its series, with numeric axes in ascending order. The results of a study without
+        series have the name ``""``, or ``"-"`` if series were added later. Arrays are loaded when they are used. In a
+        group larger than `LAZY_BYTES` they are Dask arrays, which are reduced chunk by chunk.
 
     Raises
     ------
@@ -90,12 +91,15 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:
-    """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``; a lazy one piece by piece, lists in attrs as text."""
+    """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``.
+
+    A lazy Dataset is written piece by piece. Lists in attrs become text.
+    """
     plain = dataset.copy()
     plain.attrs = {
         name: value if isinstance(value, str | int | float) and not isinstance(value, bool) else json.dumps(value)
         for name, value in dataset.attrs.items()
-        if value is not None and name != "mdr_dask_layout"  # so no run extends the copy
+        if value is not None and name != "mdr_dask_layout"  # without this attribute, no run can extend the copy
     }
     if path.suffix == ".nc":
         if find_spec("h5netcdf") is None:

@@ -1,7 +1,7 @@
 """Records of blocks: times, versions, messages, and the digest of every chunk.
 
-During a run each block has a record file of its own. These files are merged from time to time, so that no folder holds
-a hundred thousand files.
+During a run, each block has its own record file. These files are merged from time to time, so that no folder holds a
+hundred thousand files.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def _is_message(message: Mapping[str, Any]) -> bool:
 
 
 def record(url: str, series: str, index: BlockIndex, attempt: int) -> dict[str, Any] | None:
-    """Return the record of an attempt at a block, or None if it has no file of its own or is damaged."""
+    """Return the record of an attempt at a block, or None if the record has no file of its own or is damaged."""
     content = read_bytes(url, name_of(series, index, attempt))
     return None if content is None else decoded(content)
 
@@ -104,7 +104,7 @@ def _warn_of_damaged(url: str, count: int) -> None:
 
 
 def attempts(url: str, series: str) -> dict[BlockIndex, int]:
-    """Return how often each block has been begun."""
+    """Return how often the computation of each block has been started."""
     found: dict[BlockIndex, int] = {}
     for record in records(url, series):
         key = tuple(record["block"])
@@ -122,7 +122,7 @@ def merge_records(url: str, series: str) -> None:
     """Merge the records of single blocks into files of many.
 
     Records of attempts that were not written to the ledger are not merged. If two processes merge at the same time, or
-    one is killed, some records are in two files; readers use them once.
+    a process is killed while merging, some records are in two files; readers use each record once.
     """
     prefix = folder(series)
     loose = [name for name in listed(url, prefix) if _LOOSE.fullmatch(name.removeprefix(prefix))]

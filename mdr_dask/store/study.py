@@ -23,7 +23,7 @@ def document(url: str, series: str = "") -> Mapping[str, Any] | None:
     Raises
     ------
     StoreError
-        If this program did not write them.
+        If this program did not write the metadata.
     """
     name = group_name(series, "zarr.json")
     content = read_bytes(url, name)
@@ -38,13 +38,13 @@ def document(url: str, series: str = "") -> Mapping[str, Any] | None:
 
 @lru_cache(maxsize=16)
 def _checked(content: bytes) -> tuple[dict[str, Any], str | None]:
-    """Return the metadata of a group, and their first fault, or None if they have none."""
+    """Return the metadata of a group, and the first fault in them or None."""
     found = parsed(content)
     if not isinstance(found, dict) or not isinstance(found.get("attributes", {}), dict):
         return found, " is damaged"
     attributes = found.get("attributes", {})
     layout = attributes.get("mdr_dask_layout")
-    is_newer = isinstance(layout, int) and layout > LAYOUT  # `attributes` refuses it with a message of its own
+    is_newer = isinstance(layout, int) and layout > LAYOUT  # `attributes` refuses a later layout with its own message
     if "mdr_dask_layout" in attributes and not only_claimed(attributes) and not is_newer:
         return found, next((f": {fault}" for fault in faults(found)), None)
     return found, None
@@ -87,7 +87,7 @@ def is_study(url: str) -> bool:
 
 
 def _root_attributes(url: str) -> dict[str, Any] | None:
-    """Return the attributes of the Zarr group at a path or URL, or None if there is none."""
+    """Return the attributes of the Zarr group at a path or URL, or None if there is no group."""
     found = document(url)
     if found is None and read_bytes(url, "status/zarr.json") is not None:
         raise StoreError(f"{url}: zarr.json is missing; 'mdr-dask verify --repair {url}' writes it again from its copy")
@@ -121,7 +121,10 @@ def attributes(url: str) -> dict[str, Any]:
 
 
 def series_names(url: str) -> list[str]:
-    """Return the names of the groups of a study: ``""`` for one without series, `ROOT` if it has series as well."""
+    """Return the names of the groups of a study.
+
+    The group at the root has the name ``""``, or `ROOT` if the study also has series.
+    """
     root = "axes" in attributes(url)
     members = (document(url) or {})["consolidated_metadata"]["metadata"]
     names = [name for name, member in members.items() if member["node_type"] == "group"]

@@ -35,7 +35,7 @@ from mdr_dask.store.records import decoded, folder, lines, name_of
 from mdr_dask.store.study import attributes, document, refuse_file, series_names
 
 IGNORED = (".partial", ASIDE, "status/seal.json")  # the last one was written by development versions
-#: Files of a published store beside those of the study.
+#: Folder in a published store with the files that do not belong to the study itself.
 PUBLISHED = "published/"
 CHECKSUMS = f"{PUBLISHED}checksums.sha256"
 #: A file of a published study that earlier versions wrote next to the store's own files.
@@ -47,7 +47,7 @@ History = list[Mapping[str, str]]
 
 @dataclass(frozen=True)
 class Finding:
-    """A file that is not as it was written.
+    """A file that differs from what was written, or that should not exist.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class Inspection:
     Parameters
     ----------
     findings : list of Finding
-        All files that are not as they were written.
+        All faulty files.
     notes : list of str
         Facts that are not damage, such as an interrupted run or an earlier version.
     groups : list of Group
@@ -251,7 +251,7 @@ def _document(url: str, series: str) -> Mapping[str, Any] | None:
 
 
 def _unverified(url: str, series: str, metadata: Mapping[str, Any], found: Inspection, present: set[str]) -> set[str]:
-    """Check metadata and coordinates of a group that has no copy of its layout; return the names of their files."""
+    """Check the metadata and coordinates of a group without a copy of its layout; return the names of their files."""
     members = metadata.get("consolidated_metadata", {}).get("metadata", {})
     known = {group_name(series, "zarr.json")}
     for name, member in members.items():
@@ -344,7 +344,10 @@ def _check_blocks(url: str, group: Group, found: Inspection, present: set[str]) 
 
 
 def _histories(url: str, group: Group) -> tuple[dict[BlockIndex, History], set[BlockIndex]]:
-    """Return the digests of every block from its intact records, and the blocks whose records were merged when done."""
+    """Return the digests of every block from its intact records, and the blocks that have a merged record.
+
+    Only records of attempts that were written to the ledger are merged, so the ledger must contain these blocks.
+    """
     known: dict[tuple[BlockIndex, int], Mapping[str, str]] = {}
     merged = set()
     for name, line in lines(url, group.blocks.series):
@@ -394,8 +397,8 @@ def _faults(
 def _expected(history: History, status: str, name: str) -> set[str]:
     """Return the digests that the chunk of an array may have, given the digest of the ledger of the same block.
 
-    The chunk was written by the attempt that wrote this ledger, by the last attempt before it that wrote this array, or
-    by a later attempt that was killed before it wrote its own ledger.
+    One of these attempts at the block wrote the chunk: the attempt that wrote this ledger; if that attempt did not
+    write the array, the last earlier attempt that did; or a later attempt that was killed before it wrote its ledger.
     """
     first = next((i for i, chunks in enumerate(history) if chunks.get("status") == status), len(history))
     found, last = set[str](), set[str]()
@@ -406,7 +409,10 @@ def _expected(history: History, status: str, name: str) -> set[str]:
 
 
 def _set_aside_records(url: str, group: Group) -> None:
-    """Rename files with damaged records or records of damaged blocks; first copy their good records to a new file."""
+    """Rename files that contain damaged records, or records of damaged blocks.
+
+    The other records in these files are first copied to a new file.
+    """
     series, bad = group.blocks.series, set(group.bad_records)
     found = [(name, line, decoded(line)) for name, line in lines(url, series)]
     bad |= {name for name, _, record in found if record is None or tuple(record["block"]) in group.bad_blocks}
