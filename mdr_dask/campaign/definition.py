@@ -13,9 +13,9 @@ from mdr_dask.models.base import Parameters
 from mdr_dask.models.data_file import DataFile
 
 _DIGITS = 14
-#: Significant digits to which values of an axis are compared; values that agree to them are computed once.
+#: Number of significant digits to which values of an axis are compared; values that agree are computed once.
 SAME_DIGITS = 12
-#: Largest number of values of an axis that are examined, because examining all of them would take too long.
+#: Largest number of values that `Axis.some` returns, for checks that would take too long with all values.
 SOME = 64
 
 
@@ -48,7 +48,10 @@ class Spread:
 
 
 def tidy(value: float, whole: bool, exact: bool = False) -> float:
-    """Return a number of a range: rounded to a whole number if `whole`, unchanged if `exact`, else to 14 digits."""
+    """Return a number of a range, rounded.
+
+    It is rounded to a whole number if `whole`, not rounded if `exact`, and otherwise rounded to 14 digits.
+    """
     if whole:
         return round(value)
     return float(value) if exact else float(f"{value:.{_DIGITS}g}")
@@ -65,7 +68,7 @@ class Axis:
     name : str
         Name of its coordinate in the store: the path with ``_`` for ``.``.
     dim : str
-        Its dimension in the store: `name` in a grid, ``case`` where parameters vary together.
+        Its dimension in the store: `name` in a grid, ``case`` in a study in which parameters vary together.
     values : tuple
         Checked values in SI, in the order of the file: numbers, names, or whole parameter sets.
     labels : tuple of str or None
@@ -75,7 +78,7 @@ class Axis:
     long_name : str
         The parameter's meaning.
     refinement : Refinement or None
-        How further values are chosen, for an adaptive axis.
+        Rule by which an adaptive axis gets further values; None for any other axis.
     """
 
     path: str
@@ -103,7 +106,7 @@ class Series:
     name : str
         Name of its Zarr group; empty for a campaign without series, whose arrays are at the root.
     parameters : Parameters
-        The parameters with every axis at its first value.
+        The parameters, each varied parameter with the first value of its axis.
     axes : tuple of Axis
         The axes, in the order of the file.
     """
@@ -120,7 +123,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """The largest accepted error, relative to the value or absolute; it is enough to meet one of the two.
+    """The largest accepted error, relative to the value and absolute; an error within one of both is accepted.
 
     `place` is the position of the tolerance in the campaign file.
     """
@@ -132,14 +135,14 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Refinement:
-    """How a study chooses the values of an adaptive axis.
+    """The rule by which a study chooses the values of an adaptive axis.
 
     Parameters
     ----------
     spread : Spread
-        The interval, on the scale on which outputs are interpolated.
+        The interval of the axis, with the scale on which outputs are interpolated.
     until : mapping of str to Tolerance
-        Largest interpolation error of each output; a relative error refers to the largest value along the axis.
+        Largest accepted interpolation error of each output; relative errors refer to the largest value along the axis.
     at_most : int
         Largest number of values.
     """
@@ -151,16 +154,16 @@ class Refinement:
 
 @dataclass(frozen=True)
 class Replication:
-    """How many realisations each case gets: `at_least`, then rounds until every tolerance is met.
+    """The number of realisations of each case: first `at_least`, then more in rounds until every tolerance is met.
 
     Parameters
     ----------
     at_least, at_most : int
         Number of realisations of the first round, and the largest number.
     until : mapping of str to Tolerance
-        Largest standard error of the mean of each output.
+        Largest accepted standard error of the mean of each output.
     answers : mapping of str to Tolerance
-        Largest half width of the 95 % interval of each fitted constant, by its name ``fit.constant``.
+        Largest accepted half width of the 95 % interval of each fitted constant, by the name ``fit.constant``.
     """
 
     at_least: int

@@ -20,7 +20,7 @@ from mdr_dask.errors import CampaignError
 _TAG = "tag:yaml.org,2002:"
 _DEEPEST = 50
 _LARGEST = 200_000
-_LONGEST = 300_000  # about a second of reading
+_LONGEST = 300_000  # characters of a file; reading them takes about a second
 _TOO_DEEP = "nested too deeply, or refers to itself"
 _MOST_DIGITS = 300
 _KEPT_AS_TEXT = ("str", "timestamp", "merge", "value")
@@ -28,7 +28,7 @@ _KEPT_AS_TEXT = ("str", "timestamp", "merge", "value")
 
 @dataclass
 class Document:
-    """The data of a YAML file and the nodes that they were read from.
+    """The data of a YAML file, and the nodes of the file from which they were read.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Document:
     _keys: dict[Path, Node] = field(default_factory=dict)
 
     def place(self, path: Path) -> Place:
-        """Return the position of the value at a path, or of the nearest existing one above it."""
+        """Return the position of the value at a path, or of the mapping or list that lacks this value."""
         while path not in self._nodes and path:
             path = path[:-1]
         return self._at(self._nodes[path]) if path in self._nodes else Place(self.source, 1, 1)
@@ -120,7 +120,7 @@ _COLON_WITHIN = re.compile(r"\s*(?:- )?\w+: +[^\s'\"{\[#][^#]*: ")
 
 
 def _hint(text: str, index: int) -> str:
-    """Return a hint to the likely mistake at the position of a syntax error, or in the lines just above."""
+    """Return a hint to the likely mistake at a syntax error or in the lines just above the error."""
     if text[index : index + 1] == "\t":
         return " (indent with blanks, not with tabs)"
     end = text.find("\n", index)
@@ -146,7 +146,7 @@ def _is_indented_otherwise(lines: list[str]) -> bool:
 
 
 class _EndlessError(Exception):
-    """Raised to end the reading of a document that is too large or refers to itself, after this was reported."""
+    """The reading of a document ends, because the document is too large or refers to itself; this was reported."""
 
 
 class _Reader:

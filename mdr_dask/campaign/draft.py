@@ -35,7 +35,7 @@ realisations: 1                     # independent rough lines, or scatter, of ea
 
 parameters:
 """
-#: Column of the comments, and the longest value that is written out.
+#: `_COMMENTS`: column in which comments begin. `_LONGEST`: number of characters up to which a value is written out.
 _COMMENTS, _LONGEST = 36, 60
 _EXAMPLE_FILE = "table.csv"
 _BOUNDS = ("gt", "ge", "lt", "le")
@@ -80,7 +80,7 @@ def _entries(parameters: type[Parameters]) -> Iterator[str]:
 
 
 def _needed(parameters: type[BaseModel]) -> set[str]:
-    """Return the required parameters and the first of each group of alternatives; nested names are dotted."""
+    """Return the required parameters, and the first parameter of each group of alternatives, with dotted names."""
     ways = getattr(parameters, "alternatives", ())
     required = {name for name, info in parameters.model_fields.items() if info.is_required()}
     return required | {name for each in ways for name in each[0]}
@@ -108,7 +108,7 @@ def _choices(info: FieldInfo) -> list[str]:
 
 
 def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str]:
-    """Return examples of a value as text: one, or one for each structure."""
+    """Return examples of a value as text: one example, or one for each structure that the value may have."""
     info = parameters.model_fields[name]
     kinds = [kind for kind in fields.structures(info) if kind is not DataFile]
     if inner:
@@ -157,7 +157,7 @@ def _scalar(parameters: type[BaseModel], name: str) -> str:
 
 
 def _inside(info: FieldInfo) -> float:
-    """Return a number within the bounds of a field: 1 if the bounds allow it."""
+    """Return a number within the bounds of a field: 1 if 1 is within the bounds."""
     bounds = {key: getattr(part, key) for part in info.metadata for key in _BOUNDS if hasattr(part, key)}
     low = bounds.get("ge", bounds.get("gt", -math.inf))
     high = bounds.get("le", bounds.get("lt", math.inf))

@@ -155,10 +155,10 @@ class _Expansion:
     def _grid_values(
         self, base: Parameters | None, variations: Sequence[Variation], index: int, broken: set[Path]
     ) -> list[Any] | None:
-        """Return the values of one axis, each checked with the first value of all other axes; None if one is wrong."""
+        """Return the values of one axis, each checked with the first value of all other axes; None if a value is wrong."""
         one = variations[index]
         known = _checked(base, self._substituted(self.data, variations, 0), {one.path[0]})
-        elsewhere = broken | {other.path for other in variations if other is not one}  # reported with their own axes
+        elsewhere = broken | {other.path for other in variations if other is not one}  # reported by their own axes
         last = self._validate(known, [one], len(one.items) - 1, elsewhere)
         independent = fields.is_independent(self.parameters, one.path, self.data)
         values: list[Any] = []
@@ -188,7 +188,7 @@ class _Expansion:
     def _case_values(
         self, base: Parameters | None, variations: Sequence[Variation], broken: set[Path]
     ) -> list[list[Any] | None]:
-        """Return the checked values of every varied parameter, case by case; None for all if a case is wrong."""
+        """Return the checked values of every varied parameter, case by case; if a case is wrong, None for each."""
         known = _checked(base, self.data, {one.path[0] for one in variations})
         cases = range(min((len(one.items) for one in variations), default=0))
         sizes = [[item.value for item in one.items] for one in variations]

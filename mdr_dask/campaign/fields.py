@@ -25,7 +25,7 @@ def members(annotation: Any) -> tuple[Any, ...]:
 
 
 def holds_list(info: FieldInfo) -> bool:
-    """Return whether a list is one value of this field, rather than several values."""
+    """Return whether a list in this field is a single value; in other fields a list varies the parameter."""
     kinds = [get_origin(kind) or kind for kind in members(info.annotation)]
     return any(isinstance(kind, type) and issubclass(kind, Sequence) and kind is not str for kind in kinds)
 
@@ -37,7 +37,7 @@ def holds_whole_numbers(info: FieldInfo) -> bool:
 
 
 def usual(info: FieldInfo) -> str:
-    """Return a common value of a field with its unit, empty if none was declared."""
+    """Return a common value of a field with its unit; an empty text if the field declares no common value."""
     return str(info.examples[0]) if info.examples else ""
 
 
@@ -49,7 +49,8 @@ def structures(info: FieldInfo) -> tuple[type[BaseModel], ...]:
 def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
     """Return the parameter set of a mapping: the one with the same fixed keys, such as ``shape: cone``.
 
-    If several sets fit, the one with most keys in common is returned, then the one with most misspelt keys in common.
+    If several sets fit, the set with most keys of the mapping is returned; among equal sets, the set whose fields most
+    of the misspelt keys resemble.
     """
     if not isinstance(value, dict):
         return None
@@ -62,7 +63,7 @@ def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
 
 
 def _likeness(kind: type[BaseModel], value: Mapping[Any, Any]) -> tuple[int, int]:
-    """Return how many keys of a mapping are fields of a parameter set, and how many resemble one."""
+    """Return how many keys of a mapping are fields of a parameter set, and how many resemble a field."""
     keys = [str(key) for key in value]
     return (
         sum(key in kind.model_fields for key in keys),
@@ -80,7 +81,7 @@ def fixed(kind: type[BaseModel]) -> dict[str, Any]:
 
 
 def owner(parameters: type[BaseModel], path: Path, data: Any) -> tuple[type[BaseModel], str] | None:
-    """Return the parameter set and the name of the field at a path into the data, None if there is no field."""
+    """Return the parameter set and the name of the field at a path into the data; None if there is no such field."""
     kind: type[BaseModel] | None = parameters
     for depth, part in enumerate(path):
         if kind is None or not isinstance(part, str) or part not in kind.model_fields:
@@ -103,7 +104,7 @@ def is_independent(parameters: type[BaseModel], path: Path, data: Any) -> bool:
 
 
 def choices(parameters: type[BaseModel], path: Path) -> tuple[str, ...]:
-    """Return the structures that have a field at a path, such as ``indenter: {shape: power}``."""
+    """Return texts for the structures in which a path leads to a field, such as ``indenter: {shape: power}``."""
     name, *rest = path
     if name not in parameters.model_fields or not rest:
         return ()
@@ -119,6 +120,6 @@ def choices(parameters: type[BaseModel], path: Path) -> tuple[str, ...]:
 
 
 def unit_at(parameters: type[BaseModel], path: Path, data: Any) -> str | None:
-    """Return the SI unit of the field at a path into the data, None if it is not a quantity."""
+    """Return the SI unit of the field at a path into the data; None if the field is not a quantity."""
     found = owner(parameters, path, data)
     return unit_of(*found) if found else None

@@ -18,12 +18,12 @@ from mdr_dask.tables import Column, Sheet, match, plain, read_sheet, read_table
 from mdr_dask.units import shown
 
 ERROR = "standard_error"
-#: Names of errors in a heading: before or after the name of an output, or in a column of their own.
+#: Names of errors in a heading. They stand before or after the name of an output, or alone in a heading.
 _ERROR = re.compile(
     r"(?<!\w)(?:(?:std|standard)? ?(?:dev|deviation|err|error|abw|abweichung|fehler)|uncertainty|std|sd|se)(?!\w)"
     r"|[σ±]|\+ ?/?"
 )
-#: Largest table that is stored with a study, in bytes.
+#: Size in bytes of the largest table that is stored with a study.
 LARGEST = 10**6
 #: Conditions are equal if their relative difference is at most this.
 SAME = 1e-6
@@ -46,7 +46,7 @@ class Measured:
     errors : array, shape (points,), or None
         Standard errors of the values, if the table has them.
     conditions : dict of str to array, shape (points,)
-        The parameters of each measurement in SI, by the name of their coordinate.
+        The values of the parameters at each measurement, in SI, by the name of the parameter's coordinate.
     lines : tuple of int
         The line of each measurement in the table, counted from 1.
     remark : str
@@ -72,14 +72,15 @@ def read_measured(
     text, source : str
         The table and the name of its file.
     conditions, outputs : mapping of str to str
-        SI units of the quantities that a column may hold, by their names in a store.
+        SI units of the quantities that a column may contain, by the names of the quantities in a store.
     structures : iterable of str
-        Names of nested parameter sets. If only one of them has a ``temperature``, its column may have this short name.
+        Names of nested parameter sets. If only one set has a parameter ``temperature``, for example, the column of this
+        parameter may have the short name ``temperature``.
 
     Raises
     ------
     DataError
-        If the text is not a table, has no output or several, or has fewer than two points.
+        If the text is not a table, has no column or several columns for outputs, or has fewer than two points.
     """
     sheet = read_sheet(text, source)
     names = [cell.text for cell in sheet.names]
@@ -110,7 +111,9 @@ def read_measured(
 
 
 def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...], str]:
-    """Return the headings of the errors of the last of `columns`, and the unit of that column if the errors have none.
+    """Return the headings of the errors of the last column in `columns`, and the unit of this column.
+
+    The unit is empty if the errors have a unit.
 
     A heading without the name of a quantity, such as ``std``, belongs to the nearest column before it.
     """

@@ -1,4 +1,4 @@
-"""Turn validation errors of pydantic into messages, each with its place in the file."""
+"""Turn validation errors of pydantic into messages, each with its position in the file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.units import expected, likely, spelt
 
-#: Function that adds a problem: path in the data, whether it concerns the key rather than the value, and message.
+#: Function that adds a problem. Its arguments are the path in the data, whether the problem concerns the key instead of
+#: the value, and the message.
 Report = Callable[[Path, bool, str], None]
 
 _BOUNDS = {"greater_than": ("gt", "above"), "greater_than_equal": ("ge", "of at least")}
@@ -62,7 +63,7 @@ def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, repo
 
 
 def path_into(data: Any, details: ErrorDetails) -> Path:
-    """Return the path of an error into the data, without the names of union branches in its ``loc``."""
+    """Return the path of an error into the data: its ``loc`` without the names of union branches."""
     path: Path = ()
     location = details["loc"]
     for depth, part in enumerate(location):
@@ -77,7 +78,7 @@ def path_into(data: Any, details: ErrorDetails) -> Path:
 
 
 def _is_of_another_branch(details: ErrorDetails, kind: type[BaseModel], data: Any) -> bool:
-    """Return whether an error belongs to another structure than the one that the keys of the value select."""
+    """Return whether an error belongs to a structure other than the structure that the keys of the value select."""
     path: Path = ()
     value = data
     for part in details["loc"]:
@@ -146,7 +147,7 @@ def _hint(group: list[ErrorDetails], value: Any) -> str:
 
 
 def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return a hint to the unit that a bare number out of bounds may lack."""
+    """Return a hint to a unit that may be missing after a number out of bounds."""
     value, info, unit = value_at(data, path), _field(kind, path, data), fields.unit_at(kind, path, data)
     usual = fields.usual(info) if info else ""
     if not isinstance(value, int | float) or group[0]["type"] not in _BOUNDS:
@@ -158,7 +159,7 @@ def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel]
 
 
 def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return a hint on how to write a mapping or a list, where only a word was given."""
+    """Return a hint on how to write the mapping or list that a parameter needs, if only a word was given."""
     value, info = value_at(data, path), _field(kind, path, data)
     if not info or not isinstance(value, str):
         return ""
@@ -177,7 +178,7 @@ def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
 
 
 def _of_file(info: FieldInfo) -> list[str]:
-    """Return the names of those entries in the structures of a field that take the name of a file."""
+    """Return the names of the entries in the structures of a field whose value is the name of a file."""
     inner = [entry for one in fields.structures(info) for entry in one.model_fields.items()]
     named = (DataFile, NamedByFile)
     return [name for name, entry in inner if any(issubclass(one, named) for one in fields.structures(entry))]
@@ -248,7 +249,7 @@ def _missing(path: Path, kind: type[BaseModel], data: Any) -> str:
 
 
 def _unknown(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return the message about an unknown key: its new name, or the nearest known one."""
+    """Return the message about an unknown key, with its new name if it was renamed, or with the nearest known key."""
     around = _structure_around(path, kind, data)
     instead = getattr(around, "renamed", {}).get(path[-1])
     if instead:

@@ -97,7 +97,7 @@ def loads(text: str, source: str, directory: str) -> Campaign:
 
 
 def _spec(document: Document, directory: str, problems: Problems) -> tuple[CampaignSpec, set[str]]:
-    """Return the checked keys, with default values in place of wrong ones, and the names of the wrong ones."""
+    """Return the checked keys, with default values for wrong keys, and the names of the wrong keys."""
     wrong: set[str] = set()
 
     def report(path: Path, key: bool, what: str) -> None:

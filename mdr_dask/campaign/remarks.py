@@ -1,4 +1,4 @@
-"""Questions about bare numbers far from the usual values, which are read in SI units."""
+"""Questions about numbers without a unit: they are read in SI, but are far from the usual values in SI."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def remarks(
     paths : mapping of str to path
         Path of each parameter in the document.
     units : mapping of str to str
-        Units that differ from the declared ones, as in a dimensionless campaign.
+        Units that differ from the declared units of parameters, as in a dimensionless campaign.
     """
     reported: set[Path] = set()
     for name, value in data.items():
@@ -68,7 +68,7 @@ def _question(value: float, unit: str, usual: str) -> str:
 
 
 def _bare_numbers(field: Path, value: Any, at: Path) -> Iterator[_Bare]:
-    """Yield the numbers of one parameter: its value, the values of a list, the ends of a range, and nested ones."""
+    """Yield the numbers in one parameter: its value, the values of a list, the ends of a range, and nested numbers."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         yield _Bare(field, value, at)
     elif isinstance(value, list):

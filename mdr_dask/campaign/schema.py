@@ -11,9 +11,9 @@ from mdr_dask.models.base import Model, Parameters
 
 Schema = dict[str, Any]
 
-#: A model of the user's own, ``package.module:NAME``.
+#: Name of a model that the user wrote, ``package.module:NAME``.
 _OWN_MODEL = r"^[A-Za-z_][\w.]*:[A-Za-z_][\w.]*$"
-#: A quantity begins like a number; its unit is checked when the file is read.
+#: Schema of a quantity with a unit: a text that begins like a number. The unit is checked when the file is read.
 _QUANTITY = {"type": "string", "pattern": r"^\s*[+-]?(\d|\.\d)", "description": "a number with its unit"}
 _QUANTITY_REFERENCE = {"$ref": "#/$defs/quantity"}
 
@@ -48,7 +48,7 @@ def parameters_schema(parameters: type[Parameters], references: str = "#/$defs/{
     parameters : type
         The parameter set.
     references : str
-        Reference to nested parameter sets.
+        JSON reference to the schemas of nested parameter sets, with ``{model}`` for the name of the set.
     """
     own: Schema = _readable(parameters.model_json_schema(ref_template=references))
     own.pop("required", None)

@@ -64,7 +64,7 @@ def is_of_fit(name: str, model: Model[Any]) -> bool:
 
 
 def answers(document: Document, path: Path, given: Mapping[str, Written], problems: Problems) -> dict[str, Tolerance]:
-    """Return the tolerances of fitted constants by their names ``fit.constant``: with ``%`` relative, else absolute."""
+    """Return the tolerances of fitted constants, by the name ``fit.constant``; a number with ``%`` is relative."""
     found = {}
     for name, written in given.items():
         constant = name if "." in name else f"{name}.{name}"
@@ -86,7 +86,7 @@ def tolerance(given: Written, unit: str) -> Tolerance:
     Raises
     ------
     ValueError
-        If it is not a tolerance, or its unit does not fit the output.
+        If the text is not a tolerance, or its unit does not fit the output.
     """
     if isinstance(given, ToleranceSpec):
         absolute = to_si(given.absolute, unit) if isinstance(given.absolute, str) else given.absolute
@@ -101,7 +101,7 @@ def tolerance(given: Written, unit: str) -> Tolerance:
 def refinement(
     document: Document, path: Path, spread: Spread, model: Model[Any], outputs: Sequence[str], problems: Problems
 ) -> Refinement | None:
-    """Return the refinement of an adaptive axis at a path of a document, None if there is a problem."""
+    """Return the refinement of the adaptive axis at a path of a document; None if there is a problem."""
     data = value_at(document.data, path)
 
     def report(inner: Path, key: bool, what: str) -> None:

@@ -27,7 +27,7 @@ DECADE = 10.0
 
 @dataclass(frozen=True)
 class Origin:
-    """The origin of a value, for messages: name and position, and the path if the value is in the document."""
+    """The origin of a value, for messages: file name and position, and the path if the value is in the document."""
 
     name: str
     place: Place
@@ -35,7 +35,7 @@ class Origin:
 
 
 class Item(NamedTuple):
-    """One value of a varied parameter, as written or in SI; `inner` marks values between the ends of a range."""
+    """One value of a varied parameter, as written or in SI; `inner` is True for values between the ends of a range."""
 
     value: Any
     origin: Origin
@@ -97,7 +97,7 @@ def find(
 
 
 class _MalformedError(Exception):
-    """Raised to end the reading of a wrong range, after its problem was reported."""
+    """The reading of a range ends, because the range is wrong; this was reported."""
 
 
 @dataclass(frozen=True)
@@ -240,7 +240,7 @@ class _Search:
 
 
 def spaced(spread: Spread, count: int) -> list[float]:
-    """Return values from one end to the other: the ends exact, the others rounded to 14 digits.
+    """Return values from one end of an interval to the other; the ends are exact, inner values have 14 digits.
 
     Parameters
     ----------

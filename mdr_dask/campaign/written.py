@@ -19,12 +19,12 @@ def written_units(text: str) -> dict[str, str]:
     Parameters
     ----------
     text : str
-        The text of a campaign file; a damaged one gives no units.
+        The text of a campaign file; if it cannot be read, no units are returned.
 
     Returns
     -------
     dict of str to str
-        By the name of the parameter's coordinate: ``{"rotation_speed": "rpm", "indenter_radius": "mm"}``.
+        Units by the name of the parameter's coordinate: ``{"rotation_speed": "rpm", "indenter_radius": "mm"}``.
     """
     whole = parse(text, "", Problems()).data
     data = whole if isinstance(whole, dict) else {}

@@ -29,7 +29,7 @@ from mdr_dask.version import __version__
 
 BROKE = 3
 INTERRUPTED = 130
-#: Groups of commands in ``--help``; commands that are not in this table are listed last.
+#: Groups of commands in ``--help``; commands that are in none of these groups are listed last.
 GROUPS = {
     "study": ("check", "run", "status", "verify"),
     "answers": ("show", "fit", "master-curve", "plot", "report"),

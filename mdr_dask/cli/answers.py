@@ -103,7 +103,7 @@ def _print_frame(frame: pd.DataFrame, answer: Table, join: bool) -> None:
 
 
 def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
-    """Join each mean with its errors, ``0.1234 +- 0.0005 +- 0.0001``, or its interval, ``0.1234 (0.1220, 0.1240)``.
+    """Join each mean and its errors, ``0.1234 +- 0.0005 +- 0.0001``, or its interval, ``0.1234 (0.1220, 0.1240)``.
 
     An error is left out if it is unknown in all rows, or zero except for rounding in all rows. The returned text names
     the errors that are not left out.
@@ -132,7 +132,7 @@ def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
 
 
 def _meaning(kinds: dict[str, tuple[str, ...]]) -> str:
-    """Return a text that names the printed errors, only once if they are the same for all outputs."""
+    """Return a text that names the printed errors of each output, or of all outputs together if they are the same."""
     longest = max(kinds.values(), key=len, default=())
     if all(longest[: len(kind)] == kind for kind in kinds.values()):
         return f"mean{''.join(longest)}" if longest else ""
@@ -193,7 +193,7 @@ def _pyarrow() -> Any:
 
 
 def _write_parquet(answer: Table, path: Path) -> None:
-    """Write a row group for each frame, with the unit of every column in the metadata of its field."""
+    """Write a Parquet file with one row group for each frame, and the unit of each column in its metadata."""
     arrow = _pyarrow()
     first = next(answer.frames, _frame(answer))
     schema = arrow.Schema.from_pandas(first, preserve_index=False).remove_metadata()

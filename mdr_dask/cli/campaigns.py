@@ -107,7 +107,7 @@ def _print_left(rows: list[dict[str, str]], form: str | None) -> None:
 
 
 def _indented(path: str) -> str:
-    """Return the last part of a dotted name, indented by two blanks for each part before it."""
+    """Return the last part of a dotted name, indented by two blanks for each earlier part."""
     return "  " * path.count(".") + path.rpartition(".")[2]
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from mdr_dask.plots.figure import Figure
     from mdr_dask.plots.page import Page
 
-#: Options for figures of outputs only; a named figure has fixed axes.
+#: Options that apply only to figures of outputs; the axes of a named figure are fixed.
 OF_OUTPUTS = ("over", "by", "panels", "effects", "log")
 COMMAND = "mdr_dask.command"
 
@@ -234,7 +234,7 @@ def _page(look: Mapping[str, Any]) -> Page:
 
 
 def _groups(url: str, urls: Sequence[str], series: Sequence[str]) -> dict[str, xr.Dataset]:
-    """Return the groups of a store, by names that include the store if there are several."""
+    """Return the groups of a store; their names include the store if several stores are drawn."""
     from mdr_dask import store as stores
     from mdr_dask.questions import selection
 
@@ -253,7 +253,7 @@ def _name_of(url: str, urls: Sequence[str], series: str) -> str:
 
 
 def _draw(figure: Plot, groups: Mapping[str, xr.Dataset], path: Path, origin: dict[str, str], one_of: bool) -> None:
-    """Draw a figure to a file, with its data in a table next to it; with --all, only report a figure that fails."""
+    """Draw a figure to a file, with its data in a table next to it; with --all, a failing figure is only reported."""
     from mdr_dask.errors import DataError, FitError
 
     try:

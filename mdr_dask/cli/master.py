@@ -28,7 +28,7 @@ PARTS = ("factors", "curve", "points")
 
 LAWS = ("power", "arrhenius", "wlf")
 FAR, LEAST = 5.0, 0.002
-"""A point is reported if it is farther from the merged curve than FAR standard deviations and than LEAST decades."""
+"""A point is reported if its distance from the merged curve exceeds FAR standard deviations and LEAST decades."""
 
 KEPT = (".json", ".csv")
 
@@ -158,7 +158,7 @@ def _rows(frame: pd.DataFrame, selections: tuple[str, ...]) -> pd.DataFrame:
 
 
 def _kept(source: str) -> xr.Dataset | None:
-    """Return a result that --keep wrote, or None if the source is something else."""
+    """Return the result in a file that --keep wrote, or None if the source is no such file."""
     path = Path(source)
     if not path.is_file():
         return None

@@ -20,13 +20,14 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Row = dict[str, Any]
-#: Errors below this fraction of their mean are rounding errors.
+#: An error below this fraction of its mean counts as a rounding error.
 ROUNDING = 1e-13
-#: Blanks between two columns of a table, and smallest width of a terminal for which tables are formatted.
+#: `GAP`: blanks between two columns of a table. `NARROWEST`: smallest width in characters for which tables are
+#: formatted.
 GAP, NARROWEST = 2, 40
 #: Smallest width in characters to which a long text in the last column is wrapped.
 WRAPPED = 30
-#: Numbers smaller or larger than these are printed with a power of ten.
+#: Numbers below `_SMALL` or above `_LARGE` are printed with a power of ten.
 _SMALL, _LARGE = 1e-4, 1e6
 UNKNOWN = "-"
 #: A blank at which lines are not broken.
@@ -34,7 +35,7 @@ _BLANK = "\N{NO-BREAK SPACE}"
 
 
 def terminal_width() -> int:
-    """Return the width of the terminal, or 80 where the output is not a terminal."""
+    """Return the width of the terminal in characters, or 80 if the output is not a terminal."""
     return max(NARROWEST, shutil.get_terminal_size((80, 24)).columns)
 
 
@@ -59,7 +60,7 @@ def print_rows(rows: Sequence[Row], units: dict[str, str], form: str, limit: int
     Parameters
     ----------
     rows : sequence of dict
-        All with the same keys.
+        Rows with the same keys.
     units : dict of str to str
         Unit of each column that has one.
     form : str
@@ -92,8 +93,8 @@ def titled(name: str, unit: str) -> str:
 def print_aligned(titles: Sequence[str], columns: Sequence[Sequence[Any]], keys: int = 1, note: str = "") -> None:
     """Print columns side by side, within the width of the terminal.
 
-    Columns with one value in all rows are printed above the table, and columns without any value are named there. A
-    single row that is too wide is printed as a list; a table that is too wide is printed in parts.
+    A column with the same value in all rows is printed above the table, and a column without any value is named there.
+    A single row that is too wide is printed as a list; a table that is too wide is printed in parts.
 
     Parameters
     ----------
@@ -104,7 +105,7 @@ def print_aligned(titles: Sequence[str], columns: Sequence[Sequence[Any]], keys:
     keys : int
         Number of leading columns that identify a row; each part of a wide table begins with them.
     note : str
-        A first line.
+        A line that is printed above the table.
     """
     rows = len(columns[0]) if columns else 0
     cells = [[short(value) for value in column] for column in columns]
@@ -176,7 +177,7 @@ def _is_text(column: Sequence[str]) -> bool:
 
 
 def hanging(before: str, text: str) -> str:
-    """Join two texts; the second is wrapped below its own beginning if the line is too long."""
+    """Join two texts; if the line is too long, the second text continues below its own first character."""
     width = max(terminal_width() - len(before), NARROWEST // 2)
     if len(before) + len(text) <= terminal_width() or width <= NARROWEST // 2:
         return (before + text).rstrip()
@@ -185,7 +186,7 @@ def hanging(before: str, text: str) -> str:
 
 
 def _heading(title: str, width: int) -> list[str]:
-    """Return the lines of a heading: the name, broken after ``_`` or a blank to fit the cells, then the unit."""
+    """Return the lines of a heading: the name, broken after ``_`` or blanks to the width of the column, and the unit."""
     name, unit = _name(title), _unit(title).strip()
     pieces = re.findall(r"[^_ ]+[_ ]*", name) or [name]
     lines = [""]
@@ -268,7 +269,7 @@ def with_interval(value: float, low: float = math.nan, high: float = math.nan) -
 
 
 def with_error(mean: float, *errors: float | None) -> str:
-    """Join a mean and its errors: ``?`` for an unknown error, 0 for an error below rounding."""
+    """Join a mean and its errors; an unknown error is printed as ``?``, a rounding error as 0."""
     if not math.isfinite(mean) or not any(error is not None and math.isfinite(error) for error in errors):
         return short(mean)
     shown = ["?" if error is None or not math.isfinite(error) else _error(error, abs(mean)) for error in errors]

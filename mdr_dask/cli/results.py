@@ -23,7 +23,7 @@ class Reading(click.Command):
     """A command whose first argument is a store."""
 
     def invoke(self, context: click.Context) -> Any:
-        """Run the command; a chunk that cannot be read is reported as an error with one sentence."""
+        """Run the command; if a chunk cannot be read, report this in one sentence."""
         from mdr_dask.store import readable
 
         with readable(context.params[str(self.params[0].name)]):

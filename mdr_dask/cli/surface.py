@@ -129,7 +129,7 @@ def _option(name: str) -> str:
 
 
 def _kind(file: str, options: dict[str, Any]) -> str:
-    """Return the kind of a file: a spectrum by the names of its columns, a map or a scan by its dimensions."""
+    """Return the kind of a file: spectra are recognised by the names of columns, maps and scans by their dimensions."""
     from mdr_dask.models.data_file import DataFile
     from mdr_dask.models.parts.height_file import TEXT, dimensions
     from mdr_dask.tables import decoded

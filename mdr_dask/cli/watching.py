@@ -12,7 +12,7 @@ import click
 
 from mdr_dask.cli.printing import Row
 
-#: Smallest pause between two updates in seconds, and smallest ratio of the pause and the duration of an update.
+#: Between two updates the program waits at least `PAUSE` seconds, and at least `SHARE` times the duration of an update.
 PAUSE, SHARE = 1.0, 5.0
 
 
@@ -36,14 +36,16 @@ def _ranges(numbers: list[int]) -> str:
 
 
 def watch(store: str, count: Callable[[], list[Row]]) -> None:
-    """Show the progress of a store until no run is active: in place on a terminal, otherwise a line for every change.
+    """Show the progress of a store until no run is active.
+
+    On a terminal, the text is replaced in place. Otherwise a line is printed for every change.
 
     Parameters
     ----------
     store : str
         Path or URL of the store.
     count : callable
-        Returns a row for every group: its name, the number of its results, and their numbers in each state.
+        Returns a row for every group: its name, the number of its results, and the number of results in each state.
     """
     if sys.stdout.isatty():
         from rich.console import Console

@@ -18,7 +18,7 @@ format_option = click.option(
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Make the folder of a new file; after an error, remove what was made, and name the file in the error."""
+    """Make the folder of a new file; after an error, remove both again, and name the file in the error."""
     require_outside(path)
     there = path.exists()
     missing = [folder for folder in path.parents if not folder.exists()]
@@ -29,7 +29,7 @@ def writing(path: Path) -> Iterator[None]:
     except BaseException as error:
         if not there and path.exists():
             shutil.rmtree(path) if path.is_dir() else path.unlink()
-        with suppress(OSError):  # the folder was not made, or is not empty
+        with suppress(OSError):  # the folder could not be made, or is not empty
             for folder in missing:
                 folder.rmdir()
         if isinstance(error, OSError) and error.filename is None:

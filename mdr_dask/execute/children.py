@@ -98,9 +98,8 @@ def children(count: int, model: str) -> Iterator[list[Child]]:
 def compute_apart(child: Child, work: Work, limit: float | None = None) -> Iterator[tuple[Work, Outcome]]:
     """Compute a block that may crash its process. If it does, its halves are computed, down to single results.
 
-    A single result that crashes its process has failed.
-
-    After `CONVICTED` results of a case have crashed, its other results are marked as failed without computing them.
+    A single result that crashes its process has failed. After `CONVICTED` results of a case have crashed, its other
+    results are marked as failed without computing them.
     """
     pieces, attempts = [work], itertools.count(work.attempt)
     crashed: Counter[int] = Counter()

@@ -176,7 +176,7 @@ def cluster_class(name: str) -> type[Cluster]:
 
 
 def _closed_to_others(kind: type[Cluster], arguments: Mapping[str, Any], stack: ExitStack) -> dict[str, Any]:
-    """Add arguments that exclude other users, unless they are set: TLS, and a web page that only this machine can open."""
+    """Add arguments that exclude other users, unless they are set: TLS, and a web page for this machine only."""
     own = dict(arguments)
     if issubclass(kind, LocalCluster):
         own["dashboard_address"] = own.get("dashboard_address") or DASHBOARD

@@ -18,9 +18,9 @@ from mdr_dask.questions.expression import Column, Value, evaluate, parse
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Columns with the state of the results of a row, and with the number of finished results.
+#: Names of the columns with the state of the results of a row, and with the number of its finished results.
 STATUS, REALISATIONS = "status", "realisations"
-#: Variable with the number of results in each state, for rows that combine several cases.
+#: Name of the variable with the number of results in each state, for rows that combine several cases.
 COUNTS = "state_counts"
 #: States of results that need no further work.
 COMPLETE = (Status.DONE, Status.NOT_NEEDED)
@@ -83,7 +83,7 @@ class Columns:
         Raises
         ------
         DataError
-            If there is no such column, or the study lacks a quantity in its formula.
+            If there is no such column, or the study lacks a quantity in the formula of the column.
         """
         from xarray import DataArray
 

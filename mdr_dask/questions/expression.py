@@ -47,7 +47,7 @@ _OPERATORS: Mapping[type[ast.AST], Callable[[Any, Any], Any]] = {
 
 
 class Column(NamedTuple):
-    """Values of a name with their coherent SI unit; the unit is None for words and truth values."""
+    """The values that a name stands for, with their coherent SI unit; the unit is None for words and truth values."""
 
     array: Any
     unit: str | None
@@ -56,8 +56,8 @@ class Column(NamedTuple):
 class Value(NamedTuple):
     """Numbers in SI with their dimension (of pint), words, or truth values.
 
-    The dimension is None for words, for truth values, and for a number without a unit. Such a number is taken to be in
-    the SI unit of the quantity with which it is combined.
+    The dimension is None for words, for truth values, and for a number without a unit. A number without a unit is taken
+    to be in the SI unit of the quantity with which it is combined.
     """
 
     array: Any
@@ -65,7 +65,7 @@ class Value(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """Numpy's letter for the data type; a lazy array is not loaded."""
+        """Numpy's letter for the data type; reading it does not load a lazy array."""
         return str((self.array if hasattr(self.array, "dtype") else np.asarray(self.array)).dtype.kind)
 
 
@@ -113,7 +113,7 @@ def evaluate(expression: Expression, find: Callable[[str], Column | None], known
     find : callable, str -> Column or None
         Returns the values of a name; None if there is no such name.
     known : sequence of str
-        All names, for the hint in the message about an unknown one.
+        All names, for the hint in the message about an unknown name.
 
     Raises
     ------
@@ -212,7 +212,7 @@ class _Evaluation:
             raise DataError(f"{self.text!r}: no column {name!r}{did_you_mean(name, self.known)}")
         try:
             return Value(found.array, None if found.unit is None else dimension_of(found.unit)[0])
-        except ValueError:  # pint does not have this unit of a model from outside this package
+        except ValueError:  # a model from outside this package may declare a unit that `mdr_dask.units` does not define
             return Value(found.array)
 
     def _truth(self, node: ast.expr) -> Any:

@@ -48,7 +48,10 @@ def counts(url: str) -> list[dict[str, Any]]:
 
 
 def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return the current messages of a series: from the last attempt at each result, if its state is still the same."""
+    """Return the current messages of a series.
+
+    They come from the last attempt at each result, and are left out if the state of the result has changed since.
+    """
     last: dict[tuple[int, ...], dict[str, Any]] = {}
     telling = [record for record in store.records(url, series) if record["messages"]]
     for record in sorted(telling, key=lambda record: record["attempt"]):
@@ -89,7 +92,7 @@ _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 
 
 def _merged(texts: Sequence[str]) -> str:
-    """Merge texts that differ only in their numbers; numbers become ranges: ``a film ratio of 0.2 to 0.4``."""
+    """Merge texts that differ only in their numbers; each number becomes a range: ``a film ratio of 0.2 to 0.4``."""
     columns = iter(list(zip(*map(_NUMBER.findall, texts), strict=True)))
 
     def ends(_: re.Match[str]) -> str:

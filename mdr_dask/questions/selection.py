@@ -40,7 +40,8 @@ def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings
     Returns
     -------
     Dataset
-        The selected part with all dimensions. A selection by a fixed parameter with this value keeps everything.
+        The selected part with all dimensions. A selection by a fixed parameter keeps the whole group if the parameter
+        has the given value.
 
     Raises
     ------
@@ -78,7 +79,7 @@ def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
 
 
 def where_all(groups: Mapping[str, xr.Dataset], condition: str) -> dict[str, xr.Dataset]:
-    """Keep the cases of all groups that meet a condition; raise DataError if there are none."""
+    """Keep the cases of all groups that meet a condition; raise DataError if no case meets it."""
     kept = {name: where(dataset, condition) for name, dataset in groups.items()}
     if all((dataset["status"] == Status.NOT_NEEDED.value).all() for dataset in kept.values()):
         raise DataError(f"--where {condition}: no result meets the condition")
@@ -131,7 +132,7 @@ def _parsed(text: str) -> tuple[str, str]:
 
 
 def _axis(dataset: xr.Dataset, name: str) -> xr.DataArray:
-    """Return the values of a name as a one-dimensional array, also for a fixed parameter."""
+    """Return the values of an axis or parameter as a one-dimensional array; a fixed parameter gives one value."""
     from xarray import DataArray
 
     if name in dataset.dims and name not in dataset.coords:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MEANS = ("mean", "standard_error", "grid_error")
-#: Number of rows computed at a time, and the largest size in bytes of a study that is read at once.
+#: `ROWS`: number of rows computed at a time. `WHOLE`: size in bytes up to which a study is read at once.
 ROWS, WHOLE = 2**16, 2**26
 
 
@@ -51,7 +51,7 @@ class Question:
     units : mapping of str to str
         Units of columns; all other columns are in SI.
     statistics : tuple of str, optional
-        Statistics over realisations; None for one row for each result.
+        Statistics over realisations; None for a table with one row for each result.
     written : bool
         Whether axes and parameters that are not in `units` are given in the unit of the campaign file.
     """
@@ -69,7 +69,7 @@ class Question:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows as a sequence of data frames, and the units of their columns.
+    """A table as a sequence of data frames, with the units of its columns.
 
     `total` is the number of rows, or None if it is unknown before the last frame. `keys` is the number of leading
     columns that identify a row.
@@ -269,7 +269,7 @@ def boxes(sizes: Mapping[str, int], most: int, chunks: Sequence[int] = ()) -> It
     Parameters
     ----------
     sizes : mapping of str to int
-        Lengths of the dimensions; the last one varies fastest.
+        Lengths of the dimensions; the index of the last dimension varies fastest.
     most : int
         Largest number of points of a box.
     chunks : sequence of int

@@ -1,4 +1,4 @@
-"""Conversion of columns to other units: ``velocity=km/h,wear_volume=um^3``."""
+"""Convert columns to other units: ``velocity=km/h,wear_volume=um^3``."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from mdr_dask.units import conversion
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Suffixes of statistics that are values in the unit of their output.
+#: Suffixes of statistics that are values of the output, in its unit.
 _OF_OUTPUTS = ("mean", "interval", "quantile")
-#: Suffixes of statistics that are differences, which are converted without the zero point of a temperature scale.
+#: Suffixes of statistics that are differences of values. They are converted without the zero point of a temperature
+#: scale.
 _DIFFERENCES = ("error", "standard_deviation", "standard_error", "grid_error")
 
 
@@ -47,7 +48,7 @@ def in_units(dataset: xr.Dataset, wanted: Mapping[str, str]) -> xr.Dataset:
     Parameters
     ----------
     dataset : Dataset
-        Variables with their unit in ``attrs["units"]``.
+        Its variables have their unit in ``attrs["units"]``.
     wanted : mapping of str to str
         Units by the name of an axis, a parameter or an output, in any spelling that a campaign file may use.
 
