@@ -1,6 +1,6 @@
 """A distributed parameter-study runner for tribology with the method of dimensionality reduction.
 
-The names below are imported when they are first used, so that importing the package is quick.
+The public names are imported from their modules when they are first used, so that importing the package is quick.
 """
 
 from importlib import import_module

@@ -25,8 +25,8 @@ _STEP = 2**20
 class Statistic:
     """One reduction over ``realisation``: its name, its meaning and the function that computes it.
 
-    `compute` takes an output and the companion with its errors (None if there is none). It returns None if it needs
-    errors and there are none.
+    `compute` takes an output and its companion with discretisation errors, or None if the output has no companion. It
+    returns None if the statistic needs these errors and there is no companion.
     """
 
     name: str
@@ -35,18 +35,18 @@ class Statistic:
 
 
 def count(array: xr.DataArray) -> xr.DataArray:
-    """Return the number of realisations that succeeded."""
+    """Return the number of successful realisations."""
     return array.notnull().sum("realisation")
 
 
 def mean(array: xr.DataArray) -> xr.DataArray:
-    """Return the mean of the realisations that succeeded; NaN where none did."""
+    """Return the mean of the successful realisations; NaN for a case without a successful realisation."""
     number = count(array)
     return array.sum("realisation") / number.where(number > 0)
 
 
 def standard_deviation(array: xr.DataArray) -> xr.DataArray:
-    """Return the standard deviation over realisations; NaN for fewer than two."""
+    """Return the standard deviation of the successful realisations; NaN for fewer than two."""
     spare = count(array) - 1
     squares: xr.DataArray = (array - mean(array)) ** 2
     variance: xr.DataArray = squares.sum("realisation") / spare.where(spare > 0)
@@ -60,7 +60,7 @@ def standard_error(array: xr.DataArray) -> xr.DataArray:
 
 
 def grid_error(error: xr.DataArray) -> xr.DataArray:
-    """Return the discretisation error of the mean: the mean error, because errors of a grid need not cancel."""
+    """Return the discretisation error of the mean: the mean of the errors, because they need not cancel."""
     return mean(abs(error))
 
 
@@ -82,7 +82,7 @@ def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
 def mean_and_ends(array: xr.DataArray, error: xr.DataArray | None) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
     """Return the mean and both ends of its `interval`.
 
-    Where the scatter is unknown, as with one realisation, the ends are the mean plus and minus its discretisation
+    If the scatter is unknown, for example with one realisation, the ends are the mean plus and minus its discretisation
     error.
     """
     known = (array,) if error is None else xr.broadcast(array, abs(error))
@@ -181,7 +181,7 @@ NAMES = tuple(statistic.name for statistic in STATISTICS)
 
 
 def companion(dataset: xr.Dataset, output: str) -> xr.DataArray | None:
-    """Return the discretisation errors of an output, which its ``ancillary_variables`` name, or None without any."""
+    """Return the discretisation errors of an output, or None; its attribute ``ancillary_variables`` has their name."""
     name = dataset[output].attrs.get("ancillary_variables")
     return dataset[name] if name in dataset.data_vars else None
 
@@ -192,15 +192,15 @@ def aggregate(dataset: xr.Dataset, statistics: Sequence[str] = NAMES) -> xr.Data
     Parameters
     ----------
     dataset : Dataset
-        As :func:`mdr_dask.store.datasets` opens it; backed by dask, the result stays lazy.
+        A group as opened by :func:`mdr_dask.store.datasets`. If its arrays are lazy, the result is lazy.
     statistics : sequence of str
         Some of `NAMES`.
 
     Returns
     -------
     Dataset
-        A variable ``<output>_<statistic>`` for every output and statistic, with units and meaning in attrs;
-        ``<output>_grid_error`` where the output has a companion with errors.
+        A variable ``<output>_<statistic>`` for every output and statistic, with units and meaning in attrs. The
+        statistic ``grid_error`` exists only for outputs that have a companion with errors.
     """
     for name in statistics:
         if name not in NAMES:

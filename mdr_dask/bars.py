@@ -14,7 +14,7 @@ from mdr_dask.units import seconds
 if TYPE_CHECKING:
     from mdr_dask.execute import Progress
 
-#: Seconds between two plain lines, and between two updates of the live line.
+#: `PAUSE`: seconds between two plain lines. `LIVE_PAUSE`: seconds between two updates of the live line.
 PAUSE, LIVE_PAUSE = 5.0, 0.5
 
 Draw = Callable[["Progress | None", float], None]
@@ -40,7 +40,7 @@ def reporter(quiet: bool) -> Iterator[Callable[[Progress], None]]:
 
 @contextmanager
 def at_work(what: str) -> Iterator[None]:
-    """Print every few seconds on a terminal what is being done and for how long."""
+    """On a terminal, print every few seconds the text `what` and the time since the start."""
 
     def draw(_: Progress | None, elapsed: float) -> None:
         _write(", ".join([what, seconds(round(elapsed)), *(["compiling ..."] if _compiles() else [])]))
@@ -119,7 +119,7 @@ def _write(line: str) -> None:
 
 
 def describe(progress: Progress | None, elapsed: float) -> str:
-    """Return one line with the share done, the elapsed and remaining time, and the number of results."""
+    """Return one line with the fraction of results done, the elapsed and remaining time, and the number of results."""
     if progress is None:
         return f"preparing, {seconds(round(elapsed))}"
     settled = progress.total - progress.to_do

@@ -17,13 +17,14 @@ from mdr_dask.arrays import FloatArray
 
 CONFIDENCE = 0.95
 RESAMPLES = 400
-#: Number of groups in which values are shifted by their errors, one group at a time; in a group, errors have one sign.
+#: Values are divided into this number of groups of neighbours. One group at a time is shifted by its errors, all with
+#: the same sign.
 GROUPS = 32
 #: Probabilities of the ends of an interval.
 TAILS = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
 #: Smallest number of resamples from which the ends of an interval are computed.
 FEWEST = round(1 / TAILS[0])
-#: Logarithm that stands for values that are not positive; its exponential is 0.
+#: Number that replaces the logarithm of a value that is not positive; its exponential is 0.
 NOTHING = -1000.0
 
 
@@ -58,7 +59,7 @@ def means(values: FloatArray) -> FloatArray:
 
 
 def complete(values: FloatArray) -> FloatArray:
-    """Return the values with NaN for every realisation (first axis) that has a value that is not finite."""
+    """Return the values, with NaN for all values of a realisation (first axis) if one of them is not finite."""
     known = np.all(np.isfinite(values.reshape(values.shape[0], -1)), axis=1)
     return np.where(known.reshape(-1, *(1 for _ in values.shape[1:])), values, np.nan)
 
@@ -79,7 +80,10 @@ def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
 
 
 def difference(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Return the stack of the difference of two stacks with the same resamples, with rows for the errors of both."""
+    """Return the stack of the difference of two stacks with the same resamples.
+
+    It has the rows for the errors of the first stack, then the rows for the errors of the second stack.
+    """
     plain = 1 + RESAMPLES
     rows = [one[:plain] - other[:plain], one[plain:] - other[0], one[0] - other[plain:]]
     both: FloatArray = np.concatenate(rows)
@@ -94,7 +98,7 @@ def logarithms(stack: FloatArray) -> FloatArray:
 
 
 def _reach(shifts: FloatArray) -> FloatArray:
-    """Return the sum of the upward shifts of all groups; of the two signs of an error, the larger shift counts.
+    """Return the sum over all groups of the larger of two upward shifts, which belong to the two signs of the errors.
 
     A shift that is NaN counts as 0.
     """
@@ -104,9 +108,9 @@ def _reach(shifts: FloatArray) -> FloatArray:
 
 
 def regrouped(stack: FloatArray) -> FloatArray:
-    """Return a stack in which the errors of neighbouring cases are shifted together, with the same sign.
+    """Return a stack in which neighbouring cases are shifted by their errors together, with the same sign.
 
-    In the given stack, each error has rows of its own.
+    In the given stack, the error of each case has its own rows.
     """
     shifts = stack[1 + RESAMPLES :] - stack[0]
     own = np.maximum(_reach(shifts), _reach(-shifts))
@@ -117,8 +121,9 @@ def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tup
     """Return 95 % intervals from a stack, along its first axis.
 
     The percentiles of a bootstrap over few realisations are too narrow, so their distances from the value are
-    multiplied by sqrt(n / (n - 1)) t / z, with Student's t and the normal z. The shifts by errors are added linearly,
-    because the same error in every realisation does not average out.
+    multiplied by sqrt(n / (n - 1)) t / z. Here t and z are the 97.5 % quantiles of Student's distribution with n - 1
+    degrees of freedom and of the normal distribution. The shifts by errors are added linearly, because the same error
+    in every realisation does not average out.
 
     Parameters
     ----------
@@ -143,7 +148,7 @@ def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tup
 
 
 def widening(count: ArrayLike) -> FloatArray:
-    """Return sqrt(n / (n - 1)) t / z, by which deviations of resamples of n realisations are multiplied."""
+    """Return the factor sqrt(n / (n - 1)) t / z for deviations of resamples of n realisations (see `interval`)."""
     from scipy.special import ndtri, stdtrit
 
     number = np.maximum(np.asarray(count, dtype=np.float64), 2.0)
@@ -154,7 +159,7 @@ def widening(count: ArrayLike) -> FloatArray:
 def chance(residuals: FloatArray, count: int, draws: int = RESAMPLES) -> float:
     """Return the probability that scatter and errors alone cause residuals as large as those of the first row.
 
-    It is NaN if there are too few resamples, as with one realisation.
+    It is NaN if there are too few resamples, for example with one realisation.
 
     Parameters
     ----------
@@ -185,7 +190,7 @@ def scatter(residuals: FloatArray, count: int) -> float:
 def _caused(residuals: FloatArray, count: int, draws: int) -> FloatArray:
     """Return the rms residuals that scatter and errors alone cause, one per resample; none for too few resamples.
 
-    The errors of different groups move different cases, so the squares of the residuals that they cause are added.
+    The errors of different groups affect different cases, so the squares of the residuals that they cause are added.
     """
     flat = residuals.reshape(residuals.shape[0], -1)
     away = np.sqrt(np.mean((flat[1:] - flat[0]) ** 2, axis=1))

@@ -35,7 +35,7 @@ class CompileClock:
 
     @property
     def seconds(self) -> float:
-        """Seconds so far."""
+        """Seconds of compilation so far."""
         with self._lock:
             return self._before + (time.perf_counter() - self._since if self._running else 0.0)
 

@@ -45,7 +45,7 @@ class FitError(MdrDaskError):
     """A law that cannot be fitted to the data."""
 
 
-#: Digits that distinguish any two floating-point numbers.
+#: Number of digits with which any two floating-point numbers can be distinguished.
 _ALL_DIGITS = 17
 
 
@@ -64,7 +64,7 @@ def distinguishable(
     return tuple(write(number, _ALL_DIGITS) for number in (value, *limits))
 
 
-#: Names of parameters and outputs, by other common names for them.
+#: Names of parameters and outputs in this package, by other common names of the same quantity.
 _SYNONYMS = {
     "load": ("normal_force", "line_load"),
     "speed": ("velocity", "mean_velocity", "rotation_speed"),
@@ -83,7 +83,7 @@ _SYNONYMS = {
 
 
 def did_you_mean(word: Any, known: Sequence[str]) -> str:
-    """Return a hint in parentheses, with a leading blank: the nearest known word, or all words if they are few."""
+    """Return a hint in parentheses, after a blank: the nearest known word, or all known words if they are few."""
     from difflib import get_close_matches
 
     folded = {name.casefold(): name for name in known}

@@ -20,7 +20,8 @@ from mdr_dask.errors import CampaignError, ModelError, distinguishable
 from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, with_value
 from mdr_dask.models.numbers import numbers_of
 
-#: Estimated seconds that a block should take; scheduling a task takes about 3 ms, and writing a chunk about 1 ms.
+#: Estimated seconds that a block should take. This is long compared with scheduling a task (about 3 ms) and writing a
+#: chunk (about 1 ms).
 BLOCK_SECONDS = 1.0
 #: Approximate number of blocks of a small study, so that several workers can share it.
 FEW_BLOCKS = 16
@@ -28,7 +29,7 @@ FEW_BLOCKS = 16
 LEAST_SECONDS = 0.1
 #: Blocks whose cases share work are always halved if they take more seconds than this.
 SHARED_SECONDS = 30.0
-#: Shorter blocks are halved only if the total work grows by less than this factor.
+#: Shorter blocks whose cases share work are halved only if the total work then grows by less than this factor.
 REPEATED_WORK = 1.15
 #: Largest number of blocks of a series for which the model estimates the time.
 SAMPLED = 1000
@@ -36,7 +37,7 @@ SAMPLED = 1000
 RECORDS_TOGETHER = 1000
 #: Largest chunk of one array, in bytes.
 CHUNK_BYTES = 64 * 2**20
-#: Largest number of cases; more are taken to be a mistake in the file.
+#: Largest number of cases of a campaign; a larger number is taken to be a mistake in the file.
 MOST_CASES = 10**9
 
 BlockIndex = tuple[int, ...]
@@ -59,7 +60,7 @@ class Template:
     outputs : tuple of Output
         The arrays, without ``status``.
     extra : mapping of str to Coordinate
-        Dimensions that outputs have beyond case and realisation.
+        Dimensions of outputs in addition to those of cases and realisations.
     """
 
     campaign: Campaign
@@ -90,12 +91,12 @@ class Template:
         return tuple(math.ceil(size / self.chunks[dim]) for dim, size in self.sizes.items())
 
     def extra_shape(self, output: Output) -> tuple[int, ...]:
-        """Shape that an output has beyond case and realisation."""
+        """Lengths of the dimensions of an output in addition to those of cases and realisations."""
         return tuple(self.extra[dim].values.size for dim in output.dims)
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Notes of the model and of parts of its parameters, each once, with one axis varied at a time."""
+        """Notes of the model and of parts of its parameters, without duplicates; only one axis is varied at a time."""
         base = self.series.parameters
         sets = [base, *(with_value(base, axis.path, value) for axis in self.series.axes for value in axis.some)]
         of_parts = [note for parameters in sets for note in notes_of(parameters)]
@@ -109,7 +110,7 @@ class Template:
 
     @property
     def files(self) -> int:
-        """Number of files of the group when it is done: chunks, coordinates, metadata and records."""
+        """Number of files of the group when all results are computed: chunks, coordinates, metadata and records."""
         blocks, arrays = math.prod(self.grid), len(self.outputs) + 1
         axes = {axis.name for axis in self.series.axes}
         coordinates = axes | set(self.extra) | (numbers_of(self.series.parameters).keys() - self.sizes.keys())
@@ -134,14 +135,14 @@ class Template:
         return self._block(dict(zip(self.dims, self.region(index), strict=True)))
 
     def seconds(self, index: BlockIndex) -> float:
-        """Return the estimated time of a block, scaled from the block of the same cases with the first realisations."""
+        """Return the estimated seconds of a block, scaled from the block of its cases with the first realisations."""
         *cases, last = index
         rest = self.sizes["realisation"] - last * self.chunks["realisation"]
         part = min(rest / self._first_realisations, 1.0)
         return part * self._first_seconds((*cases, 0))
 
     def _first_seconds(self, index: BlockIndex) -> float:
-        """Return the time that the model estimates for a block of the first realisations; it is cached."""
+        """Return the seconds that the model estimates for a block of the first realisations; the result is cached."""
         known = self._estimates
         if index not in known:
             known[index] = models.load(self.campaign.model).seconds(self.block(index))
@@ -180,7 +181,7 @@ class Template:
         return {axis.path: _as_array(axis) for axis in self.series.axes}
 
     def sample(self, chunks: Mapping[str, int], position: float) -> Block[Any]:
-        """Return a block of the given lengths at a relative position (0 first, 1 last), for estimates."""
+        """Return a block of the given lengths for estimates; `position` is 0 for the first block, 1 for the last."""
         starts = self._starts(chunks, position)
         return self._block({dim: slice(start, start + chunks[dim]) for dim, start in starts.items()})
 
@@ -354,9 +355,10 @@ def _whole_dims(template: Template, model: Model[Any]) -> list[str]:
 
 
 def _is_cut(template: Template, chunks: Mapping[str, int], dim: str, most: float) -> bool:
-    """Return whether blocks of more than `most` seconds are halved along a dimension.
+    """Return whether blocks that take more than `most` seconds are halved along a dimension.
 
-    They are not if the halves would repeat much of the shared work, unless a block takes more than `SHARED_SECONDS`.
+    They are not halved if the halves would repeat much of the shared work, unless a block takes more than
+    `SHARED_SECONDS`.
     """
     now = template.mean_seconds(chunks)
     if now <= most or now > SHARED_SECONDS:

@@ -1,4 +1,4 @@
-"""Describe what a campaign will compute and cost, as text and as JSON, for ``mdr-dask check``."""
+"""Describe the results and the costs of a campaign before it is run, as text and as JSON, for ``mdr-dask check``."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ START = 2.0
 
 @dataclass(frozen=True, repr=False)
 class Summary(Estimate):
-    """What a campaign will compute and cost; printed, it is the output of ``mdr-dask check``.
+    """The results and the costs of a campaign; as text, it is the output of ``mdr-dask check``.
 
     Attributes
     ----------
     lines : tuple of str
-        The axes of each series, notes about its data, its costs.
+        The axes of each series, notes about its data, and its costs, as lines of text.
     questions : tuple of str
         Questions about bare numbers far from the usual values.
     """
@@ -159,7 +159,7 @@ def costs_row(costs: Estimate) -> dict[str, Any]:
 
 
 def axes_rows(campaign: Campaign) -> list[dict[str, Any]]:
-    """Return the axes of all series: name, unit, number of values, first and last."""
+    """Return the axes of all series: name, unit, number of values, first value and last value."""
     return [
         {
             "series": series.name,
@@ -176,6 +176,6 @@ def axes_rows(campaign: Campaign) -> list[dict[str, Any]]:
 
 
 def _counted(what: str, first: int, more: float) -> str:
-    """Return the count of the first round, and the count of all rounds if there may be more, with its noun."""
+    """Return a text with the count of the first round and, if there may be further rounds, the count of all rounds."""
     last = round(first * more)
     return f"{first if more == 1 else f'{first} to {last}'} {what}{'s' if last != 1 else ''}"

@@ -1,4 +1,4 @@
-"""The reader of all tables that campaigns and commands name, as written by people and instruments.
+"""Read the tables that campaigns and commands name, in the forms in which people and instruments write tables.
 
 Columns are recognised by their names, in any order. Units are in brackets after the names, joined to the names, or in a
 separate row. Text before the table, blocks with repeated names, decimal commas, UTF-16 and Excel workbooks are allowed.
@@ -26,7 +26,7 @@ from mdr_dask.units import example_unit, is_unit, to_si
 COMMENT = "#%"
 BLANKS = r"\s+"
 SEPARATORS = ("\t", ";", ",", BLANKS)
-#: Four consecutive letters outside ASCII, which do not occur in Western text.
+#: Four consecutive characters outside ASCII. Western text does not contain them, but text with a wrong encoding does.
 MANY_LETTERS = re.compile(r"[^\x00-\x7f]{4}")
 #: Start of the line that precedes each sheet of a workbook; the name of the sheet follows.
 SHEET = "# sheet of a workbook: "
@@ -34,14 +34,15 @@ SHEET = "# sheet of a workbook: "
 MOST_COLUMNS = 1000
 #: Largest number of problems of one table that are shown.
 MOST_SHOWN = 10
-#: Largest relative difference between two columns of the same quantity; instruments print three digits or more.
+#: Two columns of the same quantity agree if their relative difference is at most this, because instruments print at
+#: least three digits.
 AGREE = 0.01
 #: Largest number of characters of a number.
 LONGEST_NUMBER = 60
 SEMICOLONS = " (put semicolons between the values if they have decimal commas)"
 NO_ROWS = "expected a line of names and at least one line of values"
 
-#: Common names of quantities in the form of `plain`; a `Column` may have further names.
+#: Common names of quantities, in the form that `plain` returns; a `Column` may have further names.
 SYNONYMS = {
     "temperature": ("T", "temp", "sample temperature", "temperature sample", "ts", "tr", "temperatur"),
     "frequency": (
@@ -153,7 +154,7 @@ class Problem(NamedTuple):
 
 
 class TableError(DataError):
-    """The error for a table that cannot be used: the name of its file, and all problems."""
+    """An error in a table that cannot be used; it contains the name of the file and all problems."""
 
     def __init__(self, source: str, problems: Sequence[Problem]) -> None:
         super().__init__(source, tuple(problems))
@@ -180,7 +181,7 @@ class Column:
     Parameters
     ----------
     name : str
-        Name in messages and in the result; its `SYNONYMS` are also recognised.
+        Name in messages and in the result. A heading may also be one of the `SYNONYMS` of this name.
     unit : str
         SI unit of the result, ``"1"`` for a pure number. For angular frequencies (``rad/s``) a table may use Hz or rpm.
     other_names : tuple of str
@@ -188,9 +189,10 @@ class Column:
     needed : bool
         Whether a table must have this column.
     above, least : float, optional
-        Limits in SI: values must be greater than `above`, and at least `least`.
+        Limits in SI: values must be greater than `above` and not smaller than `least`; a limit that is None is ignored.
     given_unit : str
-        Unit to use if the table states none. If it is empty, a column with a dimension must state its unit.
+        Unit to use if the table states no unit. If `given_unit` is empty, a table must state the unit, except for pure
+        numbers.
     """
 
     name: str
@@ -202,7 +204,7 @@ class Column:
     given_unit: str = ""
 
     def holds(self, heading: str) -> bool:
-        """Return whether a heading, without its unit, is a name of this column."""
+        """Return whether a heading without unit is a name of this column."""
         return is_called(heading, self.name, *self.other_names)
 
 
@@ -263,11 +265,11 @@ class Sheet:
     names : tuple of Cell
         Headings without their units; empty for a table without names.
     units : tuple of str
-        Unit of each column as written; empty if there is none.
+        Unit of each column as written; empty for a column without a unit.
     rows : tuple of tuple of Cell
         Rows of equal length.
     notes : tuple of Cell
-        First entries of the text lines below the numbers.
+        First entry of each text line below the numbers.
     """
 
     source: str
@@ -413,7 +415,7 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
 
 
 class _Match(NamedTuple):
-    """The `Column` of a heading or None, the unit as written, and whether the entries are common logarithms."""
+    """The `Column` that a heading means (or None), the unit as written, and whether entries are common logarithms."""
 
     column: Column | None
     unit: str
@@ -450,7 +452,7 @@ def _antilogarithm(cell: Cell) -> Cell:
 
 
 def match(heading: str, unit: str, columns: Sequence[Column]) -> tuple[Column | None, str]:
-    """Return the column of a heading or None, and its unit, which may be joined to the heading (``freq_hz``)."""
+    """Return the column that a heading means, or None, and its unit, which may be part of the heading (``freq_hz``)."""
     names = [(heading, unit)]
     front, _, behind = heading.replace(" ", "_").rpartition("_")
     if front and not unit:
@@ -681,7 +683,7 @@ def _stripped(row: tuple[Cell, ...]) -> list[str]:
 
 
 def _names_in_remark(raw: list[_Line], first: tuple[Cell, ...]) -> tuple[Cell, ...]:
-    """Return the names in the last comment line above the numbers, if their number fits; otherwise empty."""
+    """Return the names in the last comment above the numbers; empty unless there are as many names as columns."""
     above = [line for line in raw if line.number < first[0].line and line.text.lstrip()[0] in COMMENT]
     for line in above[-1:]:
         words = line._replace(text=line.text.lstrip(COMMENT + " "))
@@ -693,7 +695,7 @@ def _names_in_remark(raw: list[_Line], first: tuple[Cell, ...]) -> tuple[Cell, .
 
 
 def _stated(rows: Sequence[tuple[Cell, ...]]) -> tuple[str, str] | None:
-    """Return the last temperature, with its unit, in the text above a block; None if there is none."""
+    """Return the last temperature, with its unit, in the text above a block; None if the text has no temperature."""
     found = [match for row in rows for match in _STATED.finditer(" ".join(cell.text for cell in row))]
     return (found[-1][1].replace(",", "."), found[-1][2].replace(" ", "")) if found else None
 
@@ -829,7 +831,7 @@ def _unit_of(text: str) -> str:
 
 
 def _separator(lines: Sequence[str], numeric: bool) -> str:
-    """Return the separator of cells: the one for which most lines contain two or more numbers."""
+    """Return the separator of cells with which most lines contain two or more numbers."""
     counts = [sum(_numbers_between(line, mark) > 1 for line in lines) for mark in SEPARATORS]
     if not numeric or not any(counts):
         counts = [sum(mark in line for line in lines) for mark in SEPARATORS[:3]]
@@ -882,7 +884,7 @@ def _cells(lines: Sequence[_Line], separator: str) -> list[tuple[Cell, ...]]:
 
 
 def _unit(written: str, column: Column) -> str:
-    """Return the unit of a column after checking that it fits; empty if no conversion is needed."""
+    """Return the unit of a column after checking its dimension; an empty text if no conversion is needed."""
     unit = written or column.given_unit
     if unit in ("-", "1") and column.unit == "1":
         return ""

@@ -25,7 +25,7 @@ from mdr_dask.store import Place
 from mdr_dask.version import __version__
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
-MAPPED, TRIMMED = 32 * 2**20, 128 * 2**20  # bytes: largest allocation that glibc makes on the heap, and 4 times that
+MAPPED, TRIMMED = 32 * 2**20, 128 * 2**20  # bytes: larger arrays are not on the heap; free heap that glibc keeps
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Work:
     wanted, spared : bool array, shape of the block
         Results to compute, and results to mark as not needed.
     attempt : int
-        How often the computation of the block has been begun, including this time.
+        Number of the attempt: how often the computation of the block has been started, including this time.
     estimate : float
         Time that the model estimates, in seconds.
     """
@@ -65,7 +65,7 @@ class Work:
         return f"{self.place.series or '-'} {'.'.join(map(str, self.place.index))}"
 
     def halves(self) -> tuple[Work, ...]:
-        """Return two tasks with half of the results each, to be run one after the other; none for a single result."""
+        """Return two tasks with half of the results each, to be run one after the other; empty for a single result."""
         cells = np.flatnonzero(self.wanted)
         if cells.size < 2:
             return ()
@@ -163,14 +163,15 @@ def _warned(record: Mapping[str, Any]) -> int:
     return sum(message["status"] == Status.DONE.name.lower() for message in record["messages"])
 
 
-#: Errors that a fault of the machine causes, not a case: a broken cache of the compiler, a full disk, no library.
+#: Errors that a fault of the machine causes and not a case, for example a broken cache of the compiler, a full disk or
+#: a missing library.
 MACHINE_FAULTS = (OSError, EOFError, ImportError, pickle.UnpicklingError)
 #: Largest number of characters that are stored of a message.
 LONGEST_MESSAGE = 1000
 
 
 def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
-    """Call the model. If it raises an exception for the block, compute every result separately to find those that fail.
+    """Call the model. If it raises an exception for the block, compute each result separately to find the failing ones.
 
     `is_own` means that the user wrote the model. Then every exception is a failed case, and results are checked.
     """
@@ -364,7 +365,7 @@ def kind() -> str:
 
 
 def one_blas_thread() -> AbstractContextManager[object]:
-    """Limit linear algebra to one thread from now until the context ends.
+    """Limit the libraries for linear algebra to one thread until the context ends.
 
     Results then do not depend on the number of threads, and each block uses one thread.
     """

@@ -110,7 +110,8 @@ _MOST_LETTERS = 60
 _BAD_POWER = re.compile(r"(\*\*|\^)\s*(?!\(?[-+]?\d{1,2}\)?(?![\d.]|\s*(\*\*|\^)))")
 
 _NOT_A_UNIT = re.compile(r"[,._]|\d(?!\s*/)|.*%.*%")
-#: A number with a decimal comma, one whose comma may separate thousands, and text that looks like several numbers.
+#: Patterns of a number with a decimal comma, of a number whose comma may separate thousands, and of a text that looks
+#: like several numbers.
 _COMMA = re.compile(r"\s*[+-]?\d*,\d+\s*([eE][+-]?\d+)?\s*[^\d,]*\Z")
 _THOUSANDS = re.compile(r"[+-]?\d{1,3},\d{3}")
 _SEVERAL = re.compile(r"\d.*?(,|;|\.\.|\bto\b|\s-\s)\s*[+-]?[\d.]")
@@ -205,7 +206,7 @@ def shown(value: float, unit: str, digits: int = 4, written: str = "") -> str:
     digits : int
         Largest number of digits.
     written : str
-        The unit to print it in; a suitable prefix is chosen if it is empty.
+        Unit in which the value is printed; if it is empty, the SI unit with a suitable prefix is used.
     """
     if written:
         factor, zero = conversion(written, unit)
@@ -240,7 +241,8 @@ def seconds(duration: float) -> str:
     return f"{minutes // 60} h {minutes % 60} min"
 
 
-#: Decades from the usual value beyond which ``check`` asks about a number without a unit; the second for temperatures.
+#: ``check`` asks about a number without a unit if it is more than this number of decades from the usual value. The
+#: second limit is for temperatures.
 _FAR, _FAR_TEMPERATURE = 3.0, 0.3
 
 
@@ -250,7 +252,7 @@ def is_far(value: float, unit: str, usual: str) -> bool:
 
 
 def likely(value: float, unit: str, usual: str) -> str:
-    """Return a number with the unit of the usual value if it is then near that value, otherwise an empty text."""
+    """Return a number with the unit of the usual value, if it is near the usual value in this unit; else empty."""
     meant = f"{value:g} {unit_behind(usual)}"
     with suppress(ValueError):  # the converted number is too large
         return "" if is_far(to_si(meant, unit), unit, usual) else meant
@@ -300,7 +302,7 @@ def registry() -> UnitRegistry[Any]:
 
 @lru_cache(maxsize=1024)
 def conversion(given: str, unit: str) -> tuple[float, float]:
-    """Return factor and zero of a unit, so that ``number [given] = number * factor + zero [unit]``.
+    """Return `factor` and `zero` of a unit: ``x`` in the unit `given` is ``x * factor + zero`` in the unit `unit`.
 
     Raises
     ------

@@ -1,3 +1,3 @@
-"""The version of the package, on the ground floor: stores and tasks name it without importing what is above them."""
+"""The version of the package, in a module without imports, so that every module can import it."""
 
 __version__ = "0.2.0"

@@ -155,7 +155,7 @@ class _Expansion:
     def _grid_values(
         self, base: Parameters | None, variations: Sequence[Variation], index: int, broken: set[Path]
     ) -> list[Any] | None:
-        """Return the values of one axis, each checked with the first value of all other axes; None if a value is wrong."""
+        """Return the values of one axis, checked with the first values of all other axes; None if a value is wrong."""
         one = variations[index]
         known = _checked(base, self._substituted(self.data, variations, 0), {one.path[0]})
         elsewhere = broken | {other.path for other in variations if other is not one}  # reported by their own axes

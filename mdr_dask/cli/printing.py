@@ -186,7 +186,7 @@ def hanging(before: str, text: str) -> str:
 
 
 def _heading(title: str, width: int) -> list[str]:
-    """Return the lines of a heading: the name, broken after ``_`` or blanks to the width of the column, and the unit."""
+    """Return the lines of a heading: the name, broken after ``_`` or blanks to fit the column, and the unit."""
     name, unit = _name(title), _unit(title).strip()
     pieces = re.findall(r"[^_ ]+[_ ]*", name) or [name]
     lines = [""]

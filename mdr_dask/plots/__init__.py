@@ -1,8 +1,8 @@
 """Figures drawn from a store.
 
-A figure is first described as data (`figure`). The description is made from the series of a store (by `view` for any
-output against parameters, by `named` for the figures with a name) and then drawn with matplotlib (`render`) or on the
-page of `mdr_dask.report`.
+A figure is first described as data (`figure`). `view` makes this description from the series of a store for any output
+against parameters, and `named` for the figures with a name. The description is then drawn with matplotlib (`render`) or
+on the page of `mdr_dask.report`.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ class Plot:
     fitted: bool = False
 
     def describe(self, groups: Mapping[str, xr.Dataset]) -> Figure:
-        """Return the figure as data, with the numbers of results that failed or are missing.
+        """Return the figure as data, including texts with the numbers of failed and missing results.
 
         Axes with one value are treated as fixed parameters.
 
@@ -83,7 +83,7 @@ def _squeezed(data: xr.Dataset) -> xr.Dataset:
 
 
 def _without_value(groups: Mapping[str, xr.Dataset]) -> list[str]:
-    """Return, for each reason, a text with the number of results of a store that have no value."""
+    """Return texts with the numbers of results that have no value, one text for each reason, such as failed."""
     states = [data["status"].to_numpy() for data in groups.values() if "status" in data]
     total = sum(state.size for state in states)
     reasons = {Status.FAILED: "failed", Status.NOT_CONVERGED: "did not converge", Status.MISSING: "are missing"}

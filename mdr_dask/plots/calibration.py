@@ -17,7 +17,7 @@ from mdr_dask.plots import colours, labels
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 
-#: Number of posterior samples for the band of predictions, and of bins of a density.
+#: `SAMPLES`: number of posterior samples for the band of predictions. `BINS`: number of bins of a density.
 SAMPLES, BINS = 400, 60
 #: Half width of the 95 % interval of a normal distribution, in standard deviations.
 HALF = 1.96
@@ -36,8 +36,8 @@ class _Curve(NamedTuple):
 def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Return measured points with the band of the study, their residuals, and the density of each unknown.
 
-    Bars are 95 % intervals of the errors of measurement, the band is the interval of the posterior. A density is grey
-    if the data do not determine its unknown; panels for the products that they determine instead follow.
+    Bars are 95 % intervals of the errors of measurement, the band is the 95 % interval of the posterior. A density is
+    grey if the data do not determine the unknown. Further panels show the products of unknowns that are determined.
     """
     found, series, data = _first(groups)
     main = max(found.measured.conditions, key=lambda name: np.unique(found.measured.conditions[name]).size, default="")
@@ -74,7 +74,7 @@ def _quantity(found: fit.Calibration, name: str, data: xr.Dataset) -> labels.Qua
 
 
 def _curves(found: fit.Calibration, main: str, data: xr.Dataset) -> list[_Curve]:
-    """Return the points in groups that differ only in the condition `main`; one group if there are too many."""
+    """Return groups of points that differ only in the condition `main`; too many groups are merged into one."""
     others = {name: each for name, each in found.measured.conditions.items() if name != main}
     rows = np.stack(list(others.values()), axis=1) if others else np.zeros((found.measured.values.size, 1))
     places, which = np.unique(np.round(rows, 12), axis=0, return_inverse=True)
@@ -195,7 +195,7 @@ def _density(
 
 
 def of_whole_cells(ends: FloatArray, across: FloatArray, place: FloatArray, width: float) -> FloatArray:
-    """Return edges of bins with the same number of cells each; unequal numbers would look like structure."""
+    """Return edges of bins that contain equal numbers of cells, because unequal numbers would look like peaks."""
     low, high = int(place.argmin()), int(place.argmax())
     cell = width * (across[high] - across[low]) / (place[high] - place[low])
     start = across[low] - cell / 2

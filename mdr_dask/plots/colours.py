@@ -13,7 +13,8 @@ from mdr_dask.plots.labels import is_geometric
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap, Normalize
 
-#: Colours of Okabe and Ito, which colour-blind readers can distinguish; more curves than colours need a colour bar.
+#: Colours of Okabe and Ito, which colour-blind readers can distinguish. A figure with more curves than colours has a
+#: colour bar.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 LINES = ("-", "--", ":", "-.")
 MARKERS = ("o", "s", "^", "D")
@@ -37,7 +38,7 @@ def colour(number: int) -> str:
 
 
 def line_and_marker(number: int) -> tuple[str, str]:
-    """Return line and marker of a curve; they differ between curves if the style is grey or defines them."""
+    """Return line and marker of a curve; they differ between curves if the style is grey or if it defines them."""
     from matplotlib.colors import to_rgb
 
     greys = all(len(set(to_rgb(each))) == 1 for each in _cycle("color") or COLOURS)

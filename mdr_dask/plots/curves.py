@@ -37,7 +37,7 @@ class Family(NamedTuple):
     Attributes
     ----------
     curves : list of Curve
-        Curves; each has one dimension besides the realisations.
+        The curves. The data of each curve have one dimension besides the realisations.
     keys : list of Key
         Entries of the legend.
     bar : Bar or None
@@ -105,7 +105,7 @@ def parameters_along(data: xr.Dataset, dim: str) -> list[str]:
 
 
 def hold(data: xr.Dataset, dims: Sequence[str]) -> tuple[xr.Dataset, list[str]]:
-    """Fix axes at their middle value; return the rest of the series, and a text for each axis with several values."""
+    """Return a series with axes fixed at their middle values, and a text for each fixed axis with several values."""
     places = {dim: data.sizes[dim] // 2 for dim in dims}
     sentences = [_only_one(data, dim, place) for dim, place in places.items() if data.sizes[dim] > 1]
     return data.isel(places), sentences
@@ -181,7 +181,7 @@ def family(data: xr.Dataset, output: str, along: str, by: str = "") -> Family:
 
 
 def with_one_legend(families: Mapping[str, Family]) -> tuple[list[str], list[str]]:
-    """Return the largest group of series with the same legend and colour bar, and a text about the other series."""
+    """Return the largest set of series that have the same legend and colour bar, and a text about the other series."""
     groups: dict[Any, list[str]] = {}
     for name, one in families.items():
         groups.setdefault((tuple(one.keys), one.bar), []).append(name)
@@ -250,7 +250,7 @@ def needed(curve: xr.Dataset) -> xr.Dataset:
 
 
 def _names(part: xr.Dataset, dims: Sequence[str]) -> list[str]:
-    """Return the labels of one curve: its parameters along some axes, with values."""
+    """Return the labels of one curve: its values of the parameters that vary along some axes."""
     axes = part.attrs.get("axes", [])
     found = []
     for dim in dims:

@@ -25,7 +25,7 @@ Kind = Literal["curve", "law", "band", "dots", "map", "absent"]
 
 
 class Mean(NamedTuple):
-    """Values with the ends of their 95 % intervals; ends are NaN if the error is unknown."""
+    """Values with the ends of their 95 % intervals; the ends are NaN if the error is unknown."""
 
     value: Any
     low: Any
@@ -41,13 +41,13 @@ class Axis:
     label : str
         Label with its unit; symbols as mathtext between dollars.
     log : bool
-        Whether it is logarithmic.
+        Whether the axis is logarithmic.
     ticks : sequence of (float, str)
-        Positions and texts of ticks, for words instead of numbers.
+        Positions and texts of the ticks, for an axis whose values are words.
     low, high : float, optional
-        Limits; None for the limits of the data.
+        Limits of the axis; None for the limits of the data.
     quantity : str
-        Name of the parameter or output on the axis; empty if the axis shows a quantity derived from it.
+        Name of the parameter or output on the axis; empty if the axis shows a derived quantity.
     reverse : bool
         Whether values increase downwards or to the left.
     """
@@ -99,7 +99,7 @@ class Trace:
     label : str
         Name of the curve.
     colour, line, marker : str
-        As in matplotlib; empty for no line or no marker.
+        Names as in matplotlib; an empty text means no line or no marker.
     bars : bool
         Whether intervals are drawn as bars instead of a band.
     """
@@ -159,7 +159,7 @@ class Figure:
     Parameters
     ----------
     panels : list of Panel
-        In rows from left to right, or in stacks from left to right.
+        The panels. They fill rows from left to right; with `stack`, they fill columns from left to right.
     subject : str
         The subject, for the title.
     fixed : str
@@ -173,9 +173,9 @@ class Figure:
     columns : int, optional
         Largest number of panels in a row.
     stack : int
-        Number of successive panels that stand one above the other.
+        Number of successive panels that are drawn one above the other in a column.
     ratio : float
-        Height of a panel over its width.
+        Height of a panel divided by its width.
     share_y : bool
         Whether all panels have the same vertical axis.
     """
@@ -246,7 +246,8 @@ def columns(of: xr.Dataset | xr.DataArray | None = None, **values: Any) -> xr.Da
     Parameters
     ----------
     of : Dataset or DataArray, optional
-        Its scalar coordinates and those along the dimensions of the values become the parameters of the points.
+        Its scalar coordinates, and its coordinates along the dimensions of the values, become the parameters of the
+        points.
     **values
         ``x``, ``y`` and ``value``. A `Mean` also gives the ends of its interval. A plain array gets the dimensions of a
         labelled array of the same shape.
@@ -273,7 +274,7 @@ def columns(of: xr.Dataset | xr.DataArray | None = None, **values: Any) -> xr.Da
 
 
 def _apart(name: Any) -> str:
-    """Return the name of a parameter, changed if it equals one of the fixed columns of the table."""
+    """Return the name of a parameter for a table; it is changed if the table has another column of this name."""
     return f"parameter {name}" if name in (*FIRST, *LAST) else str(name)
 
 

@@ -22,7 +22,7 @@ BEFORE, JUMP, AFTER = (f"friction_coefficient_{name}" for name in ("before", "ju
 FRICTION = "friction_coefficient"
 TIME = "relaxation_times"
 DRIVEN = ("velocity", "normal_force")
-#: Time before the history, as a share of the time shown.
+#: Duration that is shown before the history begins, as a fraction of the duration shown.
 LEAD = 0.08
 STEADY = "steady state at the end"
 
@@ -74,7 +74,7 @@ def _column(name: str, data: xr.Dataset, one: curves.Family) -> list[Panel]:
 
 
 def _driven(name: str, data: xr.Dataset) -> tuple[Axis, labels.Quantity]:
-    """Return axis and unit of a prescribed quantity; the quantity may be part of the history and not a parameter."""
+    """Return axis and unit of a prescribed quantity, which is a parameter or only part of the loading history."""
     unit = {"velocity": "m/s", "normal_force": "N"}[name]
     values = data[name] if name in data.coords else xr.DataArray(np.nan, attrs={"units": unit})
     how = labels.quantity(name, values)

@@ -44,7 +44,7 @@ SYMBOLS: Mapping[str, str] = {
 }
 #: Units that are shown instead of an SI unit if the campaign states no unit.
 USUAL = {"rad/s": "rpm", "rad": "deg"}
-#: Common prefixes by their power of a thousand, and the units that are written with a prefix.
+#: `PREFIXES`: common prefixes by their power of a thousand. `_PREFIXED`: units that are written with a prefix.
 PREFIXES = {-3: "n", -2: "u", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
 _PREFIXED = re.compile(r"(m|Pa|N|s|W|ohm)(?:\^([23]))?")
 #: Symbols in the long names of outputs, as mathtext.

@@ -51,7 +51,7 @@ def law_of(data: xr.Dataset, output: str) -> Law | None:
 
 
 def along(data: xr.Dataset, name: str, count: int = 200) -> xr.Dataset:
-    """Return the data of a curve on many values of its parameter, for a smooth law.
+    """Return the data of a curve at many values of its parameter, so that a law can be drawn as a smooth line.
 
     The data are unchanged if an output that the law needs varies along the curve.
 

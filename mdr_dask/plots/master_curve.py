@@ -15,7 +15,7 @@ from mdr_dask.plots import colours, curves, labels
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Bar, Figure, Key, Mean, Panel, Trace, columns
 
-#: Largest rms deviation from the merged curve at which the curves count as collapsed.
+#: Largest relative rms deviation from the merged curve at which the curves count as collapsed.
 COLLAPSED = 0.05
 
 
@@ -86,7 +86,7 @@ def _channels(curve: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def _axes(curve: xr.Dataset, shifted: str = "") -> tuple[Axis, Axis]:
-    """Return the axes of the curves; two ordinates share one."""
+    """Return the axes of the curves; two ordinates share one vertical axis."""
     names = [_words(curve.attrs[name]) for name, _ in _channels(curve)]
     unit = str(curve["curve_ordinate"].attrs.get("units", ""))
     across = _label(curve.attrs["abscissa"], curve["curve_abscissa"])
@@ -110,7 +110,7 @@ def _groups(curve: xr.Dataset) -> tuple[list[_Group], list[Key], Bar | None]:
     values = curve[by].to_numpy()
     bar = colours.bar(_label(by, curve[by]), values) if values.size > colours.most() else None
     points = curve[[name for name in curve.data_vars if curve[name].dims == ("point",)]]
-    # readings scatter about round values, so labels are rounded to a hundredth of the smallest step
+    # measured temperatures or velocities scatter about round values: round labels to a hundredth of the smallest step
     digits = -int(np.floor(np.log10(np.min(np.diff(np.sort(values))) / 100)))
     found = [
         _Group(

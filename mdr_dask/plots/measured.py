@@ -1,4 +1,4 @@
-"""Add measured points to any figure that shows their output against one of their conditions."""
+"""Add measured points to any figure that shows the measured output against one of the conditions of measurement."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Figure, Key, Mean, Panel, Trace, columns
 from mdr_dask.units import shown
 
-#: Largest relative difference at which a measured condition counts as equal to that of a curve or panel.
+#: Largest relative difference at which a measured condition counts as equal to the value of a curve or panel.
 SAME = 1e-3
 #: Half width of a 95 % interval in standard errors.
 HALF = 1.96
@@ -26,7 +26,7 @@ NAME = "measured"
 def with_points(
     groups: Mapping[str, xr.Dataset], figures: Mapping[str, Plot], file: str
 ) -> tuple[dict[str, xr.Dataset], dict[str, Plot]]:
-    """Return the series with a table of measurements, and figures that show its points.
+    """Return the series with a table of measurements, and the figures with the measured points added.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def _with_points(figure: Plot) -> Plot:
 
 
 def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
-    """Add the measured points of a study to the panels that show their output against one of their conditions.
+    """Add the measured points of a study to the panels that show the measured output against a measured condition.
 
     Raises
     ------

@@ -27,7 +27,7 @@ LETTERS: dict[Any, Any] = {
 }
 #: Sizes of letters and lines for a figure on a screen.
 SCREEN: dict[Any, Any] = {"legend.fontsize": 8, "lines.linewidth": 1.2, "lines.markersize": 4}
-#: Length of an inch in metres; smallest and largest width and height in metres.
+#: `INCH`: length of an inch in metres. `LEAST`, `MOST`: smallest and largest width and height of a figure in metres.
 INCH = 0.0254
 LEAST, MOST = 0.02, 1.0
 
@@ -75,7 +75,7 @@ def drawing_for(page: Page, style: str | None = None) -> Iterator[None]:
     page : Page
         Size, title and units.
     style : str, optional
-        A style file of matplotlib, or the name of one of its styles; its settings take precedence.
+        A style file of matplotlib, or the name of a style; the settings of the style take precedence over the page.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def drawing_for(page: Page, style: str | None = None) -> Iterator[None]:
 
 @contextmanager
 def with_units(units: Mapping[str, str]) -> Iterator[None]:
-    """Show quantities in these units, unless the user requested others."""
+    """Show quantities in these units, except quantities for which the user requested another unit."""
     token = _PAGE.set(replace(current(), units={**units, **current().units}))
     try:
         yield

@@ -1,7 +1,7 @@
 """Draw a figure with matplotlib: panels, legend, colour bars and title, without overlaps at any width.
 
-The height follows from the content unless it was requested. Legends are below the panels and colour bars beside them.
-Labels are broken into lines and ticks are thinned out if they would overlap.
+The height follows from the content unless the user requested a height. Legends are below the panels and colour bars
+beside the panels. Labels that would overlap are broken into lines, and ticks that would overlap are thinned out.
 """
 
 from __future__ import annotations
@@ -29,21 +29,23 @@ from mdr_dask.version import __version__
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Width in inches of a single panel on a screen, of a panel beside others, and least width at a requested width.
+#: Widths in inches: of a single panel on a screen, of a panel next to another panel, and the least width of a panel in
+#: a figure whose width was requested.
 ALONE, BESIDE, LEAST_PANEL = 6.4, 4.2, 2.2
-#: Least height of a panel in inches, and largest number of panels in a row.
+#: `LEAST_HEIGHT`: least height of a panel in inches. `MOST_COLUMNS`: largest number of panels in a row.
 LEAST_HEIGHT, MOST_COLUMNS = 1.3, 3
-#: Largest share of a requested height for the legend; entries beyond it are left out.
+#: Largest share of a requested height that the legend may take; entries that do not fit are left out.
 LEGEND_SHARE = 0.35
 #: Least distance between the texts of two ticks, in points.
 GAP = 3
 #: Largest number of lines of a title.
 MOST_LINES = 7
-#: Largest number of decades of a vertical logarithmic axis; a share of 1e-90 would hide everything else.
+#: Largest number of decades of a vertical logarithmic axis; with a value such as 1e-90 on it, all other values would
+#: coincide.
 DECADES = 15
 #: Curves with at least this number of points are drawn without markers.
 MANY_POINTS = 60
-#: Height of the marks for cases without a value above the lower edge, as a share of the panel.
+#: Cases without a value are marked at this height above the lower edge, as a fraction of the height of the panel.
 FOOT = 0.02
 #: Dots per inch of pictures for a screen and for print.
 DPI, PRINTED_DPI = 150, 300
@@ -83,7 +85,7 @@ class Drawn(MplFigure):
 
 
 def table_beside(path: str | Path) -> Path:
-    """Return the path for the table of a figure; raise DataError if it is a table that does not belong to a figure."""
+    """Return the path for the table of a figure; raise DataError if another table already has this path."""
     beside = Path(path).with_suffix(".csv")
     if beside.exists() and not beside.read_bytes().startswith(b"# mdr_dask"):
         raise DataError(f"{beside} exists and was not written beside a figure; choose another name for the figure")
@@ -196,7 +198,7 @@ def _finish_axis(axes: Axes, name: str, axis: Axis) -> None:
 
 
 def _log_ticks(axis: Any) -> None:
-    """Put ticks with plain numbers at 1, 2 and 5 times powers of ten on an axis of less than two decades."""
+    """Put ticks at 1, 2 and 5 times powers of ten on an axis of less than two decades, with plain numbers."""
     from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter
 
     low, high = sorted(np.abs(axis.get_view_interval()))
@@ -274,7 +276,7 @@ _DRAW = {"curve": _curve, "law": _curve, "band": _band, "dots": _dots, "map": _m
 
 
 def _bars(figure: Drawn, places: list[Axes], panels: list[Panel]) -> None:
-    """Draw the colour bars; one for all panels if it is the same for all."""
+    """Draw the colour bars; if all panels have the same colour bar, it is drawn once."""
     from matplotlib.cm import ScalarMappable
 
     beside: dict[Bar, list[Axes]] = {}

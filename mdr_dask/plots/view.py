@@ -20,9 +20,11 @@ from mdr_dask.plots import colours, curves, labels, laws
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 
-#: Largest number of panels of one figure, and of letters in one line of the text at a tick.
+#: `MOST_PANELS`: largest number of panels of one figure. `LONGEST_WORD`: largest number of characters in one line of
+#: the text at a tick.
 MOST_PANELS, LONGEST_WORD = 6, 20
-#: Main effects of a sampled study: least cases in a bin, and most bins, parameters and cases drawn as points.
+#: For main effects of a sampled study: smallest number of cases in a bin, and largest numbers of bins, of parameters,
+#: and of cases that are drawn as points.
 IN_A_BIN, MOST_BINS, MOST_EFFECTS, MOST_POINTS = 8, 10, 12, 5000
 #: Marks for cases without a value, and for cases whose mean lacks some realisations and may therefore be biased.
 MARKS = {
@@ -40,9 +42,10 @@ class View:
     Parameters
     ----------
     outputs : str or tuple of str
-        Outputs, or their errors; several are drawn in panels one above the other.
+        Outputs, or errors of outputs; several outputs are drawn in panels one above the other.
     over : str or tuple of str
-        The parameter on the horizontal axis; two for a map, none for the main effects of all parameters.
+        The parameter on the horizontal axis; two parameters for a map, no parameter for the main effects of all
+        parameters.
     by : str
         The parameter that colours show.
     panels : str
@@ -132,7 +135,7 @@ def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
 
 
 def _holding(groups: Mapping[str, xr.Dataset], view: View, output: str) -> tuple[dict[str, xr.Dataset], list[str]]:
-    """Return the series with an output that vary in the named parameters, and the reasons against the other series."""
+    """Return the series that can be drawn as requested, and the reasons why the other series cannot."""
     known = sorted({str(name) for data in groups.values() for name in data.data_vars if name != "status"})
     if output not in known:
         hint = did_you_mean(output, known)
@@ -219,7 +222,7 @@ def _lines(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     panels = [_panel(part, each, view, output, x) for part, each in zip(parts, families, strict=True)]
     first = next(iter(found.values()))
     log = view.is_log("y", np.concatenate([_values(panel) for panel in panels]))
-    log &= view.log is not None or not labels.quantity(output, first[output]).offset  # not for degrees Celsius
+    log &= view.log is not None or not labels.quantity(output, first[output]).offset  # no logarithm of degrees Celsius
     y = Axis(labels.label(output, first[output]), log, quantity=output)
     for panel in panels:
         panel.y = y
@@ -251,7 +254,11 @@ def _guides(levels: Mapping[float, str], panel: Panel) -> list[Trace]:
 
 
 def _parts(found: Mapping[str, xr.Dataset], view: View, output: str) -> tuple[list[_Part], list[str]]:
-    """Return the contents of the panels: a parameter value each, all series, or one series each if they are many."""
+    """Return the contents of the panels.
+
+    There is one panel for each value of the parameter `view.panels`, or one panel for all series, or one panel for each
+    series if there are too many curves for one panel.
+    """
     if view.panels:
         return _by_value(found, view)
     families = {name: curves.family(data, output, view.along[0], view.by) for name, data in found.items()}

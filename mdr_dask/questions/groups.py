@@ -26,10 +26,10 @@ def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None =
 
     The mean m of a group is the mean over its C cases of their means m_c, each case counted once. All cases share their
     R realisations, so their means scatter together. Realisation r of a group is therefore ``m + R u_r``, where ``u_r``
-    is the sum over the cases c of ``(x_cr - m_c) / (n_c C)``. Here x_cr is the result of case c in realisation r, and n_c
-    is the number of realisations of case c. The mean and the standard error of these R numbers are the mean and the
-    standard error of the group, even if the numbers n_c differ. If all n_c are equal, ``m + R u_r`` is the mean of x_cr
-    over the cases.
+    is the sum over the cases c of ``(x_cr - m_c) / (n_c C)``. Here x_cr is the result of case c in realisation r, and
+    n_c is the number of realisations of case c. The mean and the standard error of these R numbers are the mean and the
+    standard error of the group, even if the numbers n_c differ. If every case has all R realisations, ``m + R u_r`` is
+    the mean of x_cr over the cases.
 
     Parameters
     ----------

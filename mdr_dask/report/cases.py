@@ -14,7 +14,7 @@ from mdr_dask.plots import curves, labels
 from mdr_dask.report.figures import Json, numbers
 from mdr_dask.report.words import markup, plain
 
-#: Largest number of cases of one series on the page; beyond it, values of the longest axes are left out.
+#: Largest number of cases of one series on the page; in a larger series, values of the longest axes are left out.
 MOST_CASES = 4000
 
 
@@ -24,9 +24,9 @@ def cases_of(groups: Mapping[str, xr.Dataset]) -> list[Json]:
     Returns
     -------
     list of dict
-        For each series: ``axes`` and ``outputs`` with labels; columns with a number for each case, namely the varied
-        parameters (``at``, in the units of figures), and ``value``, ``low``, ``high``, ``lines`` (standard error) and
-        ``grid`` (grid error) of each output; and ``reduced``, texts on values of axes that are left out.
+        For each series: ``axes`` and ``outputs`` with labels, and ``reduced``, texts on values of axes that are left
+        out. Columns have a number for each case: ``at`` holds the varied parameters in the units of figures; ``value``,
+        ``low``, ``high``, ``lines`` (standard error) and ``grid`` (grid error) belong to each output.
     """
     found = [_series(name, data) for name, data in groups.items()]
     return [series for series in found if series["outputs"] and series["axes"]]
@@ -63,7 +63,7 @@ def _companions(data: xr.Dataset, outputs: list[str]) -> list[str]:
 
 
 def _thinned(data: xr.Dataset, dims: list[str]) -> tuple[xr.Dataset, list[str]]:
-    """Return at most `MOST_CASES` cases, with evenly spread values of the longest axes, and texts on those left out."""
+    """Return at most `MOST_CASES` cases, with evenly spread values of the longest axes, and texts on omitted values."""
     left_out: list[str] = []
     while (total := math.prod(data.sizes[dim] for dim in dims)) > MOST_CASES:
         longest = max(dims, key=lambda dim: data.sizes[dim])

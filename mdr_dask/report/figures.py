@@ -18,7 +18,7 @@ from mdr_dask.report.words import markup
 
 #: Largest number of points of one figure on the page; longer curves are thinned out.
 MOST_POINTS = 20_000
-#: Digits of a number on the page, and number of colours of a colour bar.
+#: `DIGITS`: digits of a number on the page. `SHADES`: number of colours of a colour bar.
 DIGITS, SHADES = 9, 17
 
 Json = dict[str, Any]
@@ -27,7 +27,7 @@ Json = dict[str, Any]
 def drawn_of(
     figures: Mapping[str, Plot], groups: Mapping[str, xr.Dataset], provenance: Any
 ) -> Iterator[Json | tuple[str, str]]:
-    """Yield every figure for which a study has the data; for every other figure, its name and the reason."""
+    """Yield every figure as data; if a study lacks the data for a figure, yield its name and the reason instead."""
     for name, each in figures.items():
         try:
             figure = each.describe(groups)

@@ -1,7 +1,8 @@
 """The page: one HTML file that contains all data and scripts, with a content security policy.
 
-The template escapes text from a store. Data are a block of JSON that browsers do not run. The policy allows only the
-scripts of this package, by their digests. So nothing in a store can become a script.
+The template escapes text from a store. Data are stored as a block of JSON that browsers do not run. The content
+security policy allows only the scripts of this package, which it identifies by their digests. So nothing in a store can
+become a script.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ def publish(url: str, target: Path) -> int:
     Raises
     ------
     StoreError
-        If the store is damaged, in use, or a data file of its campaign was changed or removed.
+        If the store is damaged or in use, or if a data file of its campaign was changed or removed.
     """
     found = store.verify(url)
     if found.findings:

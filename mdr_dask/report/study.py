@@ -58,7 +58,8 @@ class Study:
     campaign, source : str
         Text of the campaign file, and its name.
     understood, counts, machines, laws, errors : lists of Table
-        Axes and fixed parameters; results in each state; computers and versions; fits; sources of the errors.
+        Tables of axes and fixed parameters, of the results in each state, of computers and versions, of fits, and of
+        the sources of errors.
     failures : list of Group
         Messages of failed results and warnings, grouped.
     not_fitted, not_drawn : list of (name, reason)
@@ -68,9 +69,9 @@ class Study:
     subject : Subject or None
         Description of the method.
     digests, rerun : dict of str to str, list of str
-        Digests of campaign and results; commands that compute the study again.
+        Digests of the campaign and of the results, and commands that compute the study again.
     at_work : str
-        Processes that are working on the study.
+        Text with the processes that are working on the study.
     """
 
     url: str

@@ -24,7 +24,7 @@ class Subject(NamedTuple):
     papers : tuple of str
         Papers to cite.
     can, cannot : tuple of str
-        Statements that the results support, and statements that they do not support.
+        Statements that the results support (`can`) and statements that the results do not support (`cannot`).
     page : str
         The page of the documentation with more details.
     """
