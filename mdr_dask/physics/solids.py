@@ -366,7 +366,7 @@ def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
 
 @jit
 def _imbalance(k: int, offset: float, weight: FloatArray, times: FloatArray) -> tuple[float, float]:
-    """Return 1 + sum G tau / (tau - lambda) at a distance `offset` from pole `k`, and its derivative by lambda."""
+    """Return f = 1 + sum G tau / (tau - lambda) at a distance `offset` from pole `k`, and df/dlambda."""
     total, rate = 1.0, 0.0
     for m in range(times.size):
         inverse = 1 / ((times[m] - times[k]) - offset)

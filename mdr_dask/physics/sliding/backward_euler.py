@@ -19,22 +19,22 @@ from mdr_dask.physics.jit import jit
 from mdr_dask.physics.sliding.cases import Cases
 
 ITERATIONS = 200
-COARSENING = 8
-COARSEST = 64  # nodes of the grid on which the search for the depth starts
-CONVERGED = 1e-9  # product of the last two relative steps of the depth, which bounds the error of a secant
-EXACT_STEP = 1e-13  # relative change of the depth that is due to rounding
-COARSE = 1e-3
+COARSENING = 8  # ratio of the numbers of nodes of successive grids in the search for the depth
+COARSEST = 64  # largest number of nodes of the grid on which the search for the depth starts
+CONVERGED = 1e-9  # tolerance of the product of the last two relative steps of the depth, the error of a secant
+EXACT_STEP = 1e-13  # relative step of the depth that is as small as rounding errors
+COARSE = 1e-3  # tolerance of the same product on all grids except the finest
 
 BLOCK = 256  # nodes
-LANES = 8  # cases in one vector instruction
+LANES = 8  # number of cases in one vector instruction
 
-# The results of a sweep for every case, in this order
+# Indices of the results of a sweep for every case
 CARRIED, STIFFNESS, DRAG = range(3)
 SUMS = 3
-# Bounds and sums of a block of nodes, in this order: bounds of height and rise, the previous height, sums
+# Indices of the properties of a block of nodes: bounds of height and rise, height of the previous node, sums
 PEAK, LOWEST, STEEPEST, BEFORE, HEIGHTS, RISES, WORK, SQUARES = range(8)
 KNOWN = 8
-# The state of a case in a sweep, in this order; the last three are sums over the nodes of a block
+# Indices of the state of a case in a sweep; LOAD, RATE and LOSS are sums over the nodes of a block
 U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS = range(7)
 ROWS = 7
 
@@ -45,7 +45,7 @@ class Nodal(NamedTuple):
     Parameters
     ----------
     height, rise : array, shape (n,)
-        Heights, and their increase from the previous node.
+        Height of each node, and its increase from the previous node.
     blocks : array, shape (n // BLOCK, KNOWN)
         From `_blocks`.
     periodic : bool
@@ -59,7 +59,7 @@ class Nodal(NamedTuple):
 
 
 class Moving(NamedTuple):
-    """Sliding cases: v tau in cells, lambda, and the penetration of the highest node."""
+    """Sliding cases: v tau in cells, lambda = 1 / (1 + dt / tau), and the penetration of the highest node."""
 
     deborah: FloatArray
     decay: FloatArray
@@ -72,13 +72,14 @@ class Lanes(NamedTuple):
     Parameters
     ----------
     state : array, shape (ROWS, cases)
-        `U` and `FADE` are, after the sweep, u and its derivative by the depth at the end of the line.
+        State of each case during the sweep. After the sweep, `U` is the displacement u at the end of the line, and
+        `FADE` the derivative of u with respect to the depth.
     packed : array, shape (ROWS + 2, cases + LANES)
-        State, decay and depth of the cases in the queue.
+        State, decay and depth of the cases in the queue, without gaps between them.
     queue : array, shape (cases,)
         Cases in which contact begins or ends in a block.
     sums : array, shape (SUMS, cases)
-        Written: sum of u, its derivative by the depth, and F_x / (4 G) times 1 - lambda.
+        Written: sum of u, the derivative of this sum with respect to the depth, and F_x / (4 G) times 1 - lambda.
     """
 
     state: FloatArray
@@ -89,14 +90,14 @@ class Lanes(NamedTuple):
 
 @jit
 def lanes_for(cases: int) -> Lanes:
-    """Return the workspace of a sweep."""
+    """Return the work arrays of a sweep."""
     packed = np.empty((ROWS + 2, cases + LANES))
     return Lanes(np.empty((ROWS, cases)), packed, np.empty(cases, np.int64), np.empty((SUMS, cases)))
 
 
 @jit
 def _step(h: float, t: float, decay: float, depth: float, u: float, fade: float) -> tuple[float, float, float]:
-    """Move to the next node: return u, its derivative by the depth, and the drag times 1 - lambda."""
+    """Return u at the next node, du/d(depth) there, and the contribution to the drag times 1 - lambda."""
     free = decay * u
     w = h + depth
     is_pressed = w > free
@@ -121,7 +122,7 @@ def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
             work += h * t
             squares += t * t
         blocks[j, PEAK], blocks[j, LOWEST], blocks[j, STEEPEST] = peak, lowest, steepest
-        # elements enter a line that is not periodic out of contact
+        # on a line that is not periodic, elements are out of contact before the first node
         blocks[j, BEFORE] = height[first - 1] if j > 0 or periodic else -np.inf
         blocks[j, HEIGHTS], blocks[j, RISES], blocks[j, WORK], blocks[j, SQUARES] = heights, rises, work, squares
     return blocks
@@ -129,7 +130,10 @@ def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
 
 @jit
 def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) -> int:
-    """Sum a block in closed form; queue the cases in which contact begins or ends in it, and return their number."""
+    """Add the sums of a block for the cases in which it is entirely in contact or entirely free.
+
+    Put the other cases, in which contact begins or ends in the block, into the queue, and return their number.
+    """
     peak, lowest, steepest, before = block[PEAK], block[LOWEST], block[STEEPEST], block[BEFORE]
     heights, rises, work, squares = block[HEIGHTS], block[RISES], block[WORK], block[SQUARES]
     deborah, decay, depth = moving
@@ -155,7 +159,7 @@ def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) ->
 
 @jit
 def _walk(height: FloatArray, rise: FloatArray, decay: FloatArray, depth: FloatArray, workspace: FloatArray) -> None:
-    """Move all cases from node to node, and add to their `LOAD`, `RATE` and `LOSS`."""
+    """Move the element of each case from node to node, and add to the `LOAD`, `RATE` and `LOSS` of the case."""
     whole = height.size // 4 * 4
     for i in range(0, whole, 4):
         h0, h1, h2, h3 = height[i], height[i + 1], height[i + 2], height[i + 3]
@@ -182,7 +186,7 @@ def _walk(height: FloatArray, rise: FloatArray, decay: FloatArray, depth: FloatA
 
 @jit
 def _walk_some(height: FloatArray, rise: FloatArray, moving: Moving, lanes: Lanes, queued: int) -> None:
-    """Move the cases of the queue from node to node together."""
+    """Move the elements of the cases in the queue from node to node, several cases in one vector instruction."""
     decay, depth = moving.decay, moving.depth
     workspace, packed, queue, sums = lanes
     for q in range(queued):
@@ -206,8 +210,8 @@ def _walk_some(height: FloatArray, rise: FloatArray, moving: Moving, lanes: Lane
 def _sweep(line: Nodal, moving: Moving, lanes: Lanes) -> None:
     """Move one element of every case along the line and write the sums.
 
-    On a periodic line it starts and ends at the highest node; otherwise it starts undeformed at the first node. The
-    queue contains the cases for which a block cannot be summed in closed form.
+    On a periodic line the element starts and ends at the highest node; on any other line it starts undeformed at the
+    first node. The queue contains the cases for which a block cannot be summed in closed form.
     """
     height, rise, blocks, periodic = line
     deborah, depth = moving.deborah, moving.depth
@@ -238,11 +242,11 @@ def _newton(
     drags: FloatArray,
     outside: NDArray[np.bool_],
 ) -> None:
-    """Find the depth of every case; `depths` contains guesses at first, and `drags` is NaN where no depth is found.
+    """Find the depth of every case; `depths` contains guesses and is overwritten, `drags` is NaN if no depth is found.
 
     The load is a convex, increasing, piecewise linear function of the depth, so that Newton's method approaches the
-    root from above after its first step. The last step needs no further sweep, because the drag is extrapolated along
-    the secant.
+    root from above after its first step. No sweep follows the last step, because the drag is extrapolated along the
+    secant through the last two sweeps.
     """
     count = depths.size
     active, lanes, before = np.arange(count), lanes_for(count), np.full((2, count), np.nan)
@@ -256,7 +260,7 @@ def _newton(
         kept = 0
         for k in range(count):
             case = active[k]
-            # behind the end of a line that is not periodic, u and its derivative decay freely
+            # behind the end of a line that is not periodic, u and its derivative decay exponentially
             carried = sums[CARRIED, k] + ends * deborah[k] * workspace[U, k]
             step = (load[k] - carried) / (sums[STIFFNESS, k] + ends * deborah[k] * workspace[FADE, k])
             drag = sums[DRAG, k] * (1 + deborah[k])
@@ -285,7 +289,10 @@ def contact(
     touched: FloatArray,
     slope: FloatArray,
 ) -> None:
-    """Write the number of nodes in contact and the rms rise over them; line and cases as in :func:`steady_by_steps`."""
+    """Write the number of nodes in contact and the rms rise at these nodes.
+
+    The other parameters are as in :func:`steady_by_steps`.
+    """
     for k in range(depths.size):
         decay, count, square = deborah[k] / (1 + deborah[k]), 0, 0.0
         u = depths[k] if periodic else 0.0
@@ -305,15 +312,15 @@ def contact(
 def steady_by_steps(
     height: FloatArray, periodic: bool, deborah: FloatArray, loads: FloatArray
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Return the depth of the highest node, F_x / (4 G) and whether the contact leaves the line, for every case.
+    """Return for every case the depth of the highest node, F_x / (4 G), and whether an end of the line is in contact.
 
-    The depth is first found on every `COARSENING`-th node, repeatedly if the line is long. The guesses, and so the
-    results, depend on the case alone.
+    The depth is found on finer and finer grids, each with `COARSENING` times as many nodes as the previous one. The
+    first guess, and therefore the result, does not depend on the other cases.
 
     Parameters
     ----------
     height : array, shape (n,)
-        Heights. A periodic line starts at the node after the highest one and ends at the highest one.
+        Heights. A periodic line starts at the node after the highest node and ends at the highest node.
     periodic : bool
         Whether the line is periodic; if not, elements enter undeformed at the first node.
     deborah, loads : array, shape (cases,)

@@ -14,7 +14,7 @@ from mdr_dask.physics.outcome import Outcome
 Scheme = Literal["hermite", "piecewise_linear", "backward_euler"]
 
 COLUMNS = ("drag", "depth", "contact_fraction", "contact_slope")
-"""The results of a case, in the order of the rows of an array of results."""
+"""Names of the results of a case, in the order of the rows in which arrays of results store them."""
 
 
 class Cases(NamedTuple):
@@ -31,13 +31,13 @@ class Steady:
     Parameters
     ----------
     drag : array
-        F_x / (4 G), in the unit of height squared: mu = F_x / F_N.
+        F_x / (4 G), in the unit of height squared. The coefficient of friction is mu = F_x / F_N.
     depth : array
         Penetration d of the mean line, in the unit of height.
     contact_fraction : array
         Length in contact over the length of the line.
     contact_slope : array
-        rms slope of the profile over the contact.
+        rms slope of the part of the line that is in contact.
     status : int8 array
         Values of `Outcome`.
     """
@@ -55,12 +55,12 @@ class Steady:
 
     @classmethod
     def of(cls, columns: FloatArray, status: NDArray[np.int8]) -> Steady:
-        """Return steady states from the rows of an array; NaN where a case has not converged."""
+        """Return steady states from the rows of an array; results of cases that have not converged become NaN."""
         drag, depth, fraction, slope = np.where(status == Outcome.CONVERGED, columns, np.nan)
         return cls(drag, depth, fraction, slope, status)
 
     def only(self, cases: NDArray[Any]) -> Steady:
-        """Return some of the cases."""
+        """Return the steady states of the selected cases."""
         return Steady(**{name: column[cases] for name, column in vars(self).items()})
 
 

@@ -1,9 +1,10 @@
 """Full contact of any linear solid with a rough plane: the harmonics are independent.
 
-The displacement is u = d + h, and every wave c_k has the pressure G*(q_k v) c_k (thesis eq. 3.14 for the Kelvin solid).
+The displacement is u = d + h, and the pressure of wave k, with the amplitude c_k, is G*(q_k v) c_k (thesis eq. 3.14 for
+the Kelvin solid).
 The drag is therefore a sum over the spectrum and does not depend on the phases. This is valid if the pressure is
-positive everywhere, which is checked at nodes: between m nodes, a sum of waves of up to k periods is at most 1 / cos(pi
-k / m) times its largest value at the nodes (Ehlich and Zeller, 1964).
+positive everywhere. The pressure is computed at m nodes. Between them, a sum of waves with up to k periods on the line
+is at most 1 / cos(pi k / m) times its largest value at the nodes (Ehlich and Zeller, 1964).
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from mdr_dask.physics.sliding.cases import Steady
 from mdr_dask.physics.surfaces.waves import Waves, series
 
 OVERSAMPLING = 2  # nodes per Nyquist point: the pressure between nodes is at most 41 % larger
-DEEP = 4.0  # load over the rms pressure of the waves; below this ratio full contact is too rare to be worth a check
-ROUNDING = 1e-12  # relative error of sums over a spectrum
+DEEP = 4.0  # ratio of the load to the rms pressure of the waves; below it full contact is too rare to be checked
+ROUNDING = 1e-12  # relative rounding error of sums over a spectrum
 
 
 def steady_full_contact(
@@ -29,12 +30,14 @@ def steady_full_contact(
     deborah: FloatArray,
     loads: FloatArray,
 ) -> Steady | None:
-    """Return the steady states of cases in full contact, and `Outcome.INVALID` for other cases; None if there are none.
+    """Return the steady states of the cases in full contact, or None if no case is in full contact.
+
+    The status of cases that are not in full contact is `Outcome.INVALID`.
 
     Parameters
     ----------
     waves : Waves
-        The line, of length 1.
+        Spectrum of the line, whose length is 1.
     terms : sequence of (float, float)
         G_m / G_inf and tau_m v / L of the Prony terms; empty for a Kelvin solid.
     nodes : pair of array, shape (nodes,)
@@ -42,7 +45,7 @@ def steady_full_contact(
     deborah : array, shape (cases,)
         eta v / (G_inf L) of the dashpot.
     loads : array, shape (cases,)
-        F_N / (4 G_inf L), in the unit of height: the mean displacement.
+        F_N / (4 G_inf L), in the unit of height; equal to the mean displacement.
 
     Examples
     --------

@@ -3,8 +3,8 @@
 All lengths are in cells: a cell has length 1, a slope is the rise over one cell, ``deborah`` is v tau / dx. Heights are
 positive towards the elastomer and are measured from the highest point of the line, so that the penetration is w = depth
 + height with depth > 0. In contact u = w; a free element recovers as exp(-s / deborah). The derivative du/d(depth) is 1
-in contact and decays with u behind a contact. The shift of the places where contact begins and ends has an effect of
-second order only.
+in contact; behind a contact it decays in proportion to u. The shift of the places where contact begins and ends has an
+effect of second order only.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, summit
 
 BLOCK = 16  # cells that are skipped together if all of them are in contact or all of them are free
-TINY = 1e-290
-CLOSE = 1e-8  # cells: a Newton step of this size is the last one, because the next one would be below rounding
+TINY = 1e-290  # displacements below this are set to 0
+CLOSE = 1e-8  # cells: Newton's method stops after a step shorter than this, because a further step would be rounding
 ITERATIONS = 80
 
-# The results of a sweep, in this order
+# Indices of the results of a sweep
 DISPLACEMENT, STIFFNESS, DRAG, DRAG_RATE, LENGTH, STRETCH, OUTSIDE = range(7)
 SUMS = 7
 
@@ -38,7 +38,7 @@ class Blocks(NamedTuple):
 
 @jit_inline
 def _four(column: FloatArray, i: int) -> float:
-    """Return the sum over cells i and i + 1, and over the two cells half a block after them."""
+    """Return the sum of a column over the cells i and i + 1, and over the two cells half a block later."""
     half = BLOCK // 2
     here, after = column[np.uintp(i)] + column[np.uintp(i + half)], column[np.uintp(i + 1)]
     return float(here + (after + column[np.uintp(i + 1 + half)]))
@@ -46,7 +46,7 @@ def _four(column: FloatArray, i: int) -> float:
 
 @jit
 def blocks_of(cells: Cells) -> Blocks:
-    """Return the blocks of a line; the cells after the last whole block belong to no block."""
+    """Return the whole blocks of a line; the cells that remain at the end belong to no block."""
     blocks = (cells.mean.size - 1) // BLOCK
     peak, mean, stretch = np.empty(blocks), np.empty(blocks), np.empty(blocks)
     for block in range(blocks):
@@ -61,10 +61,10 @@ def blocks_of(cells: Cells) -> Blocks:
 
 
 class Barriers(NamedTuple):
-    """Limits of the depth for cells and blocks at a Deborah number; limits of blocks are NaN until they are needed.
+    """Limits of the depth for cells and blocks at a Deborah number; the limit of a block is NaN until it is computed.
 
-    At a depth above `cell` or `block`, the force on elements in contact is positive everywhere in the cell or block. At
-    a depth up to `idle`, it is positive nowhere in the cell.
+    At a depth above `cell` (or `block`), the force on elements in contact is positive everywhere in the cell (or
+    block). At a depth up to `idle`, the force is positive nowhere in the cell.
     """
 
     cell: FloatArray
@@ -74,12 +74,12 @@ class Barriers(NamedTuple):
 
 @jit
 def barriers_for(cells: int) -> Barriers:
-    """Return arrays for the barriers of a line, none of which is computed yet."""
+    """Return empty arrays for the barriers of a line with the given number of cells."""
     return Barriers(np.empty(cells), np.full(cells // BLOCK + 1, np.nan), np.empty(cells))
 
 
 class Places(NamedTuple):
-    """Where contact begins and ends, in cells."""
+    """Positions along the line where each contact patch begins and ends, in cells."""
 
     begins: FloatArray
     ends: FloatArray
@@ -87,7 +87,7 @@ class Places(NamedTuple):
 
 @jit
 def places_for(patches: int) -> Places:
-    """Return arrays with a capacity for a number of patches."""
+    """Return empty arrays that hold the places of up to the given number of patches."""
     return Places(np.empty(patches), np.empty(patches))
 
 
@@ -95,9 +95,10 @@ def places_for(patches: int) -> Places:
 def write_barriers(
     height: FloatArray, enter: FloatArray, leave: FloatArray, deborah: float, block: int, barriers: Barriers
 ) -> None:
-    """Write the barriers of the cells of a block from the force w + deborah w', and their maximum, the block's barrier.
+    """Write the barriers of the cells of a block, which follow from the force w + deborah w'.
 
-    `idle` follows from the Bernstein control points of the force, which bound it.
+    The barrier of the block is the largest barrier of its cells. `idle` follows from the Bernstein control points of
+    the force, which bound the force in the cell.
     """
     every, written, idle = -np.inf, barriers.cell, barriers.idle
     for i in range(block * BLOCK, min((block + 1) * BLOCK, written.size)):
@@ -123,7 +124,7 @@ def _decayed(x: float) -> float:
     """Return 1 - exp(-x) for x >= 0; for small x by a series, which is faster and exact to rounding."""
     if x > 1 / 32:
         return -math.expm1(-x)
-    # products, because divisions would take a tenth of the time of a sweep
+    # products with reciprocals, because divisions would make a sweep a tenth slower
     rest = 1 - x * (1 / 5) * (1 - x * (1 / 6) * (1 - x * (1 / 7)))
     return x * (1 - x * (1 / 2) * (1 - x * (1 / 3) * (1 - x * (1 / 4) * rest)))
 
@@ -184,7 +185,10 @@ class FreeElement(NamedTuple):
 
 @jit
 def _contact_begin_between(element: FreeElement, deborah: float, low: float, high: float) -> float:
-    """Return where w rises to u exp(-(x - start) / deborah) between `low` and `high`; at `high` it is above this."""
+    """Return the place between `low` and `high` where w rises to u exp(-(x - start) / deborah).
+
+    At `high`, w must be larger than this expression.
+    """
     w0, a, b, c, u, start = element
     if w0 + low * (a + low * (b + low * c)) >= u - u * _decayed((low - start) / deborah):
         return low
@@ -242,10 +246,11 @@ def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) 
 
 @jit
 def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> tuple[float, float, float, float]:
-    """Return the integral of u over a free recovery, its derivative by the depth, the drag and its derivative.
+    """Return the integral of u over a free recovery, the drag, and their derivatives with respect to the depth.
 
-    The integral of u is deborah times the decrease of u, and the drag is half the decrease of u^2. The derivative of
-    the drag includes the shift of the place where contact begins, where the line has the given slope.
+    The order is: integral, its derivative, drag, its derivative. The integral of u is deborah times the decrease of u,
+    and the drag is half the decrease of u^2. The derivative of the drag includes the shift of the place where contact
+    begins; `slope` is the slope of the line there.
     """
     lost = _decayed(travelled / deborah) if u > 0 else 1.0
     memory = deborah * lost
@@ -256,7 +261,7 @@ def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> 
 def _skip_free(
     peak: FloatArray, block_peak: FloatArray, depth: float, decay: float, block_decay: float, i: int, free: float
 ) -> tuple[int, float]:
-    """Skip cells in which a free element stays out of contact; return the next cell and the displacement there."""
+    """Skip cells in which a free element stays out of contact; return the first other cell and u at its start."""
     n, blocks = peak.size - 1, block_peak.size
     while i < n and peak[i] + depth <= free * decay:
         if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_peak[i // BLOCK] + depth <= free * block_decay:
@@ -287,11 +292,11 @@ def sweep_cells(
     depth : float
         Penetration of the highest point.
     sums : array, shape (SUMS,)
-        Written: the integral of u (F_N / (4 G dx)), its derivative by the depth, F_x / (4 G), its derivative by the
-        depth, the length in contact, the integral of w'^2 over it, and 1 if an end of a line that is not periodic is in
-        contact.
+        Written: the integral of u, which equals F_N / (4 G dx); the derivative of this integral with respect to the
+        depth; F_x / (4 G); the derivative of F_x / (4 G) with respect to the depth; the length in contact; the integral
+        of w'^2 over the length in contact; and 1 if an end of a line that is not periodic is in contact, otherwise 0.
     places : Places
-        Written up to its capacity: where each patch begins and ends.
+        Written: where each patch begins and ends; patches beyond the capacity of the arrays are only counted.
     """
     # local names, because reading an array from a tuple takes more time than computing a cell
     height, enter, leave, peak, mean, stretches = (
@@ -311,9 +316,9 @@ def sweep_cells(
     i, x, contact, patches = 0, start, cells.periodic, 0
     if contact and begins.size > 0:
         begins[0] = start
-    # u: displacement where contact ended; free: at the start of this cell; left: place where contact ended
+    # u: displacement where contact ended; free: displacement at the start of this cell; left: place where contact ended
     u = free = left = 0.0
-    # the period ends at the highest point, in a cell that repeats the first one in part
+    # the period ends at the highest point, inside a last cell that repeats the start of the first cell
     last = n if cells.periodic and start > 0 else n - 1
     while i <= last:
         if contact and x == 0:
@@ -357,7 +362,7 @@ def sweep_cells(
                     ends[patches] = left
                 patches += 1
                 free = u = w0 + place * (c1 + place * (c2 + place * c3))
-            # a cubic falls through 0 at most twice
+            # a cubic force falls through 0 at most twice in a cell
             low = x + CLOSE if visits > 0 else x
             may_begin = visits < 2 and low < stop
             begin = _contact_begin(FreeElement(w0, c1, c2, c3, free, x), deborah, low, stop) if may_begin else NONE
@@ -371,7 +376,7 @@ def sweep_cells(
                 begins[patches] = i + begin
         x = 0.0
         i += 1
-    # the last free recovery extends to the highest point, or to infinity
+    # the last free recovery extends to the highest point of a periodic line, otherwise to infinity
     if not contact:
         travelled = n + start - left if cells.periodic else np.inf
         slope = enter[n] if cells.periodic and start == 0 else 0.0

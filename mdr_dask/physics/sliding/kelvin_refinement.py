@@ -23,15 +23,18 @@ from mdr_dask.physics.sliding.node_to_node import NodeToNode
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 FLOORS = (0.0, 1.0, 0.0, 0.0)
-"""Errors of the depth are relative to the unit of height (the rms height) if the depth is smaller."""
-ORDER = 3.0  # of `node_to_node`: fourth order in cubic cells, lower at contact edges; measured 3.3
-ORDER_OF_CELLS = 2.0  # of sweeps: second order for contacts that are shorter than a cell
-ORDER_OF_STEPS = 1.0  # of backward Euler, and of contact edges on straight cells
-SEARCH = 0.1  # part of the accuracy: allowed error of the search for the depth
+"""Floors of drag, depth, contact fraction and contact slope: an error is relative to the floor if the value is smaller.
+
+The floor of the depth is the unit of height, which is the rms height.
+"""
+ORDER = 3.0  # order of convergence of `node_to_node`: four in cubic cells, lower at contact edges; measured: 3.3
+ORDER_OF_CELLS = 2.0  # order of convergence of sweeps over cubic cells if contacts are shorter than a cell
+ORDER_OF_STEPS = 1.0  # order of convergence of backward Euler, and of the place of contact edges on straight cells
+SEARCH = 0.1  # allowed error due to the search for the depth, as a fraction of the accuracy
 NODE_ERROR = 5e-5  # relative error of the arithmetic of `node_to_node` on any grid
 NODE_LEVELS = tuple(2**k for k in range(12))  # nodes per Nyquist point; above 2 only where contact begins or ends
 CELL_LEVELS = tuple(2**k for k in range(1, 7))
-REFERENCE = 0.01  # accuracy of the reference for errors of time steps on a given grid
+REFERENCE = 0.01  # relative accuracy of the solution with which results of time steps are compared
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,7 @@ class KelvinCases:
     deborah, loads : array, shape (cases,)
         v tau / L and F_N / (4 G L), in the unit of height.
     contact : bool
-        Whether fraction and slope of the contact are requested. They take extra time with time steps only.
+        Whether contact fraction and contact slope are requested. Only with time steps do they take extra time.
     """
 
     line: RoughLine
@@ -57,7 +60,7 @@ class KelvinCases:
     contact: bool = True
 
     def only(self, cases: NDArray[Any]) -> KelvinCases:
-        """Return some of the cases."""
+        """Return the selected cases."""
         return replace(self, deborah=self.deborah[cases], loads=self.loads[cases])
 
     def on_grid(self, oversampling: int) -> Steady:
@@ -65,7 +68,7 @@ class KelvinCases:
         return self._on_grid(oversampling, None)
 
     def _on_grid(self, oversampling: int, depths: FloatArray | None) -> Steady:
-        """Solve the cases on a grid; the search starts from depths on another grid, if there are any."""
+        """Solve the cases on a grid; the search starts from the given depths, which come from another grid."""
         nodes = self.line.points * oversampling
         if self.scheme == "hermite":
             return sliding.steady_sliding(self.line.cubic(nodes), self.deborah, self.loads, depths)
@@ -77,15 +80,15 @@ class KelvinCases:
     def with_errors(self, oversampling: int) -> tuple[Steady, FloatArray]:
         """Solve the cases on a grid and estimate their errors.
 
-        The errors of cells are estimated from cells of twice the length. Results of time steps, and results on the
-        coarsest grid, are compared with the default scheme at an accuracy of 1 %, because time steps converge too
-        slowly for an estimate from two grids.
+        For cubic and straight cells, the errors are estimated by a second solution on cells of twice the length.
+        Results of time steps, and results on the coarsest grid, are compared with the default scheme at an accuracy of
+        1 %, because time steps converge too slowly for an estimate from two grids.
 
         Returns
         -------
         Steady
         array, shape (4, cases)
-            Estimated absolute errors of the columns of the steady states.
+            Estimated absolute errors of `Steady.columns`.
         """
         if self.scheme != "backward_euler" and oversampling > 1:
             found = self._swept((oversampling // 2, oversampling), np.inf)
@@ -98,8 +101,8 @@ class KelvinCases:
     def to_accuracy(self, accuracy: float) -> tuple[Steady, FloatArray]:
         """Solve every case on the coarsest grid that meets a relative accuracy.
 
-        The accuracy is required for drag, contact fraction and contact slope together, because two grids may agree by
-        chance in one of them. The error of the depth is relative to the rms height if the depth is smaller.
+        All results of a case have to meet the accuracy, because the drag (or another single result) may agree on two
+        grids by chance. The error of a depth that is smaller than the rms height is relative to the rms height.
 
         Returns
         -------
@@ -131,7 +134,7 @@ class KelvinCases:
         return Steady.of(columns, status), errors
 
     def _swept(self, levels: tuple[int, ...], accuracy: float) -> Refined:
-        """Solve the cases by sweeps over whole lines; each search for a depth starts from the previous grid."""
+        """Solve the cases by sweeps over whole lines; a search starts from the depth on the previous grid."""
         depths = np.full(self.loads.size, np.nan)
 
         def solve(level: int, cases: IntArray) -> Solution:
@@ -139,7 +142,7 @@ class KelvinCases:
             depths[cases] = found.depth
             return Solution(found.columns, found.status)
 
-        # with one node per Nyquist point cubic cells do not reach their order
+        # with one node per Nyquist point, cubic cells do not converge at their order
         order = ORDER_OF_CELLS if self.scheme == "hermite" and levels[0] > 1 else ORDER_OF_STEPS
         return refine(solve, self.loads.size, levels, accuracy, order, floors=FLOORS)
 
@@ -147,7 +150,7 @@ class KelvinCases:
 def _write(
     results: tuple[FloatArray, FloatArray, NDArray[np.int8]], cases: IntArray, found: Refined, least: float
 ) -> None:
-    """Write refined results of some cases, unless existing results have smaller errors."""
+    """Replace the results of the given cases by refined results, unless the errors of the old results are smaller."""
     columns, errors, status = results
     values = np.array(found.values)
     known = found.errors + least * np.maximum(np.abs(values), np.array(FLOORS)[:, None])
@@ -158,6 +161,6 @@ def _write(
 
 
 def nodes_of(line: RoughLine) -> tuple[FloatArray, FloatArray]:
-    """Return heights and slopes at two nodes per Nyquist point, the input of full contact and `NodeToNode`."""
+    """Return heights and slopes at two nodes per Nyquist point, as `full_contact` and `NodeToNode` need them."""
     nodes = full_contact.OVERSAMPLING * line.points
     return line.heights(nodes), line.slopes(nodes)

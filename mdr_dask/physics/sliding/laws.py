@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-INDENTER_EXPONENT = 1.5  # alpha of eq. 3.40
-BETA = 1.6  # beta of eq. 3.11 for all Hurst exponents; computed: 1.61 to 1.67 (docs/evidence/friction.md, Laws)
+INDENTER_EXPONENT = 1.5  # exponent alpha in eq. 3.40
+BETA = 1.6  # beta of eq. 3.11, for all Hurst exponents; computed values: 1.61 to 1.67 (docs/evidence/friction.md, Laws)
 
 
 def force_number(force: Any, shear_modulus: Any, rms: Any, length: Any) -> Any:
@@ -21,7 +21,7 @@ def force_number(force: Any, shear_modulus: Any, rms: Any, length: Any) -> Any:
 
 
 def velocity_number(velocity: Any, relaxation_time: Any, slope: Any, rms: Any) -> Any:
-    """Return v tau slope / (sqrt 2 h) (eq. 3.19); near 1 the contacts become one-sided."""
+    """Return v tau slope / (sqrt 2 h) (eq. 3.19); near 1, contact becomes limited to the front of the asperities."""
     return velocity * relaxation_time * slope / (math.sqrt(2) * rms)
 
 
@@ -36,15 +36,15 @@ def zone_one(force: Any, velocity: Any, exponent: Any, beta: Any) -> Any:
     Parameters
     ----------
     force, velocity : array_like
-        `force_number` and `velocity_number`.
+        Results of `force_number` and `velocity_number`.
     exponent, beta : array_like
-        Constants of the law.
+        Constants alpha and beta of the law.
     """
     return math.sqrt(2) * beta * velocity * force**-exponent
 
 
 def full_contact(force: Any, velocity: Any) -> Any:
-    """Return mu / slope in full contact, 4 eta v L slope / F_N, which is exact (eq. 3.14)."""
+    """Return mu / slope in full contact, where mu = 4 eta v L slope^2 / F_N exactly (eq. 3.14)."""
     return 4 * math.sqrt(2) * velocity / force
 
 
@@ -91,7 +91,7 @@ def indenter(xi: Any, exponent: Any = INDENTER_EXPONENT) -> Any:
     xi : array_like
         mu / (sqrt 2 slope) from the law for low velocity.
     exponent : array_like
-        alpha of the law.
+        Exponent alpha of the law.
     """
     return np.exp(-np.logaddexp(0.0, -exponent * np.log(xi)) / exponent)
 
@@ -99,8 +99,8 @@ def indenter(xi: Any, exponent: Any = INDENTER_EXPONENT) -> Any:
 def single_tip(curvature: Any, force: Any, viscosity: Any, velocity: Any) -> Any:
     """Return mu of a viscous foundation at very high velocity, (2/3) sqrt(kappa F_N / (2 eta v)).
 
-    One parabolic tip is in contact from its summit to a = sqrt(F_N / (2 eta v kappa)) ahead of it. The rms slope in
-    contact is kappa a / sqrt 3 = mu sqrt(3) / 2. The derivation is in docs/high-speed.md.
+    One parabolic tip is in contact from its summit to the distance a = sqrt(F_N / (2 eta v kappa)) ahead of the summit.
+    The rms slope in contact is kappa a / sqrt 3 = mu sqrt(3) / 2. The derivation is in docs/high-speed.md.
 
     Parameters
     ----------

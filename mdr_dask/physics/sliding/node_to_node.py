@@ -4,12 +4,12 @@ In a cell the line is a cubic through heights and slopes at its ends, w = d + h 
 number v tau in cells. Contact ends where the force w + De w' falls to 0, and begins where the gap closes. A cell that
 is partly in contact adds only positive terms, which avoids cancellation in slow sliding: the integrals of w and De w'^2
 over the part in contact, and of u and u^2 / De over the free part. Cells that are entirely in contact are integrated
-exactly, so that full contact is exact on any grid. Lengths are in cells, as in `kelvin`.
+exactly, so that full contact is exact on any grid. Lengths are in cells, as in module `kelvin`.
 
 All cases are moved along the line together, block by block. Vector instructions decide for all cases whether a block is
-entirely in contact or entirely free; its integrals are then sums in closed form. In the other blocks each case is moved
-from cell to cell. The results of a case do not depend on the other cases. The depth that carries the load is found by
-Newton's method on finer and finer grids, each time starting from the depth on the previous grid.
+entirely in contact or entirely free; the integrals over such a block are sums in closed form. In the other blocks each
+case is moved from cell to cell. The results of a case do not depend on the other cases. The depth that carries the load
+is found by Newton's method on finer and finer grids, each time starting from the depth on the previous grid.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from mdr_dask.physics.surfaces.cubic_line import highest_point
 
 BLOCK = 32  # cells
 WING = 4  # nodes on each side from which the nodes of a finer grid are interpolated
-BEFORE, AFTER = WING + 1, WING + 2  # nodes added from the previous and the next period, as many as `refine` needs
-ABOVE = 4 / 27  # times the slopes at both ends: a cubic cell rises above its ends by this at most
-SUMMIT = 64  # nodes in the cell of the highest point; the highest of them is used as the summit
+BEFORE, AFTER = WING + 1, WING + 2  # numbers of nodes added from the previous and the next period, for `refine`
+ABOVE = 4 / 27  # a cubic cell rises above its ends by at most this factor times the sum of its inward slopes
+SUMMIT = 64  # number of nodes in the cell of the highest point; the highest of these nodes is used as the summit
 
 NO_ENDS: FloatArray = np.empty((2, 0))
-# Bounds and sums of a block of cells, in this order
+# Indices of the bounds and sums of a block of cells
 PEAK, LOWEST, STEEPEST, HEIGHTS, SQUARES = range(5)
 KNOWN = 5
-# Rows of a tile: two at nodes, from the node before the tile on, then three at cells
+# Rows of a tile: HEIGHT and SLOPE for each node (from the node before the tile on), then three values for each cell
 HEIGHT, SLOPE, MEAN, SQUARE, TOP = range(5)
 IN_A_TILE = 5
 
@@ -50,7 +50,8 @@ class Nodes(NamedTuple):
     Parameters
     ----------
     height, slope : array, shape (BEFORE + n + AFTER,)
-        Heights relative to the first node, and slopes as rises per cell, with some nodes of the neighbouring periods.
+        Heights relative to the first node, and slopes as rises per cell; the arrays begin with `BEFORE` nodes of the
+        previous period and end with `AFTER` nodes of the next period.
     ends : array, shape (2, BEFORE + n + AFTER) or (2, 0)
         From `ends_of`, with the same additional nodes.
     blocks : array, shape (n // BLOCK, KNOWN)
@@ -58,7 +59,8 @@ class Nodes(NamedTuple):
     top : float
         Height of the first node.
     rise : float
-        Height of the highest point above the first node, in the cell before this node; 0 on coarse grids.
+        Height of the highest point of the line above the first node. The highest point is in the cell before the first
+        node. On coarse grids `rise` is 0.
     """
 
     height: FloatArray
@@ -71,7 +73,10 @@ class Nodes(NamedTuple):
 
 @jit
 def _take(given: FloatArray, first: int, stride: int, period: FloatArray) -> None:
-    """Write every stride-th number of a period from `first` on, with numbers of the previous and the next period."""
+    """Write every stride-th value of `given`, from index `first` on, to `period`.
+
+    Values of the previous and of the next period are added at both ends.
+    """
     n = period.size - BEFORE - AFTER
     left = -(-(given.size - first) // stride)
     filled = left if left < n else n  # up to the end of the given array
@@ -88,7 +93,7 @@ def _take(given: FloatArray, first: int, stride: int, period: FloatArray) -> Non
 
 @lru_cache(maxsize=4)
 def _end_factors(n: int) -> NDArray[np.complex128]:
-    """Return the factors of `ends_of` for the mean and every wave of a line of n nodes."""
+    """Return the factors with which `ends_of` multiplies the mean and every wave of a line of n nodes."""
     wave = 2 * np.pi / n * np.arange(1, n // 2 + 1)
     return np.append(0.0, 1j * (1 / wave - 0.5 / np.tan(wave / 2)))
 
@@ -96,9 +101,9 @@ def _end_factors(n: int) -> NDArray[np.complex128]:
 def ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
     """Return corrections of the trapezium rule for the integrals of height and slope squared, shape (2, n).
 
-    The integral from one node to another is the trapezium sum plus the correction at the first node minus the
-    correction at the last one. This is exact; slopes are rises per cell. Corrections from local derivatives would miss
-    the shortest waves, which are important for the integrals over small contacts.
+    The integral from node i to node j is the trapezium sum, plus the correction at node i, minus the correction at node
+    j. This is exact. Slopes are rises per cell. Corrections from local derivatives would miss the shortest waves, which
+    are important for the integrals over small contacts.
     """
     n = height.size
     parts = fft.rfft([height, (slope / n) ** 2])
@@ -107,18 +112,18 @@ def ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
 
 
 def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolved: bool, ends: FloatArray) -> Nodes:
-    """Take every stride-th node of a line; slopes are differences of heights unless the line is resolved.
+    """Return every stride-th node of a line; unless `resolved`, slopes are computed from differences of heights.
 
     Parameters
     ----------
     height, slope : array, shape (n,)
-        Heights, and derivatives by position over the length of the line.
+        Heights, and their derivatives with respect to the position x / L, where L is the length of the line.
     first : int
-        First node; heights are relative to it.
+        Index of the first node, whose height is subtracted from all heights.
     resolved : bool
-        Whether the nodes resolve the slopes.
+        Whether the nodes are close enough for the given slopes to be used.
     ends : array, shape (2, n) or (2, 0)
-        From `ends_of`; if it is empty, integrals over cells follow from the neighbouring nodes.
+        From `ends_of`. If the array is empty, integrals over cells are computed from neighbouring nodes.
     """
     n = height.size // stride
     h, s = np.empty((2, BEFORE + n + AFTER))
@@ -138,7 +143,7 @@ def _take_line(
     line: Nodes,
     cells: FloatArray,
 ) -> None:
-    """Write the nodes and blocks of a line; slopes are differences of heights if none are given."""
+    """Write the nodes and blocks of a line; if `slope` is empty, slopes are computed from differences of heights."""
     h, s, of_height, of_square, blocks = line.height, line.slope, line.ends[0], line.ends[1], line.blocks
     n = h.size - BEFORE - AFTER
     _take(height, first, stride, h)
@@ -158,7 +163,7 @@ def _take_line(
     mean, square, above = cells[0], cells[1], cells[2]
     for j in range(blocks.shape[0]):
         before, begin, last = BEFORE + j * BLOCK - 1, BEFORE + j * BLOCK, BEFORE + (j + 1) * BLOCK
-        # first values of each cell, by vector instructions, then the sums
+        # compute the values of all cells by vector instructions, then sum them over the block
         _integrals(h[before:], s[before:], of_height[before:], of_square[before:], BLOCK, mean, square)
         for k in range(BLOCK):
             i = begin + k
@@ -188,8 +193,9 @@ def _integrals(
 ) -> None:
     """Write the integrals of height and slope squared over cells; `square` must have one more element than cells.
 
-    The arrays begin with the node before the first cell. If there are no exact corrections, Euler-Maclaurin corrections
-    are used, with derivatives from heights and slopes at the neighbouring nodes. They cancel over a whole line.
+    The arrays begin one node before the first cell. If there are no exact corrections, Euler-Maclaurin corrections are
+    used, with derivatives from heights and slopes at the neighbouring nodes. In the sum over a whole line, these
+    corrections cancel.
     """
     if of_height.size > 0:
         for k in range(cells):
@@ -208,14 +214,14 @@ def _integrals(
 
 @jit
 def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
-    """Write the largest height in each cell; the first cell begins at the second node."""
+    """Write the largest height in each cell; the first cell begins at the second node of `h`."""
     for k in range(cells):
         h0, h1, s0, s1 = h[k + 1], h[k + 2], s[k + 1], s[k + 2]
         rise = h1 - h0
         a, b = 3 * rise - 2 * s0 - s1, s0 + s1 - 2 * rise
         inside = a * a - 3 * s0 * b
         root = math.sqrt(inside) if inside > 0 else 0.0
-        above, below = (s0, root - a) if a <= 0 else (a + root, -3 * b)  # the form of the root without cancellation
+        above, below = (s0, root - a) if a <= 0 else (a + root, -3 * b)  # formula for the root without cancellation
         x = above / below if below > 0 else 0.0
         x = x if (x > 0) & (x < 1) else 0.0
         top, ends = h0 + x * (s0 + x * (a + x * b)), max(h0, h1)
@@ -230,7 +236,7 @@ def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatAr
     ----------
     line : Nodes
     first, cells : int
-        First node, and number of cells of the line.
+        Index of the node of the line at which the tile begins, and number of cells of the line in the tile.
     weights : array, shape (2, refinement, 4 WING)
         From :func:`weights`.
     tile : array, shape (IN_A_TILE, cells refinement + 3)
@@ -253,11 +259,12 @@ def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatAr
 
 @lru_cache
 def weights(refinement: int) -> FloatArray:
-    """Return weights of `WING` nodes on each side for the nodes of a finer grid, shape (2, refinement, 4 WING).
+    """Return interpolation weights for the nodes of a finer grid, shape (2, refinement, 4 WING).
 
-    The first index is 0 for the height and 1 for the slope. The second one is the node of the finer grid in a cell. The
-    third one is for the heights and then the slopes at the 2 WING nodes: the Hermite polynomial through them has degree
-    15. With two nodes per Nyquist point its error is below 1e-7 of the shortest wave.
+    The first index is 0 for the interpolated height and 1 for the interpolated slope. The second index is the node of
+    the finer grid in a cell. The third index runs over the heights at the `WING` nodes on each side of the cell, and
+    then over the slopes at these nodes. The Hermite polynomial through these values has degree 15. With two nodes
+    per Nyquist point, the error is below 1e-7 times the amplitude of the shortest wave.
     """
     places, x = np.arange(1.0 - WING, 1.0 + WING), np.arange(refinement) / refinement
     table = np.empty((2, refinement, 4 * WING))
@@ -275,7 +282,10 @@ def weights(refinement: int) -> FloatArray:
 
 @jit
 def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: FloatArray, slope: FloatArray) -> None:
-    """Write heights and slopes on the finer grid over cells of a line, with one node before and two after them."""
+    """Write heights and slopes on the finer grid over some cells of a line.
+
+    The nodes range from one fine node before these cells to one fine node behind them.
+    """
     refinement = weights.shape[1]
     h, s = line.height, line.slope
     for place in range(-1, cells * refinement + 2):
@@ -296,24 +306,24 @@ def with_summit(line: Nodes) -> Nodes:
     return line._replace(rise=max(float(np.max(height[1:-1])), 0.0))
 
 
-LANES = 64  # cases that are computed together
-SMALL, LARGE = 1e-300, 1e12
-CLOSED = 1e-9  # a period is closed if the displacements before and after it differ by at most this, relative
-RESOLVED = 10  # a grid with fewer cells in contact does not resolve the contact
+LANES = 64  # number of cases that are computed together
+SMALL, LARGE = 1e-300, 1e12  # a positive number close to zero; largest value of 1 / De that is used
+CLOSED = 1e-9  # largest relative difference of the displacements at the start and at the end of a converged period
+RESOLVED = 10  # smallest number of cells in contact with which a grid resolves the contact
 
 ITERATIONS = 25
 COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most COARSENING * COARSEST nodes
 LAST_STEP = 0.03  # largest relative last step of the depth; the results are extrapolated along their secants
-SECANT_ERROR = 0.1  # relative error of this extrapolation
-FIRST_STEP, FIRST_ERROR = 0.1, 0.03  # last step, and error of the drag, on a grid that only provides a first guess
-ROUNDING = 1e-12  # relative step of the depth that is due to rounding
+SECANT_ERROR = 0.1  # error of this extrapolation, as a fraction of the extrapolated change
+FIRST_STEP, FIRST_ERROR = 0.1, 0.03  # largest relative last step and drag error on grids that only provide a guess
+ROUNDING = 1e-12  # relative step of the depth that is as small as rounding errors
 AHEAD = 1 / 16  # expected ratio of successive changes of the depth between grids: fourth order
 
 ROWS = 15
-# Start of each quantity of the cases in the workspace of a sweep: state, sums, constants of a case
+# Offset of each quantity in the workspace of a sweep: state and sums of the cases, then constants of the cases
 U, FADE, CONTACT, LOAD, RATE, LOSS, LENGTH, STRETCH = range(0, 8 * LANES, LANES)
 DEPTH, DEBORAH, DECAY, INVERSE, THROUGH, BEGAN, CALM = range(8 * LANES, ROWS * LANES, LANES)
-# Results of a case that are extrapolated along secants
+# Indices of the results of a case, which are extrapolated along secants
 DRAG, FRACTION, CONTACT_SLOPE = range(3)
 SECANTS = 3
 
@@ -330,7 +340,7 @@ def _fading(time: float) -> float:
 
 
 class Cell(NamedTuple):
-    """Penetration w = w0 + s0 x + a x^2 + b x^3 in a cell, for one case, and its value and slope at the end."""
+    """Penetration w = w0 + s0 x + a x^2 + b x^3 in a cell, for one case; w1 and s1 are value and slope at x = 1."""
 
     w0: float
     s0: float
@@ -342,7 +352,7 @@ class Cell(NamedTuple):
 
 @jit_inline
 def _cell(tile: FloatArray, i: int, depth: float) -> Cell:
-    """Return the penetration in cell i of a tile for a depth."""
+    """Return the penetration in cell i of a tile at a given depth."""
     h0, h1, s0, s1 = tile[HEIGHT, i + 1], tile[HEIGHT, i + 2], tile[SLOPE, i + 1], tile[SLOPE, i + 2]
     rise = h1 - h0
     return Cell(depth + h0, s0, 3 * rise - 2 * s0 - s1, s0 + s1 - 2 * rise, depth + h1, s1)
@@ -364,9 +374,10 @@ def _tilt(cell: Cell, x: float) -> float:
 def _contact_end(
     cell: Cell, r: float, begins: float, force: float, force_end: float, inverse: float
 ) -> tuple[float, float, float]:
-    """Return where the force falls to 0 in a cell, w there, and the part of w that remains at the end of the cell.
+    """Return where the force falls to 0 in a cell, w there, and the fraction of w left at the end of the cell.
 
-    The place is found by a secant from the place where the force begins to fall, and one Newton step.
+    A secant from `begins`, where the force begins to fall, gives a first estimate of the place, which one Newton step
+    improves.
     """
     fall = (1 - begins) / (force - force_end)
     x = begins + force * fall
@@ -383,9 +394,10 @@ def _contact_end(
 
 @jit_inline
 def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: float) -> tuple[float, float]:
-    """Return the place before `last` where the gap closes, and the part of u that remains there.
+    """Return the place before `last` where the gap closes, and the fraction of the displacement u that remains there.
 
-    The gap is closed at `last`. The place is found by a parabola through the gap at both ends, and one Newton step.
+    At `last` the line is above the free element: the gap is negative. A parabola through the gap at the start of the
+    cell and at `last` gives a first estimate of the place, which one Newton step improves.
     """
     gap, closing = u - cell.w0, cell.s0 + u * inverse
     bow = (gap - closing * last - gap_last) / (last * last + SMALL)
@@ -407,14 +419,15 @@ def _contact_in_cell(
 ) -> tuple[bool, float, float, float, float]:
     """Return whether a free element comes into contact in a cell, and where this contact ends.
 
-    Also return w there, the part of w that remains at the end of the cell, and the gap there without this contact.
+    Then return, for the place where the contact ends: w, the fraction of w that remains at the end of the cell, and the
+    gap between line and element if there were no contact.
     """
     force, gap = cell.w1 + r * cell.s1, kept - cell.w1
     if force > 0:
         return gap <= 0, 1.0, cell.w1, 1.0, gap
     begins, falls = 0.0, cell.w0 + r * cell.s0
     if falls <= 0 and cell.s0 > 0 and cell.s1 < 0:
-        # about at the summit of the cell
+        # approximate place of the highest point of the cell
         begins = cell.s0 / (cell.s0 - cell.s1)
         falls = _at(cell, begins)
     if falls <= 0:
@@ -426,7 +439,7 @@ def _contact_in_cell(
 
 @jit
 def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
-    """Move a case along the cells of a tile, and add to its sums."""
+    """Move the element of a case along the cells of a tile, and add the contributions to the sums of the case."""
     d, r = workspace[DEPTH + k], workspace[DEBORAH + k]
     decay, inverse = workspace[DECAY + k], workspace[INVERSE + k]
     u, fade = workspace[U + k], workspace[FADE + k]
@@ -492,7 +505,10 @@ def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
 def _pass_block(
     block: FloatArray, last: float, refinement: int, workspace: FloatArray, count: int, queue: NDArray[np.int64]
 ) -> int:
-    """Sum a block in closed form; queue the cases in which contact begins or ends in it, and return their number."""
+    """Add the sums of a block for the cases in which it is entirely in contact or entirely free.
+
+    Put the other cases, in which contact begins or ends in the block, into the queue, and return their number.
+    """
     peak, lowest, steepest = block[PEAK], block[LOWEST], block[STEEPEST]
     steepest /= refinement
     cells, heights, squares = BLOCK * refinement, block[HEIGHTS] * refinement, block[SQUARES] / refinement
@@ -534,9 +550,9 @@ def sweep(
     queue: NDArray[np.int64],
     count: int,
 ) -> None:
-    """Move one element of every case along the line, from the summit of the line back to it.
+    """Move one element of every case along one period of the line, which begins and ends at the summit of the line.
 
-    Blocks in which contact begins or ends are computed on the finer grid of the weights.
+    Blocks in which contact begins or ends are computed on the finer grid for which the weights are given.
     """
     refinement, blocks = weights.shape[1], line.blocks
     n = line.height.size - BEFORE - AFTER
@@ -545,7 +561,7 @@ def sweep(
         force = w + workspace[DEBORAH + k] / refinement * line.slope[BEFORE - 1]
         workspace[U + k], workspace[FADE + k] = max(w, 0.0), 1.0
         workspace[CONTACT + k] = 1.0 if w > 0 and force > 0 else 0.0
-    # the cell of the summit, where every case is in contact, then the blocks, then the remaining cells
+    # first the cell of the summit, where every case is in contact, then the blocks, then the remaining cells
     first, cells = BEFORE - 1, 1
     for j in range(blocks.shape[0] + 2):
         if 0 < j <= blocks.shape[0]:
@@ -590,7 +606,7 @@ class _Workspace(NamedTuple):
 
     @classmethod
     def on(cls, refinement: int) -> _Workspace:
-        """Return the arrays for a grid."""
+        """Return the arrays for a grid with the given refinement of the line."""
         tile, (queue, lanes) = np.empty((IN_A_TILE, BLOCK * refinement + 3)), np.empty((2, LANES), np.int64)
         last_step, last, (now, rate) = np.empty(LANES), np.empty((LANES, SECANTS)), np.empty((2, SECANTS))
         return cls(tile, np.empty(ROWS * LANES), queue, lanes, last_step, last, now, rate)
@@ -608,7 +624,7 @@ def _search(
     results: FloatArray,
     place: _Workspace,
 ) -> None:
-    """Find the depths of cases on a grid by Newton's method; the last step is made without another sweep.
+    """Find the depths of cases on a grid by Newton's method; no sweep follows the last step.
 
     Parameters
     ----------
@@ -619,13 +635,13 @@ def _search(
     cases : Cases
         v tau / L, and F_N / (4 G L) in the unit of height.
     last_step, error : float
-        Largest relative last step of the depth, and largest relative error of the drag due to it.
+        Largest relative last step of the depth, and largest relative error of the drag due to this step.
     depths : array, shape (cases,)
         Penetration of the summit: first guesses, replaced by the solutions.
     rates : array, shape (cases, SECANTS)
-        Derivatives of the results by the depth, relative to the results; NaN where unknown; updated.
+        Derivatives of the logarithms of the results with respect to the depth; NaN where unknown; updated.
     results : array, shape (cases, SECANTS)
-        Written where a depth is found.
+        Written for the cases whose depth is found.
     place : _Workspace
         Work arrays for this grid.
     """
@@ -681,7 +697,8 @@ class NodeToNode:
     Parameters
     ----------
     height, slope : array, shape (nodes,)
-        Heights of a periodic line, and their derivative by position over its length, at two nodes per Nyquist point.
+        Heights of a periodic line at two nodes per Nyquist point, and their derivatives with respect to x / L, where L
+        is the length of the line.
     cases : Cases
         v tau / L and F_N / (4 G L), positive and finite.
     error : float
@@ -692,13 +709,14 @@ class NodeToNode:
         self._height, self._slope, self._cases, self._error = height, slope, cases, error
         loads = cases.loads
         self._rates = np.full((loads.size, SECANTS), np.nan)
-        self._depth, self._change = np.full((2, loads.size), np.nan)  # depth of the mean line, and its last change
+        self._depth, self._change = np.full((2, loads.size), np.nan)  # depth of the mean line; its change between grids
 
     def solve(self, level: int, cases: IntArray) -> Solution:
-        """Solve cases on a grid of `level` nodes per Nyquist point: 1 for all cases, then 2, 4, 8, ... for any cases.
+        """Solve cases on a grid of `level` nodes per Nyquist point.
 
-        Above 2 nodes, the grid is finer only in blocks where contact begins or ends; it is interpolated from heights
-        and slopes at 2 nodes per Nyquist point.
+        Level 1 must come first and solves all cases. The levels 2, 4, 8, ... solve the given cases. Above level 2 only
+        blocks in which contact begins or ends have a finer grid, which is interpolated from heights and slopes at 2
+        nodes per Nyquist point.
         """
         if level == 1:
             return self._start()
@@ -721,7 +739,7 @@ class NodeToNode:
         return self._solution(results, start - top, level)
 
     def _start(self) -> Solution:
-        """Solve all cases on finer and finer grids up to one node per Nyquist point; return the results there."""
+        """Solve all cases on finer and finer grids; return the results on one node per Nyquist point."""
         height, loads = self._height, self._cases.loads
         strides = [2]
         while height.size > COARSENING * COARSEST * strides[-1]:

@@ -40,16 +40,16 @@ class Request:
     Parameters
     ----------
     accuracy : float
-        Allowed relative error of drag, contact fraction and contact slope; the error of the depth is relative to the
-        rms height if the depth is smaller.
+        Allowed relative error of drag, contact fraction, contact slope and depth. The error of a depth that is smaller
+        than the rms height is relative to the rms height.
     oversampling : int or "auto"
-        Nodes per Nyquist point; "auto" for the smallest number that meets the accuracy.
+        Nodes per Nyquist point; "auto" selects the smallest number that meets the accuracy.
     scheme : {"hermite", "piecewise_linear", "backward_euler"}
         Scheme for a Kelvin solid.
     with_errors : bool
-        Whether errors are requested if the grid is given.
+        Whether errors are requested on a given grid.
     contact : bool
-        Whether fraction and slope of the contact are requested.
+        Whether contact fraction and contact slope are requested.
     """
 
     accuracy: float = 0.01
@@ -67,11 +67,11 @@ def solve(
     Parameters
     ----------
     line : RoughLine
-        The line, in units of its length and of one height.
+        The line; positions are in units of its length, heights in any unit.
     terms : PronyTerms or None
         Prony terms of the solid; None for a Kelvin solid.
     deborah : array, shape (cases,)
-        eta v / (G_inf L) of the dashpot: the Deborah number v tau / L of a Kelvin solid.
+        eta v / (G_inf L) of the dashpot. For a Kelvin solid this is the Deborah number v tau / L.
     loads : array, shape (cases,)
         F_N / (4 G_inf L), in the unit of height.
     request : Request
@@ -81,7 +81,7 @@ def solve(
     -------
     Steady
     array, shape (4, cases)
-        Estimated absolute discretisation errors of the columns of the steady states.
+        Estimated absolute discretisation errors of `Steady.columns`.
     """
     if terms is not None:
         return _general(line, terms, deborah, loads, request)
@@ -116,7 +116,7 @@ def _general(
     if not left.size:
         return Steady.of(columns, status), errors
     turned = line.from_summit()
-    # cells of the coarsest grid; results on each later grid are extrapolated from it and the previous grid
+    # number of cells of the coarsest grid; from the second grid on, results are extrapolated from two successive grids
     coarsest = line.points if request.oversampling == "auto" else -(-line.points * request.oversampling // 4)
     levels = GENERAL_LEVELS if request.oversampling == "auto" else GENERAL_LEVELS[:2]
     accuracy = request.accuracy if request.oversampling == "auto" else np.inf
@@ -133,14 +133,15 @@ def _general(
         on_grid(1, None)
         found = refine(on_grid, 1, levels, accuracy, viscoelastic.ORDER, floors=FLOORS)
         status[k], columns[:, k], errors[:, k] = found.outcome[0], np.concatenate(found.values), found.errors[:, 0]
-    # stresses have the tolerance of the depth; in very fast or slow sliding they nearly cancel in the drag
+    # the relative error of stresses equals the tolerance of the depth; in very fast or very slow sliding the drag is a
+    # small difference of large stresses
     rounding = viscoelastic.TOLERANCE * loads[left] * columns[3, left]
     errors[0, left] += np.where(np.isnan(rounding), 0.0, rounding)
     return Steady.of(columns, status), errors
 
 
 def _closed_form(body: PowerLaw | None, deborah: FloatArray, loads: FloatArray) -> tuple[Steady, FloatArray]:
-    """Solve a Kelvin solid without roughness: a plane has no friction, and an indenter has a closed form."""
+    """Return steady states on a smooth body: friction is zero on a plane, and has a closed form for an indenter."""
     good = valid(deborah, loads)
     status = np.where(good, np.int8(Outcome.CONVERGED), np.int8(Outcome.INVALID))
     columns = np.full((4, loads.size), np.nan)

@@ -36,11 +36,11 @@ from mdr_dask.physics.sliding.kelvin import (
 from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 
 ITERATIONS = 200
-PATIENCE = 20  # sweeps after which the interval of the depth is bisected
-OUTLINES, OUTLINED = 12, 0.02  # most iterations of a guess from the peaks of blocks, and size of the last step
-OUTLINED_FROM = 64.0  # smallest Deborah number in cells for this guess: below it the line between the peaks matters
-LOST = 1e-13  # relative rise of the line where contact begins, below which the case is lost to rounding
-TRAIL = 5  # entries of a trail: log depth, log load, slope between them, its change, Deborah number
+PATIENCE = 20  # number of sweeps after which the interval that contains the depth is bisected
+OUTLINES, OUTLINED = 12, 0.02  # guess from the peaks of blocks: largest number of iterations, last step of log depth
+OUTLINED_FROM = 64.0  # smallest v tau, in cells, for this guess; at lower speeds the line between the peaks matters
+LOST = 1e-13  # a case is lost to rounding if the line rises by a smaller fraction of the depth where contact begins
+TRAIL = 5  # entries of a trail: log depth, log load, slope d(log depth) / d(log load), its change, Deborah number
 LATTICE_BITS = 20  # depths are searched on a lattice of relative spacing 2**-LATTICE_BITS: see `_solve`
 
 
@@ -66,10 +66,10 @@ def _begin(trail: FloatArray, depth: float, load: float) -> None:
 
 @jit
 def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tuple[float, float]:
-    """Return a guess of log depth for a load, and its derivative by log load, from the peaks of the blocks alone.
+    """Return a guess of log depth for a load, and d(log depth) / d(log load), from the peaks of the blocks alone.
 
-    The depth of full contact is an upper bound, and so is every tangent of the load. If the load is lost to rounding,
-    `start` is returned.
+    Two upper bounds limit the guess: the depth at which full contact carries the load, and the depth at which a tangent
+    of the load reaches it. If the depth is not positive because of rounding, `start` is returned.
     """
     fade, memory = np.exp(-BLOCK / deborah), -deborah * math.expm1(-BLOCK / deborah)
     depth, most, slope = math.exp(start), load / (memory * peak.size) - peak.mean(), 1.0
@@ -82,7 +82,7 @@ def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tu
             carried += free
             stiffness += gain
             free, gain = free * fade, gain * fade
-        if not carried > 0:  # no whole block contains the highest point
+        if not carried > 0:  # the highest point is outside all whole blocks
             depth *= 2
             continue
         most = min(most, depth + (load / memory - carried) / stiffness)
@@ -96,9 +96,9 @@ def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tu
 
 @jit
 def _follow(sums: FloatArray, depth: float, deborah: float, trail: FloatArray) -> None:
-    """Write log depth, log load, their slope and its change to `trail`, from the last two sweeps.
+    """Write log depth, log load, their slope and the change of this slope to `trail`, from the last two sweeps.
 
-    At a new Deborah number the change of the slope is kept, because it is nearly the same.
+    At a new Deborah number the change of the slope is kept, because it hardly depends on the Deborah number.
     """
     carried = sums[DISPLACEMENT]
     load, slope = np.log(carried), carried / (sums[STIFFNESS] * depth)
@@ -109,7 +109,7 @@ def _follow(sums: FloatArray, depth: float, deborah: float, trail: FloatArray) -
 
 @jit
 def _guess(trail: FloatArray, load: float) -> float:
-    """Return a guess of the depth for a load, by extrapolation of log depth over log load."""
+    """Return a guess of the depth for a load, by extrapolation of log depth as a function of log load."""
     ahead = np.log(load) - trail[1]
     bend = 0.5 * trail[3] * ahead
     limit = 0.5 * trail[2]
@@ -129,11 +129,12 @@ class _Swept(NamedTuple):
 def _solve(
     line: _Swept, deborah: float, load: float, trail: FloatArray, sums: FloatArray, places: Places
 ) -> tuple[float, bool]:
-    """Return the last lattice depth that carries less than the load, and success; write its sums.
+    """Return the largest lattice depth that carries no more than the load, and success; write the sums at this depth.
 
-    The load is a convex, increasing function of the depth, so that its tangents are upper bounds of the root, and so is
-    the depth of full contact. The search ends at a lattice depth below the root whose tangent reaches the load before
-    the next lattice depth. There is only one such depth, so that the result does not depend on the `trail`.
+    The load is a convex, increasing function of the depth. The depths at which its tangents reach the load are
+    therefore upper bounds of the root, and so is the depth at which full contact carries the load. The search ends at a
+    lattice depth below the root whose tangent reaches the load before the next lattice depth. Only one lattice depth
+    meets this condition, so that the result does not depend on the `trail`.
     """
     cells, blocks, barriers, mean = line
     low, high = 0.0, np.inf
@@ -180,10 +181,11 @@ def _states(
     results: FloatArray,
     status: NDArray[np.int8],
 ) -> None:
-    """Solve cases on one line at one Deborah number, in order of load; the columns of the results are as in `Steady`.
+    """Solve cases on one line at one Deborah number, in order of load; write results in the order of `cases.COLUMNS`.
 
-    The search for a depth starts from its guess if this is a number, otherwise from the previous case. The first search
-    starts from the trail `first`, which is then replaced by the trail of the first case.
+    The search for a depth starts from the guess of the case if the guess is a number, otherwise from the depth of the
+    previous case. The first search starts from the trail `first`, which is then replaced by the trail of the first
+    solved case.
     """
     (cells, _, _, _), (deborahs, loads) = line, cases
     n, places = cells.mean.size - 1, places_for(0)
@@ -214,7 +216,7 @@ def steady_sliding(
     loads: FloatArray,
     guesses: FloatArray | None = None,
 ) -> Steady:
-    """Return the steady states of a Kelvin foundation that slides over a line, by exact sweeps over its cells.
+    """Return the steady states of a Kelvin foundation on a line, by exact sweeps over the cells of the line.
 
     Parameters
     ----------
@@ -231,8 +233,8 @@ def steady_sliding(
     Returns
     -------
     Steady
-        With ``mu = drag / (load L)`` if heights and the length L have the same unit; `Outcome.OUTSIDE_LINE` if an end
-        of a line that is not periodic is in contact.
+        The coefficient of friction is ``drag / (load L)`` if heights and the length L have the same unit. The status is
+        `Outcome.OUTSIDE_LINE` if an end of a line that is not periodic is in contact.
 
     Examples
     --------
@@ -261,14 +263,16 @@ def steady_on_cells(
 
 
 def stepped_sliding(line: CubicLine, deborah: FloatArray, loads: FloatArray, contact: bool = True) -> Steady:
-    """Return the steady states by the time steps of the papers, one cell long, from the heights at the nodes.
+    """Return the steady states by the time-stepping method of the papers, from the heights at the nodes.
+
+    In each time step the body travels one cell.
 
     Parameters
     ----------
     line, deborah, loads
         As in :func:`steady_sliding`.
     contact : bool
-        Whether fraction and slope of the contact are requested; they take extra time.
+        Whether contact fraction and contact slope are requested; they take extra time.
     """
     return _solved(line, deborah, loads, lambda _, cases: _stepped(line, cases, contact))
 
@@ -279,7 +283,7 @@ def _solved(
     loads: FloatArray,
     solve: Callable[..., tuple[FloatArray, NDArray[np.int8]]],
 ) -> Steady:
-    """Solve the cases whose numbers are finite and positive; lengths are converted to cells."""
+    """Solve the cases whose Deborah number and load are finite and positive, with lengths converted to cells."""
     n = line.enter.size if isinstance(line, CubicLine) else line.mean.size - 1
     with np.errstate(over="ignore"):
         good = valid(deborah * n, loads * n)
@@ -295,7 +299,7 @@ def _solved(
 def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> tuple[FloatArray, NDArray[np.int8]]:
     """Solve cases by sweeps over cells.
 
-    Deborah numbers are in cells, loads are over 4 G dx, guesses are depths of the highest point.
+    Deborah numbers are v tau / dx, loads are F_N / (4 G dx), and guesses are depths of the highest point.
     """
     order = np.lexsort((cases.loads, cases.deborah))
     ordered, ordered_status = np.full((order.size, 4), np.nan), np.zeros(order.size, np.int8)
@@ -330,10 +334,10 @@ def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> t
 
 
 def _is_lost(cases: Cases, near: FloatArray, depth: FloatArray) -> NDArray[np.bool_]:
-    """Return the cases in which the line rises no more than rounding errors where elements come into contact.
+    """Return whether, in each case, the rise of the line where contact begins is as small as rounding errors.
 
-    The rise is F_N / (4 G dx) over the Deborah number in cells. `near` contains the heights next to the highest point,
-    relative to it.
+    The rise is F_N / (4 G dx) divided by v tau / dx. `near` contains the heights of the two nodes next to the highest
+    point, relative to the highest point.
     """
     fall = -np.min(near)
     with np.errstate(over="ignore"):
@@ -342,7 +346,7 @@ def _is_lost(cases: Cases, near: FloatArray, depth: FloatArray) -> NDArray[np.bo
 
 
 def _stepped(line: CubicLine, cases: Cases, contact: bool) -> tuple[FloatArray, NDArray[np.int8]]:
-    """Solve cases by time steps of one cell; Deborah numbers are in cells, loads are over 4 G dx."""
+    """Solve cases by time steps of one cell; Deborah numbers are v tau / dx, loads are F_N / (4 G dx)."""
     n = line.enter.size
     nodes = line.height[:n] if line.periodic else line.height
     highest = int(np.argmax(nodes))

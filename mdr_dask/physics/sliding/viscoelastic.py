@@ -14,11 +14,11 @@ from mdr_dask.physics.sliding.viscoelastic_sweep import Travelling
 from mdr_dask.physics.solids import LinearSolid, recovery
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
-TOLERANCE = 1e-11  # last step of Newton's method relative to the depth, larger than rounding errors
-SHORTEST = 1e-9  # cells: shorter Prony terms are added to the dashpot, which is a term of a tenth of this time
-BALANCE = 1e-3  # largest relative error of the carried load
-RESOLVED = 0.5  # largest relative change between two grids at which a result is extrapolated
-ORDER = 2.0  # order of straight cells; extrapolation raises it, but less if few cells are in contact
+TOLERANCE = 1e-11  # last step of Newton's method relative to the depth; larger than rounding errors
+SHORTEST = 1e-9  # cells: Prony terms with a smaller tau v are added to the dashpot, a term with a tenth of this tau v
+BALANCE = 1e-3  # largest relative error of the carried load in a converged solution
+RESOLVED = 0.5  # a result is extrapolated if its relative change between two grids is at most this
+ORDER = 2.0  # order of convergence without extrapolation; extrapolation raises it unless few cells are in contact
 
 DRAG, DEPTH, FRACTION, SLOPE = range(4)
 
@@ -30,8 +30,8 @@ class ViscoelasticSteady:
     Parameters
     ----------
     values : array, shape (4,)
-        The columns of a `Steady`: F_x / (4 G_inf) in the unit of height squared, penetration of the mean line (of z = 0
-        under an indenter), length in contact over length of the line, rms slope of the line in contact.
+        The columns of a `Steady`: F_x / (4 G_inf) in the unit of height squared; penetration of the mean line, or of z
+        = 0 under an indenter; fraction of the line in contact; rms slope of the part of the line in contact.
     errors : array, shape (4,)
         Estimated absolute discretisation errors of the values.
     status : Outcome
@@ -49,16 +49,17 @@ class ViscoelasticSteady:
 def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float) -> ViscoelasticSteady:
     """Return the steady state of a foundation of independent elements that slides along a line.
 
-    An element that has travelled s along the line is in contact where u = w(s) = d + h(s); a free element has f = 0,
-    with f = 4 dx [G_inf u + sum G_m (u - a_m) + eta v u'] (thesis 3.3.3 for any linear rheology).
+    The force on an element of width dx is f = 4 dx [G_inf u + sum G_m (u - a_m) + eta v u'], where a_m is the strain of
+    the dashpot of Prony term m (thesis 3.3.3 for any linear rheology). An element that has travelled the distance s is
+    either in contact, with u = w(s) = d + h(s), or free, with f = 0.
 
     Parameters
     ----------
     line : CubicLine
-        Only its nodes are used, with straight lines between them. The number of cells must be a multiple of four, so
-        that every fourth node describes the same line.
+        The line, of which only the heights at the nodes are used, with straight lines between them. The number of cells
+        must be a multiple of four, so that every fourth node describes the same line.
     solid : LinearSolid
-        The material. Its times are in units of L / v, which makes them the Deborah numbers of its Prony terms.
+        The material. Its relaxation times are in units of L / v: they are the Deborah numbers tau_m v / L.
     load : float
         F_N / (4 G_inf L), in the unit of height.
 
@@ -70,7 +71,7 @@ def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float
     Notes
     -----
     The sweep of a line with straight cells is exact. The result is extrapolated from the results on all nodes and on
-    every second node. Its error is estimated from the extrapolated result on half as many nodes.
+    every second node. Its error is estimated from the difference to the extrapolated result on half as many nodes.
     """
     cells = line.enter.size
     if not np.all(np.isfinite(line.height)):
@@ -104,7 +105,9 @@ class ViscoelasticCase:
         if not (np.isfinite(load) and load > 0):
             raise ValueError(f"the load must be positive and finite, got {load!r}")
         self._solid, self._load = solid, load
-        self._state: FloatArray | None = None  # stretches of the terms at the first node, penetration of the summit
+        self._state: FloatArray | None = (
+            None  # stretches of the Prony terms at the first node, then depth of the summit
+        )
         self._before: FloatArray | None = None  # results on the previous grid
         self.sweeps = 0
 
@@ -147,9 +150,10 @@ class ViscoelasticCase:
     def _solve(
         self, below: FloatArray, load: float, solid: Travelling, periodic: bool, start: FloatArray | None
     ) -> tuple[Outcome, FloatArray, FloatArray]:
-        """Solve the case on one grid, starting from a static contact or from `start`, the state on the previous grid.
+        """Solve the case on one grid; return the outcome, the state and the four results.
 
-        The computed depth is the penetration of the summit.
+        The search starts from `start`, the state on the previous grid, or from a static contact if `start` is None. The
+        computed depth is the penetration of the summit.
         """
         terms, cells = solid.moduli.size, below.size - 1
         if start is None or start.size != terms + 1:
@@ -167,9 +171,9 @@ class ViscoelasticCase:
 
 
 def _travelling(solid: LinearSolid, cell: float) -> Travelling:
-    """Return a solid in units of cells and static moduli.
+    """Return a solid with lengths in cells and stresses divided by the static modulus.
 
-    Prony terms that are much shorter than a cell and the dashpot are replaced by one term.
+    The dashpot, and Prony terms that relax within a very small fraction of a cell, are replaced by one term.
     """
     static = solid.static_modulus
     fast = solid.times < SHORTEST * cell

@@ -14,7 +14,7 @@ DEEPEST_STEP = 0.7
 """Largest relative decrease of the depth in a step, on a line that is not periodic."""
 
 LINEAR = 1e-10
-"""Relative residual of the linear equations of a step, which is much smaller than the error that the step leaves."""
+"""Relative residual of the linear equations of a step; much smaller than the error that remains after the step."""
 
 
 class Swept(NamedTuple):
@@ -23,9 +23,10 @@ class Swept(NamedTuple):
     Parameters
     ----------
     decayed : array, shape (pieces, terms)
-        1 - exp(-length / time) of every mode in each free recovery and of every term in each contact.
+        1 - exp(-length / decay length), for every recovery mode in each free recovery, and for every Prony term in each
+        contact.
     lengths : array, shape (pieces,)
-        See `sweep_line`.
+        Lengths of free recoveries and contacts alternately, as in `Passage`.
     solid : Travelling
         The solid.
     """
@@ -39,16 +40,16 @@ class Swept(NamedTuple):
 def follow(
     direction: FloatArray, swept: Swept, periodic: bool, product: FloatArray, workspace: FloatArray
 ) -> None:  # pragma: no cover
-    """Write the derivatives of the integrals of e_m and of u over the line in one direction.
+    """Write the changes of the integrals of the stretches e_m and of u over the line for given changes of the unknowns.
 
     Contacts and free recoveries of fixed lengths act linearly on the stretches. The shift of the places where contact
-    begins and ends has an effect of second order only, because u is continuous there. A free recovery takes three
-    products of a matrix and a vector, a contact none.
+    begins and ends has an effect of second order only, because u is continuous there. Each free recovery costs three
+    products of a matrix and a vector.
 
     Parameters
     ----------
     direction : array, shape (terms + 1,)
-        Changes of e at the start and of the depth.
+        Changes of the stretches e_m at the start of the line, and change of the depth.
     swept : Swept
         Contacts and free recoveries.
     periodic : bool
@@ -88,7 +89,10 @@ def follow(
 
 @jit
 def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: float) -> None:  # pragma: no cover
-    """Change the strain without a change of memory so that the derivative of the stress is 0, as in free recovery."""
+    """Change the strain instantly so that the change of the stress becomes 0, as at the start of free recovery.
+
+    The strains of the dashpots do not change.
+    """
     if stretch.size == 0:
         return
     stress = depth
@@ -103,7 +107,7 @@ def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: f
 
 @jit
 def _decays(lengths: FloatArray, deborah: FloatArray, times: FloatArray) -> FloatArray:  # pragma: no cover
-    """Return the decay of modes in every free recovery and of terms in every contact, shape (pieces, terms)."""
+    """Return `Swept.decayed` for contacts and free recoveries of the given lengths, shape (pieces, terms)."""
     decayed = np.empty((lengths.size, deborah.size))
     for piece in range(lengths.size):
         scales = deborah if piece % 2 == 1 else times
@@ -113,13 +117,16 @@ def _decays(lengths: FloatArray, deborah: FloatArray, times: FloatArray) -> Floa
 
 
 class Krylov(NamedTuple):
-    """Work arrays of a Newton step: directions, triangular matrix, rotations, and the workspace of `follow`.
+    """Work arrays of a Newton step with n unknowns.
 
     Parameters
     ----------
     basis, triangle : array, shape (n + 1, n)
+        Orthogonal directions, and the triangular matrix.
     rotations : array, shape (3, n + 1)
+        Cosines and sines of the Givens rotations, and the right side.
     workspace : array, shape (3, n - 1)
+        The workspace of `follow`.
     """
 
     basis: FloatArray
@@ -138,13 +145,15 @@ def newton_step(
 ) -> None:  # pragma: no cover
     """Solve the linear system of a step by GMRES with Givens rotations.
 
-    If rows are divided by `scale`, the derivative is the identity plus a smooth operator over the relaxation times,
-    whose singular values decrease fast. Four to seven products are therefore enough for any number of terms.
+    After division of its rows by `scale`, the matrix of derivatives is the identity plus an operator that is smooth as
+    a function of the relaxation time. The singular values of such an operator decrease fast, so that four to seven
+    products are enough for any number of terms.
 
     Parameters
     ----------
     residual, scale : array, shape (n,)
-        Required changes of the integrals of e_m and u (n = terms + 1), and the magnitude of their derivatives.
+        Required changes of the integrals of e_m and u (n = terms + 1), and the magnitude of the derivatives of these
+        integrals.
     swept : Swept
         Contacts and free recoveries.
     krylov : Krylov
@@ -186,7 +195,10 @@ def newton_step(
 
 @jit
 def _orthogonalise(basis: FloatArray, triangle: FloatArray, j: int) -> None:  # pragma: no cover
-    """Make row j + 1 orthogonal to the earlier rows, twice because of rounding; write the coefficients to column j."""
+    """Make row j + 1 of the basis orthogonal to the earlier rows; write the coefficients to column j of the triangle.
+
+    This is done twice because of rounding errors.
+    """
     column = basis[j + 1]
     for i in range(j + 1):
         triangle[i, j] = 0.0
@@ -210,7 +222,10 @@ def _orthogonalise(basis: FloatArray, triangle: FloatArray, j: int) -> None:  # 
 
 @jit
 def _rotate(triangle: FloatArray, rotations: FloatArray, j: int) -> None:  # pragma: no cover
-    """Rotate column j so that the matrix is triangular, and rotate the right side; its last entry is the residual."""
+    """Rotate column j so that the matrix is triangular, and rotate the right side.
+
+    The last entry of the rotated right side is the residual.
+    """
     cosine, sine, right = rotations[0], rotations[1], rotations[2]
     for i in range(j):
         upper, lower = triangle[i, j], triangle[i + 1, j]
@@ -258,25 +273,27 @@ def solve_sliding(
 ) -> tuple[bool, int, bool]:  # pragma: no cover
     """Find the depth that carries the load, and for a periodic line the stretches that repeat after one period.
 
-    In the steady state the integral of the stress is equal to the integral of u, which is therefore known from the
-    load. The strain is a convex, increasing function of the unknowns (in contact it is the larger of two convex,
-    increasing functions). Newton's method therefore converges from any start, and from above after its first step.
+    In the steady state the integral of the stress is equal to the integral of u, so that the load prescribes the
+    integral of u. The strain is a convex, increasing function of the unknowns (in contact it is the larger of two
+    convex, increasing functions). Newton's method therefore converges from any start, and from above after its first
+    step.
 
     Parameters
     ----------
     profile : array, shape (nodes,)
-        Heights, positive towards the elastomer; the highest is 0. A periodic line starts at the highest node and
-        repeats it at the end.
+        Heights, positive towards the elastomer, relative to the highest node. A periodic line starts at the highest
+        node and repeats it at the end.
     strain_area : float
-        F_N / (4 G_inf cell): the integral of u, in cells times height.
+        F_N / (4 G_inf dx) with the length dx of a cell; equal to the integral of u, in cells times height.
     periodic : bool
-        Whether the line is periodic; otherwise elements enter undeformed and recover behind its end.
+        Whether the line is periodic. On any other line, elements enter undeformed and recover behind the end of the
+        line.
     solid : Travelling
         The solid.
     tolerance : float
-        Step relative to the depth at which the iteration ends.
+        The iteration ends when a step, relative to the depth, is at most this.
     unknown : array, shape (terms + 1,), input and output
-        Start and solution: e_m at the first node, then the depth.
+        First guess, replaced by the solution: the stretches e_m at the first node, then the depth.
     totals : array, shape (6,), output
         See `sweep_line`.
 
@@ -313,13 +330,13 @@ def solve_sliding(
             scale[terms] = totals[3]
             newton_step(residual, scale, swept, krylov, step)
         else:
-            residual[:] = 1.0  # a unit change of the depth; elements enter undeformed
+            residual[:] = 1.0  # a unit change of the depth, while elements enter undeformed
             follow(residual, swept, False, product, workspace)
             # the load is the integral of the stress: u behind the line is unknown if its end is in contact
             step[terms] = max((strain_area - totals[1]) / product[terms], -DEEPEST_STEP * unknown[terms])
         largest = 0.0
         for j in range(size):
-            weight = min(1.0, moduli[j]) if j < terms else 1.0  # the stretch of a soft term has little influence
+            weight = min(1.0, moduli[j]) if j < terms else 1.0  # the stretch of a soft Prony term has little influence
             largest = max(largest, weight * abs(step[j]))
             unknown[j] += step[j]
         if not np.isfinite(largest):

@@ -1,9 +1,9 @@
 """Sweep of a linear viscoelastic foundation along a line of straight cells, exact inside every cell.
 
-Lengths are in cells, stresses in static moduli. The penetration w at a node is the displacement of an element in
-contact there. The stretch of Prony term m is e = u - a, with de/ds = du/ds - e / deborah and deborah = tau v / cell. In
-contact the stretches have closed forms; a free element recovers as a sum of modes. Contact begins and ends inside
-cells.
+Lengths are in cells, stresses in units of the static modulus. The penetration w at a node is the displacement of an
+element in contact there. The stretch of Prony term m is e = u - a, with de/ds = du/ds - e / deborah and deborah = tau v
+/ cell. In contact the stretches have closed forms; a free element recovers as a sum of modes. Contact begins and ends
+inside cells.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ class Travelling(NamedTuple):
     Parameters
     ----------
     moduli, deborah : array, shape (terms,)
-        Prony terms, in ascending order of the Deborah number tau v / cell.
+        G_m / G_inf and the Deborah number tau_m v / dx of the Prony terms, in ascending order of the Deborah number.
     times : array, shape (terms,)
         Decay lengths of the recovery modes, in cells.
     stretch_of, amplitude_of : array, shape (terms, terms)
-        Stretches in every mode (one row per mode), and contribution of the stretch of every term to the modes (one row
-        per term).
+        Row k of `stretch_of` contains the stretches in recovery mode k. Row m of `amplitude_of` contains the
+        contributions of the stretch of Prony term m to the modes.
     """
 
     moduli: FloatArray
@@ -40,7 +40,7 @@ class Travelling(NamedTuple):
 
 
 SURFACE_LAYER = 1e-7
-"""Part of a cell that is tried first if there are terms so short that they relax within it."""
+"""First guess of the place of separation, in cells, if a Prony term relaxes within a shorter distance."""
 
 
 @jit
@@ -57,7 +57,11 @@ def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> No
 def step_factors(
     length: float, deborah: FloatArray, decay: FloatArray, gain: FloatArray, area: FloatArray
 ) -> None:  # pragma: no cover
-    """Write the factors of a straight piece: e becomes decay e + gain slope, its integral gain e + area slope."""
+    """Write the factors decay, gain and area of a straight piece of the line for every Prony term.
+
+    In a piece of the given slope, the stretch e changes to decay e + gain slope, and the integral of the stretch is
+    gain e + area slope.
+    """
     for m in range(deborah.size):
         x = length / deborah[m]
         if x < 0.02:
@@ -88,7 +92,7 @@ def _pressure_inside(
 def separation_point(
     end: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, deborah: FloatArray
 ) -> float:  # pragma: no cover
-    """Return where the stress falls to zero in (0, end], by Newton's method inside a bracket."""
+    """Return the place in (0, end] where the stress falls to zero, by Newton's method inside a bracket."""
     low, high = 0.0, end
     point = SURFACE_LAYER if deborah.size and deborah[0] < SURFACE_LAYER and end > SURFACE_LAYER else 0.5 * end
     for _ in range(200):
@@ -110,7 +114,10 @@ def separation_point(
 def contact_point(
     low: float, high: float, start: float, slope: float, modes: FloatArray, times: FloatArray
 ) -> float:  # pragma: no cover
-    """Return the place where the recovering strain meets the line start + slope (t - low); both are convex."""
+    """Return the place t where the recovering strain meets the straight line start + slope (t - low).
+
+    Newton's method converges from `low` without overshooting, because the difference of the two functions is convex.
+    """
     point = low
     for _ in range(60):
         gap, rate = -(start + slope * (point - low)), -slope
@@ -143,12 +150,13 @@ def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[f
 def _next_contact(
     place: float, node: int, modes: FloatArray, times: FloatArray, penetration: FloatArray, last: int
 ) -> float:  # pragma: no cover
-    """Return where the strain that recovers from `place` meets the profile at `node` or later, or -1.
+    """Return where the strain that recovers from `place` meets the profile again, or -1 if it does not.
 
-    `node` must be the end of the next cell, because a convex strain that separates from a straight cell does not meet
-    it again.
+    The search begins in the cell that ends at `node`. This must be the next cell after a separation, because a convex
+    strain that separates from a straight cell does not meet this cell again.
 
-    A sum of decaying exponentials is log-convex, so that its tangent exponential is a lower bound. Nodes below this
+    The logarithm of a sum of decaying exponentials is convex, so that the exponential function that is tangent to the
+    sum is a lower bound. Nodes below this
     bound are skipped without evaluation of the sum.
     """
     strain, rate = _strain_of(0.0, modes, times)
@@ -176,12 +184,12 @@ class Passage(NamedTuple):
     Parameters
     ----------
     lengths : array, shape (>= 2 nodes + 2,)
-        Lengths of free recoveries and contacts alternately; the first one is a free recovery and may be 0.
+        Lengths of free recoveries and contacts alternately. The first entry belongs to a free recovery and may be 0.
     imbalance : array, shape (terms,)
         Integral of e_m over the line.
     totals : array, shape (6,)
-        Integrals of u, of the stress, of stress times slope; length in contact; integral of slope^2 in contact;
-        integral of u behind the line.
+        Integral of u; integral of the stress; integral of the stress times the slope; length in contact; integral of
+        slope^2 over the length in contact; integral of u behind the end of the line.
     """
 
     lengths: FloatArray
@@ -203,9 +211,9 @@ def sweep_line(
     Parameters
     ----------
     penetration : array, shape (nodes,)
-        w at each node; the last node of a periodic line repeats the first.
+        w at each node; the last node of a periodic line repeats the first node.
     start : array, shape (terms,)
-        e_m at the first node under the penetration there; ignored if `undeformed`.
+        Stretches e_m of an element at the first node with the penetration of this node; ignored if `undeformed`.
     solid : Travelling
         The solid.
     undeformed : bool
@@ -216,7 +224,8 @@ def sweep_line(
     Returns
     -------
     pieces, end : int
-        Number of lengths; CLOSED if the last node is free, OPEN_END if it is in contact.
+        Number of lengths that were written; CLOSED if the element is free at the last node, OPEN_END if it is in
+        contact there.
     """
     # local names, because reading an array from a tuple takes more time than computing a cell
     moduli, deborah, times, stretch_of, amplitude_of = solid
@@ -274,8 +283,9 @@ def _contact(
     Returns
     -------
     place, strain, pressure, left
-        End of the contact or of the line, strain and remaining stress there, and whether contact ends there. The
-        stretches are in ``workspace[0]``, and ``workspace[2, 0]`` is the next node at which contact can begin.
+        The place where the contact or the line ends, strain and remaining stress at this place, and whether the contact
+        ends. The stretches are in ``workspace[0]``, and ``workspace[2, 0]`` is the next node at which contact can
+        begin.
     """
     terms, last = moduli.size, penetration.size - 1
     e, following = workspace[0], workspace[9]
@@ -321,7 +331,7 @@ def _contact(
 def _stretch(
     strain: float, slope: float, e: FloatArray, following: FloatArray, moduli: FloatArray, factors: FloatArray
 ) -> float:  # pragma: no cover
-    """Write the stretches at the end of a straight piece, and return the stress there; the strain there is `strain`."""
+    """Write the stretches at the end of a straight piece, where the strain is `strain`, and return the stress there."""
     pressure = strain
     for m in range(moduli.size):
         following[m] = factors[0, m] * e[m] + factors[1, m] * slope
@@ -333,7 +343,10 @@ def _stretch(
 def _begin_recovery(
     strain: float, excess: float, e: FloatArray, moduli: FloatArray, modes: FloatArray, amplitude_of: FloatArray
 ) -> None:  # pragma: no cover
-    """Write the modes after a decrease of the strain by `excess`; the shortest term makes the stress zero."""
+    """Write the recovery modes after a decrease of the strain by `excess`.
+
+    The stretch of the shortest Prony term is adjusted so that the stress is zero.
+    """
     stress = strain - excess
     for m in range(moduli.size):
         e[m] -= excess

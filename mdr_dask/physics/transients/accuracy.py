@@ -2,8 +2,8 @@
 
 The steady states before and after a jump, and the instant of the jump, are solved on finer and finer grids
 (:mod:`mdr_dask.physics.refine`). The transient between them is marched on one grid, and is taken as the difference from
-the steady state on that grid. This keeps its relative accuracy even if the transient is much smaller than the friction.
-Its error is estimated by a second march on half as many nodes with half as many steps.
+the steady state on that grid. The transient is then accurate even if it is much smaller than the friction. Its error is
+estimated by a second march on half as many nodes with half as many steps.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits, stead
 from mdr_dask.physics.transients.velocity_jump import Jump, MarchRequest, Path, jump_between, retraced
 
 FINEST = 64  # largest number of nodes per Nyquist point in steady states
-ORDER = 2  # order of convergence of the steady states, at least
+ORDER = 2  # lower bound of the order of convergence of the steady states
 CAUTION = 2 * SAFETY  # safety factor of steady states: contacts of a few nodes change irregularly from grid to grid
 TRANSIENT = SAFETY  # safety factor of a transient: first order, because single asperities enter and leave contact
 
@@ -49,13 +49,13 @@ class JumpRequest(NamedTuple):
     Parameters
     ----------
     accuracy : float or None
-        Allowed relative error of every level; the error of the depth is relative to h if the depth is smaller than h.
-        None if neither an accuracy nor errors are requested: the steady states are then solved on the grid of the
-        march.
+        Allowed relative error of the quantities in `Levels`. The error of a depth that is smaller than h is relative to
+        h. If neither an accuracy nor errors are requested, this is None, and the steady states are solved on the grid
+        of the march.
     oversampling : int
-        Nodes per Nyquist point in the march, an even number; the steady states use at least as many.
+        Nodes per Nyquist point in the march, an even number; the steady states use at least as many nodes.
     march : MarchRequest or None
-        None if the transient is not requested.
+        Times and accuracy of the march; None if the transient is not requested.
     with_errors : bool
         Whether the error of the transient is requested. This requires an accuracy.
     """
@@ -67,7 +67,10 @@ class JumpRequest(NamedTuple):
 
 
 class Levels(NamedTuple):
-    """Drag before the jump, its change at the jump, steady drag and depth after it; or their errors; shape (cases,)."""
+    """Steady drag before the jump, change of the drag at the jump, steady drag and steady depth after the jump.
+
+    Each array has the shape (cases,). The same class holds the errors of these quantities.
+    """
 
     before: FloatArray
     jump: FloatArray
@@ -76,7 +79,7 @@ class Levels(NamedTuple):
 
     @classmethod
     def of(cls, limits: list[SteadyLimits]) -> Levels:
-        """Return the levels of steady limits."""
+        """Return the levels from the steady limits of every case."""
         rows = [(each.before, each.at - each.before, each.after, each.depth[1]) for each in limits]
         return cls(*np.array(rows).reshape(-1, 4).T)
 
@@ -87,13 +90,13 @@ class Jumps(NamedTuple):
     Parameters
     ----------
     levels, errors : Levels
-        Levels and their estimated absolute errors.
+        Steady drags and depths, and their estimated absolute errors.
     trace, depth : array, shape (cases, times)
-        Drag and depth after the jump: the steady value after the jump plus the transient of the march.
+        Drag and depth at the requested times: the steady value after the jump plus the transient of the march.
     trace_error, depth_error : array, shape (cases, times)
         Estimated absolute errors; NaN if they are not requested.
     contact : array, shape (cases,)
-        Fraction of the line in contact in steady sliding before or after the jump, the larger of the two.
+        The larger of the fractions of the line in contact in steady sliding before and after the jump.
     outcome : array, shape (cases,)
     """
 
@@ -108,7 +111,10 @@ class Jumps(NamedTuple):
 
 
 def solve_jumps(problem: JumpProblem, request: JumpRequest) -> Jumps:
-    """Return the velocity jumps on a line: levels to the requested accuracy, the transient on the grid of the march."""
+    """Return the velocity jumps on a line.
+
+    The steady limits have the requested accuracy; the transient is computed on the grid of the march.
+    """
     cases, grid = problem.loads.size, request.oversampling
     guesses = np.full((cases, 2), np.nan)
     lines: dict[int, PreparedLine] = {}
@@ -154,7 +160,7 @@ def solve_jumps(problem: JumpProblem, request: JumpRequest) -> Jumps:
 
 
 def _left_out(jump: Jump, limits: SteadyLimits, request: MarchRequest) -> FloatArray:
-    """Return the errors of drag and depth if nothing was marched: the neglected changes, or 0 in full contact."""
+    """Return the errors of drag and depth of a jump without a march: the neglected changes, or 0 in full contact."""
     changes = np.array([jump.left_out, abs(limits.depth[1] - limits.depth[0]) if jump.left_out > 0 else 0.0])
     return np.repeat(changes[:, None], request.times.size, axis=1)
 
@@ -162,11 +168,11 @@ def _left_out(jump: Jump, limits: SteadyLimits, request: MarchRequest) -> FloatA
 def _change(
     fine: Path, limits: SteadyLimits, coarse: Path | None, others: SteadyLimits, times: FloatArray
 ) -> FloatArray:
-    """Return, for every time, the largest change of drag and of depth at later times between two paths.
+    """Return the largest differences of drag and of depth between two paths at and after every given time.
 
-    The paths are the same march on two grids. Each is taken relative to the steady state on its own grid. They are
-    compared at the given times and at all time steps of the fine path. The change is infinite if there is no path on
-    the coarse grid.
+    The paths are the same march on two grids. From each path, the steady state on the same grid is subtracted. The
+    paths are compared at the given times and at all time steps of the fine path. The differences are infinite if there
+    is no path on the coarse grid.
     """
     if coarse is None:
         return np.full((2, times.size), np.inf)

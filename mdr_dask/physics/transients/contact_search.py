@@ -2,23 +2,27 @@
 
 The search visits the cells of the line one by one, from the highest point on and in the direction in which the elements
 move. It records where contact last ended and where free elements may have separated (`FreeRecovery`). The force on an
-element in contact is lift + h + D h', where the lift is the depth plus its rate. In each cell that is examined:
+element in contact is lift + h + D h', where D is the Deborah number v tau in cells, and the lift is the depth plus its
+rate. In each cell that is examined:
 
 * Inside a patch, contact ends where the force falls through zero, or where free elements arrive with a displacement
   larger than the depth plus the height of the line (contact is then lost although the contact force is positive).
 * Outside a patch, contact begins where the line rises above the free elements and the force would be positive.
 
-A patch is added to the sums when its end is found. Three bounds, none of which can miss a contact, allow most cells to
-be skipped:
+A patch is added to the sums when its end is found. Most cells can be skipped because of three bounds, which are
+rigorous: no contact is missed.
 
-* A cell in contact is skipped if the force was positive everywhere in it while the elements that are now further along
-  the line passed it, and if the displacement u of free elements cannot exceed w = depth + h there. Along the line
-  u' = (drift - u) / D, so that u stays below w wherever w + D h' exceeds the largest drift.
-* A free cell is skipped if a lower bound of the displacement of its free elements is above its highest point. The bound
+* A cell in contact is skipped under two conditions. The force was positive everywhere in the cell while the elements
+  that are now further along the line passed it. And the displacement u of free elements cannot exceed w = depth + h
+  there. Along the line u' = (drift - u) / D, so that u stays below w wherever w + D h' exceeds the largest drift (see
+  `free_recovery`).
+* A free cell is skipped if its highest point is below a lower bound of the displacement of the free elements. The bound
   is computed along the line from the last known displacement and the least drift.
-* A free cell is also skipped if its gap is wider than a gap can have opened since the elements separated: the cell was
-  then out of contact all the time. It is skipped until the line has approached by that gap. The gap closes at most at
-  the rate of the depth plus the largest drift. The integral of this rate over time is the *approach*.
+* A free cell is also skipped if its gap is wider than any gap that can have opened since the elements separated,
+because
+  the cell was then out of contact all the time. It is skipped until the line has approached by the width of the gap.
+  The gap closes at most at the rate of the depth plus the largest drift. The integral of this rate over time is the
+  *approach*.
 
 Elements that travel more than a whole period of the line can pass the highest point out of contact. In that case the
 search is repeated with the places of separation of the previous period.
@@ -70,10 +74,10 @@ from mdr_dask.physics.transients.patches import (
 SEPARATIONS = 1024  # largest number of places of separation at one instant
 PERIODS = 3  # largest number of periods of the line for which the search is repeated
 VISITS = 6  # largest number of changes of contact in a cell: a cubic force changes sign at most three times
-ROUNDING = 1e-9  # relative to a displacement
+ROUNDING = 1e-9  # margin for rounding errors, relative to a displacement
 CLOSE = 1e-9  # cells: accuracy of the place where contact is lost to free elements
-FULL = -1  # returned instead of a number of patches: capacity exceeded, or a patch does not end within its run of cells
-DEPTH_CHANGES = 4.0  # largest derivative of a displacement by the last depth; an assumption
+FULL = -1  # returned instead of the number of patches if the capacity is exceeded or a patch continues beyond its run
+DEPTH_CHANGES = 4.0  # assumed largest derivative of a displacement with respect to the last depth
 
 # Entries of `Workspace.scan`, the state of the search
 BEGIN, FREE_FROM, HELD, FIRM_LIFT, FIRM_UNTIL, LOWEST, LOWEST_PASSED, PASSED = range(8)
@@ -82,7 +86,7 @@ APPROACH, LARGEST, TIME, DEPTH, DRIFT = range(5)
 
 
 class Reachable(NamedTuple):
-    """Where elements can be in contact at depths between two limits.
+    """The cells in which elements can be in contact at depths between two limits.
 
     Parameters
     ----------
@@ -124,10 +128,11 @@ class Workspace(NamedTuple):
     sums : array, shape (SUMS,)
         Sums over the patches, and their derivatives.
     scan : array
-        State of the search, in this order: where the current patch begins; where contact last ended; up to where
-        contact is certain; the barrier below which cells in contact can be skipped, and up to where this barrier is
-        valid; the least displacement of free elements at the end of the previous cell; the same for those elements only
-        that passed the end of the last patch after the jump; and how far these elements have come.
+        State of the search, in this order: place where the current patch begins; place where contact last ended; place
+        up to which contact is certain; barrier below which cells in contact can be skipped; place up to which this
+        barrier is valid; least displacement of free elements at the end of the previous cell; least displacement there
+        of those free elements that passed the end of the last patch after the jump; and the farthest place that the
+        latter elements have reached.
     recovery : FreeRecovery
     skip : SkipBounds
     barriers : Barriers
@@ -163,8 +168,8 @@ class Motion(NamedTuple):
     Parameters
     ----------
     rise, fall : float
-        Largest mean rate at which the lift has risen from any earlier moment until now, and largest rate at which it
-        has fallen.
+        Largest mean rate at which the lift has risen from any earlier moment until now, and largest rate at which the
+        lift has fallen between two successive moments.
     shallowest, deepest, highest : float
         Least depth, largest depth and largest lift so far.
     passes_top : bool
@@ -210,7 +215,7 @@ def add_approach(now: Instant, bounds: PathBounds, state: FloatArray) -> None:
     """Add the approach since the last search; reset all skipping if the last search was at an unrelated instant."""
     history, last = now.history, now.history.count - 1
     depth, drift = history.depth[last], bounds.most_drift[WINDOWS - 1]
-    if now.time == state[TIME]:  # the same instant with another guess of the depth
+    if now.time == state[TIME]:  # same instant, another guess of the depth
         state[APPROACH] += DEPTH_CHANGES * abs(depth - state[DEPTH])
     elif last > 0 and history.time[last - 1] == state[TIME]:
         before = history.depth[last - 1]
@@ -239,9 +244,9 @@ def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
     reachable : Reachable
         Its runs must contain all patches at this depth.
     work : Workspace
-        Written: the patches, and in `sums` load and drag over 4 G dx, length in contact, integral of the slope over
-        this length, the derivatives of load and drag by the depth, and the rates at which load and drag grow because
-        patches grow.
+        Written: the patches and `sums`. The sums are: load and drag, divided by 4 G dx; length in contact; integral of
+        the slope over the length in contact; derivatives of load and drag with respect to the depth; and the rates at
+        which load and drag change because patches grow.
 
     Returns
     -------
@@ -265,7 +270,9 @@ def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
 
 @jit_inline_uncounted
 def _move_back_one_period(now: Instant, recovery: FreeRecovery, motion: Motion) -> None:
-    """Shift all places of separation back by one period, and keep those that still matter after the highest point."""
+    """Shift all places of separation back by one period; keep those whose elements may be free behind the highest
+    point.
+    """
     for k in range(recovery.count[0]):
         recovery.earliest[k] -= now.track.cells
         recovery.place[k] -= now.track.cells
@@ -277,8 +284,8 @@ def _move_back_one_period(now: Instant, recovery: FreeRecovery, motion: Motion) 
 def _search_period(now: Instant, motion: Motion, reachable: Reachable, work: Workspace) -> int:
     """Search one period of the line; return the number of patches, or `FULL`.
 
-    Places of separation that the workspace already contains belong to the previous period. If there are none, the
-    highest point is taken to be in contact.
+    Places of separation that the workspace already contains belong to the previous period. If it contains no place, the
+    highest point is assumed to be in contact.
     """
     track, history, scan, sums, recovery = now.track, now.history, work.scan, work.sums, work.recovery
     last, runs = history.count - 1, reachable.runs
@@ -317,7 +324,7 @@ def _search_period(now: Instant, motion: Motion, reachable: Reachable, work: Wor
 
 @jit_inline_uncounted
 def _oldest(recovery: FreeRecovery, otherwise: float) -> float:
-    """Return the first place at which elements found further along the line can have separated."""
+    """Return the first place at which elements that are now further along the line can have separated."""
     return recovery.earliest[0] if recovery.count[0] > 0 else otherwise
 
 
@@ -369,7 +376,10 @@ def _skip_free(
 def _examine(
     now: Instant, motion: Motion, work: Workspace, lift: float, cell: int, contact: bool, found: int
 ) -> tuple[bool, int]:
-    """Find where contact begins and ends in a cell; return whether its end is in contact, and the number of patches."""
+    """Find where contact begins and ends in a cell.
+
+    Return whether there is contact at the end of the cell, and the number of patches found so far.
+    """
     track, scan, recovery, barriers = now.track, work.scan, work.recovery, work.barriers
     n, finish = int(track.cells), track.cells + track.origin
     if recovery.count[0] + VISITS > recovery.place.size or found + VISITS > work.start.size:
@@ -399,7 +409,7 @@ def _examine(
             scan[FIRM_UNTIL] = 0.0
         elif x >= stop:
             break
-        else:  # elements that separated earlier would be under tension from here on
+        else:  # from here on, the force on elements in contact would be tensile
             scan[FREE_FROM], ended = x, True
     return contact, found
 
@@ -416,10 +426,10 @@ def _contact_end(
     pressed: bool,
     separated: bool,
 ) -> tuple[float, float, bool, bool]:
-    """Return where contact ends in a cell from x on, from where elements are free, and which of two reasons applies.
+    """Return where contact ends in a cell from x on, the place from which elements are free, and two flags.
 
-    The two reasons are a displacement of free elements beyond the line, and a zero of the force. Both flags are False
-    if contact does not end in the cell. Contact ends at the latest where the force falls to zero.
+    The first flag is True if contact ends because free elements arrive with a displacement beyond the line, the second
+    flag if the force falls to zero. Both are False if contact does not end in the cell.
     """
     scan, place = work.scan, NONE
     c0, c1, c2, c3 = line
@@ -438,9 +448,9 @@ def _contact_end(
 
 @jit_inline_uncounted
 def _overtaking(now: Instant, recovery: FreeRecovery, held: float, x: float) -> float:
-    """Return the displacement at x of free elements that may lose contact with a patch, or 0 if there can be none.
+    """Return the displacement at x of free elements that may arrive inside a patch, or 0 if no such element exists.
 
-    Up to `held` the patch is certainly in contact, and no element has separated in the patch beyond `held`.
+    Up to `held` the patch is certainly in contact. Beyond `held` no element of the patch has separated.
     """
     if x > held:
         depth = now.history.depth[now.history.count - 1]
@@ -454,7 +464,7 @@ def _overtaking(now: Instant, recovery: FreeRecovery, held: float, x: float) -> 
 
 @jit_uncounted
 def _contact_loss(now: Instant, recovery: FreeRecovery, low: float, high: float) -> float:
-    """Return the place between `low` and `high` where contact is lost to free elements, by bisection."""
+    """Return, by bisection, the place between `low` and `high` where free elements rise above the line."""
     depth = now.history.depth[now.history.count - 1]
     while high - low > CLOSE:
         x = 0.5 * (low + high)
@@ -487,7 +497,7 @@ def _close_patch(
 
 @jit_inline_uncounted
 def _lowest_behind(now: Instant, bounds: PathBounds, u: float) -> float:
-    """Return the least displacement of free elements one cell behind a place where their displacement is u."""
+    """Return the least displacement of free elements one cell behind a place at which the displacement is u."""
     drift, fade = bounds.least_drift[WINDOWS - 1], np.exp(-1 / min(now.deborah, now.first.deborah))
     return float((u - drift) * fade + drift)
 
@@ -508,8 +518,8 @@ def _contact_begin(
 ) -> tuple[bool, float]:
     """Return whether contact begins in a cell from x on, and where; if not, the place where the search continues.
 
-    Contact can begin only between `low`, where the force becomes positive, and `high`, where it falls to zero again.
-    Elements may have separated earlier at `high`.
+    Contact can begin only between the place `low`, where the force becomes positive, and the place `high`, where the
+    force falls to zero again. Elements may have separated at `high` at an earlier time.
     """
     track, scan, recovery, (c0, c1, c2, c3) = now.track, work.scan, work.recovery, line
     low, high, depth = x - cell, NONE, now.history.depth[now.history.count - 1]
@@ -553,7 +563,7 @@ def _guess_begin(
 ) -> float:
     """Return an approximate place in a cell where the line rises above free elements.
 
-    These have the displacement u and the slope `u_slope` at `high`.
+    The displacement of the free elements at `high` is u, and the slope of the displacement along the line `u_slope`.
     """
     c0, c1, c2, c3 = line
     bend, y = u_slope * u_slope / u if u > 0 else 0.0, high
@@ -573,10 +583,11 @@ def _guess_begin(
 def _add_edge(
     now: Instant, lift: float, place: float, steep: float, by_depth: float, opening: float, sums: FloatArray
 ) -> None:
-    """Add the derivatives of load and drag by depth and time due to the motion of an edge where the force is not zero.
+    """Add the derivatives of load and drag, with respect to depth and time, due to the motion of an edge of a patch.
 
-    `steep` is the slope, towards the inside of the patch, of the gap between line and free elements; `by_depth` is its
-    derivative by the depth, and `opening` its rate.
+    The force at this edge is not zero. The gap is the height of the line above the free elements: `steep` is the slope
+    of the gap towards the inside of the patch, `by_depth` the derivative of the gap with respect to the depth, and
+    `opening` the rate of the gap.
     """
     h, slope, _ = height_at(now.track, place)
     force = lift + h + now.deborah * slope
@@ -590,7 +601,10 @@ def _add_edge(
 
 @jit_inline_uncounted
 def _add_separation(now: Instant, motion: Motion, work: Workspace, place: float) -> None:
-    """Add a place where the force falls to zero now, with the farthest such place since the jump."""
+    """Add a place where the force falls to zero now.
+
+    Also store the farthest such place since the jump.
+    """
     track, recovery, n = now.track, work.recovery, int(now.track.cells)
     i = min(int(place), n)
     h, slope, _ = height_at(track, i + 1.0)
@@ -606,7 +620,10 @@ def _add_separation(now: Instant, motion: Motion, work: Workspace, place: float)
 
 @jit_inline_uncounted
 def _add_stretch(recovery: FreeRecovery, cell: float, barrier: float) -> None:
-    """Add a cell where elements can have separated although the force is positive now, or extend the last stretch."""
+    """Add a cell in which elements can have separated although the force is positive now.
+
+    If the last stretch ends at this cell, extend the stretch.
+    """
     k, last = recovery.count[0], recovery.count[0] - 1
     if k > 0 and recovery.earliest[last] < recovery.place[last] and recovery.place[last] == cell:
         recovery.place[last] = recovery.farthest[last] = cell + 1

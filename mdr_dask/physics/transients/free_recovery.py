@@ -7,12 +7,12 @@ then:
     u(x, t) = max over t' <= t of (d(t') + h(x')) exp(-(t - t'))
 
 Only the depth d(t) needs a history, so that elements are never followed one by one. The place where an element
-separated from the line is the place where this expression is stationary, that is, where the force on the element was
-zero. `FreeRecovery` holds the places near which elements can have separated.
+separated from the line is the place x' where the expression in the maximum is stationary; the force on the element was
+zero there. `FreeRecovery` holds the places near which elements can have separated.
 
-Along the line the *drift* D u' + u of free elements is minus the rate of the depth at their separation, reduced by the
-decay since then. The extremes of the drift over the recent past (`PathBounds`) bound how fast u can change along the
-line.
+The *drift* of free elements is D u' + u, where u' is the derivative along the line. It is equal to minus the rate of
+the depth at the time of separation, reduced by the decay since then. The extremes of the drift over the recent past
+(`PathBounds`) bound how fast u can change along the line.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted, last_until
 from mdr_dask.physics.transients.patches import History, Patches, Track, height_at, patch_before
 
 ITERATIONS = 60  # largest number of iterations of Newton's method with bisection
-NEAR = 0.02  # cells: size of the last Newton step towards a place of separation; the error is about its cube
+NEAR = 0.02  # cells: last Newton step towards a place of separation; the error is about the cube of this step
 STRIDE = 2.0  # cells: longest step towards a place of separation
-MET = 1e-3  # cells: size of the last step towards the place where contact begins; the error is about its cube
+MET = 1e-3  # cells: last step towards the place where contact begins; the error is about the cube of this step
 CREST = 1e-3  # cells: resolution of the place in a cell where the gap between line and free elements is smallest
-FARTHEST = 200  # cells behind x in which separated elements are searched for in a stretch
-MARGIN = 64.0  # cells added to twice a distance: over that way a change of the depth may matter for what `prune` keeps
-WINDOW, WINDOWS = 8.0, 16  # cells travelled in the shortest window of `PathBounds`; every next window is twice as long
+FARTHEST = 200  # cells before x in which the place of separation is searched for in a stretch
+MARGIN = 64.0  # cells added to twice a distance when the window of a bound is chosen
+WINDOW, WINDOWS = 8.0, 16  # cells travelled in the shortest window; number of windows, each twice as long as the last
 _DOUBLINGS = np.frexp(np.arange(1024))[1]  # index of the window that covers a given number of shortest windows
 
 
@@ -60,7 +60,9 @@ class Instant(NamedTuple):
 
 
 class PathBounds(NamedTuple):
-    """Bounds over the times in which the line travels `WINDOW` cells, twice as many, and so on; shape (WINDOWS,) each.
+    """Bounds over windows of time that end now, shape (WINDOWS,) each.
+
+    During the shortest window the line travels `WINDOW` cells, and during every next window twice as many.
 
     Parameters
     ----------
@@ -71,7 +73,8 @@ class PathBounds(NamedTuple):
     least_lift : array
         Least lift, the sum of depth and rate.
     most_drift, least_drift : array
-        Largest and least drift (or 0) of elements that separated in that time or have been free since before the jump.
+        Largest and least drift, or 0, of elements that separated within the window or have been free since before the
+        jump.
     """
 
     spread: FloatArray
@@ -82,7 +85,7 @@ class PathBounds(NamedTuple):
 
 
 class FreeRecovery(NamedTuple):
-    """Places or stretches of the line where elements can have separated: `count[0]` entries in order along the line.
+    """Places or stretches of the line where elements can have separated, in order along the line.
 
     Parameters
     ----------
@@ -92,6 +95,7 @@ class FreeRecovery(NamedTuple):
     barrier : array
         Elements can have separated in a stretch only while the lift was below this value.
     count : int array, shape (1,)
+        Number of places and stretches.
     bounds : PathBounds
     """
 
@@ -111,9 +115,9 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
     left, back = np.exp(-time), last
     shallowest, deepest, least_lift = depth, depth, depth + rate
     most, least = max(-rate, -history.rate[0] * left, 0.0), min(-rate, -history.rate[0] * left, 0.0)
-    if first.deborah > deborah:  # elements that are free since before the jump have the drift u (1 - D / D_1)
+    if first.deborah > deborah:  # the drift of elements that have been free since before the jump is u (1 - D / D_1)
         most = max(most, min(depth, first.depth * left) * (1 - deborah / first.deborah))
-    # if the velocity rises, elements that were free at the jump arrive with more displacement, for half a window
+    # if the velocity rises, elements that were free at the jump arrive with larger displacements, during half a window
     rise, gains = 0.0, first.depth * (deborah / first.deborah - 1)
     for k in range(WINDOWS):
         duration = WINDOW / deborah * 2.0**k
@@ -165,7 +169,7 @@ def _depth_at(history: History, t: float) -> tuple[float, float, float]:
 
 @jit_inline_uncounted
 def _by_last_depth(history: History, t: float) -> float:
-    """Return the derivative of the depth at time t by the last depth of the history."""
+    """Return the derivative of the depth at time t with respect to the last depth of the history."""
     last = history.count - 1
     if last <= 0 or t >= history.time[last]:
         return 1.0
@@ -185,11 +189,12 @@ def _in_period(now: Instant, s: float) -> float:
 
 @jit_inline_uncounted
 def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tuple[float, float, float]:
-    """Return displacement, slope and derivative by the depth of an element at x that separated near a place.
+    """Return displacement, slope and du/d(depth) of an element at x that separated near a place.
 
-    The element separated after the jump where the force on it vanished. This is between the place where the force
-    vanishes now and the farthest place where it has vanished since the jump. The displacement is stationary there, so
-    that few Newton steps are enough. The displacement is -1 if the element at x did not separate there.
+    The element separated after the jump, where the force on it vanished. This place is between `place`, where the force
+    vanishes now, and `farthest`, the farthest place where the force has vanished since the jump. At the place of
+    separation the displacement is stationary, so that few Newton steps are enough. The returned displacement is -1 if
+    the element at x did not separate between `place` and `farthest`.
     """
     deborah = now.deborah
     first = x - deborah * now.time
@@ -227,7 +232,7 @@ def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tu
 def _separated_within(now: Instant, x: float, low: float, high: float) -> tuple[float, float, float]:
     """Return the results of `_separated_near` for an element at x that separated anywhere in a stretch of cells.
 
-    The node with the largest displacement is found first.
+    First the node of the stretch is found for which the displacement is largest.
     """
     most, place, s = 0.0, x, min(high, np.ceil(x) - 1)
     low = max(low, x - now.deborah * now.time, s - FARTHEST)
@@ -243,7 +248,7 @@ def _separated_within(now: Instant, x: float, low: float, high: float) -> tuple[
 
 @jit_inline_uncounted
 def _from_separation(now: Instant, recovery: FreeRecovery, k: int, x: float) -> tuple[float, float, float]:
-    """Return displacement, slope and derivative by the depth at x of elements that separated at entry k."""
+    """Return displacement, slope and du/d(depth) at x of elements that separated at entry k of `recovery`."""
     if recovery.earliest[k] < recovery.place[k]:
         if recovery.bounds.least_lift[window(x - recovery.earliest[k])] > recovery.barrier[k]:
             return -1.0, 0.0, 0.0
@@ -253,9 +258,9 @@ def _from_separation(now: Instant, recovery: FreeRecovery, k: int, x: float) -> 
 
 @jit_inline_uncounted
 def from_before(now: Instant, x: float, least: float) -> tuple[float, float]:
-    """Return displacement and slope at x that remain from the state before the jump.
+    """Return displacement and slope at x of elements that have been free since before the jump.
 
-    Both may be 0 if the displacement is at most `least`.
+    If the displacement is at most `least`, both returned values may be 0.
     """
     first, s = now.first, _in_period(now, x - now.deborah * now.time)
     low = patch_before(first, s)
@@ -271,7 +276,7 @@ def from_before(now: Instant, x: float, least: float) -> tuple[float, float]:
 
 @jit_inline_uncounted
 def displacement_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float, float]:
-    """Return displacement, slope along the line and derivative by the depth of free elements at x."""
+    """Return displacement, slope along the line and derivative with respect to the depth of free elements at x."""
     u, slope, by_depth = 0.0, 0.0, 0.0
     for k in range(recovery.count[0]):
         value, value_slope, value_by_depth = _from_separation(now, recovery, k, x)
@@ -286,10 +291,11 @@ def displacement_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[flo
 
 @jit_inline_uncounted
 def gap_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float, float, float, float]:
-    """Return the height of the line above free elements at x, and its slope, curvature, derivative by depth, and rate.
+    """Return the gap at x, and its slope, curvature, derivative with respect to the depth, and rate.
 
-    Free elements recover and move along the line, so that their displacement at x changes at the rate -u - D u'. Along
-    the line it is approximated by an exponential function to obtain the curvature.
+    The gap is the height of the line above free elements. Free elements recover and move along the line, so that the
+    displacement at x changes at the rate -u - D u'. For the curvature, the displacement is approximated by an
+    exponential function along the line.
     """
     u, u_slope, by_depth = displacement_at(now, recovery, x)
     last = now.history.count - 1
@@ -303,7 +309,7 @@ def gap_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float
 def contact_begin(
     now: Instant, recovery: FreeRecovery, low: float, high: float, x: float
 ) -> tuple[float, float, float, float]:
-    """Return where the line rises above free elements, and slope, derivative by depth and rate of the gap there.
+    """Return where the line rises above free elements, and slope, depth derivative and rate of the gap there.
 
     `x` is the first guess, between `low` and `high`.
     """
@@ -328,7 +334,7 @@ def contact_begin(
 
 @jit_uncounted
 def nearest_approach(now: Instant, recovery: FreeRecovery, low: float, high: float) -> tuple[float, float]:
-    """Return the place between `low` and `high` where the line is nearest to free elements, and its height above them.
+    """Return the place between `low` and `high` where the line is nearest to free elements, and the gap at this place.
 
     The search stops at the first place where the line is above the free elements.
     """
@@ -350,7 +356,7 @@ def prune(now: Instant, recovery: FreeRecovery, x: float, pressed: float, deepes
     for k in range(recovery.count[0]):
         place, farthest = recovery.place[k], recovery.farthest[k]
         u = _from_separation(now, recovery, k, x)[0]
-        if u < 0 and x - now.deborah * now.time < farthest:  # elements farther on may have separated there
+        if u < 0 and x - now.deborah * now.time < farthest:  # elements beyond x may have separated at this entry
             height = height_at(now.track, _in_period(now, place))[0]
             u = (deepest + height) * np.exp(-max(x - farthest, 0.0) / now.deborah)
         if u + 2 * recovery.bounds.spread[window(2 * (x - place) + MARGIN)] >= pressed:

@@ -27,14 +27,14 @@ from mdr_dask.physics.transients.patches import (
     track_of,
 )
 
-KEPT_CELLS, KEPT_SPEEDS = 2**21, 4  # number of cells whose barriers are kept (16 bytes each), at least four speeds
+KEPT_CELLS, KEPT_SPEEDS = 2**21, 4  # barriers are kept for this many cells (16 bytes each), or for at least 4 speeds
 WHOLE = 1 - 1e-12  # fraction of the line in contact that counts as full contact, within rounding
 NEWTON_STEPS = 60
-NEARLY = 1e-6  # part of the load that may be missing before the last Newton step; the error is about its square
+NEARLY = 1e-6  # relative error of the load before the last Newton step; the remaining error is about its square
 
 
 class PreparedLine(NamedTuple):
-    """One periodic line in the form needed by the steady sweep and the march, with barriers of some Deborah numbers."""
+    """One periodic line, prepared for the steady sweep and for the march, with the barriers computed so far."""
 
     cells: Cells
     blocks: Blocks
@@ -48,7 +48,9 @@ class PreparedLine(NamedTuple):
         return cls(cells, blocks_of(cells), track_of(cells), {})
 
     def barriers(self, deborah: float) -> Barriers:
-        """Return the barriers at a Deborah number in cells; keep them, because successive cases often share them."""
+        """Return the barriers at a Deborah number in cells, and store them, because successive cases often need the
+        same.
+        """
         if deborah not in self.known:
             if len(self.known) >= max(KEPT_CELLS // self.cells.mean.size, KEPT_SPEEDS):
                 self.known.clear()
@@ -71,11 +73,13 @@ class SteadyLimits(NamedTuple):
     before, at, after : float
         Drag in steady sliding at v_1, just after the jump, and in steady sliding at v_2.
     rate, tilt : float
-        Rate of the depth by t / tau just after the jump, and the derivative of `at` by this rate.
+        Derivative of the depth with respect to t / tau just after the jump, and derivative of `at` with respect to this
+        rate.
     depth : array, shape (2,)
         Steady depth before and after the jump.
     first, slower : Patches or None
-        Contact before the jump, and in steady sliding at the lower velocity; None without a solution.
+        Contact before the jump, and contact in steady sliding at the lower velocity; None if a steady state was not
+        found.
     contact : array, shape (2,)
         Fraction of the line in contact in steady sliding before and after the jump.
     outcome : Outcome
@@ -103,8 +107,8 @@ def steady_limits(
 ) -> list[SteadyLimits]:
     """Solve the steady states before and after jumps on one line, and the instants of the jumps.
 
-    At the instant of a jump the displacements and the depth do not change. The rate of the depth does, and elements
-    whose force would be negative separate.
+    At the instant of a jump the displacements and the depth do not change. The rate of the depth changes, and
+    elements whose force would become negative separate.
 
     Parameters
     ----------
@@ -155,7 +159,7 @@ def _release(
 ) -> tuple[float, float, float, int]:
     """Return the drag just after a jump, the rate of the depth that carries the load, the tilt, and the outcome.
 
-    The tilt is the derivative of the drag by the rate.
+    The tilt is the derivative of the drag with respect to the rate.
     """
     rate, sums = 0.0, np.empty(SUMS)
     for _ in range(NEWTON_STEPS):

@@ -27,10 +27,10 @@ from mdr_dask.physics.transients.patches import (
 
 TRIALS = 80  # largest number of Newton steps for the depth at one moment
 ORDER = 3  # order of the backward differentiation
-EXACT = 1e-11  # part of the load: the load is met if less is missing
-NEWTON_LOAD = 0.03  # part of the load that may be missing before the last Newton step
-SETTLED = 1.5  # a march ends when depth and drag have been settled while the time grew by this ratio
-LEFT_LIMITS = -1  # outcome of a march whose depth leaves the limits for which the reachable cells were determined
+EXACT = 1e-11  # relative error of the load below which no Newton step is needed
+NEWTON_LOAD = 0.03  # largest relative error of the load before the last Newton step
+SETTLED = 1.5  # a march ends when depth and drag meet `Finish` during an interval of time with this ratio of its ends
+LEFT_LIMITS = -1  # outcome of a march whose depth leaves the interval for which the reachable cells are known
 
 
 class Stepping(NamedTuple):
@@ -43,9 +43,9 @@ class Stepping(NamedTuple):
     growth : float
         Largest ratio of a step to the previous one.
     miss : float
-        Largest difference between the extrapolated and the solved depth.
+        Largest allowed difference between the extrapolated and the solved depth.
     close : float
-        Size of a Newton step of the depth below which it is the last one.
+        Newton's method ends with the first step of the depth that is smaller than this.
     until : float
         Last time.
     """
@@ -58,9 +58,9 @@ class Stepping(NamedTuple):
 
 
 class Finish(NamedTuple):
-    """Criterion for the end of a march: final depth and drag, and how near to them the march has to come.
+    """Criterion for the end of a march: final depth and drag, and allowed distances from these values.
 
-    The distance of the drag is relative to its largest distance during the march.
+    The allowed distance of the drag is a fraction of its largest distance during the march.
     """
 
     depth: float
@@ -74,14 +74,14 @@ class Marching(NamedTuple):
 
     Parameters
     ----------
-    track, first, reachable
+    track, first, reachable : Track, Patches, Reachable
         The line, the contact before the jump, and the cells where contact is possible at depths from `low` to `high`.
     deborah, load : float
         Deborah number after the jump, and F_N / (4 G dx).
     low, high : float
         Limits of the depth.
     onset : float
-        Time from which on the steps grow in a constant ratio. They are equal in log(1 + t / onset).
+        Time after which the steps grow in a constant ratio. The steps are equal in log(1 + t / onset).
     """
 
     track: Track
@@ -107,9 +107,10 @@ class Trajectory(NamedTuple):
 
 @jit_uncounted
 def _drag_rate(sums: FloatArray, stiff: float, step: float) -> float:
-    """Return the rate of the drag at constant load: patches grow where they begin, and the lift falls in balance.
+    """Return the rate of the drag at constant load: growing patches add load, and the lift falls to compensate.
 
-    The last Newton step of the depth also changes the rate of the depth, and so the growth at the edges of the patches.
+    `step` is the last Newton step of the depth. It also changes the rate of the depth, and therefore the growth of the
+    patches at their edges.
     """
     edges = sums[STIFFNESS] - sums[LENGTH] * (1 + stiff)
     edges_drag = sums[DRAG_STIFFNESS] - sums[TILT] * (1 + stiff)
@@ -128,6 +129,7 @@ def _balance(
     -------
     outcome : int
     drag, drag_rate : float
+        Drag, and its derivative with respect to t / tau.
     """
     now, load = history.count - 1, marching.load
     guess, (a, b), sums = history.depth[now], weights, work.sums
@@ -151,7 +153,7 @@ def _balance(
             drag = sums[DRAG] + step * sums[DRAG_STIFFNESS]
             return Outcome.CONVERGED, drag, _drag_rate(sums, a, step)
         if high - low <= 1e-13 * (abs(low) + abs(high)):
-            # the load jumps at this depth because a single asperity comes into contact
+            # the load is discontinuous at this depth, because a single asperity comes into contact
             return Outcome.CONVERGED, sums[DRAG], _drag_rate(sums, a, 0.0)
         guess += step
         if not marching.low <= guess <= marching.high:
@@ -163,10 +165,10 @@ def _balance(
 
 @jit_uncounted
 def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
-    """Return a and b of d_dot = a d + b at moment `now` of a march that begins with a known rate.
+    """Return the weights a and b of the rate of the depth, a d + b, at moment `now` of a march with a known first rate.
 
-    This is backward differentiation over log(1 + t / onset). In this variable the relaxation is smooth and the steps
-    are equal.
+    The weights are those of backward differentiation with respect to log(1 + t / onset). As a function of this variable
+    the relaxation is smooth, and the steps are equal.
     """
     time, place, depth = found.time, found.place, found.depth
     if now == 1:
@@ -186,7 +188,7 @@ def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
 
 @jit_uncounted
 def _extrapolated(found: Trajectory, now: int) -> float:
-    """Extrapolate the depth to moment `now` by a parabola over log(1 + t / onset), or over t for the first moments."""
+    """Extrapolate the depth to moment `now` by a parabola in log(1 + t / onset), or in t for the first moments."""
     time, place, depth, rate, _, _ = found
     taken = time[now] - time[now - 1]
     if now == 1:
@@ -203,7 +205,7 @@ def _extrapolated(found: Trajectory, now: int) -> float:
 def march_depth(
     marching: Marching, pace: Stepping, finish: Finish, found: Trajectory, work: Workspace
 ) -> tuple[int, int]:
-    """March the depth at constant load by backward differentiation of third order over log(1 + t / onset).
+    """March the depth at constant load by backward differentiation of third order with respect to log(1 + t / onset).
 
     Parameters
     ----------
@@ -255,7 +257,7 @@ def march_depth(
 
 @jit_uncounted
 def retrace(marching: Marching, depths: FloatArray, found: Trajectory, work: Workspace) -> int:
-    """March through given moments with approximately known depths, with one Newton step for each depth.
+    """March through given moments with approximately known depths; each depth is corrected by one Newton step.
 
     Parameters
     ----------
@@ -264,7 +266,7 @@ def retrace(marching: Marching, depths: FloatArray, found: Trajectory, work: Wor
     depths : array, shape (moments,)
         Depths at these moments on another grid.
     found : Trajectory
-        Contains times and places; the rest is written from the second entry on.
+        Contains t and log(1 + t / onset) of every moment; the other columns are written from the second entry on.
 
     Returns
     -------

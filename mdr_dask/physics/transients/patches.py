@@ -2,7 +2,7 @@
 
 Lengths are in cells of the line and slopes are rises per cell, as in the steady sweep. Heights are in any unit, times
 in relaxation times. The Deborah number D is v tau in cells. The lift is the sum of the depth and its rate, so that the
-force on an element in contact, over 4 G dx, is lift + h + D h'.
+force on an element in contact, divided by 4 G dx, is lift + h + D h'.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, contact_end, write_
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
 ROOT_STEPS = 60
-CLOSE = 1e-2  # cells: size of the last step towards a zero of the force; the error is about its cube
-NEARBY = 8  # patches that are tried one after the other before bisection
+CLOSE = 1e-2  # cells: last step towards a zero of the force; the error is about the cube of this step
+NEARBY = 8  # number of patches that are tried one after the other before bisection
 LOAD, DRAG, LENGTH, TILT, STIFFNESS, DRAG_STIFFNESS, GROWTH, DRAG_GROWTH = range(8)
 SUMS = 8
 
@@ -31,11 +31,12 @@ class Track(NamedTuple):
     height : array, shape (n + 2,)
         Heights at the nodes relative to the highest point, which avoids rounding errors in light contacts.
     enter, leave, peak : array, shape (n + 1,)
-        Slopes at the start and at the end of each cell, and its largest height; the last cell repeats the first one.
+        Slope at the start and at the end of each cell, and largest height in the cell; the last cell repeats the first
+        cell.
     area, square : array, shape (n + 2,)
         Integrals of the height and of the square of the slope up to each node.
     cells : float
-        n, the length of the line.
+        Length n of the line.
     origin : float
         Place of the highest point, in the first cell. The period begins here.
     """
@@ -74,7 +75,10 @@ class Patches(NamedTuple):
 
 
 class History(NamedTuple):
-    """Depth and its rate at ``count`` moments; ``stiff`` is the derivative of the last rate by the last depth."""
+    """Depth and its rate at ``count`` moments.
+
+    ``stiff`` is the derivative of the last rate with respect to the last depth.
+    """
 
     time: FloatArray
     depth: FloatArray
@@ -98,7 +102,10 @@ def height_at(track: Track, x: float) -> tuple[float, float, float]:
 
 @jit_inline_uncounted
 def patch_before(patches: Patches, s: float) -> int:
-    """Return the last patch that begins at s or before, or the first patch; start from the patch found last time."""
+    """Return the index of the last patch that begins at or before s, or 0 if every patch begins later.
+
+    The search starts from the patch found by the previous search.
+    """
     low, high = int(patches.cursor[0]), patches.count
     if patches.start[low] <= s:
         for _ in range(NEARBY):
@@ -130,7 +137,8 @@ def _part(c0: float, c1: float, c2: float, c3: float, y: float) -> tuple[float, 
 def add_patch(track: Track, start: float, end: float, lift: float, deborah: float, sums: FloatArray) -> None:
     """Add the exact forces of a patch in contact, f = lift + h + deborah h' with lift = d + d_dot.
 
-    The integrals over whole cells follow from the running integrals, those over parts of cells from the cubics.
+    The integrals over whole cells follow from the integrals in `Track`, the integrals over parts of cells from the
+    cubics.
     """
     last = track.enter.size - 1
     i, j = min(int(start), last), min(int(end), last)
@@ -223,8 +231,8 @@ def released(track: Track, first: Patches, barriers: Barriers, deborah: float, r
     deborah, rate : float
         New Deborah number, and new rate of the depth.
     sums : array, shape (SUMS,)
-        Written: load and drag over 4 G dx, length in contact (the derivative of the load by the rate), and the integral
-        of the slope over this length.
+        Written: load and drag, divided by 4 G dx; length in contact, which is also the derivative of the load with
+        respect to the rate; and integral of the slope over the length in contact.
     """
     sums[:] = 0.0
     lift, n = first.depth + rate, int(track.cells)

@@ -1,8 +1,8 @@
 """Friction after a velocity jump at constant load, marched from one steady state to the next on one line.
 
 The march starts from steady sliding at v_1. After the jump the depth is marched by backward differentiation of third
-order over the logarithm of the time, and the edges of all patches are solved at every moment (thesis 4.2, with the rate
-of the depth in the velocity of the elements).
+order with respect to the logarithm of the time. The edges of all patches are solved at every moment. The method is that
+of section 4.2 of the thesis, except that the velocity of the elements includes the rate of the depth.
 """
 
 from __future__ import annotations
@@ -22,20 +22,24 @@ from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits, stead
 from mdr_dask.physics.transients.march import LEFT_LIMITS, Finish, Marching, Stepping, Trajectory, march_depth, retrace
 from mdr_dask.physics.transients.patches import Patches, Track
 
-ONSET = 0.5  # part of the time in which the line travels 1 / q_max; steps grow in a constant ratio from then on
-ROOT = 10.0  # the first step is smaller by this factor if the velocity falls: contact then grows as sqrt(t)
-# The next three are divided by the steps per decade
-MISS = 1.0  # part of the change of depth: a step is shortened if the error of the extrapolated depth is larger
-NEWTON = 0.2  # part of the change of depth: largest size of the last Newton step; the error is about its square
-SETTLED = 0.04  # part of the changes of depth and drag: distances from the steady values at the end of a march
-OF_ACCURACY = 0.1  # part of the accuracy: the same distance, if this is larger
-NEGLIGIBLE = 1e-5  # part of the mean displacement: smallest change of depth to which the factors above are applied
-LONG, NOT_STEADY = 15.0, (0.02, 1e-3)  # a march this long must end near the steady drag: parts of its range and value
-MARGIN, WIDENINGS = 0.25, 3  # part of the change of depth by which a march may leave it; times four at each retry
-SHALLOW = 0.01  # part of the lower steady depth: a march never becomes shallower
+ONSET = 0.5  # times the duration of a travel of 1 / q_max: time after which the steps grow in a constant ratio
+ROOT = 10.0  # the first step is smaller by this factor if the velocity falls, because contact then grows as sqrt(t)
+# MISS, NEWTON and SETTLED are divided by the number of steps per decade
+MISS = 1.0  # allowed error of the extrapolated depth, divided by the change of depth; otherwise the step is shortened
+NEWTON = 0.2  # largest last Newton step, divided by the change of depth; the error is about the square of the step
+SETTLED = 0.04  # distances of depth and drag from the steady values at the end of a march, divided by their changes
+OF_ACCURACY = 0.1  # or distance of the drag divided by the accuracy times the steady drag, if this distance is larger
+NEGLIGIBLE = 1e-5  # smallest change of depth that is used in these ratios, divided by the mean displacement
+# the march has failed if, after LONG relaxation times, the drag differs from the steady drag by more than
+# NOT_STEADY[0] times the range of the drag plus NOT_STEADY[1] times the steady drag
+LONG, NOT_STEADY = 15.0, (0.02, 1e-3)
+# the depth may leave the interval between the steady depths by MARGIN times its length; if it goes farther, the march
+# is repeated with four times this margin, for at most WIDENINGS attempts in total
+MARGIN, WIDENINGS = 0.25, 3
+SHALLOW = 0.01  # least depth of a march, divided by the smaller steady depth
 MOMENTS = 3000  # largest number of moments of a march
-STEEPEST = 3.0  # times the smaller of the two secants at a moment: a cubic with a steeper tangent would overshoot
-EVERY = 2  # moments of a path per step of its repetition on another grid, except for the last step
+STEEPEST = 3.0  # largest ratio of a tangent to the flatter of the two adjacent secants; a steeper cubic may overshoot
+EVERY = 2  # a path is repeated on another grid at every second moment and at the last moment
 
 
 class MarchRequest(NamedTuple):
@@ -46,12 +50,13 @@ class MarchRequest(NamedTuple):
     times : array, shape (m,)
         Requested (t - t_0) / tau, increasing.
     wavenumber : float
-        q_max L, which decides the size of the first step.
+        Largest wavenumber of the line times its length, q_max L; it determines the first step.
     per_decade : float
         Steps per factor of ten in time.
     accuracy : float
-        Allowed error of the friction relative to the steady friction after the jump. A smaller transient is not
-        marched. A march ends when drag and depth are within a tenth of this accuracy.
+        Allowed error of the friction relative to the steady friction after the jump. A transient that is smaller than
+        this error is not marched. A march ends when drag and depth are near enough to the steady values; a tenth of
+        this error is always near enough.
     """
 
     times: FloatArray
@@ -78,11 +83,11 @@ class Path(NamedTuple):
     falls: bool
 
     def at(self, times: FloatArray, after: FloatArray) -> FloatArray:
-        """Return drag and depth at increasing times, shape (2, times), equal to `after` beyond the last moment.
+        """Return drag and depth at increasing times, shape (2, times); after the last moment they are equal to `after`.
 
-        Between moments they are cubic in log(1 + t / t_1), where t_1 is the first moment after the jump. Before t_1
-        they change in proportion to the time, or to its square root if the velocity falls, because contact then grows
-        behind every patch.
+        Between moments both are cubic in log(1 + t / t_1), where t_1 is the first moment after the jump. Before t_1
+        both change in proportion to the time, or, if the velocity falls, to the square root of the time, because
+        contact then grows behind every patch.
         """
         power = 0.5 if self.falls else 1.0
         moments, wanted = (self.time / self.time[1]) ** power, (times / self.time[1]) ** power
@@ -92,11 +97,13 @@ class Path(NamedTuple):
 
 
 def _limited_cubic(x: FloatArray, rows: FloatArray, slopes: FloatArray, places: FloatArray) -> FloatArray:
-    """Return cubics through rows of points with given slopes; if the first slope is NaN, the first piece is a parabola.
+    """Return the values at `places` of piecewise cubics through rows of points with given slopes.
+
+    If the first slope is NaN, the first piece is a parabola.
 
     A slope that is much steeper than the secants at its point is due to a single asperity that enters or leaves
-    contact. It is reduced, so that the cubic does not overshoot. (Splines of scipy would take a tenth of the time of a
-    jump.)
+    contact. Such a slope is reduced, so that the cubic does not overshoot. (Splines of scipy would take a tenth of the
+    computing time of a jump.)
     """
     step, rise = np.diff(x), np.diff(rows)
     sizes = np.abs(rise / step)[:, [0, *range(step.size), -1]]
@@ -125,7 +132,7 @@ class Jump(NamedTuple):
     trace, depth : array, shape (times,)
         Drag and depth at the requested times.
     path : Path or None
-        Path of the march; None if nothing was marched.
+        Path of the march; None if there was no march.
     left_out : float
         Estimated size of a transient that was not marched because it is smaller than the accuracy; otherwise 0.
     outcome : Outcome
@@ -147,12 +154,14 @@ class Jump(NamedTuple):
 
 
 def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], request: MarchRequest) -> Jump:
-    """Return the friction of a Kelvin foundation on a periodic line through a velocity jump at constant load.
+    """Return the friction of a Kelvin foundation on a periodic line before, during and after a velocity jump.
+
+    The load is constant.
 
     Parameters
     ----------
     line : CubicLine
-        Periodic.
+        A periodic line.
     load : float
         F_N / (4 G L), in the unit of height.
     deborah : tuple of float
@@ -191,9 +200,9 @@ def jump_between(
 def retraced(
     line: PreparedLine, load: float, deborah: FloatArray, limits: SteadyLimits, path: Path, request: MarchRequest
 ) -> Path | None:
-    """Return a path on another grid at every second one of its moments, or None if there is no solution.
+    """Return the march of `path` repeated on another grid, at every second moment, or None if there is no solution.
 
-    The other parameters are as in :func:`jump_between`, for the other grid.
+    The other parameters are as in :func:`jump_between`, on the other grid.
     """
     if limits.outcome != Outcome.CONVERGED:
         return None
@@ -222,15 +231,15 @@ class _Relaxation(NamedTuple):
 
     @property
     def change(self) -> float:
-        """Change of the depth, relative to which its errors are measured."""
+        """Change of the steady depth, to which errors of the depth are relative."""
         return max(abs(float(np.diff(self.limits.depth)[0])), NEGLIGIBLE * self.load / self.line.track.cells)
 
     @property
     def stepping(self) -> Stepping:
         """Sizes of the steps.
 
-        They grow in a constant ratio from a part of the time in which the line travels 1 / q_max. The line travels at
-        v_2, and contact behind a patch grows at v_1 - v_2 if the velocity falls.
+        The steps grow in a constant ratio after `ONSET` times the duration of a travel of 1 / q_max. The line travels
+        at v_2. If the velocity falls, contact behind a patch grows at v_1 - v_2, and the larger velocity is used.
         """
         before, after = self.deborah / self.line.track.cells
         growth = 10 ** (1 / self.request.per_decade)
@@ -262,7 +271,7 @@ class _Relaxation(NamedTuple):
             margin *= 4
 
     def march(self, transient: float) -> tuple[Path | None, Outcome]:
-        """March from one steady state to the next; return the path (None if there is none) and the outcome."""
+        """March from one steady state to the next; return the path (None if the march failed) and the outcome."""
         after, request = self.limits.after, self.request
         near = max(SETTLED / request.per_decade, OF_ACCURACY * request.accuracy * after / max(transient, 1e-300))
         finish = Finish(float(self.ends[1]), after, near * self.change, near)
@@ -282,7 +291,7 @@ class _Relaxation(NamedTuple):
         return path, Outcome.CONVERGED
 
     def begun(self, interval: tuple[float, float], moments: int) -> tuple[Marching, Trajectory, Workspace]:
-        """Return a march between two depths, with its first moment written, and its workspace."""
+        """Return a march whose depth stays in an interval, its trajectory with the first moment, and its workspace."""
         line, limits, stepping = self.line, self.limits, self.stepping
         assert limits.first is not None
         assert limits.slower is not None
@@ -302,7 +311,7 @@ class _Relaxation(NamedTuple):
         return Path(found.time, values, np.stack([found.drag_rate, found.rate]), falls)
 
     def retrace(self, path: Path) -> Path | None:
-        """Return the path on this grid at every second moment of a path on another grid, or None."""
+        """Return the march of `path` repeated on this grid at every second moment, or None if there is no solution."""
         moments = np.unique(np.append(np.arange(0, path.time.size, EVERY), path.time.size - 1))
         time, depths = path.time[moments], path.values[1, moments] + self.line.cells.top
         for interval in self.intervals(np.append(depths + (self.ends[0] - depths[0]), self.ends)):
@@ -321,10 +330,10 @@ def _reachable(track: Track, slower: Patches, interval: tuple[float, float]) -> 
 
 @jit
 def _runs(track: Track, slower: Patches, interval: tuple[float, float]) -> tuple[IntArray, FloatArray]:
-    """Return the runs of cells where contact is possible at depths in an interval, and the bound for each cell.
+    """Return the runs of cells where contact is possible at depths in an interval, and a bound for each cell.
 
-    The bound is the largest depth at which a cell is certainly out of contact. It follows from the steady state at the
-    lower velocity: if the depth is smaller by some length, displacements are smaller by this length at most.
+    The bound is the largest depth at which the cell is certainly out of contact. It follows from the steady state at
+    the lower velocity: if the depth is smaller by some length, displacements are smaller by at most this length.
     """
     (low, high), cells, decay = interval, track.peak.size, np.exp(-1 / slower.deborah)
     from_depth = np.full(cells + 1, -np.inf)

@@ -1,9 +1,9 @@
-"""One element of a viscoelastic foundation during one step: pressed at constant speed, or recovering without force.
+"""One element of a viscoelastic foundation during one step: moved at constant speed, or recovering without force.
 
-Functions take the strains of the dashpots of the Prony terms of all elements, shape (n, terms), and the index i of one
-element, because passing an index is faster than slicing.
+`terms` contains the strains of the dashpots of the Prony terms of all elements, shape (n, terms), and i is the index of
+one element: passing an index is faster than slicing.
 
-Units: the static modulus is 1, heights are in any unit, lengths in the unit of the line, times in one unit for all.
+Units: the static modulus is 1, heights are in any unit, lengths in the length of the line, all times in the same unit.
 """
 
 from __future__ import annotations
@@ -26,13 +26,14 @@ class Foundation(NamedTuple):
     moduli, times : array, shape (terms,)
         G_m / G_inf and tau_m.
     viscosity : float
-        eta / G_inf of the dashpot, 0 for none.
+        eta / G_inf of the dashpot; 0 without a dashpot.
     rates : array, shape (modes,)
         Decay rates of the modes, positive. There is one mode for each Prony term, and one more for a dashpot.
     outward, inward : array, shape (modes, modes)
-        Transformation from the modes to the state (u of a solid with a dashpot, a_1, ...), and back.
+        Transformation from the modes to the state, and back. The state is (u, a_1, ...) with a dashpot, otherwise
+        (a_1, ...).
     push : array, shape (modes,)
-        Growth rates of the modes of the mean over all elements, under a unit load.
+        Growth rates of the modes of the mean state of all elements under a unit load.
     """
 
     moduli: FloatArray
@@ -50,9 +51,9 @@ def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundat
     Parameters
     ----------
     moduli, times : array_like, shape (terms,)
-        G_m / G_inf, positive, and tau_m, distinct, in the unit of time used.
+        G_m / G_inf, positive, and tau_m, distinct, in any unit of time.
     viscosity : float
-        eta / G_inf in that unit; 1 for the Kelvin body (no terms) if the unit is tau.
+        eta / G_inf in the same unit of time. For a Kelvin solid (no terms) this is 1 if the unit is tau.
 
     Raises
     ------
@@ -66,7 +67,7 @@ def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundat
     g, tau = g[order], tau[order]
     pole, weight = (np.append(0.0, tau), np.append(viscosity, g * tau)) if viscosity > 0 else (tau, g * tau)
     zeros, distance = recovery_times(weight, pole)
-    # a mode of unit displacement, u = 1 and a_m = -lambda / (tau_m - lambda): orthogonal under the weights
+    # modes of unit displacement, u = 1 and a_m = -lambda / (tau_m - lambda), which are orthogonal with the weights
     modes = -zeros / distance
     modes /= np.sqrt(weight @ modes**2)
     load = np.append(1.0, 0 * g) if viscosity > 0 else g / (1 + g.sum())
@@ -78,7 +79,7 @@ KELVIN = foundation([], [], 1.0)
 
 
 class ElementWorkspace(NamedTuple):
-    """Work arrays of one element: modes, decay of modes and of terms over a part of a step, terms (1, terms)."""
+    """Work arrays of one element: modes, decay of modes and terms during a part of a step, strains of the terms."""
 
     modes: FloatArray
     decay: FloatArray
@@ -103,7 +104,7 @@ class Lapse(NamedTuple):
 
 
 class Rise(NamedTuple):
-    """Height of the line over one element at the start and the end of a duration, and the rates of the height there."""
+    """Height of the line at one element at the start and at the end of a duration, and the rates of this height."""
 
     w0: float
     w1: float
@@ -112,10 +113,10 @@ class Rise(NamedTuple):
 
 
 class Release(NamedTuple):
-    """Separation of an element in a step: the part of the step before it (1 for none), and two displacements.
+    """Separation of an element in a step.
 
-    `leaves` is the displacement at the separation, `after` the displacement at the end of the step if the element
-    separates.
+    `part` is the time until the separation as a fraction of the step, or 1 if the element does not separate. `leaves`
+    is the displacement at the separation, and `after` the displacement at the end of the step.
     """
 
     part: float
@@ -173,8 +174,8 @@ def press(
 ) -> tuple[float, float]:
     """Move an element from u0 to u1 at constant speed; return work and dissipation.
 
-    The difference of the two is stored. The stretch q = u - a of a term is A + B exp(-t / tau) with A = tau du/dt. Work
-    is the integral of f du, dissipation the integral of G q^2 / tau and of eta (du/dt)^2 over time.
+    The difference of work and dissipation is stored. The stretch q = u - a of a term is A + B exp(-t / tau) with A =
+    tau du/dt. Work is the integral of f du, dissipation the integral of G q^2 / tau and of eta (du/dt)^2 over time.
     """
     if step <= 0:
         return 0.0, 0.0
@@ -211,9 +212,9 @@ def pull(solid: Foundation, u: float, terms: FloatArray, i: int) -> float:
 
 @jit_inline
 def release(solid: Foundation, lapse: Lapse, rise: Rise, terms: FloatArray, i: int) -> tuple[float, float]:
-    """Return the part of a duration after which an element in contact separates, and its displacement then.
+    """Return the fraction of a duration after which an element in contact separates, and its displacement at that time.
 
-    The part is 1 if the element does not separate. The force is taken as linear in time, the height of the line as
+    The fraction is 1 if the element does not separate. The force is taken as linear in time, the height of the line as
     cubic.
     """
     begin = pull(solid, rise.w0, terms, i) + solid.viscosity * rise.rise0
@@ -259,7 +260,8 @@ def advance(
 ) -> tuple[float, bool, float, float]:
     """Move one element through a duration; return displacement, contact, work and dissipation; overwrite its `terms`.
 
-    `w` is the height of the line at the start and at the end, `element` displacement and contact at the start.
+    `w` is the displacement at the line (depth plus height) at the start and at the end. `element` contains displacement
+    and contact at the start.
     """
     (w0, w1), (u0, touching), step, workspace = w, element, lapse.time, lapse.workspace
     before = stored(solid, u0, terms, i)

@@ -1,4 +1,4 @@
-"""Friction under any loading history, from the motion of every element, of second order in the step.
+"""Friction under any loading history, from the motion of every element; second-order accurate in the time step.
 
 Times are in the unit of the solid, travel is in lengths of the line, loads are F_N / (4 G_inf L) in the unit of height.
 A single velocity jump of a Kelvin solid on a periodic line is solved much faster by `velocity_jump`.
@@ -40,8 +40,8 @@ from mdr_dask.physics.transients.elements.steps import (
 )
 
 PERIODS = 3000  # largest number of periods of the line until the state of an element repeats
-STEADY = 1e-14  # part of the depth: accuracy of the depth at the start
-LOAD_MISSED = 1e-6  # part of the load that may be missing in the steady state at the start
+STEADY = 1e-14  # tolerance of the depth of the steady state at the start, as a fraction of the depth
+LOAD_MISSED = 1e-6  # largest relative error of the load in the steady state at the start
 
 
 class Response(NamedTuple):
@@ -50,13 +50,14 @@ class Response(NamedTuple):
     Parameters
     ----------
     drag, depth, rate, contact : array, shape (moments,)
-        F_x / (4 G L) in the unit of height squared over length; depth; its derivative by t / tau; fraction in contact.
+        F_x / (4 G L), in the unit of height squared divided by the unit of length; depth; derivative of the depth with
+        respect to time; fraction of the line in contact.
     stored : array, shape (moments,)
-        Stored energy over 4 G L.
+        Stored energy, divided by 4 G L.
     work, dissipated : array, shape (moments,)
-        Work done on the elements and energy dissipated since the first moment, over 4 G L. Their difference is the
-        increase of the stored energy, within rounding. All energy stored in an element that leaves the end of a line
-        that is not periodic counts as dissipated.
+        Work done on the elements and energy dissipated since the first moment, both divided by 4 G L. Their difference
+        is the increase of the stored energy, within rounding. All energy stored in an element that leaves the end of a
+        line that is not periodic counts as dissipated.
     displacement : array, shape (n,)
         Displacement of every element at the end.
     status : Outcome
@@ -99,9 +100,9 @@ def _copy(state: State) -> State:
 def steady_start(line: CubicLine, solid: Foundation, deborah: float, load: float) -> tuple[State, float, Outcome]:
     """Return the steady state of the elements at the nodes, sliding at constant speed under a constant load.
 
-    One element is carried around the line until its state repeats, in steps of half a cell by the method of
-    :func:`follow_line`. The depth is found from the mean displacement, which increases with the depth. At ``deborah =
-    0`` the elements are in equilibrium at rest under the load.
+    One element is moved along the line, period after period, until its state repeats, in steps of half a cell by the
+    method of :func:`follow_line`. The depth is found from the mean displacement, which increases with the depth. At
+    ``deborah = 0`` the elements are in equilibrium at rest under the load.
 
     Returns
     -------
@@ -228,14 +229,14 @@ def follow_line(
     """Compute the motion of every element of a linear foundation under a line during a loading history.
 
     During a step an element in contact moves at constant speed, and a free element recovers by the modes of the solid.
-    Contact begins or ends inside the step, where the gap or the force vanishes. The load decides the mean displacement,
-    whichever elements are in contact, so that the depth is the root of a convex sum.
+    Contact begins inside a step when the gap vanishes, and ends when the force vanishes. The load determines the mean
+    displacement, whichever elements are in contact, so that the depth is the root of a convex function.
 
     Parameters
     ----------
     line : CubicLine
-        Elements enter a line that is not periodic undeformed. Forces are linear between elements: the error is smallest
-        for a line :func:`~mdr_dask.physics.surfaces.cubic_line.without_kinks`.
+        If the line is not periodic, elements enter undeformed. Forces are interpolated linearly between elements, which
+        is most accurate for a line :func:`~mdr_dask.physics.surfaces.cubic_line.without_kinks`.
     solid : Foundation
     schedule : Schedule
         Travel, velocity and load at every moment.
@@ -254,18 +255,18 @@ def follow_line(
 
 
 MOST_STEPS = 400_000  # largest number of steps in one piece of a history
-# The next three are for 12 steps per decade; with more, the steps are shorter in proportion
-CELLS = 0.5  # cells of the line per step, at most
-PART = 0.01  # part of a ramp or of a period per step, at most
-FIRST = 1e-3  # first step, relative to the longest step or to the unit of time, whichever is smaller
+# CELLS, PART and FIRST are valid for 12 steps per decade; with more steps per decade they are smaller in proportion
+CELLS = 0.5  # largest travel in a step, cells
+PART = 0.01  # largest step, as a fraction of the duration of a ramp or of the period of an oscillation
+FIRST = 1e-3  # first step, as a fraction of the longest step or of the unit of time, whichever is smaller
 STEPS_PER_DECADE = 12.0
-NEARLY = 1e-2  # part of a step: a moment that is so near to a requested time is replaced by it
-ROUNDING = 1e-12  # relative to a time
+NEARLY = 1e-2  # a moment that is nearer to a requested time than this fraction of a step is replaced by that time
+ROUNDING = 1e-12  # relative difference of times that counts as a rounding error
 
 
 @dataclass(frozen=True)
 class Piece:
-    """Smooth velocity and load between two times: linear in time, perhaps with a sine added from `start` on."""
+    """Velocity and load between two times: linear in time, with an optional sine that begins at `start`."""
 
     start: float
     end: float
@@ -274,7 +275,7 @@ class Piece:
     swing: tuple[float, float, float] = (0.0, 0.0, 0.0)  # amplitude of the velocity and of the load, angular frequency
 
     def scaled(self, time: float, velocity: float, force: float) -> Piece:
-        """Return the piece in other units."""
+        """Return the piece in units of the given time, velocity and force."""
         swing = self.swing[0] / velocity, self.swing[1] / force, self.swing[2] * time
         ends = (
             (self.velocity[0] / velocity, self.velocity[1] / velocity),
@@ -283,7 +284,7 @@ class Piece:
         return Piece(self.start / time, self.end / time, *ends, swing)
 
     def at(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return travel since `start`, velocity and load."""
+        """Return the travel since `start`, the velocity and the load at given times."""
         late = time - self.start
         width = self.end - self.start
         part = late / width if np.isfinite(width) else 0 * late
@@ -300,7 +301,7 @@ class Piece:
 
     @property
     def changes_in(self) -> float:
-        """Characteristic time: period of the sine or length of the ramp, infinite for constant values."""
+        """Characteristic time: period of the sine, duration of the ramp, or infinity for constant values."""
         if self.swing[2]:
             return 2 * np.pi / self.swing[2]
         same = self.velocity[0] == self.velocity[1] and self.force[0] == self.force[1]
@@ -332,15 +333,18 @@ class Piece:
 
 
 class Trace(NamedTuple):
-    """Friction during a history: drag F_x / (4 G L) over the load, in height over length; depths in units of height.
+    """Friction during a history.
+
+    The friction is the drag F_x / (4 G L) divided by the load F_N / (4 G_inf L), in the unit of height divided by the
+    unit of length. Depths are in the unit of height.
 
     Parameters
     ----------
     before, at, after : float
-        Friction in the steady state before t = 0, at t = 0+, and in the final steady state; NaN if there is no final
-        steady state.
+        Friction in the steady state before t = 0, just after t = 0, and in the final steady state. `after` is NaN if
+        the history does not end in steady sliding.
     friction, depth : array, shape (times,)
-        Friction and depth at the requested times; at a jump, the value after it.
+        Friction and depth at the requested times; at a jump, the value just after the jump.
     contact : float
         Largest fraction of the line in contact from t = 0 to the last requested time.
     outcome : Outcome
@@ -381,11 +385,11 @@ def trace(
         Velocity and load until t = 0: the body slides steadily, or is at rest if the velocity is 0. Both may jump at t
         = 0.
     pieces : sequence of Piece
-        Velocity and load from t = 0 on, without an end.
+        Velocity and load from t = 0 on; the last piece has no end.
     times : array, shape (m,)
         Requested times, increasing.
     per_decade : float
-        Steps per factor of ten in time after every change.
+        Number of steps per factor of ten in the time since the start of a piece.
     """
     times = _snapped(times, np.array([piece.start for piece in pieces]))
     velocity, load_before = before
@@ -434,7 +438,7 @@ def _still(line: CubicLine, solid: Foundation, velocity: float, load: float, sta
 
 
 def _end(line: CubicLine, solid: Foundation, piece: Piece) -> float:
-    """Return the friction of the steady state in which a history ends; NaN if it has no steady end or ends at rest."""
+    """Return the friction in the final steady state, or NaN if the history ends with an oscillation or at rest."""
     velocity, load = piece.velocity[1], piece.force[1]
     if piece.swing[2] or velocity <= 0:
         return np.nan
@@ -445,7 +449,7 @@ def _end(line: CubicLine, solid: Foundation, piece: Piece) -> float:
 
 
 def _snapped(times: FloatArray, starts: FloatArray) -> FloatArray:
-    """Return the times; those that differ from the start of a piece by rounding only are replaced by this start."""
+    """Return the times, each replaced by the start of a piece if the two differ only by a rounding error."""
     nearest = starts[np.abs(times[:, None] - starts).argmin(axis=1)]
     found: FloatArray = np.where(np.abs(times - nearest) <= ROUNDING * nearest, nearest, times)
     return found
@@ -466,6 +470,6 @@ def _with_times(moments: FloatArray, times: FloatArray) -> FloatArray:
 
 
 def _at(times: FloatArray, moments: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the values at times that are among the moments; at a jump, the value after it."""
+    """Return the values at the given times, which are among the moments; at a jump, the value just after the jump."""
     found: FloatArray = values[np.searchsorted(moments, times, side="right") - 1]
     return found

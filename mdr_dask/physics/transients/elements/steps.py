@@ -1,6 +1,6 @@
 """Motion of all elements of a viscoelastic foundation through the moments of a loading history.
 
-Units: the static modulus is 1, heights are in any unit, lengths in the unit of the line, times in one unit for all.
+Units: the static modulus is 1, heights are in any unit, lengths in the length of the line, all times in the same unit.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ from mdr_dask.physics.transients.elements.foundation import (
 
 
 class Edges(NamedTuple):
-    """Edges of contact in the cell before each element, at the last step in which the force decided their place.
+    """Edges of contact in the cell before each element, at the last moment at which the edge followed from the force.
 
-    `place` is the distance of the edge from the element in contact as a part of the cell, -1 for none; `gap` is the gap
-    at the element out of contact at that time.
+    `place` is the distance of the edge from the element in contact, in cells, or -1 if there is no edge. `gap` is the
+    gap at the neighbouring element out of contact at that moment.
     """
 
     place: FloatArray
@@ -48,10 +48,10 @@ class Contact(NamedTuple):
     Parameters
     ----------
     gaps, slope : array
-        Height of the line over the displacement that an element would have without contact, and the slope of the line.
+        Distance between the line and the position that an element would have without contact, and slope of the line.
     pulls, force, power : array
-        Force of springs and Prony terms of elements pressed to the line; the total force, and its product with the
-        slope (both written).
+        Force of spring and Prony terms of an element that follows the line; written: the total force, and the product
+        of the total force and the slope.
     touching : bool array
     edges : Edges
     """
@@ -66,7 +66,10 @@ class Contact(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """Deborah number and load at one moment, and the first element of a line that is not periodic (-1 if it is)."""
+    """Deborah number and load at one moment.
+
+    `first` is the first element of a line that is not periodic, or -1 on a periodic line.
+    """
 
     deborah: float
     load: float
@@ -77,7 +80,7 @@ class Drive(NamedTuple):
 def under_elements(line: CubicLine, travel: float, under: FloatArray, slope_under: FloatArray) -> int:
     """Write height and slope of the line at every element after a travel; return the number of whole cells travelled.
 
-    Slopes are over the length of the line.
+    Slopes are derivatives with respect to x / L, where L is the length of the line.
     """
     n = under.size
     cells = travel * n
@@ -97,9 +100,10 @@ def under_elements(line: CubicLine, travel: float, under: FloatArray, slope_unde
 
 @jit
 def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) -> tuple[float, bool]:
-    """Return the depth d at which the mean of max(d + p, free) has a given value, and success.
+    """Return the depth d at which the mean displacement max(d + h, free) has a given value, and success.
 
-    The mean is convex and increases with d.
+    h is the height of the line at an element (`under`), and `free` the displacement of the element without contact. The
+    mean is a convex, increasing function of d.
     """
     n = under.size
     for _ in range(200):
@@ -128,14 +132,14 @@ def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) ->
 
 @jit_inline
 def _whole(values: FloatArray, j: int) -> float:
-    """Return the integral over the cell before node j of the cubic through four nodes."""
+    """Return the integral over the cell before node j of the cubic through the four nearest values."""
     n = values.size
     return float((13 * (values[j - 1] + values[j]) - values[j - 2] - values[(j + 1) % n]) / 24)
 
 
 @jit_inline
 def _limit(inner: float, outer: float, place: float, gap: float) -> float:
-    """Return the distance of the edge from the element in contact, as a part of the cell."""
+    """Return the distance of the edge from the element in contact, in cells."""
     if place < 0:
         inner = max(inner, 0.0)
         return inner / (inner - outer) if outer < 0 else 1.0
@@ -146,7 +150,7 @@ def _limit(inner: float, outer: float, place: float, gap: float) -> float:
 def _cell(
     j: int, gaps: FloatArray, force: FloatArray, touching: BoolArray, edges: Edges, keep: bool
 ) -> tuple[float, float]:
-    """Return start and end of contact in the cell before element j, as parts of the cell."""
+    """Return where contact starts and ends in the cell before element j, between 0 and 1."""
     f0, f1 = force[j - 1], force[j]
     before, after = touching[j - 1], touching[j]
     if keep and before == after:
@@ -173,7 +177,7 @@ def _cell(
 def _forces(contact: Contact, first: int, keep: bool) -> tuple[float, float, float]:
     """Return mean load, drag and fraction in contact; write the edges if `keep`.
 
-    There is no cell before the element `first`.
+    The cell before the element `first` does not exist.
     """
     force, power, slope, touching, edges = contact.force, contact.power, contact.slope, contact.touching, contact.edges
     n = force.size
@@ -199,7 +203,7 @@ def _forces(contact: Contact, first: int, keep: bool) -> tuple[float, float, flo
 
 @jit
 def _pressing_rate(contact: Contact, weight: float, deborah: float) -> float:
-    """Return the smallest rate at which no element in contact has a negative force."""
+    """Return the smallest rate of the depth at which the force of no element in contact is negative."""
     rate = -np.inf
     for j in range(contact.force.size):
         if contact.touching[j]:
@@ -209,11 +213,12 @@ def _pressing_rate(contact: Contact, weight: float, deborah: float) -> float:
 
 @jit
 def carrying_rate(contact: Contact, weight: float, rate: float, drive: Drive) -> tuple[float, float, float]:
-    """Return the rate of the depth at which the load is carried, drag and fraction in contact; write the edges.
+    """Find the rate of the depth at which the load is carried; write the edges of contact.
 
-    The force of an element pressed to the line is `pulls` plus `weight` times ``rate + deborah * slope``. With a
-    dashpot, `weight` is its viscosity and `rate` the rate of the depth. Without one, `weight` is the glass modulus,
-    `rate` a correction of the depth, and `deborah` 0.
+    Return this rate, the drag and the fraction of the line in contact. The force of an element pressed to the line is
+    `pulls` plus `weight` times ``rate + deborah * slope``. With a dashpot, `weight` is the viscosity and `rate` the
+    rate of the depth. Without a dashpot, `weight` is the glass modulus, `rate` a correction of the depth, and `deborah`
+    0.
     """
     force, power, slope = contact.force, contact.power, contact.slope
     drag, length = 0.0, 0.0
@@ -243,9 +248,10 @@ class State(NamedTuple):
     Parameters
     ----------
     displacement, terms : array, shape (n,) and (n, terms)
-        u, and the strains of the dashpots of the Prony terms.
+        Displacement u, and strains of the dashpots of the Prony terms.
     free, free_terms : array, shape (n,) and (n, terms)
-        The same for elements without contact; `free_terms` is valid only for elements in contact.
+        Values of `displacement` and `terms` that an element would have if it had separated; `free_terms` is valid only
+        for elements in contact.
     touching : array, shape (n,)
         Whether an element is in contact.
     edges : Edges
@@ -294,7 +300,7 @@ def mean_after(solid: Foundation, state: State, load: float, next_load: float, s
 def _instant(
     solid: Foundation, state: State, under: FloatArray, load: float, depth: float
 ) -> tuple[float, float, bool]:
-    """Load elements without a dashpot instantly; return the depth, the work (all of which is stored), and success."""
+    """Load elements without a dashpot instantly; return the depth, the work and success. All of the work is stored."""
     n = under.size
     mean, work, glass = 0.0, 0.0, 1.0 + solid.moduli.sum()
     for j in range(n):
@@ -330,11 +336,11 @@ class Schedule(NamedTuple):
     Parameters
     ----------
     moments : array
-        Times, increasing, in the unit of the solid. Velocity and load may jump at the first one.
+        Increasing times, in the unit of time of the solid. Velocity and load may jump at the first time.
     travels, deborahs : array
-        Travelled distance over L, and its derivative by time; both may be negative.
+        Travelled distance divided by L, and its derivative with respect to time; both may be negative.
     loads : array
-        F_N / (4 G_inf L), positive; linear between the moments.
+        F_N / (4 G_inf L), positive; between the moments the load is interpolated linearly.
     """
 
     moments: FloatArray
@@ -355,8 +361,9 @@ class Step(NamedTuple):
 class StepWorkspace(NamedTuple):
     """Work arrays of one step.
 
-    They contain heights and slopes of the line at the elements at the end and at the start, displacements without
-    contact at the end, times and displacements of separation, gaps and forces, and the decay over the whole step.
+    The arrays contain: heights and slopes of the line at the elements, at the start and at the end of the step;
+    displacements without contact at the end; times and displacements of separation; gaps and forces; and the decay
+    during the whole step.
     """
 
     under: FloatArray
@@ -508,7 +515,9 @@ def _state_energy(solid: Foundation, state: State) -> float:
 def forces_now(
     solid: Foundation, state: State, workspace: StepWorkspace, depth: float, rate: float, drive: Drive
 ) -> tuple[float, float, float, float]:
-    """Return the depth and its rate at which the load is carried, drag and fraction in contact; write the edges.
+    """Find the depth and its rate at which the load is carried; write the edges of contact.
+
+    Return the depth, its rate, the drag and the fraction of the line in contact.
 
     Without a dashpot the depth is corrected so that the load is met. The depth from the mean displacement is less
     accurate, because it follows from a sum over the elements.
