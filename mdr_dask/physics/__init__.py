@@ -1,6 +1,7 @@
 """The numerics: arrays in, arrays out, with numpy, scipy and numba only.
 
-On the ground `outcome` (how a solver ended), `jit` (compilation of kernels), `linear` (solves by one thread)
-and `solids` (linear viscoelastic solids). Above them the rooms `mdr` and `surfaces`; then `sliding`; on top
-`transients`, `wear`, `lubrication` and `superposition`, which do not know each other.
+The lowest layer contains `outcome` (how a solver ended), `jit` (compilation of kernels), `linear` (linear systems,
+solved by one thread) and `solids` (linear viscoelastic solids). The packages `mdr` and `surfaces` form the next layer,
+and `sliding` the layer above. The top layer consists of `transients`, `wear`, `lubrication` and `superposition`, which
+do not import each other.
 """

@@ -1,7 +1,7 @@
 """Compilation of numerical kernels by numba: `jit` for kernels, `jit_inline` for small functions inside them.
 
-Numba recompiles a kernel when its own file changes. After a change of a function that kernels of other files call,
-empty the cache or set NUMBA_CACHE_DIR to a new folder; the tests do this automatically.
+Numba recompiles a kernel only when the file of the kernel changes. After a change of a function that kernels in other
+files call, empty the cache or set NUMBA_CACHE_DIR to a new folder; the tests do this automatically.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ UNCOUNTED = OPTIONS | {"_nrt": False}  # without its runtime, numba does not cou
 def jit(function: Kernel) -> Kernel:
     """Compile a function of numbers and arrays, and store its machine code in numba's cache.
 
-    If the cache cannot be written or read, the function is compiled in this process, which only costs time.
+    If the cache cannot be written or read, the function is compiled again in every process, which only costs time.
     """
     return _cached(function, OPTIONS)
 
@@ -59,7 +59,7 @@ def _cached(function: Kernel, options: dict[str, Any]) -> Kernel:
 
 
 def _survive_faults(stored: Any) -> None:
-    """Compile again if a file of the cache is incomplete or unreadable; continue if it cannot be written."""
+    """Compile again if a file of the cache is incomplete or unreadable; continue if a file cannot be written."""
     load, save = stored.load_overload, stored.save_overload
 
     def load_overload(signature: Any, context: Any) -> Any:
@@ -86,7 +86,7 @@ def _warn_once(problem: str) -> None:
 
 @jit_inline
 def last_until(values: Any, x: float, low: int, high: int) -> int:
-    """Return the largest index in [low, high) whose value is at most x, or `low`; the values ascend."""
+    """Return the largest index in [low, high) whose value is at most x, or `low` if no value is; the values ascend."""
     while high - low > 1:
         middle = (low + high) // 2
         if values[middle] <= x:

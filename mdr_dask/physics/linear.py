@@ -21,7 +21,7 @@ class Factors(NamedTuple):
     pivots: NDArray[np.int32]
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Return x of matrix @ x = right, a vector or one column for each system."""
+        """Return the solution x of matrix @ x = right, where `right` is a vector or has one column for each system."""
         return np.asarray(dgetrs(self.triangles, self.pivots, right, trans=1)[0])
 
 

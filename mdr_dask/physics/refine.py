@@ -7,8 +7,8 @@ last two levels, and b the change before that. The relative error on the last le
     error = safety max( c / (r - 1),  b / (r (r - 1)) ).
 
 The first term is Richardson's estimate, with the safety factor of the grid convergence index (Roache, J. Fluids Eng.
-116, 405, 1994). The second term is the first one for a change b / r, which follows from b if the change decreases by r.
-It is needed because the results on two grids may agree by chance, and is available from the third level on.
+116, 405, 1994). The second term is the same estimate with the change c = b / r that is expected after a change b.
+The second term is needed because the results on two grids may agree by chance; it is available from the third level on.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ class Solution(NamedTuple):
     Parameters
     ----------
     values : sequence of array, shape (cases, ...)
-        One array per output: one number per case, or a whole profile per case at positions that are the same on every
-        grid. NaN marks positions where the output does not exist.
+        One array per output. It contains one number per case, or one profile per case at positions that are the same on
+        every grid. NaN marks positions where the output does not exist.
     outcome : int8 array, shape (cases,)
         Values of `Outcome`.
     """
@@ -50,8 +50,8 @@ class Refined(NamedTuple):
     values : list of array, shape (cases, ...)
         One array per output; NaN where a case has no solution.
     errors : array, shape (outputs, cases)
-        Estimated absolute errors in the unit of the output; for a profile the largest error along it. Infinite where no
-        estimate is possible.
+        Estimated absolute errors in the unit of the output; for a profile, the largest error along the profile. An
+        error is infinite where no estimate is possible.
     met : bool array, shape (cases,)
         Whether every output meets the accuracy.
     level : int array, shape (cases,)
@@ -83,8 +83,8 @@ def refine(
     Parameters
     ----------
     solve : callable, (level, cases) -> Solution
-        Solves the cases with these indices on the grid of a level. It must not raise an exception for a case that
-        fails. All outputs that it returns have to meet the accuracy.
+        Function that solves the cases with the given indices on the grid of a level. It must not raise an exception for
+        a case that fails. All outputs that it returns have to meet the accuracy.
     cases : int
         Number of cases.
     levels : sequence of int
@@ -94,12 +94,13 @@ def refine(
         Allowed error of every output, relative to its largest absolute value, or to its floor if the floor is larger.
         Infinity to stop at the second level and obtain the errors there.
     order : float
-        Order of convergence p of the solver, or at least of the dominant part of its error.
+        Order of convergence p of the dominant part of the error of the solver.
     safety : float
         Safety factor of the estimate.
     floors : float or array, shape (outputs,)
-        Absolute value, for all outputs or for each, below which an error is taken relative to the floor instead of the
-        output. It is needed for outputs that can be zero, such as a probability.
+        One floor for all outputs, or one floor for each. If the absolute value of an output is below its floor, the
+        relative error is computed with respect to the floor. Floors are needed for outputs that can be zero, such as a
+        probability.
     shared : bool
         Whether all outputs of a case get the relative error of the output with the largest change. Two grids may agree
         by chance in one output but hardly in all. Choose False for outputs that converge at different rates.
@@ -144,7 +145,7 @@ def refine(
         change = relative_changes(coarse, fine, floor)
         if shared:
             change = np.broadcast_to(change.max(axis=0, initial=0.0), change.shape)
-        # `before` is infinite where a previous grid had no solution; it is then ignored
+        # `before` is infinite where a previous grid had no solution; the second term is then left out
         earlier = np.where(np.isfinite(before), before, 0.0) / reduction
         relative = safety / (reduction - 1) * np.maximum(change, earlier)
         solved = fine.outcome == Outcome.CONVERGED
@@ -163,9 +164,10 @@ def refine(
 
 
 def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> FloatArray:
-    """Return the change of every output from one grid to the next relative to its size, shape (outputs, cases).
+    """Return the change of every output from one grid to the next, relative to the output, shape (outputs, cases).
 
-    For a profile this is the largest change divided by the largest value. It is infinite where a grid has no solution.
+    For a profile this is the largest change divided by the largest value. The change is infinite where one of the grids
+    has no solution.
     """
     solved = (coarse.outcome == Outcome.CONVERGED) & (fine.outcome == Outcome.CONVERGED)
     changes = np.empty((len(fine.values), solved.size))
@@ -179,12 +181,12 @@ def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> Fl
 
 
 def _sizes(values: Sequence[FloatArray] | FloatArray, floors: FloatArray) -> FloatArray:
-    """Return the largest absolute value of every output and case, or its floor if larger; shape (outputs, cases)."""
+    """Return the largest absolute value of every output and case, at least the floor; shape (outputs, cases)."""
     return np.maximum([_largest(np.fmax(np.abs(value), 0.0)) for value in values], floors[:, None])
 
 
 def _largest(sizes: FloatArray) -> FloatArray:
-    """Return the largest number of every case; none is negative."""
+    """Return the largest of the numbers of every case; the numbers are not negative."""
     return sizes if sizes.ndim == 1 else sizes.reshape(len(sizes), -1).max(axis=1, initial=0.0)
 
 

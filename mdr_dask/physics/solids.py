@@ -58,7 +58,7 @@ def standard_solid(static_modulus: float, glass_modulus: float, relaxation_time:
     Parameters
     ----------
     static_modulus, glass_modulus : float
-        Shear modulus at slow and at sudden deformation, Pa.
+        Shear modulus at very slow and at sudden deformation, Pa.
     relaxation_time : float
         Relaxation time of the Prony term, s.
 
@@ -78,7 +78,8 @@ def prony(static_modulus: float, moduli: ArrayLike, times: ArrayLike, viscosity:
     Parameters
     ----------
     static_modulus : float
-        G_inf, Pa, positive, because without it a periodic contact carries no load in the steady state.
+        G_inf, Pa. It must be positive, because without a static modulus a periodic contact carries no load in the
+        steady state.
     moduli, times : array_like, shape (terms,)
         G_m >= 0, Pa, and tau_m > 0, s.
     viscosity : float
@@ -123,7 +124,7 @@ def complex_modulus(solid: LinearSolid, angular_frequency: ArrayLike) -> NDArray
 
 
 def relaxation_modulus(solid: LinearSolid, time: ArrayLike) -> FloatArray:
-    """Return G(t), Pa, the stress at times t > 0, s, after a unit step of strain, without the impulse of a dashpot."""
+    """Return G(t), Pa, the stress at times t > 0, s, after a unit step of strain, without the dashpot."""
     elapsed = np.asarray(time, dtype=np.float64)
     terms = solid.moduli * np.exp(-elapsed[..., None] / solid.times)
     return np.asarray(solid.static_modulus + terms.sum(axis=-1), dtype=np.float64)
@@ -182,7 +183,7 @@ def power_law_series(
     lowest, highest : float
         Range of angular frequency of the law, rad/s. The relaxation times extend one decade further on each side.
     terms_per_decade : int
-        With two, G'' is within 1 % of the law inside the range.
+        Number of terms per decade of relaxation time. With two terms, G'' is within 1 % of the law inside the range.
 
     Raises
     ------
@@ -220,14 +221,15 @@ def fit_series(
     storage, loss : array_like, shape (points,)
         G' and G'', Pa, positive. Moduli in tension must first be divided by 2 (1 + Poisson's ratio).
     terms_per_decade : float
-        Relaxation times per decade; they cover the range of 1 / omega plus half a decade on each side.
+        Number of relaxation times per decade. The relaxation times cover the range of 1 / omega plus half a decade on
+        each side.
     dashpot : bool
         Whether the solid has a dashpot.
 
     Raises
     ------
     ValueError
-        If the three lists differ, a value is not positive, or the fit leaves no static modulus.
+        If the three lists differ in length, a value is not positive, or the fitted static modulus is zero.
     """
     omega, stored, lost = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (angular_frequency, storage, loss))
     if not omega.size == stored.size == lost.size >= 2:
@@ -323,18 +325,19 @@ def at_temperature(solid: LinearSolid, factor: float) -> LinearSolid:
 
 @dataclass(frozen=True)
 class Recovery:
-    """Free recovery (zero stress) of a solid as a sum of decaying modes; the modes have the sign of the strain.
+    """Free recovery (zero stress) of a solid as a sum of decaying modes.
 
     In mode k the strain is u = c_k exp(-t / lambda_k), and the stretch of term m is u - a_m = stretch[m, k] u.
 
     Parameters
     ----------
     times : array, shape (terms,)
-        lambda_k, s, ascending: lambda_k is between tau_k and tau_(k+1); the last one is above the last tau.
+        lambda_k, s, ascending: lambda_k is between tau_k and tau_(k+1), and the largest lambda_k is above the largest
+        tau.
     stretch : array, shape (terms, terms)
-        tau_m / (tau_m - lambda_k).
+        Element (m, k) is tau_m / (tau_m - lambda_k).
     amplitude : array, shape (terms, terms)
-        Its rows give c_k = amplitude[k] @ (u - a) for a state of zero stress.
+        Row k gives c_k = amplitude[k] @ (u - a) for a state of zero stress.
     """
 
     times: FloatArray
@@ -354,8 +357,8 @@ def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
 
     Notes
     -----
-    -1 / lambda_k are the zeros of the modulus, see :func:`recovery_times`. The modes are orthogonal with the weights
-    G_m / tau_m, so that the inverse of `stretch` is explicit.
+    The rates -1 / lambda_k are the zeros of the modulus as a function of i omega, see :func:`recovery_times`. The modes
+    are orthogonal with the weights G_m / tau_m, so that the inverse of `stretch` has a closed form.
     """
     zeros, distance = recovery_times(moduli * times, times)
     stretch = times[:, None] / distance
@@ -389,10 +392,10 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
     Returns
     -------
     times : array, shape (modes,)
-        lambda_k, ascending: lambda_k is between tau_k and tau_(k+1); the last one is above the last tau.
+        lambda_k, ascending: lambda_k is between tau_k and tau_(k+1), and the largest lambda_k is above the largest tau.
     distance : array, shape (modes, modes)
-        tau_m - lambda_k. Each zero is computed as its distance from the nearer pole. This keeps the relative precision
-        of these differences even for times over many decades.
+        Element (m, k) is tau_m - lambda_k. Each zero is computed as its distance from the nearer pole. The differences
+        are therefore precise even if the times cover many decades.
     """
     terms = times.size
     zeros, distance = np.empty(terms), np.empty((terms, terms))
@@ -410,7 +413,7 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
 
 @jit
 def _distance_to_zero(pole: int, sign: float, gap: float, weight: FloatArray, times: FloatArray) -> float:
-    """Return the distance of a zero from the pole next to it, by bisection of its logarithm and Newton's method."""
+    """Return the distance of a zero from the nearest pole, by Newton's method with bisection of the log distance."""
     high = np.log(gap)
     low = high - 80.0
     place = 0.5 * (low + high)

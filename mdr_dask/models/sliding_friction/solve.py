@@ -19,10 +19,10 @@ from mdr_dask.physics.sliding.cases import COLUMNS, Steady
 from mdr_dask.physics.sliding.problem import Request, solve
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
-ACCURACY = 0.01  # used if the campaign does not give an accuracy
+ACCURACY = 0.01  # relative accuracy if the campaign does not give an accuracy
 USUAL_ON_PLANES, USUAL = 2, 16  # nodes per Nyquist point on the finest grid that cases usually need
-BYTES_A_NODE = 150  # peak memory of a line and a case on it; measured: 20 to 130
-SECONDS_A_NODE = 1e-8  # per node of a line, and per node of a case on it, for all grids: order of magnitude
+BYTES_A_NODE = 150  # peak memory, bytes per node, of a line and one case on this line; measured: 20 to 130 bytes
+SECONDS_A_NODE = 1e-8  # seconds per visit of a node, order of magnitude; `seconds` counts the visits
 
 #: Outputs that have errors, and the corresponding columns of a steady state.
 OUTPUTS = dict(
@@ -38,7 +38,7 @@ def compute(block: Block[SlidingFriction]) -> Result:
     problems = sliding_problems(block)
     solves = 0
     groups = [_Group.of(block, problems, *group) for group in _groups(block, problems)]
-    for r, realisation in enumerate(block.realisations):  # all lines of a realisation share the phases
+    for r, realisation in enumerate(block.realisations):  # all lines of a realisation have the same random phases
         for group in groups:
             solves += group.solve(result, r, realisation)
     if "material_error" in block.outputs:
@@ -52,7 +52,7 @@ def compute(block: Block[SlidingFriction]) -> Result:
 def _groups(
     block: Block[SlidingFriction], problems: SlidingProblems
 ) -> Iterator[tuple[Setting, SlidingFriction, IntArray]]:
-    """Yield the cases that share setting, oversampling and scheme, with the parameters of one of these cases."""
+    """Yield setting, parameters of one case, and indices of all cases with this setting, oversampling and scheme."""
     varied = [block.columns[name] for name in ("oversampling", "scheme") if name in block.columns]
     for setting, members in problems.groups(*varied):
         yield setting, block.case(int(members[0])), members
@@ -60,7 +60,7 @@ def _groups(
 
 @dataclass
 class _Group:
-    """Cases that share line, solid and grid; equal cases are solved once."""
+    """Cases with the same line, solid and grid; equal cases are solved once."""
 
     block: Block[SlidingFriction]
     problems: SlidingProblems
@@ -80,7 +80,7 @@ class _Group:
         case: SlidingFriction,
         members: IntArray,
     ) -> _Group:
-        """Return the group with the different cases among its members."""
+        """Return a group of cases; equal cases among the members are listed once."""
         deborah, loads, which = problems.different(members)
         with_errors = any(f"{output}_error" in block.outputs for output in OUTPUTS)
         contact = not {"contact_fraction", "contact_slope"}.isdisjoint(block.outputs)
@@ -89,7 +89,7 @@ class _Group:
         return cls(block, problems, setting, request, members, deborah, loads, which)
 
     def solve(self, result: Result, r: int, realisation: int) -> int:
-        """Write the results of one realisation, index r in the block; return the number of solved cases."""
+        """Write the results of the realisation with index r in the block; return the number of solved cases."""
         roughness = self.setting.roughness
         if r and not roughness.is_random:
             self._repeat(result, r)
@@ -165,19 +165,19 @@ def _lines(block: Block[SlidingFriction], setting: Setting) -> int:
 
 
 def seconds(block: Block[SlidingFriction]) -> float:
-    """Return the time of a block, estimated from its nodes to an order of magnitude."""
+    """Return the computing time of a block, s; an order of magnitude, from the number of visits of nodes."""
     problems, nodes = sliding_problems(block), 0.0
     for setting, case, members in _groups(block, problems):
         solves = problems.different(members)[0].size
         visits = 1 if setting.terms is None else 4 * (4 + len(setting.terms.moduli))
         grid = 2 if case.oversampling == "auto" else case.oversampling
-        # a line takes as much time as ten cases; on the coarse grids cases need only a part of the nodes
+        # a line takes the time of ten visits of all its nodes; a case takes half as many visits as it has on one grid
         nodes += _lines(block, setting) * setting.roughness.points * grid * (10 + 0.5 * solves * visits)
     return 1e-4 + SECONDS_A_NODE * nodes
 
 
 def memory(block: Block[SlidingFriction]) -> float:
-    """Return the estimated peak memory of a block: one line on the grid that its cases usually need."""
+    """Return the estimated peak memory of a block, bytes: one line on the finest grid that its cases usually need."""
     problems, nodes = sliding_problems(block), 0.0
     for setting, case, _ in _groups(block, problems):
         grid = case.oversampling

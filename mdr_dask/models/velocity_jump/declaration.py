@@ -21,7 +21,7 @@ TIMES = tuple(float(f"{time:.4g}") for time in np.geomspace(1e-4, 20, 54))
 
 
 class VelocityJump(SlidingBody):
-    """A viscoelastic body under a load on a rough line, whose velocity jumps from v_1 to v_1 + dv."""
+    """A viscoelastic body under a load that slides over a rough line and whose velocity jumps from v_1 to v_1 + dv."""
 
     settings: ClassVar[frozenset[str]] = frozenset({"oversampling", "steps_per_decade"})
     rms_roughness: float | None = quantity("m", "rms height h of the roughness", usual="2 um", default=None, gt=0)

@@ -37,14 +37,15 @@ from mdr_dask.physics.transients.elements.foundation import foundation
 from mdr_dask.physics.transients.elements.loading_history import Trace, trace
 from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
-ACCURACY = 0.01  # of friction before and after and of the jump, if the campaign does not give an accuracy
-SECONDS_NODE, SECONDS_MOMENT = 6.2e-8, 3.3e-9  # per node of a line, and per node and moment of a march
-MOMENTS = 4  # moments of a march, divided by the steps per decade
-SECONDS_STEPPED = 3.5e-8  # per node squared, for a history that travels a few lengths of the line
-FLAT = 1e-12  # part of the largest height; smaller differences of heights are rounding errors
-HISTORY_ORDER = 2  # order of convergence of a history in nodes and steps
+ACCURACY = 0.01  # relative accuracy of steady friction and of the jump, if the campaign does not give an accuracy
+# computing time of a jump, seconds: steady states per node of the line; march per node and per moment
+SECONDS_NODE, SECONDS_MOMENT = 6.2e-8, 3.3e-9
+MOMENTS = 4  # typical number of moments of a march, divided by the number of steps per decade
+SECONDS_STEPPED = 3.5e-8  # computing time, seconds per square of the number of nodes, for a travel of a few lines
+FLAT = 1e-12  # a line is flat if its rms height is at most this fraction of its largest absolute height
+HISTORY_ORDER = 2  # order of convergence of the results of a history in cell size and time step
 
-#: Outputs that have errors.
+#: Names of the outputs for which errors are estimated.
 WITH_ERROR = (
     "friction_coefficient_before",
     "friction_coefficient_jump",
@@ -57,7 +58,7 @@ TRANSIENT = ("friction_coefficient", "indentation_depth")
 
 @dataclass(frozen=True)
 class _Found:
-    """Outputs of some cases and their errors, dimensionless: friction over h / L, depth over h."""
+    """Dimensionless outputs of some cases and their errors: friction divided by h / L, depth divided by h."""
 
     values: dict[str, FloatArray]
     errors: dict[str, FloatArray]
@@ -78,7 +79,7 @@ def compute(block: Block[VelocityJump]) -> Result:
     for j in np.flatnonzero(after == 1):
         problems.faults.setdefault(int(j), "expected a velocity_change above rounding, the velocity stays the same")
     groups = list(_groups(block, problems))
-    for r, realisation in enumerate(block.realisations):  # all lines of a realisation share the phases
+    for r, realisation in enumerate(block.realisations):  # all lines of a realisation have the same random phases
         for group in groups:
             solves += group.solve(result, r, realisation)
     result.messages.update({(j, r): fault for j, fault in problems.faults.items() for r in range(shape[1])})
@@ -86,7 +87,10 @@ def compute(block: Block[VelocityJump]) -> Result:
 
 
 def _groups(block: Block[VelocityJump], problems: SlidingProblems) -> Iterator[_Group]:
-    """Yield groups of cases: the jumps on one line and grid that are marched together, and every other case alone."""
+    """Yield groups of cases.
+
+    All jumps of a plane Kelvin body on the same line and grid form a group. Every other case is a group by itself.
+    """
     protocols, which = each(block, "protocol")
     is_jump = np.array([protocol.shape == "jump" for protocol in protocols])[which]
     is_simple = np.array([setting.terms is None and setting.body is None for setting in problems.settings] + [False])
@@ -100,7 +104,7 @@ def _groups(block: Block[VelocityJump], problems: SlidingProblems) -> Iterator[_
 
 @dataclass(frozen=True)
 class _Group:
-    """Cases that share line, grid and steps."""
+    """Cases with the same line, grid and time steps."""
 
     block: Block[VelocityJump]
     problems: SlidingProblems
@@ -111,12 +115,12 @@ class _Group:
 
     @property
     def outputs(self) -> list[str]:
-        """The requested outputs that have errors."""
+        """The requested outputs for which errors are estimated."""
         return [name for name in WITH_ERROR if name in self.block.outputs]
 
     @property
     def largest_loads(self) -> FloatArray:
-        """F_N / (4 G_inf L h) of the cases; the largest value during a history."""
+        """F_N / (4 G_inf L h) of each case; for a history, the largest value during the history."""
         return self.problems.loads[self.members]
 
     def found(self, waves: Waves) -> tuple[_Found, int]:
@@ -124,7 +128,7 @@ class _Group:
         raise NotImplementedError
 
     def solve(self, result: Result, r: int, realisation: int) -> int:
-        """Write the results of one realisation, index r in the block; return the number of solved cases."""
+        """Write the results of the realisation with index r in the block; return the number of solved cases."""
         members = self.members
         height, length = self.problems.height[members], self.problems.length[members]
         try:
@@ -165,7 +169,7 @@ class _Group:
     def _floor(self, found: _Found, name: str) -> FloatArray:
         """Return the floor of the relative error of an output: 0, or the largest friction of the case.
 
-        The largest friction is used if the output is zero within its error, such as the friction of a body at rest.
+        The largest friction is used if the output is zero within its error, for example the friction of a body at rest.
         """
         cases = found.outcome.size
         if name == "indentation_depth":
@@ -201,7 +205,7 @@ class _Marched(_Group):
     def different(self) -> tuple[FloatArray, FloatArray, IntArray]:
         """Loads and Deborah numbers of the different cases, and the index of the case of every member.
 
-        They are sorted by velocity, so that the barriers of the line at a Deborah number are computed once.
+        The cases are sorted by velocity, so that the barriers of the line are computed once for each Deborah number.
         """
         before = self.problems.deborah[self.members]
         change = np.asarray(self.block.column("velocity_change"), dtype=np.float64)[self.members]
@@ -228,7 +232,7 @@ class _Followed(_Group):
     """One case that is computed from the motion of all elements: any history, solid and indenter."""
 
     def found(self, waves: Waves) -> tuple[_Found, int]:
-        """Solve the case on a quarter and on half of the nodes, with longer steps in proportion, and on all nodes."""
+        """Solve the case on a quarter, half and all of the nodes, with time steps in proportion to the cell size."""
         nodes = waves.points * self.oversampling
         grids = [nodes // every for every in (4, 2, 1) if nodes % every == 0 and nodes // every >= waves.points]
 
@@ -255,7 +259,7 @@ class _Followed(_Group):
         return self.problems.loads[self.members] * (case.largest_force() / case.normal_force)
 
     def _trace(self, waves: Waves, every: int) -> Trace:
-        """Compute the case on every n-th of its nodes, n being `every`."""
+        """Compute the case on a grid that contains one out of `every` nodes."""
         case = self.block.case(int(self.members[0]))
         height, length = (float(column[self.members[0]]) for column in (self.problems.height, self.problems.length))
         solid, unit = case.solid(), case.time_unit()
@@ -288,7 +292,7 @@ def distinct(block: Block[VelocityJump]) -> int:
 
 
 def seconds(block: Block[VelocityJump]) -> float:
-    """Return the time of a block, s, estimated from its nodes and moments."""
+    """Return the computing time of a block, s, estimated from the numbers of nodes and moments."""
     total = 1e-3
     for group in _groups(block, sliding_problems(block)):
         nodes = group.setting.roughness.points * group.oversampling

@@ -1,8 +1,8 @@
-"""Half-integrals of piecewise polynomials on graded panels: matrices of both transforms, exact for the polynomials.
+"""Half-integrals of piecewise polynomials on graded panels: matrices of both transforms, exact for such polynomials.
 
 As functions of the square of the radius, both transforms are Abel's half-integrals. After the substitution z -> z - t^2
-their weights are integrals of polynomials. One set of matrices on [0, 1] is used for all contacts, which are scaled to
-this interval.
+the weights of the quadrature are integrals of polynomials. All contacts are scaled to the interval [0, 1], so that one
+set of matrices is enough.
 """
 
 from __future__ import annotations
@@ -21,18 +21,20 @@ from mdr_dask.physics.mdr.transforms import gauss
 
 
 class Mesh(NamedTuple):
-    """Panels from 0 on for a piecewise polynomial; there is no node at 0, where functions may jump.
+    """Panels for a piecewise polynomial, the first of which begins at 0.
+
+    There is no node at 0, because functions may jump there.
 
     Parameters
     ----------
     edges : array, shape (panels + 1,)
-        Edges of the panels.
+        Ends of the panels.
     order : int
-        Nodes per panel: the interior Lobatto points and the right end.
+        Number of nodes per panel: the interior Lobatto points and the right end.
     nodes : array, shape (n,)
-        All nodes, increasing.
+        Nodes of all panels, increasing.
     barycentric : array, shape (panels, order + 1)
-        Weights of the interpolation inside each panel (the first panel uses only the last `order` of them).
+        Weights of the interpolation inside each panel; the first panel uses only the last `order` weights.
     """
 
     edges: FloatArray
@@ -41,7 +43,7 @@ class Mesh(NamedTuple):
     barycentric: FloatArray
 
     def extended(self, end: float) -> Mesh:
-        """Return the mesh with one more panel, which ends at `end`."""
+        """Return the mesh with an additional last panel, which ends at `end`."""
         last = self.edges[-1]
         local = (self.nodes[-self.order :] - self.edges[-2]) / (last - self.edges[-2])
         nodes = np.append(self.nodes, last + (end - last) * local)
@@ -50,7 +52,9 @@ class Mesh(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Panels:
-    """Nodes and matrices on [0, 1]; the last node is at 1.
+    """Nodes and matrices on [0, 1]; each matrix maps the values u at the nodes to a function of z at the nodes.
+
+    The last node is at 1.
 
     Parameters
     ----------
@@ -63,9 +67,9 @@ class Panels:
     outer : array, shape (n, n)
         (1/pi) int_z^1 u'(z') / sqrt(z' - z) dz'.
     slope : array, shape (n, n)
-        u'(z) at the nodes; at the edge of two panels, the slope in the left one.
+        u'(z); at the common end of two panels, the slope in the left panel.
     weights : array, shape (n,)
-        int_0^1 u dz.
+        Weights of the integral int_0^1 u dz.
     """
 
     mesh: Mesh
@@ -77,7 +81,7 @@ class Panels:
 
     @cached_property
     def nodes(self) -> FloatArray:
-        """All nodes, increasing."""
+        """Nodes of all panels, increasing."""
         return self.mesh.nodes
 
 
@@ -88,14 +92,14 @@ def graded_panels(left: int, right: int, order: int) -> Panels:
     Parameters
     ----------
     left, right : int
-        How many times the panel at each end is halved.
+        Number of times that the panel at each end is halved.
     order : int
         Nodes per panel, at least 2.
 
     Returns
     -------
     Panels
-        With (left + right + 2) * order nodes; cached.
+        Nodes and matrices with (left + right + 2) * order nodes; cached.
     """
     towards_left = 0.5 * 0.5 ** np.arange(left, -1, -1.0)
     towards_right = 1.0 - 0.5 * 0.5 ** np.arange(1.0, right + 1.0)
@@ -118,7 +122,10 @@ def graded_panels(left: int, right: int, order: int) -> Panels:
 
 
 def panel_members(panel: int, order: int) -> NDArray[np.intp]:
-    """Return the indices of the nodes of a panel's polynomial: its own, and the last node of the previous panel."""
+    """Return the indices of the nodes of a panel, and of the last node of the previous panel.
+
+    The polynomial of the panel interpolates at these nodes.
+    """
     return np.arange(max(panel * order - 1, 0), (panel + 1) * order)
 
 
@@ -161,7 +168,7 @@ def _add_panel(
 
 
 def interpolate(mesh: Mesh, values: FloatArray, places: FloatArray) -> FloatArray:
-    """Return the piecewise polynomial through `values`, shape (n,), at places on the mesh, and zero beyond it."""
+    """Return the piecewise polynomial through `values`, shape (n,), at places; it is zero beyond the mesh."""
     result = np.zeros_like(places)
     _interpolate(mesh, values, places, result)
     return result
@@ -189,7 +196,7 @@ def _interpolate(mesh: Mesh, values: FloatArray, places: FloatArray, result: Flo
 
 @jit_inline
 def value_at(mesh: Mesh, values: FloatArray, place: float) -> float:
-    """Return the piecewise polynomial through `values` at a place on the mesh, and zero beyond it."""
+    """Return the piecewise polynomial through `values` at a place; it is zero beyond the mesh."""
     if place >= mesh.edges[-1]:
         return 0.0
     order = mesh.order

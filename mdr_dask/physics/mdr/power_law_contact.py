@@ -1,7 +1,8 @@
-"""Contacts of power-law bodies of revolution in closed form (sphere, cone, other powers), with their stick radius.
+"""Closed forms for contacts of power-law bodies of revolution (sphere, cone, other powers), and for the stick radius.
 
-The profile is f = A r^n, its image g = B |x|^n with B = kappa_n A. E_star and G_star are the effective moduli. Normal
-and tangential contact are independent, because the bodies are elastically similar.
+The profile is f = A r^n, and its image is g = B |x|^n with B = kappa_n A (see `transforms.power_factor`). E_star and
+G_star are the effective moduli of normal and tangential contact, which are independent, because the bodies are assumed
+to be elastically similar.
 """
 
 from __future__ import annotations
@@ -56,6 +57,10 @@ def stiffness(radius: ArrayLike, E_star: ArrayLike) -> FloatArray:
 
 
 def stick_radius(slip_share: ArrayLike, exponent: ArrayLike) -> FloatArray:
-    """Return c / a0 = (1 - eta)^(1/n) for eta = G* U0 / (mu E* d0) < 1 (thesis eq. 6.7), NaN in gross slip."""
+    """Return the stick radius c / a0 = (1 - eta)^(1/n) for a slip share eta = G* U0 / (mu E* d0) (thesis eq. 6.7).
+
+    U0 is the tangential displacement, d0 the depth and a0 the contact radius. For eta >= 1 the whole contact slips, and
+    the result is NaN.
+    """
     rest = 1.0 - np.asarray(slip_share, dtype=float)
     return np.where(rest > 0.0, np.maximum(rest, 0.0) ** (1.0 / np.asarray(exponent, dtype=float)), np.nan)

@@ -1,4 +1,7 @@
-"""Virgin profiles of revolution in units of their first contact: radius a0 = 1 and depth d0 = 1, so that g(1) = 1."""
+"""Profiles of unworn bodies of revolution, in units of the contact radius a0 and the depth d0 before any wear.
+
+In these units g(1) = 1. The index 0 of f0 and g0 means before any wear.
+"""
 
 from __future__ import annotations
 
@@ -21,16 +24,16 @@ from mdr_dask.physics.mdr.transforms import forward_transform, gauss, power_fact
 
 
 class Image(NamedTuple):
-    """The image of a body for compiled code: a piecewise cubic if there are knots, otherwise a power law.
+    """The image of a body in the form that compiled code needs: a piecewise cubic, or without knots a power law.
 
     Parameters
     ----------
     exponent : float
-        n of g0 = x^n.
+        Exponent n of g0 = x^n; used if there are no knots.
     knots : array, shape (k + 1,)
         Ends of the pieces; empty for a power law.
     coefficients : array, shape (4, k)
-        Coefficients of the powers 3 to 0 of the distance from the left end.
+        Coefficients of the powers 3, 2, 1, 0 of the distance from the left end of each piece.
     """
 
     exponent: float
@@ -110,7 +113,7 @@ class PowerProfile:
 
 @dataclass(frozen=True, eq=False)
 class TableProfile:
-    """A body as two piecewise cubics; built by `from_table` from a table, or by `from_body` from a closed form.
+    """A body described by two piecewise cubics, from a table (`from_table`) or from a closed form (`from_body`).
 
     Parameters
     ----------
@@ -148,7 +151,7 @@ class TableProfile:
         return self.image_slope_curve(np.asarray(position))
 
     def rise(self, gap: FloatArray, start: float) -> FloatArray:
-        """Return g0(start + gap) - g0(start), for a short gap by the integral of the slope."""
+        """Return g0(start + gap) - g0(start); for a short gap, by integration of the slope."""
         gap = np.asarray(gap, dtype=float)
         abscissa, weight = gauss(8)
         short = gap * (self.image_slope_curve(start + gap[..., None] * abscissa) @ weight)
@@ -216,7 +219,8 @@ def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfi
     Raises
     ------
     ValueError
-        If the table is not finite, does not start at the axis, does not rise, or ends inside the contact.
+        If the table contains values that are not finite, does not start at r = 0, does not rise with the radius, or
+        ends inside the contact.
     """
     r, f = np.asarray(radius, dtype=float), np.asarray(height, dtype=float)
     check_table(r, f)
@@ -237,10 +241,10 @@ def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfi
 
 
 class ClosedForm(Protocol):
-    """A body of revolution in closed form, in units of its own."""
+    """A body of revolution in closed form; lengths are in any unit."""
 
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return minus the image, and the slopes of this function on the left and on the right of each position."""
+        """Return -g(x), and the slopes of -g on the left and on the right of each position x."""
 
     def body(self, r: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return height and slope of the body."""
@@ -250,14 +254,14 @@ class ClosedForm(Protocol):
         """Radii at which the body is not smooth."""
 
 
-#: For a body in closed form: largest radius over a0, and half the number of knots in each smooth piece.
+#: For a body in closed form: largest radius divided by a0, and half the number of knots in each smooth piece.
 FARTHEST, KNOTS = 8.0, 80
 
 
 def from_body(body: ClosedForm, depth: float) -> TableProfile:
     """Build the profile of a body in closed form that is pressed to a depth.
 
-    The pieces are cubic and become shorter towards the breaks of the body.
+    The profile consists of cubic pieces, which become shorter towards the breaks of the body.
     """
 
     def sunk(x: float) -> float:
@@ -277,7 +281,7 @@ def from_body(body: ClosedForm, depth: float) -> TableProfile:
 
 
 def check_table(radius: FloatArray, height: FloatArray) -> None:
-    """Raise ValueError unless the table of a profile starts at the axis, is finite and rises with the radius."""
+    """Raise ValueError unless the table of a profile is finite, starts at r = 0 and rises with the radius."""
     if radius.ndim != 1 or radius.shape != height.shape or radius.size < 4:
         raise ValueError(
             f"a profile needs two columns of at least 4 rows, got shapes {radius.shape!r} and {height.shape!r}"
@@ -298,7 +302,7 @@ def check_table(radius: FloatArray, height: FloatArray) -> None:
 
 
 def _scaled(curve: PPoly, length: float, height: float) -> PPoly:
-    """Return a piecewise cubic in other units."""
+    """Return a piecewise cubic in units of the given length and height."""
     return PPoly(curve.c * length ** np.arange(3.0, -1.0, -1.0)[:, None] / height, curve.x / length)
 
 
@@ -321,6 +325,6 @@ def _monotone(x: FloatArray, y: FloatArray) -> CubicSpline | PchipInterpolator:
 
 
 def _refine(radius: FloatArray) -> FloatArray:
-    """Return the radii of the table, with seven Chebyshev points in every interval."""
+    """Return the radii of the table and seven Chebyshev points in every interval between them."""
     local = 0.5 * (1.0 + chebyshev.chebpts2(9)[1:])
     return np.concatenate([[0.0], (radius[:-1, None] + np.diff(radius)[:, None] * local).ravel()])

@@ -1,8 +1,8 @@
 """The transforms of the method of dimensionality reduction for bodies of revolution, with an error estimate.
 
-Every integral is transformed to an angle or hyperbolic angle, which removes its square-root singularity, and is split
-at the kinks and jumps of the profile. It is computed by Gauss-Legendre rules whose number of nodes is doubled until two
-results agree.
+The substitution of an angle or a hyperbolic angle removes the square-root singularity of every integral. Integrals are
+split at the kinks and jumps of the profile, and computed by Gauss-Legendre rules. The number of nodes is doubled until
+two successive results agree.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def inverse_transform(
     Parameters
     ----------
     image : callable, array -> array
-        g at x >= 0; evaluated strictly between the breaks only.
+        g(x) for x >= 0; it is evaluated between the breaks, never at a break.
     radius : array_like, shape (m,)
         Radii r >= 0.
     breaks : sequence of float
@@ -73,8 +73,8 @@ def inverse_transform(
     Returns
     -------
     Estimate
-        f(r) = (2/pi) int_0^r g(x) / sqrt(r^2 - x^2) dx, from the same zero as g; its error is above the tolerance if
-        1024 nodes per piece are not enough.
+        f(r) = (2/pi) int_0^r g(x) / sqrt(r^2 - x^2) dx, measured from the same zero as g. The estimated error exceeds
+        the tolerance if 1024 nodes per piece are not enough.
 
     Examples
     --------
@@ -106,7 +106,7 @@ def forward_transform(
     Parameters
     ----------
     slope : callable, array -> array
-        f'(r) at r >= 0, without the jumps.
+        f'(r) for r >= 0, without the jumps of f.
     position : array_like, shape (m,)
         Positions x; g is even.
     apex : float
@@ -114,7 +114,7 @@ def forward_transform(
     breaks : sequence of float
         Places where a derivative of f jumps.
     jumps : sequence of (radius, height)
-        Places where f itself jumps, and by how much.
+        Radii where f itself jumps, and the heights of the jumps.
     tolerance : float
         Allowed error, relative to the largest value.
 
@@ -152,12 +152,12 @@ def pressure(
     jumps: Sequence[tuple[float, float]] = (),
     tolerance: float = 1e-10,
 ) -> Estimate:
-    """Return the contact pressure over the effective modulus (thesis eq. 2.11, extended to jumps of the line load).
+    """Return contact pressure divided by effective modulus (thesis eq. 2.11, extended to jumps of the line load).
 
     Parameters
     ----------
     image_slope : callable, array -> array
-        g'(x), without the jumps.
+        g'(x), without the jumps of g.
     radius : array_like, shape (m,)
         Radii; the pressure is zero outside the contact and infinite on the axis under a cone.
     contact_radius : float
@@ -167,14 +167,14 @@ def pressure(
     breaks : sequence of float
         Places where a derivative of g jumps.
     jumps : sequence of (position, height)
-        Places inside the contact where g itself jumps, and by how much.
+        Positions inside the contact where g itself jumps, and the heights of the jumps.
     tolerance : float
         Allowed error, relative to the largest value.
 
     Returns
     -------
     Estimate
-        p / E*, in the unit of height over the unit of length.
+        p / E*, in the unit of height divided by the unit of length.
     """
     r = np.atleast_1d(np.asarray(radius, dtype=float))
     inside = r < contact_radius
@@ -242,7 +242,7 @@ def _angles(outer: FloatArray, breaks: Sequence[float]) -> FloatArray:
 
 
 def _integrate(integrand: Function, edges: FloatArray, tolerance: float) -> Estimate:
-    """Return the integral over all pieces; the number of nodes is doubled until two rules agree."""
+    """Return the integral over all pieces; the number of nodes is doubled until two successive results agree."""
     nodes = FIRST_NODES
     coarse = _gauss_sum(integrand, edges, nodes)
     while True:

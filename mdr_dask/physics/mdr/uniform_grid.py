@@ -1,8 +1,10 @@
-"""The transforms on a uniform grid by product integration: piecewise-linear functions, exact singular weights.
+"""The transforms on a uniform grid by product integration.
+
+The functions are piecewise linear, and the singular weights are integrated exactly.
 
 The inverse transform is of second order, the forward transform and the pressure of order 1.5. The contact edge is
-located inside its cell. The convergence is slower than with `half_integrals`, but profiles, histories and the number of
-kinks are arbitrary.
+located inside its cell. The convergence is slower than with `half_integrals`, but the method accepts any profile, any
+history and any number of kinks.
 """
 
 from __future__ import annotations
@@ -22,13 +24,13 @@ class UniformGrid:
     Parameters
     ----------
     nodes : array, shape (n,)
-        Radii and positions.
+        Radii r and positions x.
     inverse : array, shape (n, n)
         f = inverse @ g.
     forward : array, shape (n, n)
         g = forward @ f.
     stress : array, shape (n, n)
-        p = stress @ q for the line load q = d - g, which is zero outside the contact.
+        p = stress @ q, where q = d - g is the line load, set to zero outside the contact.
     """
 
     nodes: FloatArray
@@ -42,7 +44,7 @@ class UniformGrid:
         return float(self.nodes[1])
 
     def edge(self, image: FloatArray, depth: float) -> float:
-        """Return the radius at which the image first reaches the depth, by linear interpolation in the cell."""
+        """Return the radius at which the image first reaches the depth, by linear interpolation between nodes."""
         beyond = np.flatnonzero(image >= depth)
         if beyond.size == 0:
             return float(self.nodes[-1])
@@ -52,7 +54,7 @@ class UniformGrid:
         return float(self.nodes[k] - self.spacing * (image[k] - depth) / (image[k] - image[k - 1]))
 
     def pressure(self, image: FloatArray, depth: float) -> FloatArray:
-        """Return p(r) at the nodes; the last cell of the contact is cut at the contact edge."""
+        """Return p(r) at the nodes; the cell that contains the contact edge is cut there."""
         load = np.maximum(depth - image, 0.0)
         k = int(np.argmax(image >= depth))
         result = self.stress @ load
@@ -69,7 +71,7 @@ class UniformGrid:
         return result
 
     def force(self, image: FloatArray, depth: float) -> float:
-        """Return F_N = 2 int (d - g)_+ dx; the last cell of the contact is cut at the contact edge."""
+        """Return F_N = 2 int (d - g)_+ dx over x >= 0; the cell that contains the contact edge is cut there."""
         load = np.maximum(depth - image, 0.0)
         k = int(np.argmax(image >= depth))
         if k == 0:

@@ -1,6 +1,6 @@
-"""Master curves: curves measured in groups, shifted along their axes until they are one.
+"""Master curves: curves measured in groups, shifted along their axes until they form one curve.
 
-Read `master_curve` first, which defines the question and the answer. `posterior` holds the probability density of
-shifts and its gradient, `sampling` draws from it. `two_factors` splits shifts into sums of two, `laws` fits WLF,
-Arrhenius and powers of the velocity to them.
+Read `master_curve` first: it defines input and result. `posterior` computes the probability density of shifts and the
+gradient of this density; `sampling` draws shifts from the density. `two_factors` splits each shift factor into a sum of
+two factors. `laws` fits the WLF law, Arrhenius' law and powers of the velocity to shift factors.
 """

@@ -1,6 +1,7 @@
 """Solve the normal equations of several splines that share a few offsets, with banded Cholesky factors.
 
-The unknowns are the spline coefficients m_c of each channel c, followed by the offsets v. Their precision is
+The unknowns are the spline coefficients m_c of each channel c, followed by the offsets v. The precision matrix of the
+unknowns is
 
     [ A_c   B_c ]
     [ B_c^T  D  ],
@@ -8,8 +9,8 @@ The unknowns are the spline coefficients m_c of each channel c, followed by the 
 where A_c is banded (half bandwidth 3) and channels are coupled only by the offsets. The Cholesky factor consists of the
 banded factors L_c of A_c, the border W_c = L_c^-1 B_c, and the factor of the corner D - sum_c W_c^T W_c. A lower or
 symmetric matrix M is stored by diagonals: ``band[i, d]`` is M[i, i - d]. The corner is stored in the same way, with all
-its diagonals, so that the same functions can be used for both. A row of parameters costs O(splines (4 + offsets)^2)
-operations.
+its diagonals, so that the same functions can be used for both. For one row of parameters the solution takes
+O(splines (4 + offsets)^2) operations.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit
 
 ORDER = 4
-"""Number of cubic B-splines that overlap at a point, and of the diagonals that a band stores."""
+"""Number of cubic B-splines that overlap at a point, which is also the number of diagonals that a band stores."""
 
 EPS = float(np.finfo(np.float64).eps)
 
@@ -33,9 +34,9 @@ class Factors(NamedTuple):
     Parameters
     ----------
     band : array, shape (rows, channels, splines, 4)
-        L_c, stored by diagonals.
+        Factors L_c, stored by diagonals.
     border : array, shape (rows, channels, splines, offsets)
-        W_c.
+        Borders W_c.
     corner : array, shape (rows, offsets, offsets)
         Factor of the corner, stored by diagonals.
     """
@@ -59,7 +60,7 @@ class Linear(NamedTuple):
     variance, tilt : array, shape (rows, channels, points)
         Variance of `fitted`, and covariance of `fitted` and `slope`.
     rough : array, shape (rows, channels, splines - 2)
-        Mean square of the second differences.
+        Mean square of the second differences of the coefficients.
     offsets : array, shape (rows, offsets, offsets)
         Covariance of the offsets.
     """
@@ -89,18 +90,19 @@ def solve_rows(
     Parameters
     ----------
     first : array of int, shape (rows, points)
-        First of the four splines at each point.
+        Index of the first of the four splines that overlap at each point.
     value, slope : array, shape (rows, points, 4)
-        Their values and derivatives.
+        Values and derivatives of these four splines.
     member : array of int, shape (points,)
-        Number of the offset of each point.
+        Index of the offset of each point.
     y : array, shape (channels, points)
+        Ordinates.
     weight : array, shape (rows, channels)
         Precision of y.
     stiffness : array, shape (rows, channels, splines - 2)
         Prior precision of the second differences.
     tied : array, shape (rows, offsets, offsets)
-        Prior precision of the offsets; of shape (rows, 0, 0) for curves without.
+        Prior precision of the offsets; shape (rows, 0, 0) for curves without offsets.
     """
     (rows, points), (channels, splines), offsets = first.shape, stiffness.shape[1:], tied.shape[1]
     splines += 2
@@ -125,7 +127,7 @@ def solve_rows(
 
 
 def drawn(factors: Factors, normal: FloatArray) -> FloatArray:
-    """Return departures from the mean whose precision is L L^T, from standard normal ones, shape (rows, unknowns)."""
+    """Transform standard normal numbers to departures from the mean with precision L L^T, shape (rows, unknowns)."""
     found = normal.copy()
     _back_substitute(*factors, found)
     return found
@@ -174,7 +176,7 @@ def _factorise(
 
 @jit
 def _add_bending(stiffness: FloatArray, band: FloatArray) -> None:
-    """Add the precision of second differences."""
+    """Add the prior precision of the second differences to the band."""
     second = (1.0, -2.0, 1.0)
     for j in range(stiffness.size):
         for a in range(3):
@@ -186,7 +188,7 @@ def _add_bending(stiffness: FloatArray, band: FloatArray) -> None:
 def _add_points(
     first: IntArray, value: FloatArray, y: FloatArray, weight: float, band: FloatArray, right: FloatArray
 ) -> None:
-    """Add the precision of the points of a channel, and their share of the right side."""
+    """Add the contributions of the points of a channel to the precision and to the right side."""
     for p in range(first.size):
         at = first[p]
         for a in range(ORDER):
@@ -207,7 +209,10 @@ def _add_ties(
     corner: FloatArray,
     right: FloatArray,
 ) -> None:
-    """Add what the points of a channel contribute to the rows of the offsets, which are subtracted from the spline."""
+    """Add the contributions of the points of a channel to border, corner and right side of the offsets.
+
+    The signs follow from the offsets being subtracted from the spline.
+    """
     for p in range(first.size):
         k = member[p]
         corner[k, 0] += weight
@@ -234,7 +239,7 @@ def _select(
     rough: FloatArray,
     covariance: FloatArray,
 ) -> None:
-    """Compute the entries of the covariance that are needed, and what they give at each point."""
+    """Compute the required entries of the covariance, and from them the results at each point."""
     rows, channels, splines, offsets = border.shape
     begin = channels * splines
     within = np.empty((splines, ORDER))  # the band of the covariance of a channel
@@ -295,7 +300,7 @@ def _at_points(
     variance: FloatArray,
     tilt: FloatArray,
 ) -> None:
-    """Add mean and covariance of a curve and its slope at each point."""
+    """Add the means of a curve and of its slope, the variance of the curve, and their covariance, at each point."""
     for p in range(first.size):
         at = first[p]
         for a in range(ORDER):
@@ -326,7 +331,7 @@ def _back_substitute(band: FloatArray, border: FloatArray, corner: FloatArray, r
 def _cholesky(band: FloatArray) -> float:
     """Replace a symmetric matrix by its lower factor, and return its log determinant.
 
-    A pivot that is not positive because of rounding is set to the rounding error of the diagonal.
+    A pivot that is not positive because of rounding is replaced by the rounding error of the diagonal.
     """
     size, width = band.shape
     log_determinant = 0.0

@@ -1,4 +1,7 @@
-"""Laws of shift factors: power of velocity, Arrhenius, and Williams, Landel and Ferry, fitted with their covariance."""
+"""Laws of shift factors: power of the velocity, Arrhenius, and WLF (Williams, Landel and Ferry).
+
+The fits use the covariance of the factors.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ from mdr_dask.physics.solids import GAS_CONSTANT
 CONFIDENCE = 0.95
 
 STRAIGHTEST = 1e-5
-"""Span of the temperatures over c2, below which factors count as linear in temperature."""
+"""Ratio of the range of temperature to c2 below which factors count as linear in temperature."""
 
 
 @dataclass(frozen=True)
@@ -28,13 +31,14 @@ class ShiftLaw:
     name : str
         ``power``, ``arrhenius`` or ``wlf``.
     constants : dict of str to (value, low, high)
-        With 95 % intervals: ``exponent``; ``activation_energy`` in J/mol; ``c1`` and ``c2`` (K) at the reference.
+        Value of each constant and ends of its 95 % interval. The names are ``exponent``; ``activation_energy``, in
+        J/mol; ``c1``, and ``c2`` in K, at the reference.
     factors : callable, array -> array
-        The law, decades, zero at the anchor of the fit.
+        Factors according to the law, decades; zero at the anchor of the fit.
     departures : array, shape (groups,)
-        Factors less those of the law, decades.
+        Measured factors minus factors according to the law, decades.
     chance : float
-        Probability of such departures by the errors of the factors alone.
+        Probability that the errors of the factors alone cause departures at least as large.
     """
 
     name: str
@@ -61,9 +65,9 @@ def fit_power(
     factors, covariance : arrays, shapes (groups,) and (groups, groups)
         Shift factors, decades, zero at the anchor, and their covariance.
     anchor : int
-        Number of the group at which the factors are zero and known.
+        Index of the group at which the factors are zero by definition.
     reference : float
-        Where the constants hold; of no influence on a power.
+        Value of the groups for which the constants are given; it has no influence on the power law.
 
     Raises
     ------
@@ -93,9 +97,10 @@ def fit_wlf(
 ) -> ShiftLaw:
     """Fit ``log10 a_T = -c1 (T - T_ref) / (c2 + T - T_ref)``; see `fit_power`.
 
-    The law is fitted about the anchor, with the slope c1 / c2 and the bend 1 / c2, which both stay finite where the
-    factors are linear in temperature. Its constants at the reference follow from c1 c2 and T_ref - c2, which are the
-    same for every reference: ``c2' = c2 + dT``, ``c1' = c1 c2 / c2'``.
+    The law is first fitted with the anchor as reference. The fitted constants are the slope c1 / c2 and the bend 1 /
+    c2, which both remain finite if the factors are linear in temperature. The constants c1 and c2 at the reference
+    follow from c1 c2 and T_ref - c2, which are the same for every reference. For a reference that is higher by dT:
+    ``c2' = c2 + dT``, ``c1' = c1 c2 / c2'``.
     """
     lowest, moved = float(temperature[anchor] - temperature.min()), reference - float(temperature[anchor])
     straight = STRAIGHTEST / float(np.ptp(temperature))
@@ -112,12 +117,12 @@ def fit_wlf(
     slope, bend = fitted.x
     factor, c2 = slope / bend**2, 1 / bend + moved
     c1, half_of_bend = factor / c2, fitted.quantile * float(np.sqrt(fitted.spread[1, 1]))
-    if bend - half_of_bend <= straight:  # a straight line is within the errors: no constant has an upper end
+    if bend - half_of_bend <= straight:  # a straight line is within the errors: the intervals extend to infinity
         least = 1 / min(bend + half_of_bend, steepest) + moved
         first, last = sorted([slope * (least - moved) ** 2 / least, float(np.copysign(np.inf, slope))])
         constants = {"c1": (c1, first, last), "c2": (c2, least, np.inf)}
     else:
-        gap = 1 / bend - lowest  # of the temperature at which the law diverges below the lowest one measured
+        gap = 1 / bend - lowest  # lowest measured temperature minus the temperature where the law diverges
         change = np.array(
             [1 / (bend + bend**2 * moved), -slope * (1 + 2 * bend * moved) / (bend + bend**2 * moved) ** 2]
         )
@@ -140,7 +145,7 @@ def _one_constant(
     factors: FloatArray,
     covariance: FloatArray,
 ) -> ShiftLaw:
-    """Fit a law that is proportional to a distance."""
+    """Fit the constant of a law that is proportional to a given function of the group."""
 
     def law(constants: FloatArray, at: FloatArray) -> FloatArray:
         return np.asarray(constants[0] * distance(at), dtype=np.float64)
@@ -172,7 +177,10 @@ def _fit(
     covariance: FloatArray,
     ends: tuple[list[float], list[float]] | None = None,
 ) -> _Fitted:
-    """Fit by generalised least squares; a law that misses by more than the errors gets a scatter of its own."""
+    """Fit by generalised least squares.
+
+    If the departures from the law are larger than the errors of the factors, an additional scatter is fitted.
+    """
     known = np.diag(covariance) > 0
     freedom = int(known.sum()) - guess.size
     if freedom < 1:

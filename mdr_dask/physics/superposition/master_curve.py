@@ -19,17 +19,23 @@ CURVE_POINTS = 201
 CONFIDENCE = 0.95
 
 EXPANSION = 6e-4
-"""Volume expansion of melts and rubbers, 1/K, in b_T; typical values are 5e-4 to 7e-4."""
+"""Coefficient of volume expansion of melts and rubbers, 1/K, used in b_T; typical values are 5e-4 to 7e-4."""
 
 OFFSET = (0.02 / np.log(10), np.log(2))
-"""Prior of the offset of all moduli of one temperature: 2 % within a factor of two, because specimens are clamped again
-and their dimensions are known to about a per cent."""
+"""Prior of the standard deviation of the vertical offset common to all channels of a curve.
+
+Median, decades, and standard deviation of the natural logarithm: 2 %, uncertain by a factor of two. Specimens are
+clamped again for each temperature, and their dimensions are known to about one per cent.
+"""
 
 FREE = (0.03, 1.5)
-"""Prior of the steps of free vertical factors about their mean: 0.03 decades within a factor of five."""
+"""Prior of the standard deviation of the steps of free vertical factors about their mean.
+
+Median, decades, and standard deviation of the natural logarithm: 0.03 decades, uncertain by a factor of about five.
+"""
 
 DETERMINED = 0.5
-"""Standard deviation of a step, relative to that of its prior, above which the step counts as not determined."""
+"""A step counts as not determined if its standard deviation exceeds this fraction of its prior standard deviation."""
 
 Vertical = Literal["none", "modulus", "compliance", "free"]
 
@@ -41,31 +47,33 @@ class Superposition:
     Parameters
     ----------
     groups : array, shape (groups,)
-        Values of the quantity in which the curves differ (velocity, temperature), ascending.
+        Ascending values of the quantity in which the curves differ, such as velocity or temperature.
     horizontal, vertical : array, shape (groups,)
         Decades added to log10 x and to log10 y of each curve; zero at the reference.
     draws : array, shape (draws, 2 groups)
         Draws of horizontal and vertical factors from their probability density.
     reference : float
-        The group's value at which the factors are zero.
+        Value of the groups at which the factors are zero.
     noise : array, shape (channels,)
-        Scatter of log10 y about the curve.
+        Standard deviation of log10 y about the curve.
     x : array, shape (points,)
         Abscissae after shifting, ascending.
     y : array, shape (channels, points)
         Ordinates after shifting.
     member : array of int, shape (points,)
-        The group of each point.
+        Index of the group of each point.
     curve_x : array, shape (curve points,)
+        Abscissae of the merged curves.
     curve_y, curve_error : array, shape (channels, curve points)
-        The merged curves and their standard errors; the curve of the reference is not shifted.
+        The merged curves and their standard errors. They are the curves at the reference.
     curve_cross : array, shape (channels, curve points, 2 groups)
         Covariance of the curves and the factors.
     measured : tuple of float
-        Range of log10 x in which the reference itself was measured; outside, the curve depends on the shift factors.
+        Range of log10 x of the points measured at the reference. Outside this range the curve depends on the shift
+        factors.
     undetermined : tuple of (float, float)
-        First and last group of each run of neighbours between which the curves do not determine the shift, as on a
-        plateau or across a gap.
+        First and last group of each sequence of neighbouring groups between which the curves do not determine the
+        shift, for example on a plateau or across a gap.
     """
 
     groups: FloatArray
@@ -124,14 +132,16 @@ def superpose(
     groups : array_like, shape (groups,)
         Distinct values of the quantity in which the curves differ.
     curves : sequence of (x, y)
-        log10 of abscissa, shape (points,), and ordinate of each curve, at least two points each. Ordinates of shape
-        (channels, points), such as storage and loss modulus, are shifted together.
+        log10 of abscissa and ordinate of each curve, which must have at least two points. Abscissae have the shape
+        (points,). Ordinates have the same shape, or the shape (channels, points) for channels that are shifted
+        together, such as storage and loss modulus.
     vertical : {'none', 'modulus', 'compliance', 'free'}
-        Factors along the ordinate. A modulus of a polymer is proportional to density times temperature: b_T = rho0 T0 /
-        (rho T) with `EXPANSION` is taken out, and an offset of all channels of a curve has the prior `OFFSET`. Free
-        factors drift from curve to curve by unknown steps.
+        Factors along the ordinate. A modulus of a polymer is proportional to density times temperature. For 'modulus'
+        and 'compliance' the factor b_T = rho0 T0 / (rho T), with the density rho from `EXPANSION`, is therefore
+        applied, and an offset common to all channels of a curve has the prior `OFFSET`. Factors that are 'free' differ
+        from curve to curve by unknown steps.
     reference : float, optional
-        Group whose factors are zero; the middle one if not given. Between groups see `rereference`.
+        Group whose factors are zero; by default the middle group. For a reference between groups see `rereference`.
     seed : int
         Seed of the draws.
     kelvin : array_like, shape (groups,), optional
@@ -140,7 +150,7 @@ def superpose(
     Raises
     ------
     DataError
-        If there are fewer than two curves, or too few or not finite points.
+        If there are fewer than two curves, too few points, or points that are not finite.
 
     Examples
     --------
@@ -169,7 +179,10 @@ def superpose(
 
 
 def known_rise(kelvin: FloatArray, vertical: Vertical) -> FloatArray:
-    """Return log10 of b_T for a modulus (of 1 / b_T for a compliance), about the first temperature, shape (groups,)."""
+    """Return log10 of b_T for a modulus, or of 1 / b_T for a compliance, shape (groups,).
+
+    The reference temperature T0 is the first temperature.
+    """
     if vertical not in ("modulus", "compliance"):
         return np.zeros(kelvin.size)
     decades = np.log10(kelvin[0] / kelvin * (1 + EXPANSION * (kelvin - kelvin[0])))
@@ -215,7 +228,7 @@ def _merged(
     lifted -= offsets[:, None, :1]
     factors = np.hstack([shifts * width, offsets - offsets[:, :1] + rise - rise[0]])
     vertical = factors[:, count:].mean(axis=0)
-    # the curve through the points where the mean factors put them, which the mean of the curves leaves on a plateau
+    # curve through the points shifted by the mean factors; on a plateau the mean of the drawn curves departs from them
     likeliest = solve(problem, rows.mean(axis=0)[None]).mean
     curve = np.concatenate([problem.spline(c, likeliest, mean[None], grid) for c in range(channels)])
     curve -= likeliest[:, -count:][:, :1] if problem.offset else 0.0
@@ -246,14 +259,14 @@ def _merged(
 
 
 def _runs(groups: FloatArray, steps: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
-    """Return first and last group of each run of marked steps."""
+    """Return the first and the last group of each sequence of consecutive marked steps."""
     edges = np.diff(np.concatenate([[0], steps.astype(int), [0]]))
     ends = zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
     return tuple((float(groups[first]), float(groups[last])) for first, last in ends)
 
 
 def _gaps(x: FloatArray, member: NDArray[np.intp], shifts: FloatArray) -> NDArray[np.bool_]:
-    """Return for each row of shifts and each curve whether it begins after a gap in the abscissa."""
+    """Return, for each row of shifts and each curve, whether the curve begins after a gap in the abscissa."""
     ends = np.array([[x[member == k].min(), x[member == k].max()] for k in range(shifts.shape[1])])
     low, high = ends[:, 0] + shifts, ends[:, 1] + shifts
     order = np.argsort(low, axis=1)
@@ -271,27 +284,27 @@ def rereference(
     at_reference: float = 0.0,
     logarithmic: bool = False,
 ) -> Superposition:
-    """Return the same master curve with the factors zero at another group, or between two.
+    """Return the same master curve for another reference, which is a group or a value between two groups.
 
-    Between two groups, the horizontal factor is that of a law plus the departures from it, which are interpolated
-    linearly. The error of this interpolation, `dT^2 |h''| / 8` for a distance dT of the two groups, is added to the
-    draws; h'' is that of the departures.
+    Between two groups, the horizontal factor is the factor of the law plus the linearly interpolated departure of the
+    measured factors from the law. The error of this interpolation, `dT^2 |h''| / 8` for two groups at a distance dT, is
+    added to the draws; h'' is the second derivative of the departures.
 
     Parameters
     ----------
     reference : float
-        In the range of the groups.
+        New reference, in the range of the groups.
     law : array, shape (groups,), optional
-        Factors of a law that holds; without it, the factors themselves are interpolated.
+        Factors according to a law that describes the shifts; without a law, the measured factors are interpolated.
     at_reference : float
         The factor of the law at the reference.
     logarithmic : bool
-        Whether factors are nearly linear in the logarithm of the groups, as those of velocities are.
+        Whether the factors are nearly linear in the logarithm of the groups, for example if the groups are velocities.
 
     Raises
     ------
     DataError
-        If the value lies outside the groups.
+        If the reference is outside the range of the groups.
     """
     groups, size = result.groups, result.groups.size
     if not groups[0] <= reference <= groups[-1]:
@@ -302,7 +315,7 @@ def rereference(
     known = np.zeros(size) if law is None or reference in groups else law - at_reference
     both = np.kron(np.eye(2), share)
     across, along = float(share @ (result.horizontal - known)), float(share @ result.vertical)
-    zero = both @ result.draws.T  # taken off each draw, shape (2, draws)
+    zero = both @ result.draws.T  # factors at the reference, subtracted from each draw, shape (2, draws)
     zero[0] -= share @ known
     bend = interpolation_error(places, result.horizontal - known, float(place))
     zero[0] += bend * ndtri((np.random.default_rng(0).permutation(zero.shape[1]) + 0.5) / zero.shape[1])
@@ -334,7 +347,8 @@ def rereference(
 def interpolation_error(places: FloatArray, factors: FloatArray, place: float) -> float:
     """Return the error of a linear interpolation, ``d^2 |h''| / 8`` for neighbours a distance d apart.
 
-    The second derivative is the larger one of those at the neighbours; zero at one of the places themselves.
+    The second derivative h'' is the larger of the second derivatives of the factors at the two neighbours. At one of
+    the places themselves the error is zero.
     """
     if place in places:
         return 0.0

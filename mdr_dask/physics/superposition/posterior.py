@@ -1,12 +1,13 @@
-"""Probability of shifts, given curves that are pieces of one smooth curve: the density and its gradient.
+"""Probability density of shifts, and its gradient, for curves that are pieces of one smooth curve.
 
 Each channel c of a curve k (such as storage and loss modulus of one temperature) is
 
     y_c(x) = Q_c(x + h_k) - v_k + noise_c,
 
 with a horizontal shift h_k and a vertical offset v_k common to all channels. Q_c is a cubic B-spline whose second
-differences are normal (P. H. C. Eilers, B. D. Marx, Stat. Sci. 11 (1996) 89), the offsets are normal too. Both enter
-linearly and are integrated out, so that the density depends on the shifts and on a few scales only.
+differences are normally distributed (P. H. C. Eilers, B. D. Marx, Stat. Sci. 11 (1996) 89). The offsets are normally
+distributed as well. Spline coefficients and offsets enter linearly and are integrated out, so that the density depends
+only on the shifts and on a few scales.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.superposition.banded import Factors, drawn, solve_rows
 
 CELLS = 8
-"""Spline cells along a curve of median width: ten give the same factors, five do not resolve sharp bends."""
+"""Number of spline cells along a curve of median width: ten give the same factors, five do not resolve sharp bends."""
 
 MARGIN = 0.5
 """Distance by which the spline extends beyond the first guess on each side, in widths of a curve."""
@@ -32,22 +33,28 @@ ROUNDING = 1e-5
 """Smallest scatter of a curve, decades: the rounding of a table with five digits."""
 
 STEP_MEAN, STEP_SCATTER = 1.0, 0.5
-"""Prior of the steps between neighbouring curves, in widths of a curve: the standard deviation of their mean about
-zero, and of each step about this mean."""
+"""Prior of the steps between the shifts of neighbouring curves, in widths of a curve.
+
+The first number is the standard deviation of the mean step, the second the standard deviation of each step about the
+mean step.
+"""
 
 BEND, BEND_SCATTER, BEND_DRIFT = 0.02, 3.0, 1.0
-"""Prior of the bend near each curve, which is the standard deviation of the second differences of the spline: its
-median in heights of a curve, the standard deviation of its logarithm, and the standard deviation of the change of this
-logarithm from one curve to the next. The bend varies, because a master curve is bent in some places only."""
+"""Prior of the bend near each curve; the bend is the standard deviation of the second differences of the spline.
+
+The numbers are the median of the bend, in heights of a curve; the standard deviation of the logarithm of the bend; and
+the standard deviation of the change of this logarithm from one curve to the next. The bend varies, because a master
+curve is bent in some places only.
+"""
 
 REACH = 0.3
 """Distance over which the bend changes from one curve to the next, in widths of a curve."""
 
 NOISE, NOISE_SCATTER = 0.01, 2.0
-"""Prior of the relative scatter of each channel: its median, and the standard deviation of its logarithm."""
+"""Prior of the relative scatter of each channel: median, and standard deviation of the logarithm of the scatter."""
 
 TREND = 10.0
-"""Standard deviation of the mean step of drifting offsets, relative to that of the steps about it."""
+"""Standard deviation of the mean step of drifting offsets, divided by that of the steps about their mean."""
 
 FARTHEST = 8.0
 """Largest distance of the logarithm of a scale from its prior median; it prevents overflow."""
@@ -55,16 +62,16 @@ FARTHEST = 8.0
 
 @dataclass(frozen=True)
 class Curves:
-    """Points of all curves, in widths of a curve along the abscissa.
+    """Points of all curves; abscissae are in units of the width of a curve.
 
     Parameters
     ----------
     x : array, shape (points,)
-        Abscissae, such that ``x + shift`` begins near zero.
+        Abscissae, with an origin such that the smallest ``x + shift`` is near zero.
     y : array, shape (channels, points)
         Ordinates, decades.
     member : array of int, shape (points,)
-        Number of the curve of each point.
+        Index of the curve of each point.
     count : int
         Number of curves.
     height : array, shape (channels,)
@@ -72,11 +79,11 @@ class Curves:
     splines : int
         Number of coefficients of the spline of each channel.
     offset : tuple of float or None
-        Prior of the standard deviation of the vertical offsets: median in decades, and standard deviation of its
+        Prior of the standard deviation of the vertical offsets: median in decades, and standard deviation of the
         logarithm. None for curves without vertical offsets.
     drifting : bool
-        Whether offsets drift from curve to curve by independent steps about a common mean that may be `TREND` times as
-        large; otherwise they are independent of each other.
+        Whether offsets change from curve to curve by independent steps. The mean of the steps may be `TREND` times as
+        large as the scatter of the steps. If False, the offsets are independent of each other.
     """
 
     x: FloatArray
@@ -96,11 +103,11 @@ class Curves:
         )
 
     def begin(self, moved: FloatArray) -> FloatArray:
-        """Return the beginning of the spline, which is centred on the shifted points, for each row, shape (rows,)."""
+        """Return where the spline begins for each row, shape (rows,); it is centred on the shifted points."""
         return np.asarray((moved.min(axis=1) + moved.max(axis=1) - (self.splines - 3) / CELLS) / 2, dtype=np.float64)
 
     def spline(self, channel: int, unknowns: FloatArray, shifts: FloatArray, grid: FloatArray) -> FloatArray:
-        """Return the curve of a channel for rows of unknowns and shifts (of all curves), shape (rows, grid)."""
+        """Return the curve of a channel on a grid for each row of unknowns and shifts, shape (rows, grid)."""
         low = self.begin(self.x + shifts[:, self.member])[:, None]
         first, value, _ = _basis((grid - low) * CELLS, self.splines)
         places = channel * self.splines + first[..., None] + np.arange(4)
@@ -146,13 +153,14 @@ _VALUES, _SLOPES = _pieces()
 
 @dataclass(frozen=True)
 class Solved:
-    """Density of rows of parameters, with the spline coefficients and offsets given these parameters.
+    """Density of rows of parameters, and the distribution of spline coefficients and offsets for these parameters.
 
     Parameters
     ----------
     energy : array, shape (rows,)
         Negative logarithm of the probability density, up to a constant.
     gradient : array, shape (rows, parameters)
+        Gradient of the energy.
     mean : array, shape (rows, unknowns)
         Mean coefficients of the splines, channel by channel, then the offsets.
     factors : Factors
@@ -202,7 +210,7 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
     change = share[:, None] * (near[:, :, None] - bend[..., None]) * (apart / REACH**2)[:, None]
     turn = np.einsum("wc,wcp->wp", weight, linear.tilt - left * linear.slope)
     by_place = np.einsum("wcj,wcjk->wk", by_bend, change)
-    # at the mean, the exponent is half the weighted residuals times the ordinates
+    # at the mean, the negative exponent is half the sum of weight times residual times ordinate
     energy = 0.5 * linear.log_determinant + 0.5 * np.sum(weight * np.sum(left * curves.y, axis=2), axis=1)
     energy += np.sum(bend, axis=(1, 2)) - 0.5 * points * np.sum(np.log(weight), axis=1)
     gradient = np.zeros_like(rows)
@@ -228,7 +236,7 @@ def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, Float
 
 
 def step_precision(count: int) -> FloatArray:
-    """Return the prior precision of the shifts of all curves but the first, in widths."""
+    """Return the prior precision of the shifts of all curves but the first, in widths of a curve."""
     steps = np.eye(count - 1) - np.eye(count - 1, k=-1)
     covariance = STEP_SCATTER**2 * np.eye(count - 1) + STEP_MEAN**2
     return np.asarray(steps.T @ np.linalg.inv(covariance) @ steps, dtype=np.float64)

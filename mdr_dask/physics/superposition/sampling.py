@@ -1,4 +1,4 @@
-"""Draw shifts from their probability density: find the most probable ones, then sample by Hamiltonian Monte Carlo."""
+"""Draw shifts from their probability density by Hamiltonian Monte Carlo, starting from the most probable shifts."""
 
 from __future__ import annotations
 
@@ -13,15 +13,19 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.superposition.posterior import CELLS, MARGIN, Curves, Solved, solve, step_precision
 
 HOPS = 2
-"""Jumps of single steps after each move."""
+"""Number of jumps after each move; a jump changes the step between two neighbouring curves."""
 
 CHAINS, WARM, KEPT = 24, 16, 20
-"""Number of chains, and moves of each that are discarded and kept: 480 draws give the ends of an interval of 95 % to
-about 5 %."""
+"""Number of chains, and numbers of moves of each chain that are discarded and kept.
+
+The resulting 480 draws determine the ends of a 95 % interval to about 5 %.
+"""
 
 CONVERGED = 1.1
-"""Potential scale reduction factor below which chains count as converged; otherwise two, four and eight times as many
-moves are made for each one that is kept."""
+"""Potential scale reduction factor below which chains count as converged.
+
+Otherwise sampling is repeated with two, four and eight moves for each kept move.
+"""
 
 PATH, STEPS = 1.5, 3
 """Length of a move in standard deviations (a quarter of a period), and its number of steps."""
@@ -30,10 +34,13 @@ DIFFERENCE = 1e-3
 """Step of the finite differences of the gradient, in standard deviations of the prior."""
 
 STIFFNESSES = (0.0, 3.0, 6.0)
-"""Stiffnesses of the splines tried for a first guess: logarithms, relative to the prior."""
+"""Natural logarithms of the factors by which the prior bend is divided in the splines tried for a first guess."""
 
 SCAN = 81
-"""Number of steps tried for each pair of neighbours; the extreme steps leave gaps as wide as a curve."""
+"""Number of steps tried for each pair of neighbouring curves.
+
+With the extreme steps, the gap between the two curves is as wide as a curve.
+"""
 
 
 def first_guess(curves: Curves) -> FloatArray:
@@ -56,7 +63,7 @@ def first_guess(curves: Curves) -> FloatArray:
             rows = np.column_stack([steps * width, np.tile(middle[1:], (SCAN, 1))])
             rows[:, 1 : 1 + 2 * curves.y.shape[0]] -= stiffness
             channels = curves.y.shape[0]
-            # the best step lies between two tried steps, so a steep curve misses by its slope times their distance
+            # the best step is between two tried steps, which for a steep curve causes an error of the ordinate
             coarse = curves.height * width * (steps[1] - steps[0]) / np.sqrt(12)
             noise = slice(1 + 2 * channels, 1 + 3 * channels)
             rows[:, noise] = np.maximum(rows[:, noise], np.log(coarse))
@@ -77,7 +84,7 @@ def laid_out(curves: Curves, shifts: FloatArray) -> Curves:
     return replace(curves, splines=int(np.ceil((np.ptp(moved) + 2 * MARGIN) * CELLS)) + 3)
 
 
-@np.errstate(over="ignore", invalid="ignore")  # in moves that diverge and are rejected
+@np.errstate(over="ignore", invalid="ignore")  # for moves that diverge, which are rejected
 def draws(curves: Curves, generator: np.random.Generator) -> tuple[Curves, FloatArray]:
     """Return the curves with the spline that was used, and draws of the parameters, shape (draws, parameters)."""
     shifts = first_guess(curves)
@@ -106,7 +113,7 @@ def draws(curves: Curves, generator: np.random.Generator) -> tuple[Curves, Float
 def _moved(
     curves: Curves, place: FloatArray, here: Solved, scale: FloatArray, generator: np.random.Generator
 ) -> tuple[FloatArray, Solved, float]:
-    """Move all chains by one Hamiltonian step and `HOPS` jumps; return the mean acceptance of the step too."""
+    """Move all chains by one Hamiltonian move and `HOPS` jumps; also return the mean acceptance of the move."""
     length = PATH / STEPS * generator.uniform(0.7, 1.3, (CHAINS, 1))
     momentum = generator.standard_normal(place.shape)
     speed, new, there = momentum, place, here
@@ -132,8 +139,8 @@ def _moved(
 def _reduction(kept: FloatArray) -> float:
     """Return the largest potential scale reduction factor of some parameters, shape (moves, chains, parameters).
 
-    It compares the variance of the means of the chains with that within the chains (A. Gelman, D. B. Rubin, Stat. Sci.
-    7 (1992) 457), and is 1 for chains that all represent the same distribution.
+    The factor compares the variance of the means of the chains with the variance within the chains (A. Gelman, D. B.
+    Rubin, Stat. Sci. 7 (1992) 457). It is 1 if all chains represent the same distribution.
     """
     within = kept.var(axis=0, ddof=1).mean(axis=0)
     between = kept.mean(axis=0).var(axis=0, ddof=1)
@@ -149,9 +156,10 @@ def _chosen(taken: NDArray[np.bool_], new: Solved, old: Solved) -> Solved:
 
 
 def _hop(curves: Curves, place: FloatArray, generator: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Return rows with one step between neighbours redrawn from its prior given the others, and the rise of its energy.
+    """Return rows with one step between neighbours drawn again from its prior, and the rise of the prior energy.
 
-    Such jumps cross the many small maxima along a plateau.
+    The prior of the step is conditional on the other steps. Such jumps let a chain pass between the many small maxima
+    of the density along a plateau.
     """
     lines, rows = curves.count - 1, np.arange(place.shape[0])
     known = step_precision(curves.count)
@@ -168,7 +176,7 @@ def _hop(curves: Curves, place: FloatArray, generator: np.random.Generator) -> t
 
 
 def _best(curves: Curves, start: FloatArray, fixed: int = 0) -> FloatArray:
-    """Return the most probable parameters; the first `fixed` ones are not changed."""
+    """Return the most probable parameters; the first `fixed` parameters are not changed."""
     scale = np.eye(start.size)[:, fixed:] if fixed else _scale(curves, start)
 
     def energy(away: FloatArray) -> tuple[float, FloatArray]:

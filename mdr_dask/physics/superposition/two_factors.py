@@ -1,4 +1,4 @@
-"""Shift factors that are a sum of two factors, such as one of velocity and one of temperature."""
+"""Shift factors that are a sum of two factors, such as a factor of velocity and a factor of temperature."""
 
 from __future__ import annotations
 
@@ -21,13 +21,14 @@ class TwoShifts:
     Parameters
     ----------
     first, second : Superposition
-        The same merged points and curve, once with the factors a and the groups v, once with b and T; `member` numbers
-        the groups of each.
+        The merged points and curve, which are the same in both. `first` contains the factors a and the groups v,
+        `second` the factors b and the groups T; `member` is the index of v or T, respectively.
     chi_squared : float
-        Reduced chi-squared of the difference between the factors of all pairs and the sum. Where it is above one, the
-        errors are multiplied by its square root.
+        Reduced chi-squared of the differences between the factors of all pairs and the sums a + b. If it is above one,
+        the errors are multiplied by its square root.
     probability : float
-        Probability of a chi-squared at least as large if the sum holds; 1 without a degree of freedom to test it.
+        Probability of a chi-squared at least as large if every factor is such a sum; 1 if there is no degree of freedom
+        for a test.
     """
 
     first: Superposition
@@ -45,24 +46,26 @@ def superpose_twice(
 ) -> TwoShifts:
     """Shift curves that differ in two quantities into one curve, and split each factor into a sum of two.
 
-    All curves are superposed without assuming the sum. Then a and b follow by least squares, weighted by the covariance
-    of all factors. To first order this equals a joint fit, and its chi-squared tests the sum.
+    First all curves are superposed with independent factors. Then a and b are fitted to these factors by least squares,
+    weighted by the covariance of the factors. To first order the result equals a joint fit. Its chi-squared tests
+    whether the factors are sums.
 
     Parameters
     ----------
     first, second : array_like, shape (curves,)
-        The two quantities of each curve, with at least two values each; not every pair has to exist.
+        Values of the two quantities for each curve. Each quantity must have at least two different values; a curve is
+        not required for every pair of values.
     curves : sequence of (x, y)
         log10 of abscissa and ordinate.
     references : pair of float, optional
-        Groups whose factors are zero; by default the middle ones.
+        Values of the two quantities at which the factors are zero; by default the middle values.
     seed : int
         Seed of the draws of `superpose`.
 
     Raises
     ------
     DataError
-        If a group has only one value, or the pairs form parts that share no value.
+        If a quantity has only one value, or if the pairs form separate sets that have no value in common.
     """
     values = [np.asarray(a, dtype=np.float64).reshape(-1) for a in (first, second)]
     groups, places = zip(*(np.unique(a, return_inverse=True) for a in values), strict=True)
@@ -89,8 +92,8 @@ def _split(
 ) -> TwoShifts:
     """Fit the sum to the factors of all curves by least squares, weighted by their covariance.
 
-    `design` maps the factors of both groups to those of the curves; `columns` are the factors that are not zero by
-    definition.
+    `design` maps the factors of both quantities to the factors of the curves. `columns` are the indices of the factors
+    that are not zero by definition.
     """
     curves, both = free.groups.size, design.shape[1]
     rows, moved = (design - design[0])[1:, columns], np.arange(1, curves)
@@ -144,7 +147,7 @@ def _split(
 
 
 def _serpentine(first: NDArray[np.intp], second: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return an order in which consecutive curves are neighbours in one of the groups."""
+    """Return an order of the curves in which consecutive curves are neighbours in one of the two quantities."""
     along = np.where(second % 2 == 0, first, first.max() - first)
     return np.lexsort((along, second))
 
