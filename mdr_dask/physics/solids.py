@@ -124,7 +124,7 @@ def complex_modulus(solid: LinearSolid, angular_frequency: ArrayLike) -> NDArray
 
 
 def relaxation_modulus(solid: LinearSolid, time: ArrayLike) -> FloatArray:
-    """Return G(t), Pa, the stress at times t > 0, s, after a unit step of strain, without the dashpot."""
+    """Return G(t), Pa: the stress at times t > 0, s, after a unit step of strain; a dashpot does not contribute."""
     elapsed = np.asarray(time, dtype=np.float64)
     terms = solid.moduli * np.exp(-elapsed[..., None] / solid.times)
     return np.asarray(solid.static_modulus + terms.sum(axis=-1), dtype=np.float64)

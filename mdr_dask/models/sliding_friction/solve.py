@@ -171,7 +171,7 @@ def seconds(block: Block[SlidingFriction]) -> float:
         solves = problems.different(members)[0].size
         visits = 1 if setting.terms is None else 4 * (4 + len(setting.terms.moduli))
         grid = 2 if case.oversampling == "auto" else case.oversampling
-        # a line takes the time of ten visits of all its nodes; a case takes half as many visits as it has on one grid
+        # a line takes the time of ten visits of its nodes; most grids of a case are coarse, which halves its visits
         nodes += _lines(block, setting) * setting.roughness.points * grid * (10 + 0.5 * solves * visits)
     return 1e-4 + SECONDS_A_NODE * nodes
 

@@ -35,7 +35,7 @@ class Steady:
     depth : array
         Penetration d of the mean line, in the unit of height.
     contact_fraction : array
-        Length in contact over the length of the line.
+        Fraction of the length of the line that is in contact.
     contact_slope : array
         rms slope of the part of the line that is in contact.
     status : int8 array

@@ -55,7 +55,7 @@ def steady_full_contact(
     [19.7392] [5.]
     """
     height, slope = nodes
-    # sums over the nodes equal sums over the spectrum; Prony terms can only increase the pressure of a wave
+    # sums over nodes give the same results as sums over the spectrum; Prony terms only increase the pressure of a wave
     pressure, heaviest = height, np.max(loads, initial=0.0)
     if not heaviest > DEEP * np.sqrt(height @ height / height.size):
         return None

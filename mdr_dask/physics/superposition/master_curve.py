@@ -124,8 +124,8 @@ def superpose(
     """Find the shifts for which the curves are parts of one smooth curve, with their uncertainty.
 
     The shifts, the smooth curve, the scatter and the vertical offsets have a joint probability density (module
-    `posterior`), from which they are drawn. Results are means over the draws, and intervals include the uncertainty of
-    smoothness, scatter and offsets.
+    `posterior`). Draws are taken from this density. Results are means over the draws, and intervals include the
+    uncertainty of smoothness, scatter and offsets.
 
     Parameters
     ----------

@@ -212,7 +212,10 @@ def motion_until(now: Instant, second: float) -> Motion:
 
 @jit_inline_uncounted
 def add_approach(now: Instant, bounds: PathBounds, state: FloatArray) -> None:
-    """Add the approach since the last search; reset all skipping if the last search was at an unrelated instant."""
+    """Add the approach since the last search.
+
+    If the last search was neither at this instant nor at the previous instant of the history, no cell remains skipped.
+    """
     history, last = now.history, now.history.count - 1
     depth, drift = history.depth[last], bounds.most_drift[WINDOWS - 1]
     if now.time == state[TIME]:  # same instant, another guess of the depth

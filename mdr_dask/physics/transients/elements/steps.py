@@ -318,7 +318,7 @@ def _instant(
 
 @jit
 def _forget(solid: Foundation, state: State, old: int, new: int) -> float:
-    """Replace elements that have left the line by undeformed ones; return the energy that was stored in them."""
+    """Replace elements that have left the line by undeformed elements; return the energy of the removed elements."""
     n, dissipated = state.displacement.size, 0.0
     for j in range(n):
         if (j + old) // n != (j + new) // n:
@@ -407,7 +407,7 @@ def _workspace_for(solid: Foundation, n: int) -> StepWorkspace:
 
 @jit
 def _separate(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> None:
-    """Write which elements separate during a step that ends at a given depth, and their displacements at its end."""
+    """Write which elements separate during a step to a given depth, and their displacements at the end of the step."""
     plain, damping, fall = solid.times.size == 0, solid.viscosity, (depth - step.depth) / step.time
     lapse = Lapse(step.time, workspace.decay, workspace.fades, workspace.element)
     for j in range(workspace.under.size):
