@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 Source = Mapping[str, Any] | str | Path | Campaign
 #: A study: the return value of `run` or `open_study`, or the path or URL of a store.
 Study = xr.Dataset | xr.DataTree | str | Path
-#: One name or condition, or several.
+#: One text (a name or a condition), or several.
 Words = str | Sequence[str]
 
 
@@ -108,26 +108,27 @@ def run(
     Parameters
     ----------
     source : mapping, str, Path or Campaign
-        As `read` takes it.
+        The campaign, in any form that `read` accepts.
     store : str or Path, optional
-        Path or URL of the store. The default is the store of the campaign file, or the key ``store`` of a dictionary;
-        without it a temporary folder that is kept until the process ends.
+        Path or URL of the store. The default is the store that the campaign names. If it names no store, results are
+        stored in a temporary folder that is kept until the process ends.
     progress : bool
-        Show a progress bar in a notebook or on a terminal, elsewhere a line every few seconds.
+        Whether to show the progress: as a bar in a notebook or on a terminal, otherwise as a line every few seconds.
     resources : Resources, optional
         Threads, processes, a scheduler or a cluster; the default is all cores of this machine.
     retry_failed : bool
-        Compute failed and not converged cases again.
+        Whether to compute failed and not converged cases again.
 
     Returns
     -------
     Dataset or DataTree
-        As `open_study` returns it. Failed results and questions about bare numbers are warnings.
+        The study, as returned by `open_study`. Failed results and questions about numbers without a unit are reported
+        as warnings.
 
     Raises
     ------
     MdrDaskError
-        With the messages of the command line.
+        If the campaign cannot be run; the message is the same as that of ``mdr-dask run``.
 
     Examples
     --------
@@ -154,9 +155,9 @@ def open_study(url: str | Path) -> xr.Dataset | xr.DataTree:
     Returns
     -------
     Dataset or DataTree
-        Outputs along the axes and ``realisation``, with units, their errors, and ``status``; for a campaign with
-        series a DataTree with a node for each. Arrays are read when they are used. The attribute ``complete`` is False
-        as long as results are missing; means are then taken over the available results.
+        Outputs along the axes and ``realisation`` with their units and errors, and ``status``. A campaign with series
+        gives a DataTree with a node for each series. Arrays are read when they are used. The attribute ``complete`` is
+        False as long as results are missing; means are then taken over the available results.
 
     Raises
     ------
@@ -183,7 +184,7 @@ def aggregate(
     columns: Words = (),
     units: Mapping[str, str] | None = None,
 ) -> xr.Dataset:
-    """Reduce outputs over realisations, like ``mdr-dask aggregate``.
+    """Compute statistics of outputs over realisations, like ``mdr-dask aggregate``.
 
     Parameters
     ----------
@@ -218,12 +219,14 @@ def table(
     units: Mapping[str, str] | None = None,
     limit: int = 0,
 ) -> pd.DataFrame:
-    """Return a study as a table, like ``mdr-dask show``; with ``statistics=None`` a row for each result.
+    """Return a study as a table, like ``mdr-dask show``.
+
+    A row is a case with the means of its outputs; with ``statistics=None``, a row is a single result.
 
     Returns
     -------
     pandas.DataFrame
-        With the units of the columns in ``attrs["units"]``.
+        The table; ``attrs["units"]`` contains the units of the columns.
     """
     import pandas as pd
 
@@ -239,21 +242,22 @@ def table(
 
 
 def fit(study: Study, law: str, measured: str | Path | pd.DataFrame | None = None) -> xr.Dataset | xr.DataTree:
-    """Fit a law, each constant with its 95 % interval, like ``mdr-dask fit``.
+    """Fit a law and return its constants with 95 % intervals, like ``mdr-dask fit``.
 
     Parameters
     ----------
     study : Dataset, DataTree, str or Path
         A study, or the path of its store.
     law : str
-        Its name; ``calibration`` finds parameters from measured points.
+        Name of the law; ``calibration`` finds unknown parameters from measured points.
     measured : str, Path or DataFrame, optional
         Table of measured points, in place of the table of the campaign; units are in brackets after the column names.
 
     Returns
     -------
     Dataset or DataTree
-        Constants with ``_low`` and ``_high``, and ``law_holds``; a node for each series that is fitted separately.
+        Constants, the ends of their intervals (``_low`` and ``_high``), and ``law_holds``. If series are fitted
+        separately, a DataTree with a node for each series.
 
     Raises
     ------
@@ -282,7 +286,7 @@ def plot(study: Study, figure: str, select: Words = (), **view: Any) -> Figure:
     select : sequence of str
         Parts of the study, as for the option ``--select``.
     **view
-        ``over`` (an axis, two for a map, none for main effects), ``by``, ``panels`` and ``log``; see
+        ``over`` (one axis; two axes for a map, no axis for main effects), ``by``, ``panels`` and ``log``; see
         :class:`mdr_dask.plots.view.View`.
 
     Returns
@@ -323,7 +327,7 @@ def master_curve(
     Parameters
     ----------
     study : Dataset, DataTree, DataFrame, str or Path
-        A study, a table of curves, or the path of either.
+        A study, a table of curves, or the path of a store or of a table.
     over, of, by, vertical, reference
         As the options of the command.
 
@@ -353,7 +357,7 @@ class StudyAccessor:
 
     @property
     def numbers(self) -> xr.Dataset:
-        """The dimensionless numbers of the cases, as far as the study has all parts of their formulas."""
+        """The dimensionless numbers of the cases; a number is left out if the study lacks a quantity in its formula."""
         columns = Columns(self._dataset)
         known = [name for name in numbers(self._dataset) if columns.find(name) is not None]
         return xr.Dataset({name: columns.column(name) for name in known if name not in self._dataset})
@@ -376,7 +380,7 @@ class StudyAccessor:
         return table(self._dataset, outputs, **asked)
 
     def aggregate(self, **asked: Any) -> xr.Dataset:
-        """Reduce over realisations: `mdr_dask.aggregate` of this study."""
+        """Compute statistics over realisations: `mdr_dask.aggregate` of this study."""
         return aggregate(self._dataset, **asked)
 
     def fit(self, law: str, **asked: Any) -> xr.Dataset | xr.DataTree:

@@ -1,4 +1,4 @@
-"""Rounds for a fitted constant: choose the cases of the next round."""
+"""Choose the cases of the next round if a campaign adds realisations until a fitted constant is known well enough."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def cases_that_narrow(
         try:
             wide = still_wide(fit, constant, groups, tolerance, stage.campaign.replication.at_most)
         except FitError:
-            continue  # `unanswered` reports the error at the end
+            continue  # at the end of the run, `unanswered` reports this error
         for result, flags in wide.items():
             for name in [result] if fit.apart else groups:
                 if bool(flags.any()):

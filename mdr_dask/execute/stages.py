@@ -1,4 +1,4 @@
-"""Stages of a campaign with adaptive axes: the cases of a stage in the store, and the values of the next stage.
+"""Stages of a campaign with adaptive axes: find the cases of a stage in the store, and choose the next values.
 
 A stage depends only on the results of the previous stage. So it can be determined again at any time, even if the store
 holds further results.

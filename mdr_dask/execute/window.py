@@ -181,7 +181,7 @@ def _outcomes(future: Future) -> Outcomes | None:
 
 
 def _run(work: Work, _: float | None) -> Outcomes:
-    """Compute a block in a worker, unless another worker wrote it completely and died before it could report that."""
+    """Compute a block in a worker, unless another worker has already written it and died before reporting it."""
     outcome = finished(work)
     if outcome is None:
         _report(work)

@@ -107,7 +107,7 @@ def _judged(result: xr.Dataset) -> xr.Dataset:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A law fitted to a stack of data.
+    """A law fitted to a stack of data (`mdr_dask.bootstrap` defines stacks).
 
     Attributes
     ----------

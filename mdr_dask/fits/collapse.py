@@ -81,7 +81,7 @@ def kelvins(temperatures: FloatArray, unit: str, groups: FloatArray | None = Non
 
 
 def constants_of(laws: list[ShiftLaw]) -> dict[str, xr.Variable]:
-    """Return the constants of laws with their intervals, and the distance of the factors from each law."""
+    """Return the constants of laws with their intervals, and the distance of the shift factors from each law."""
     return {name: value for law in laws for name, value in _constants(law).items()}
 
 
@@ -153,7 +153,7 @@ def _collapse_of(curve: xr.Dataset, name: str) -> str:
 
 
 class _Within(NamedTuple):
-    """Sum of the squared residuals about one polynomial for each curve, and its degrees of freedom."""
+    """Sum over all curves of the squared residuals about a polynomial for each curve, and its degrees of freedom."""
 
     squares: float
     freedom: int

@@ -1,4 +1,4 @@
-"""Film formulas from a map of computed films: powers of the load, speed and material parameters W, U and G."""
+"""Fit film formulas to computed films: powers of the load parameter W, speed parameter U and material parameter G."""
 
 from __future__ import annotations
 

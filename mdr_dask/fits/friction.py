@@ -1,4 +1,7 @@
-"""The laws of steady sliding friction (thesis eqs. 3.11 to 3.18), fitted to a store."""
+"""The laws of steady sliding friction (thesis eqs. 3.11 to 3.18), fitted to a store.
+
+`mdr_dask.bootstrap` defines the stacks from which intervals are computed.
+"""
 
 from __future__ import annotations
 

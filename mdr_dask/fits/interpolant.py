@@ -196,12 +196,12 @@ class Law:
         Parameters
         ----------
         **places : array_like
-            A number or array for every axis, in SI; they are broadcast together.
+            A number or an array for every axis, in SI; the arrays are broadcast against each other.
 
         Raises
         ------
         DataError
-            If an axis is missing or unknown, or a place lies outside.
+            If an axis is missing or unknown, or if a place lies outside the range of an axis.
         """
         points = np.broadcast_arrays(*self._checked(places).values())
         found = self._interpolate(np.stack([point.ravel() for point in points], axis=-1))

@@ -23,9 +23,9 @@ class Scale:
 
     @classmethod
     def of(cls, numbers: FloatArray, spread: bool = False) -> Scale:
-        """Return the scale on which sorted numbers are more evenly spaced.
+        """Return the scale on which ascending numbers are more evenly spaced; linear unless all are positive.
 
-        With `spread`, the scale is logarithmic if the numbers span more than a decade.
+        With `spread`, the numbers may have any order, and the scale is logarithmic if they span more than a decade.
         """
         if numbers.min() <= 0:
             return cls(False)
@@ -75,7 +75,11 @@ def linear(
 
 
 def left_out_error(scale: Scale, table: FloatArray, places: FloatArray, axis: int) -> FloatArray:
-    """Return the error of interpolation at every place of an axis, estimated by leaving out every second value."""
+    """Return the error of interpolation at every place of an axis, estimated by leaving out every second value.
+
+    `table` contains values on `scale`, but the returned error is the error of the numbers themselves. Each place has
+    the largest of the errors at this place and at its two neighbours.
+    """
     values, truth = np.moveaxis(table, axis, -1), np.moveaxis(scale.back(table), axis, -1)
     most = np.zeros_like(truth)
     number = len(places)
@@ -88,7 +92,7 @@ def left_out_error(scale: Scale, table: FloatArray, places: FloatArray, axis: in
 
 
 def chord_error(table: FloatArray, grid: FloatArray, axis: int) -> FloatArray:
-    """Return the error of linear interpolation between the values of a table: second derivative times h^2 / 8."""
+    """Return the error of linear interpolation between the values of a table: second derivative times spacing^2 / 8."""
     values, steps = np.moveaxis(table, axis, -1), np.diff(grid)
     bend = np.abs(np.diff(np.diff(values) / steps)) / (steps[1:] + steps[:-1])
     inside = bend * np.maximum(steps[1:], steps[:-1]) ** 2 / 4

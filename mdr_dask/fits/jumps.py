@@ -1,4 +1,7 @@
-"""The jump of friction at a jump of the velocity: its law, its limits, and its linearity (thesis eqs. 4.8 to 4.11)."""
+"""The jump of friction at a jump of the velocity: its law, its limits, and its linearity (thesis eqs. 4.8 to 4.11).
+
+`mdr_dask.fits.kinetic_cases` defines the symbols.
+"""
 
 from __future__ import annotations
 
@@ -73,7 +76,7 @@ def _jump_law(series: Series) -> xr.Dataset:
 
 
 def _constant(before: FloatArray, jump: FloatArray, count: int) -> dict[str, float | str]:
-    """Return the constant of eq. 4.11 for some cases, from stacks of mu_1 and of the jump, both over the slope."""
+    """Return the constant of eq. 4.11 for some cases, from stacks of mu_1 / slope and of the jump / slope."""
     row: dict[str, float | str] = {"cases": jump.shape[1], "constant_of_thesis": LAW}
     if jump.shape[1] < 2:
         reason = "not tested: the constant needs two cases"
@@ -125,7 +128,7 @@ def _limit(
     chosen: NDArray[np.bool_],
     cases: Cases,
 ) -> dict[str, float | str]:
-    """Return the mean of a number over the cases of a region, and whether the number equals the limit in all cases."""
+    """Return the mean of a number over the cases of a region, and a sentence on whether it equals its limit there."""
     inside = region & chosen
     if not np.any(inside):
         return dict.fromkeys((name, f"{name}_low", f"{name}_high"), np.nan) | {

@@ -1,4 +1,9 @@
-"""The cases of a series of velocity jumps, and the stacks of their means."""
+"""The cases of a series of velocity jumps, and the stacks of their means (`mdr_dask.bootstrap` defines stacks).
+
+The velocity jumps at time t_0 from v_1 to v_2 = v_1 + dv. Friction is mu_1 before the jump and mu_2 long after the
+jump, and d_mu_0 is its jump at t_0. The symbol tau means the relaxation time, H the Hurst exponent, and q_max the
+largest wavenumber.
+"""
 
 from __future__ import annotations
 
@@ -85,7 +90,7 @@ class Cases:
         return mean
 
     def places(self, dims: Sequence[Hashable]) -> NDArray[np.int64]:
-        """Return the index of every case in the flattened grid of some of the axes."""
+        """Return for every case the index of its values of some axes, in the flattened grid of these axes."""
         places = np.arange(int(np.prod([self.template.sizes[dim] for dim in dims], dtype=int)))
         shaped = xr.DataArray(places.reshape([self.template.sizes[dim] for dim in dims]), dims=list(dims))
         found: NDArray[np.int64] = np.asarray(self._like(shaped), dtype=np.int64).ravel()
@@ -191,7 +196,10 @@ def jump_numbers(cases: Cases) -> dict[str, FloatArray]:
 
 
 def rows_of(cases: Cases) -> list[tuple[str, NDArray[np.bool_]]]:
-    """Return a label and the cases for each Hurst exponent and for all; a measured surface has only ``all``."""
+    """Return a label and a mask of cases for each Hurst exponent and for all cases together.
+
+    A measured surface has no Hurst exponent, so the only label is ``all``.
+    """
     if "hurst" not in cases.data:
         return [("all", np.ones(cases.counts.size, dtype=bool))]
     hurst = cases.column("hurst")

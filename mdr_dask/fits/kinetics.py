@@ -1,4 +1,7 @@
-"""Kinetic laws of friction after a jump of the velocity (thesis 4.3): numbers of the jump, relaxation, its rate."""
+"""Kinetic laws of friction after a jump of the velocity (thesis 4.3): size of the jump, relaxation, rate.
+
+`mdr_dask.fits.kinetic_cases` defines the symbols; t' = (t - t_0) / tau.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +46,7 @@ LENGTH_FIELDS = {
 
 
 def _kinetics(series: Series) -> xr.Dataset:
-    """Return the numbers of the jump of every case, and the effects a and b of rate and state."""
+    """Return the dimensionless numbers of the jump of every case, and the effects a and b of rate and state."""
     cases = Cases.of(series, *LEVELS, "rms_slope")
     before, jump, after = cases.levels()
     logarithm = np.log1p(cases.column("velocity_change"))

@@ -27,7 +27,7 @@ from mdr_dask.physics.superposition import master_curve as superposition
 from mdr_dask.physics.superposition import two_factors as two_shifts
 from mdr_dask.physics.superposition.master_curve import EXPANSION, OFFSET, Superposition, Vertical
 
-SHARE_OF_BARS = 0.6827  # share of the draws within the bars ``_error``
+SHARE_OF_BARS = 0.6827  # fraction of the random draws of a factor that lie within its bar ``_error``
 
 
 def master_curve(
@@ -40,7 +40,7 @@ def master_curve(
 ) -> xr.Dataset:
     """Shift curves of a table into one.
 
-    If the curves differ in velocity and in temperature, there is a factor for each, and both are added:
+    If the curves differ in velocity v and in temperature T, the shift has two parts: log x becomes
     log x + a(v) + b(T).
 
     Parameters

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.prediction import Predicted, Prediction
 
-#: Cells along each unknown at the start, by the number of unknowns.
+#: Number of cells along each unknown before refinement, by the number of unknowns.
 START = {1: 64, 2: 24, 3: 12, 4: 8}
 #: `BEST`: least number of cells that are refined, by the number of unknowns. `MOST`: largest number of cells after a
 #: refinement.

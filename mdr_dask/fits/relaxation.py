@@ -66,13 +66,13 @@ def tried_rates(time: FloatArray) -> FloatArray:
 def exponential(time: FloatArray, traces: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Fit one exponential to each of many traces by weighted least squares.
 
-    For each of `GRID` rates the best amplitude is known in closed form; a parabola through the three best rates gives
-    the rate to about 1e-4.
+    For each of `GRID` rates, the best amplitude follows in closed form. A parabola through the best rate and its
+    neighbours then gives the rate to about 1e-4.
 
     Parameters
     ----------
     time : array, shape (m,)
-        Moments, from zero on.
+        Moments, beginning with 0.
     traces : array, shape (n, m)
         Traces that relax to zero.
     weights : array, shape (m,)
@@ -100,7 +100,7 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
     Parameters
     ----------
     time : array, shape (m,)
-        (t - t_0) / tau, from zero on.
+        (t - t_0) / tau, beginning with 0.
     traces : array, shape (1 + RESAMPLES + 2 groups, m)
         Stack of mu - mu_2 over the realisations.
     error : array, shape (m,)

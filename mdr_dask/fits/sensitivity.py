@@ -1,7 +1,7 @@
 """Sobol indices: the share of the variance of an output that each input of a study explains.
 
-The output is the mean over realisations. Each index is a ratio of mean products of two outputs. The product of a
-realisation with itself is left out, because it contains the variance of the scatter.
+The output is the mean over realisations. Each index is a ratio of mean products of the outputs of two cases. Products
+of two results of the same realisation are left out, because they contain the variance of the scatter.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError, distinguishable
 
-#: Half width of an interval that is narrow enough to compare inputs.
+#: Largest half width of the interval of an index with which inputs can be compared.
 NARROW = 0.1
 #: Least number of points from which an index is computed.
 FEWEST = 16

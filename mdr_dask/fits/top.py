@@ -18,7 +18,7 @@ PLACES = 96  # number of points, evenly spaced in the logarithm of velocity, to 
 
 
 def smoothed(mean: FloatArray) -> FloatArray:
-    """Return a smoothed curve, which serves only to choose the points that are fitted."""
+    """Return a smoothed curve, which is used only to choose the points that are fitted."""
     smooth = mean.copy()
     for _ in range(2):
         smooth[1:-1] = (smooth[:-2] + 2 * smooth[1:-1] + smooth[2:]) / 4
@@ -138,7 +138,7 @@ def _joined(x: FloatArray, stack: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _maximum(near: FloatArray, rows: FloatArray, degree: int, own: float) -> FloatArray:
-    """Return, for the polynomial through each row, the maximum nearest to `own`; infinite if it has none."""
+    """Fit a polynomial to each row and return the place of its maximum nearest to `own`; infinite without a maximum."""
     even, fine = np.linspace(-1.0, 1.0, near.size), np.linspace(-1.0, 1.0, 24 * near.size + 1)
     curves = rows @ np.linalg.pinv(np.vander(even, degree + 1)).T @ np.vander(fine, degree + 1).T
     left, middle, right = curves[:, :-2], curves[:, 1:-1], curves[:, 2:]

@@ -55,7 +55,7 @@ def decoded(line: bytes) -> dict[str, Any] | None:
 
 
 def _is_one(found: Mapping[str, Any]) -> bool:
-    """Return whether a JSON document has the structure of a record."""
+    """Return whether a JSON document has the keys and types of a record."""
     whole = type(found["attempt"]) is int and all(type(i) is int and i >= 0 for i in found["block"])
     texts = all(type(one) is str for one in found.get("chunks", {}).values()) and type(found.get("kind", "")) is str
     return whole and texts and type(found["messages"]) is list and all(map(_is_message, found["messages"]))
