@@ -1,10 +1,10 @@
 """Breakthrough of a boundary layer between two rough lines that roll on a film (thesis section 5.2.2).
 
 The film ``h0`` separates the two lines; where the sum of their heights ``z`` exceeds it, they overlap. A cluster is one
-connected interval of overlap, with the length ``D`` and the force ``F = E* int (z - h0) dx`` (eq. 5.5). It breaks the
-layer if ``pi tau0 D^3/(12 F) < h_c`` (eq. 5.6), that is, if ``int (z - h0) dx > s D^3`` with the layer strength
-``s = pi tau0/(12 E* h_c)``. tau0, E* and h_c enter only through s. Lines are closed (periodic) cubic splines, for which
-these integrals are exact. The contact is a window; one window begins at each node.
+connected interval of overlap, with the length ``D`` and the force ``F = E* int (z - h0) dx`` (eq. 5.5). A cluster
+breaks the layer if ``pi tau0 D^3/(12 F) < h_c`` (eq. 5.6), that is, if ``int (z - h0) dx > s D^3`` with the layer
+strength ``s = pi tau0/(12 E* h_c)``. tau0, E* and h_c enter only through s. Lines are closed (periodic) cubic splines,
+for which these integrals are exact. The contact is a window; one window begins at each node.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from mdr_dask.physics.jit import jit
 from mdr_dask.physics.lubrication.clusters import Clusters, crossings, total, whole_piece
 from mdr_dask.physics.surfaces.splines import integral, piece, shares, zeros
 
-#: Treatment of a cluster that is cut by an edge of the window. ``part``: the part inside is tested and counted, as if
-#: every window were tested by itself; ``clip``: the whole cluster is tested, the part inside is counted; ``whole``: the
-#: whole cluster is tested and counted; ``inside``: the cluster is ignored.
+#: Treatment of a cluster that an edge of the window cuts. ``part``: the part inside the window is tested and counted,
+#: as if nothing existed outside. ``clip``: the whole cluster is tested, but only the part inside the window is counted.
+#: ``whole``: the whole cluster is tested and counted. ``inside``: a cut cluster is ignored.
 EDGE_RULES: tuple[str, ...] = ("part", "clip", "whole", "inside")
 _PART, _CLIP, _WHOLE, _INSIDE = range(4)
-#: Lengths in contact are counted in units of the spacing over this number.
+#: Lengths in contact are counted in units of the spacing divided by this number.
 PARTS = 64
 
 
@@ -45,13 +45,16 @@ def layer_strength(shear_strength: ArrayLike, E_star: ArrayLike, thickness: Arra
 
 @jit
 def _counted(length: float) -> int:
-    """Convert a length in spacings to a whole number of parts of a spacing, at least one."""
+    """Return a length, given in spacings, as a whole number of parts of a spacing; at least one part."""
     return max(1, int(length * PARTS + 0.5))
 
 
 @jit
 def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> None:
-    """Add `number` to `count` positions of the closed trace from `begin` on; `jumps` holds differences of the trace."""
+    """Add `number` to `count` positions of the closed trace, starting at `begin`.
+
+    `jumps` holds the differences between neighbouring positions of the trace.
+    """
     points = jumps.size - 1
     while begin < 0:
         begin += points
@@ -67,7 +70,7 @@ def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> Non
 
 @jit
 def _add(jumps: NDArray[np.int32], at: int, number: int) -> None:
-    """Add `number` to one position of the closed trace, as `_block` does; `at` may be outside by one length at most."""
+    """Add `number` to the position `at` of the closed trace, like `_block`; `at` is at most one length outside."""
     points = jumps.size - 1
     at = at + points if at < 0 else at - points if at >= points else at
     jumps[at] += number
@@ -76,10 +79,10 @@ def _add(jumps: NDArray[np.int32], at: int, number: int) -> None:
 
 @jit
 def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: float, jumps: NDArray[np.int32]) -> None:
-    """Add the two parts of a cluster that edges of windows cut off: its head and its tail.
+    """Add to the trace the windows that contain only the head or only the tail of a cluster.
 
-    If `judged`, a part counts if it breaks the layer by itself; otherwise, if the whole cluster does. A part longer
-    than `reach` does not break the layer, whatever its shape.
+    If `judged`, a part is counted if this part breaks the layer by itself. Otherwise, it is counted if the whole
+    cluster breaks the layer. A part longer than `reach` cannot break the layer, whatever its shape.
     """
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
     start, end, total = clusters.start[c], clusters.end[c], clusters.total[c]
@@ -106,7 +109,7 @@ def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: fl
 
 @jit
 def _add_middles(clusters: Clusters, c: int, window: float, judged: bool, jumps: NDArray[np.int32]) -> None:
-    """Add the windows within a cluster; both edges of such a window cut the cluster."""
+    """Add to the trace the windows that lie within a cluster, so that both edges of the window cut the cluster."""
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
     start, end = clusters.start[c], clusters.end[c]
     always = clusters.total[c] > limit * (end - start) ** 3
@@ -152,7 +155,9 @@ def _collect(clusters: Clusters, window: float, rule: int, jumps: NDArray[np.int
 
 
 def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> NDArray[np.int32]:
-    """Return the length in intimate contact for the window that begins at each node, in O(points).
+    """Return the length in intimate contact for the window that begins at each node.
+
+    The computing time is proportional to the number of points.
 
     Parameters
     ----------
@@ -166,8 +171,8 @@ def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> ND
     Returns
     -------
     int array, shape (points,)
-        In units of 1/`PARTS` of a spacing, so that sums are exact. Entries are above zero only with contact; their
-        fraction is the breakthrough probability.
+        In units of 1/`PARTS` of a spacing, so that sums are exact. An entry is above zero if its window is in intimate
+        contact. The fraction of these entries is the breakthrough probability.
     """
     trace = np.zeros(clusters.points + 1, dtype=np.int32)
     if clusters.start.size:
@@ -176,7 +181,7 @@ def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> ND
 
 
 class Pair(NamedTuple):
-    """Two rough lines at the distance of a film.
+    """Two rough lines, separated by a film.
 
     Parameters
     ----------
@@ -199,7 +204,7 @@ class Pair(NamedTuple):
 
 @jit
 def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
-    """Fill `overlap` with spline coefficients of the overlap, from node p of line 1 and node q of line 2 on."""
+    """Write the spline coefficients of the overlap to `overlap`, starting at node p of line 1 and node q of line 2."""
     points = pair.line_1.size
     for k in range(overlap.size):
         overlap[k] = pair.line_1[(p + k - 1) % points] + pair.line_2[(q + k - 1) % points] - pair.level
@@ -207,9 +212,9 @@ def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
 
 @jit
 def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work: FloatArray) -> tuple[float, float]:
-    """Follow a cluster beyond an edge of the window, by at most `most`; to the right if `most` is positive.
+    """Return the length and the force of the part of a cluster beyond an edge of the window.
 
-    Return the additional length and force.
+    The cluster is followed by at most `most`, to the right if `most` is positive, and to the left otherwise.
     """
     overlap, found = work[:4], work[4:]
     direction = 1 if most > 0 else -1
@@ -273,7 +278,9 @@ def _windows(
 
 
 def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray], rule: str = "part") -> IntArray:
-    """Return the contact of each given window; the reference for pure rolling, and the method for rolling with creep.
+    """Return the length in intimate contact of each given window.
+
+    Rolling with creep is computed with this function; for pure rolling it is a slower reference.
 
     Parameters
     ----------
@@ -298,12 +305,13 @@ def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray
 
 
 def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> tuple[IntArray, IntArray]:
-    """Return the first node of the window on each line for given travels of the mean surface.
+    """Return the first node of the window on each line after given travels of the contact.
 
     Parameters
     ----------
     travel : array_like, shape (n,)
-        Travel in points. For mean values, steps of an eighth of the window are small enough.
+        Travel at the mean velocity of the surfaces, in points. For mean values, steps of an eighth of the window are
+        small enough.
     points : int
         Points of each line.
     slide_roll_ratio : float
@@ -313,7 +321,7 @@ def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> 
     Returns
     -------
     two int arrays, shape (n,)
-        First point of the window on each line.
+        First node of the window on line 1 and on line 2.
     """
     steps = np.asarray(travel, dtype=np.float64)
     first, second = (np.round(steps * (1 + sign * slide_roll_ratio / 2)).astype(np.int64) % points for sign in (1, -1))
@@ -322,7 +330,7 @@ def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> 
 
 @jit
 def _occupied(contact: NDArray[np.int32] | IntArray, windows: IntArray, lengths: IntArray, ends: IntArray) -> None:
-    """Count, for each part, windows in contact, their lengths in contact, and how often contact begins or ends."""
+    """Add, for each part, the windows in contact, their lengths in contact, and the beginnings and ends of contact."""
     parts = windows.size
     before = contact[-1] > 0
     for part in range(parts):
@@ -335,14 +343,14 @@ def _occupied(contact: NDArray[np.int32] | IntArray, windows: IntArray, lengths:
 
 
 class Occupied(NamedTuple):
-    """Intimate contact in equal parts of a revolution, each of shape (parts,).
+    """Intimate contact in equal parts of a revolution; every array has the shape (parts,).
 
     Parameters
     ----------
     windows : int array
         Number of windows in contact.
     lengths : int array
-        Sum of their lengths in contact, in the units of the input.
+        Sum of the lengths in contact of these windows, in the units of the input.
     ends : int array
         Number of times that contact begins or ends.
     """

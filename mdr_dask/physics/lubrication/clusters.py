@@ -18,15 +18,17 @@ class Clusters(NamedTuple):
     Parameters
     ----------
     start, end : array, shape (n,)
-        Beginning and end in spacings; the end of a cluster across the seam lies beyond the last node.
+        Beginning and end of each cluster in spacings. A cluster across the seam of the closed line ends beyond the last
+        node.
     total : array, shape (n,)
         Integral of ``z - h0`` over each cluster, in m times spacings.
     overlap : array, shape (points + 3,)
-        Spline of ``z - h0`` in m: its last coefficient, all coefficients, and the first two again.
+        Spline of ``z - h0`` in m, extended periodically: the last coefficient, all coefficients, and the first two
+        coefficients.
     limit : float
-        ``s dx^2`` in m: the layer breaks where ``total > limit (end - start)^3``.
+        The number ``s dx^2`` in m. A cluster breaks the layer if ``total > limit (end - start)^3``.
     closed : bool
-        Whether one cluster covers the whole line, without an end.
+        Whether one cluster covers the whole closed line, so that it has no end.
     """
 
     start: FloatArray
@@ -61,7 +63,10 @@ def whole_piece(overlap: FloatArray, k: int) -> float:
 
 @jit
 def total(overlap: FloatArray, start: float, end: float) -> float:
-    """Return the integral of a closed spline of ``overlap.size - 3`` nodes from `start`, which is on it, to `end`."""
+    """Return the integral from `start` to `end` of a closed spline with ``overlap.size - 3`` nodes.
+
+    `start` lies on the line; `end` may lie beyond the last node of the line.
+    """
     points = overlap.size - 3
     first, last = int(start), int(end)
     found: float = -integral(piece(overlap, first), start - first)
@@ -74,7 +79,10 @@ def total(overlap: FloatArray, start: float, end: float) -> float:
 
 @jit
 def crossings(overlap: FloatArray, found: FloatArray) -> int:
-    """Write the positions where a spline of ``size - 3`` nodes changes sign to `found`; return their number."""
+    """Write the positions where a spline changes sign to `found`, and return the number of these positions.
+
+    The spline has ``overlap.size - 3`` nodes.
+    """
     count = 0
     above = 4 * (overlap[0] > 0) + 2 * (overlap[1] > 0) + (overlap[2] > 0)
     for k in range(overlap.size - 3):
@@ -96,7 +104,7 @@ def find_clusters(line: FloatArray, level: float, spacing: float, strength: floa
     Parameters
     ----------
     line : array, shape (points,)
-        Spline of the sum of both lines in m, see `surfaces.splines`; at least three nodes.
+        Spline of the sum of the heights of both lines in m, see `surfaces.splines`; at least three nodes.
     level : float
         Film thickness h0 in m.
     spacing : float

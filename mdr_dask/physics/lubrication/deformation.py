@@ -1,4 +1,4 @@
-"""Elastic deformation of a half-plane under a piecewise linear pressure on any grid, exact for each element.
+"""Elastic deformation of a half-plane under a piecewise linear pressure on any grid, integrated exactly.
 
 Hertz units: positions in half widths a, pressures in p0, films and deformations in ``a^2/R`` (thesis eq. B.13, B.19).
 """
@@ -22,7 +22,10 @@ def _second_integral(x: float) -> float:
 
 @jit
 def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
-    """Replace second integrals of ``ln|x|`` at nodes by integrals over the hat functions; zero at both ends."""
+    """Replace the second integrals of ``ln|x|`` at the nodes by the integrals of ``ln|x|`` times the hat functions.
+
+    The entries of both end nodes become zero.
+    """
     left, left_slope = row[0], 0.0
     for j in range(nodes.size - 1):
         right = row[j + 1]
@@ -35,7 +38,7 @@ def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
 
 @jit
 def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
-    """Fill ``row[j]`` with the integral of ``ln|point - X|`` over the hat function of node j; zero at both ends."""
+    """Write the integral of ``ln|point - X|`` times the hat function of node j to ``row[j]``; zero at both ends."""
     for j in range(nodes.size):
         row[j] = _second_integral(point - nodes[j])
     _over_hats(nodes, row)
@@ -43,17 +46,19 @@ def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
 
 @jit
 def influence_matrix(nodes: FloatArray) -> FloatArray:
-    """Return the matrix that turns nodal pressures into deformations at the nodes, relative to the one at ``X = 0``.
+    """Return the matrix that gives, from nodal pressures, the deformations at the nodes minus the deformation at ``X =
+    0``.
 
     Parameters
     ----------
     nodes : array, shape (n,)
-        Ascending nodes of the pressure, in half widths; it is linear between them and zero at both ends.
+        Ascending nodes in half widths. The pressure is linear between the nodes and zero at both ends.
 
     Returns
     -------
     array, shape (n, n)
-        ``D`` with ``delta_i - delta(0) = sum_j D_ij P_j = -(1/pi) int P (ln|X_i - X| - ln|X|) dX`` (thesis eq. B.19).
+        The matrix ``D`` with ``delta_i - delta(0) = sum_j D_ij P_j = -(1/pi) int P (ln|X_i - X| - ln|X|) dX`` (thesis
+        eq. B.19).
     """
     n = nodes.size
     matrix, origin = np.empty((n, n)), np.empty(n)
@@ -78,7 +83,7 @@ def film(points: FloatArray, nodes: FloatArray, pressure: FloatArray, central_fi
     points : array, shape (m,)
         Positions in half widths.
     nodes, pressure : array, shape (n,)
-        Ascending nodes, and the pressures at them in units of p0, zero at both ends.
+        Ascending nodes in half widths, and the pressures at the nodes in units of p0; zero at both ends.
     central_film : float
         Film at ``X = 0`` in units of ``a^2/R``.
 
@@ -92,7 +97,7 @@ def film(points: FloatArray, nodes: FloatArray, pressure: FloatArray, central_fi
     result = np.empty(points.size)
     for i in range(points.size):
         _influence_row(points[i], nodes, row)
-        total = 0.0  # no BLAS here: with another number of threads, its last bits would differ
+        total = 0.0  # without BLAS, whose last bits depend on the number of threads
         for j in range(nodes.size):
             total += (origin[j] - row[j]) * pressure[j]
         result[i] = central_film + 0.5 * points[i] ** 2 + total / pi

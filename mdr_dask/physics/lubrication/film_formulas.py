@@ -70,17 +70,17 @@ def fluid_friction(
     sliding_velocity : float
         Difference of the two surface velocities in m/s.
     log_viscosity : callable
-        Natural logarithm of the viscosity in Pa s at pressures in Pa.
+        Returns the natural logarithm of the viscosity (in Pa s) at pressures in Pa.
     eyring_stress : float
         Stress tau_E in Pa of ``tau = tau_E asinh(eta v/(h tau_E))``; for large values the liquid is Newtonian.
     film_share : float
-        Fraction of the load, and so of the pressure, that the film carries.
+        Fraction of the load, and therefore of the Hertzian pressure, that the film carries.
 
     Returns
     -------
     float
-        Mean shear stress over mean pressure of the whole load, by 64 Gauss points in the angle of ``x = a
-        sin(angle)``, without rolling friction.
+        Mean shear stress divided by the mean pressure of the whole load, without rolling friction. The integral uses 64
+        Gauss points in the angle of ``x = a sin(angle)``.
     """
     nodes, weights = np.polynomial.legendre.leggauss(64)
     cosine = np.cos(np.pi / 2 * nodes)
@@ -96,12 +96,12 @@ def fluid_friction(
     return float(np.sum(weights * stress * cosine) / (contact.pressure * np.sum(weights * cosine**2)))
 
 
-#: Film thickness over the radius; above it, a parabola differs from the roller by more than a few per cent.
+#: Film thickness divided by the radius above which a roller differs from a parabola by more than a few per cent.
 THICKEST_FILM = 0.1
 
 
 def thick_film(film: float) -> str:
-    """Return a message if a film h/R is too thick for lubrication theory, else an empty string."""
+    """Return a message if a film h/R is too thick for lubrication theory, otherwise an empty string."""
     if not film > THICKEST_FILM:
         return ""
     return (
@@ -150,16 +150,16 @@ def dimensionless_groups(
 
 @dataclass(frozen=True)
 class FilmFormula:
-    """A regression ``h/R = factor W^load U^speed G^material`` and the ranges of the points to which it was fitted.
+    """A regression ``h/R = factor W^load U^speed G^material`` and the ranges of the numbers to which it was fitted.
 
     Parameters
     ----------
     name : str
-        Authors, and whether it gives the central or the minimum film.
+        The authors, and whether the formula gives the central or the minimum film.
     factor, load, speed, material : float
         Factor and exponents.
     load_range, speed_range, material_range : tuple of float
-        Lowest and highest W, U, G of the fitted points; outside these ranges, the formula is an extrapolation.
+        Lowest and highest W, U and G in the fit. Outside these ranges, the formula is an extrapolation.
     """
 
     name: str
@@ -191,11 +191,13 @@ class FilmFormula:
         return f"film formula {self.name} is extrapolated: {', '.join(outside)}" if outside else ""
 
 
-# Ranges from memory; no open copy of the papers was available (docs/evidence/mixed-lubrication.md).
+# The ranges are quoted from memory, because no open copy of the papers was available
+# (docs/evidence/mixed-lubrication.md).
 _PAN_HAMROCK_RANGE = ((2.045e-5, 5.0e-4), (1.0e-12, 5.0e-10), (2504.0, 10014.0))
 _DOWSON_HIGGINSON_RANGE = ((3.0e-5, 3.0e-4), (1.0e-13, 1.0e-11), (2500.0, 5000.0))
 
-#: Pan and Hamrock (1989). 2.922 is the factor of the central film; thesis eq. 5.3 and appendix B print 2.992 and 2.929.
+#: Pan and Hamrock (1989). The factor of the central film is 2.922; the thesis prints 2.992 in eq. 5.3 and 2.929 in
+#: appendix B.
 PAN_HAMROCK_CENTRAL = FilmFormula("Pan-Hamrock (central)", 2.922, -0.166, 0.692, 0.470, *_PAN_HAMROCK_RANGE)
 PAN_HAMROCK_MINIMUM = FilmFormula("Pan-Hamrock (minimum)", 1.714, -0.128, 0.694, 0.568, *_PAN_HAMROCK_RANGE)
 DOWSON_HIGGINSON_MINIMUM = FilmFormula("Dowson-Higginson (minimum)", 2.65, -0.13, 0.70, 0.54, *_DOWSON_HIGGINSON_RANGE)
@@ -235,11 +237,12 @@ REGIMES: tuple[str, ...] = (
     "elastic piezoviscous",
 )
 
-#: ``(h_min/R) W/U`` of a rigid parabola and an isoviscous liquid with the Reynolds exit condition (Kapitza).
+#: The number ``(h_min/R) W/U`` for a rigid parabola and an isoviscous liquid with the Reynolds exit condition
+#: (Kapitza).
 RIGID_ISOVISCOUS = 4.894968
-#: ``(h_min/R) (G U)^(-2/3)`` at which the maximum isoviscous pressure reaches ``1/alpha`` (Blok).
+#: The number ``(h_min/R) (G U)^(-2/3)`` at which the maximum isoviscous pressure reaches ``1/alpha`` (Blok).
 RIGID_PIEZOVISCOUS = 1.666297
-#: ``(h_min/R) M^(1/5) (2 U)^(-1/2)`` of soft bodies and an isoviscous liquid (Moes).
+#: The number ``(h_min/R) M^(1/5) (2 U)^(-1/2)`` for soft bodies and an isoviscous liquid (Moes).
 ELASTIC_ISOVISCOUS = 2.05
 
 
@@ -269,17 +272,17 @@ def limiting_films(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:
 
 
 def expected_film(M: float, L: float) -> float:
-    """Return an estimate of the film in ``a^2/R`` from the four limiting regimes, as a first guess."""
+    """Return an estimate of the film in units of ``a^2/R`` from the four limiting regimes, used as a first guess."""
     rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(M, 0.5, L) * np.pi / (8 * M)
     return float(max(min(rigid_piezo, elastic_piezo), max(rigid_iso, elastic_iso)))
 
 
 def regime(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> NDArray[np.intp]:
-    """Return the index in `REGIMES` of the regime of each point.
+    """Return the index in `REGIMES` of the regime of each case.
 
-    Elastic flattening makes an isoviscous film thicker and a piezoviscous film thinner. So take the thicker of the two
-    isoviscous limits and the thinner of the two piezoviscous limits; the thicker of these two is the film (the limit of
-    Moes' interpolation for a sharp transition).
+    Elastic flattening makes an isoviscous film thicker and a piezoviscous film thinner. So the isoviscous film is the
+    thicker of its two limits, and the piezoviscous film is the thinner of its two limits. The regime is that of the
+    thicker of these two films. This is the limit of Moes' interpolation for a sharp transition.
     """
     rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(W, U, G)
     isoviscous = np.where(elastic_iso > rigid_iso, 2, 0)

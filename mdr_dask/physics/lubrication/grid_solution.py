@@ -15,21 +15,23 @@ from mdr_dask.physics.lubrication.grids import adapted_density
 
 #: A second pressure maximum is a spike if it exceeds the minimum before it by this fraction of the maximum pressure.
 _SPIKE = 0.01
-#: Number of positions, within two cells, at which the minimum film is searched.
+#: Number of positions, in the two cells around the lowest node, among which the minimum film is found.
 _SUBDIVISION = 41
-#: Nodes on either side of a position through which a polynomial goes; the minimum film on coarse grids needs three.
+#: Number of nodes on either side of a position that the interpolating polynomial uses. The minimum film on coarse grids
+#: needs three nodes on either side.
 _CUBIC, _QUINTIC = 2, 3
-#: Fraction of a cell by which the pressure of a grid ends too early, if the film ends at a node.
+#: Distance, as a fraction of a cell, by which the pressure on a grid ends too early if the film ends at a node.
 _TOO_EARLY = 0.035
 
 
 @dataclass(frozen=True)
 class GridSolution:
-    """Pressure (in p0) and film (in ``a^2/R``) at the nodes of one grid, with the number of Newton steps.
+    """Pressure in units of p0, and film in units of ``a^2/R``, at the nodes of one grid.
 
-    `central` is the film at ``X = 0``, and `spacing` the node spacing over the spacing given by the density of nodes.
-    The method takes the pressure as linear between two nodes, so that its film sags there; :meth:`film_between` uses a
-    polynomial through the nodes instead.
+    `central` is the film at ``X = 0``, and `steps` is the number of Newton steps. `spacing` is the ratio of the node
+    spacing to the spacing given by the density of nodes. The numerical method uses a pressure that is linear between
+    two nodes, so that its film sags between the nodes. Therefore :meth:`film_between` uses a polynomial through the
+    nodes.
     """
 
     nodes: FloatArray
@@ -40,22 +42,22 @@ class GridSolution:
     spacing: float = np.nan
 
     def film_between(self, positions: FloatArray) -> FloatArray:
-        """Return the film in ``a^2/R`` at positions in half widths; NaN upstream of the oil."""
+        """Return the film in units of ``a^2/R`` at positions in half widths; NaN upstream of the oil."""
         film = _between(self.nodes, self.film, positions, _CUBIC)
         behind = positions > self.nodes[-1]
         film[behind] = film_at(positions[behind], self.nodes, self.pressure, self.central)
         return np.where(positions < self.nodes[0], np.nan, film)
 
     def pressure_between(self, positions: FloatArray) -> FloatArray:
-        """Return the pressure in p0 at positions in half widths; zero where there is no film."""
+        """Return the pressure in units of p0 at positions in half widths; zero where there is no film."""
         inside = (positions > self.nodes[0]) & (positions < self.nodes[-1])
         return np.where(inside, np.maximum(_between(self.nodes, self.pressure, positions, _CUBIC), 0.0), 0.0)
 
     def pressure_carried(self, nodes: FloatArray, front: float) -> FloatArray:
         """Return the pressure at the nodes of another grid, with the front behind the spike moved to `front`.
 
-        The nodes on either side of the front get the pressures at half a cell from the front of this grid; these are
-        nearly equal on finer grids.
+        The nodes on either side of the new front get the pressures that this grid has at half a cell from its own
+        front. On a finer grid, the pressures at half a cell from the front are nearly the same.
         """
         if np.isnan(front + self.front):
             return self.pressure_between(nodes)
@@ -67,12 +69,12 @@ class GridSolution:
 
     @cached_property
     def density(self) -> FloatArray:
-        """The density of nodes that suits the solution, at its nodes."""
+        """The density of nodes that is suitable for this solution, at its nodes."""
         return adapted_density(self.nodes, self.pressure, self.film, self.central)
 
     @cached_property
     def central_film(self) -> float:
-        """Film at ``X = 0`` in ``a^2/R``, interpolated between nodes."""
+        """Film at ``X = 0`` in units of ``a^2/R``, interpolated between nodes."""
         return float(_between(self.nodes, self.film, np.zeros(1), _CUBIC)[0])
 
     @cached_property
@@ -94,7 +96,7 @@ class GridSolution:
 
     @cached_property
     def spike(self) -> tuple[float, float]:
-        """Position and height of a second pressure maximum downstream of the first; NaN for both if there is none."""
+        """Position and height of a second pressure maximum, downstream of the first; both NaN if there is none."""
         peak, _ = self._spike
         return (float(self.nodes[peak]), float(self.pressure[peak])) if peak else (float("nan"), float("nan"))
 
@@ -109,8 +111,8 @@ class GridSolution:
     def front(self) -> float:
         """Position at which the pressure behind the spike equals the minimum before it; NaN if there is no spike.
 
-        On any grid, the pressure falls there within one or two cells; only the height of the spike depends on the
-        nodes.
+        On any grid, the pressure falls within one or two cells around this position; only the height of the spike
+        depends on the nodes.
         """
         peak, lowest = self._spike
         if not peak:
@@ -120,7 +122,7 @@ class GridSolution:
 
     @cached_property
     def _spike(self) -> tuple[int, float]:
-        """The node of a second pressure maximum and the lowest pressure before it; node 0 if there is none."""
+        """The node of the spike and the lowest pressure between both maxima; node 0 if there is no spike."""
         P = self.pressure
         peaks = np.flatnonzero((P[1:-1] > P[:-2]) & (P[1:-1] >= P[2:])) + 1
         if peaks.size < 2:
@@ -130,7 +132,10 @@ class GridSolution:
 
     @cached_property
     def rupture(self) -> float:
-        """Position where the film ends, extrapolated from the last four pressures, which tend to zero quadratically."""
+        """Position where the film ends, extrapolated from the last four pressures.
+
+        The pressure is assumed to tend to zero quadratically.
+        """
         last = int(np.flatnonzero(self.pressure)[-1])
         behind = self.nodes[min(last + 1, self.nodes.size - 1)]
         x, root = self.nodes[max(last - 3, 0) : last + 1], np.sqrt(self.pressure[max(last - 3, 0) : last + 1])
@@ -150,7 +155,11 @@ def _cell_around(nodes: FloatArray, position: float) -> FloatArray:
 def expected(
     before: Sequence[GridSolution], reading: Callable[[GridSolution], float | FloatArray], spacing: float
 ) -> FloatArray:
-    """Return a quantity on a grid of another spacing, extrapolated (second order) if there are two grids."""
+    """Return the expected value of a quantity on a grid of another spacing.
+
+    With two earlier grids, the value is extrapolated with the second order of the error; with one, it is the value on
+    that grid.
+    """
     last = np.asarray(reading(before[-1]))
     if len(before) == 1:
         return last
@@ -160,7 +169,7 @@ def expected(
 
 @jit
 def _between(nodes: FloatArray, values: FloatArray, positions: FloatArray, sides: int) -> FloatArray:
-    """Return the interpolating polynomial through `sides` nodes before and behind each position."""
+    """Return the values, at the positions, of polynomials through the `sides` nodes on either side of each position."""
     result = np.empty(positions.size)
     for k in range(positions.size):
         low, high = sides, nodes.size - sides  # bounds for the first node that is not before the position
@@ -182,7 +191,7 @@ def _between(nodes: FloatArray, values: FloatArray, positions: FloatArray, sides
 
 
 def _at_zero(x: list[float], values: list[float]) -> float:
-    """Return, at zero, the polynomial through the values at x."""
+    """Return the value at zero of the polynomial through `values` at the positions x."""
     total = 0.0
     for i, value in enumerate(values):
         share = value

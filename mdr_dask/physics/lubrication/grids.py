@@ -10,7 +10,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 
-#: A fully flooded film begins this many times ``sqrt(2 Hc)`` upstream.
+#: A fully flooded film begins this many times ``sqrt(2 Hc)`` upstream of ``X = -1``; Hc is the central film.
 FLOODED = 300.0
 
 
@@ -25,12 +25,14 @@ def outlet_position(central_film: float) -> float:
 
 
 def sample(positions: FloatArray, density: FloatArray, count: int) -> FloatArray:
-    """Return `count` nodes with spacings inverse to a density, which is linear between the given positions.
+    """Return `count` nodes whose spacing is inversely proportional to a density.
+
+    The density is linear between the given positions.
 
     Parameters
     ----------
     positions, density : array, shape (m,)
-        Ascending positions and the positive density at them; only its shape matters.
+        Ascending positions, and the positive density at these positions, in any unit.
     count : int
         Number of nodes, including both ends.
 
@@ -51,7 +53,7 @@ def _cells(positions: FloatArray, density: FloatArray) -> FloatArray:
 
 
 def _placed(positions: FloatArray, density: FloatArray, number: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Return the positions before which there are `wanted` cells; beyond the last position, the density is constant."""
+    """Return the positions before which there are `wanted` cells; the density is constant beyond the last position."""
     width = np.diff(positions)
     cell = np.clip(np.searchsorted(number, wanted, side="right") - 1, 0, width.size - 1)
     rest = wanted - number[cell]
@@ -65,28 +67,30 @@ def _placed(positions: FloatArray, density: FloatArray, number: FloatArray, want
 def aligned(
     positions: FloatArray, density: FloatArray, count: int, rupture: float, front: float = np.nan
 ) -> tuple[FloatArray, float]:
-    """Return nodes of a density such that the film ends at a node, and no node is within half a cell of the front.
+    """Return nodes with a given density, such that the film ends at a node and no node is within half a cell of the
+    front.
 
-    The error of a film depends, by up to a tenth, on where in its cell the film ends, and is least at a node. So grids
-    can be compared only if this is equal on all of them. Behind a sharp spike, the pressure falls within one or two
-    cells, and the minimum film depends on where these begin. So the cells are made slightly wider or narrower, for the
-    front to lie in the middle of a cell.
+    The error of a film changes by up to a tenth with the position, within its cell, at which the film ends. The error
+    is least if the film ends at a node. So grids can be compared only if the film ends at a node on all of them. Behind
+    a sharp spike, the pressure falls within one or two cells, and the minimum film depends on the position of these
+    cells. So the cells are made slightly wider or narrower, until the front lies in the middle of a cell.
 
     Parameters
     ----------
     positions, density : array, shape (m,)
-        Ascending positions and the positive density at them; only its shape matters.
+        Ascending positions, and the positive density at these positions, in any unit.
     count : int
         Number of nodes; the result may differ by one or two.
     rupture : float
         Position of the end of the film, estimated from coarser grids.
     front : float
-        Position where the pressure falls behind its spike, before the film ends; NaN if there is none.
+        Position where the pressure falls behind its spike, before the film ends; NaN if there is no spike.
 
     Returns
     -------
     tuple of array and float
-        Ascending nodes, the last one at or behind the last position; and the spacing in cells of the density.
+        Ascending nodes, of which the last lies at or behind the last position; and the spacing of the nodes in cells of
+        the density.
     """
     number = _cells(positions, density)
     reached = _cells_before(rupture, positions, density, number)
@@ -99,14 +103,16 @@ def aligned(
 
 
 def _halved_by(share: float, cells: int) -> int:
-    """Return the number near `cells` for which the fraction `share` of it lies closest to the middle of a cell."""
+    """Return the number n near `cells` for which n times `share` is closest to the middle between two whole numbers."""
     far = int(0.5 / max(1 - share, 4 / cells))  # the position in its cell repeats after 1 / (1 - share) cells
     near = cells + np.arange(-far, far + 1)
     return int(near[np.argmin(np.abs(near * share % 1 - 0.5))])
 
 
 def _cells_before(position: float, positions: FloatArray, density: FloatArray, number: FloatArray) -> float:
-    """Return the number of cells before any position, given the numbers before the positions of the density."""
+    """Return the number of cells before a position; `number` has the numbers of cells before the positions of the
+    density.
+    """
     before = int(np.clip(np.searchsorted(positions, position) - 1, 0, positions.size - 2))
     rest = position - positions[before]
     slope = (density[before + 1] - density[before]) / (positions[before + 1] - positions[before])
@@ -114,14 +120,16 @@ def _cells_before(position: float, positions: FloatArray, density: FloatArray, n
 
 
 def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:
-    """Return a grid for an expected film: fine at both ends of a dry contact, or around the parabola of a thick film.
+    """Return a grid for an expected film.
+
+    The grid is fine at both ends of the dry contact, or, for a thick film, around the minimum of the parabolic gap.
 
     Parameters
     ----------
     central_film : float
-        Expected film at ``X = 0`` in ``a^2/R``.
+        Expected film at ``X = 0`` in units of ``a^2/R``.
     inlet : float
-        Position where the film begins, in half widths.
+        Position where the film begins, in half widths; negative.
     count : int
         Number of nodes.
     """
@@ -141,25 +149,29 @@ def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:
 
 
 def first_pressure(nodes: FloatArray, central: float) -> FloatArray:
-    """Return half an ellipse: Hertz' pressure, or, for a thick film, a wider and flatter one upstream."""
+    """Return a first guess of the pressure, shaped like half an ellipse.
+
+    This is Hertz' pressure; for a thick film, the ellipse is wider and flatter and lies further upstream.
+    """
     reach = float(np.sqrt(2 * central))
     width, centre = (1.0, 0.0) if reach < 1 else (max(1.0, 0.8 * reach), -0.4 * reach)
     return np.sqrt(np.maximum(1 - ((nodes - centre) / width) ** 2, 0.0)) / width
 
 
 def second_derivative(nodes: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the second divided differences at the nodes; at both ends, the value at the next node."""
+    """Return the second derivative at the nodes from divided differences; end nodes have the neighbour's value."""
     width = np.diff(nodes)
     inner = 2 * np.diff(np.diff(values) / width) / (width[1:] + width[:-1])
     return np.concatenate([inner[:1], inner, inner[-1:]])
 
 
 def adapted_density(nodes: FloatArray, pressure: FloatArray, film: FloatArray, central_film: float) -> FloatArray:
-    """Return the density of nodes that suits a solution, shape (n,).
+    """Return the density of nodes that is suitable for a solution, shape (n,).
 
-    The flow error follows from the curvature of the film over the film (second order: square root), the deformation
-    error from the curvature of the pressure (integrated over an element: cube root). A least density keeps nodes in the
-    contact and in the inlet, and smoothing keeps neighbouring cells similar.
+    The flow error is of second order, so the density grows with the square root of the film's curvature divided by the
+    film. The deformation error is an integral over an element, so the density grows with the cube root of the
+    pressure's curvature. A least density provides nodes in the contact and in the inlet, and smoothing makes
+    neighbouring cells similar.
     """
     length = max(1.0, float(np.sqrt(2 * central_film)))
     of_film = np.sqrt(np.abs(second_derivative(nodes, film)) / film)

@@ -1,8 +1,8 @@
 """The elastohydrodynamic film of a line contact, in all regimes from rigid isoviscous to elastic piezoviscous.
 
 Hertz units: ``X = x/a``, ``P = p/p0``, ``H = h R/a^2`` (thesis eq. B.13), with ``a/R = sqrt(8 W/pi)`` and
-``p0 = E' sqrt(W/(2 pi))``, where ``E' = 2 E*`` and velocities are means of the two surfaces. With Barus' law and an
-incompressible liquid the solution depends on two numbers only, Moes' M and L.
+``p0 = E' sqrt(W/(2 pi))``, where ``E' = 2 E*``. The velocity is the mean of the two surface velocities. With Barus' law
+and an incompressible liquid the solution depends on two numbers only, Moes' M and L.
 
 The first solution on a coarse grid gives the density of nodes for all other grids. A case is then solved on grids of
 40, 80, 160, ... nodes with this density. The scheme is of second order, so two grids together give a value of third
@@ -29,12 +29,13 @@ from mdr_dask.physics.refine import SAFETY, Solution, refine
 
 VISCOSITY_LAWS = ("barus", "roelands")
 
-#: Nodes of the grids; on the finest one, a Newton step solves 1281 dense equations and takes about 0.1 s.
+#: Numbers of nodes of the grids. On the finest grid, a Newton step solves 1281 dense equations in about 0.1 s.
 NODES = (40, 80, 160, 320, 640, 1280)
-#: Order of the values extrapolated from two grids, and the ratio of the stated error to their last change.
+#: Order in the spacing of the values extrapolated from two grids, and ratio of the stated error to the last change of
+#: these values.
 ORDER = 3.0
 FACTOR = SAFETY / (2.0**ORDER - 1)
-#: Nodes of the two grids that are solved to obtain the density of nodes.
+#: Number of nodes of the two grids that are solved to obtain the density of nodes.
 ADAPTED_NODES = 161
 
 
@@ -44,9 +45,9 @@ class Attempt(NamedTuple):
     Parameters
     ----------
     factor : float
-        Guess of the film over the film expected from the limiting regimes.
+        Ratio of the guessed film to the film expected from the limiting regimes.
     starved : float
-        Upper limit of the guess, over the square of the distance to the inlet.
+        Upper limit of the guessed film, divided by the square of the distance to the inlet.
     nodes : int
         Number of nodes.
     pace : Pace
@@ -59,14 +60,16 @@ class Attempt(NamedTuple):
     pace: Pace
 
 
-#: Tried in this order. The second attempt, small steps from a thick film on a fine grid, is slow but hardly ever fails.
+#: The attempts, in the order in which they are tried. The second attempt takes small steps from a thick film on a fine
+#: grid; it is slow but hardly ever fails.
 ATTEMPTS = (Attempt(1.5, 0.2, 121, Pace(0.12, 80)), Attempt(2.5, 0.4, 361, Pace(0.05, 200)))
-#: Step limits on further grids: first from an extrapolated guess; if this fails, from the previous solution.
+#: Step limits on further grids. The first limits belong to an extrapolated initial guess; if this guess fails, the
+#: second limits are used from the previous solution.
 PACES = (Pace(0.12, 16), Pace(0.03, 250))
-#: Least error of a position, in cells.
+#: Least stated error of a position, in cells of the grid.
 PLACED = 0.1
-#: Cells of the coarser grid over which the largest error of a profile is taken, since a steep front moves between
-#: grids.
+#: Distance, in cells of the coarser grid, within which the largest error of a profile is used, because the position of
+#: a steep front differs between the grids.
 REACH = 2.0
 
 
@@ -187,11 +190,11 @@ class LineSolution:
     outcome : Outcome
         CONVERGED, or why there is no film.
     reason : str
-        One sentence if no film was found, else empty.
+        The reason, in one sentence, if no film was found; otherwise empty.
     grids : tuple of GridSolution
         All grids with a solution, the finest last; empty if no film was found.
     central_film, minimum_film : Estimate
-        In ``a^2/R``; NaN if no film was found.
+        Films in units of ``a^2/R``; NaN if no film was found.
     """
 
     case: LineContact
@@ -208,7 +211,7 @@ class LineSolution:
 
     @property
     def error(self) -> float:
-        """Estimated relative error of the worse of the two films."""
+        """The larger of the estimated relative errors of central and minimum film."""
         return float(max(film.error / film.value for film in (self.central_film, self.minimum_film)))
 
     @property
@@ -233,8 +236,9 @@ class LineSolution:
 
         Notes
         -----
-        The error at a position is the largest one within `REACH` cells of it: a spike or a front moves from grid to
-        grid, so the difference of two grids vanishes where their profiles intersect.
+        The error at a position is the largest difference within `REACH` cells of this position. This is necessary,
+        because the position of a spike or a front differs between the grids, and the difference of two profiles
+        vanishes where they intersect.
         """
         pairs = list(_pairs(self.grids))
         coarse = pairs[-1][0].nodes
@@ -254,7 +258,8 @@ class LineSolution:
         return found._replace(error=np.maximum(found.error, PLACED * (nodes[after] - nodes[after - 1])))
 
     def spike(self) -> tuple[Estimate, Estimate]:
-        """Return position (half widths) and pressure (p0) of the pressure spike; NaN if there is none.
+        """Return position (in half widths) and pressure (in units of p0) of the pressure spike; NaN if there is no
+        spike.
 
         Values are from the finest grid. If the pressure behind the spike falls within one cell, the height of the spike
         depends on the nodes; its error is then infinite.
@@ -275,12 +280,12 @@ class LineSolution:
 
 
 def _pairs(solved: Sequence[GridSolution]) -> Sequence[tuple[GridSolution, GridSolution]]:
-    """Return each grid with the next finer one, for the finest grids; at most three pairs."""
+    """Return pairs of a grid and the next finer grid, for the finest grids; at most three pairs."""
     return list(itertools.pairwise(solved))[-3:]
 
 
 def _extrapolated(reading: Reading, coarse: GridSolution, fine: GridSolution) -> FloatArray:
-    """Return a quantity extrapolated from two grids, without its error of second order."""
+    """Return a quantity extrapolated from two grids, so that its error of second order vanishes."""
     value, ratio = np.asarray(reading(fine)), (coarse.spacing / fine.spacing) ** 2
     return np.asarray(value + (value - np.asarray(reading(coarse))) / (ratio - 1))
 
@@ -306,14 +311,14 @@ def _solve_on(
     grid = Grid.of(nodes)
     guess = pressure.copy()
     guess[0] = guess[-1] = 0.0
-    # with negative film in the guess there is no Newton step
+    # Newton's method needs a positive film in the initial guess
     lift = max(0.0, 0.1 * central - float(film_on(grid, guess, central).min()))
     found = newton(grid, case.liquid, case.film_number, guess, central + lift, pace)
     return found.outcome, GridSolution(nodes, found.pressure, found.film, found.central, found.steps, spacing)
 
 
 def _first_solution(case: LineContact) -> tuple[Outcome, GridSolution]:
-    """Return a solution on a grid that suits the expected film."""
+    """Return a solution on a grid that is suitable for the expected film."""
     for attempt in ATTEMPTS:
         guess = attempt.factor * expected_film(case.M, case.L)
         inlet = grids.inlet_position(guess) if case.inlet is None else case.inlet
@@ -328,7 +333,9 @@ def _first_solution(case: LineContact) -> tuple[Outcome, GridSolution]:
 def _refined(
     case: LineContact, before: Sequence[GridSolution], source: GridSolution, count: int
 ) -> tuple[Outcome, GridSolution]:
-    """Solve on about `count` nodes with the density of `source`, from the one or two last solutions in `before`."""
+    """Solve on about `count` nodes with the density of `source`, starting from the last one or two solutions in
+    `before`.
+    """
     last = before[-1]
     spacing = last.spacing * (last.nodes.size - 1) / (count - 1)
     end = float(expected(before, lambda grid: grid.rupture, spacing))
@@ -368,13 +375,13 @@ def solve_film(
     readings : sequence of callable, GridSolution -> float or array
         Further quantities, or profiles at fixed positions, that must meet the accuracy.
     floors : sequence of float
-        For each reading, the magnitude below which its error is absolute; 0 by default.
+        For each reading, a magnitude. If the reading is smaller, its error is relative to this magnitude; 0 by default.
 
     Returns
     -------
     LineSolution
         If no film was found, the outcome is not CONVERGED and there is a reason. The `error` may exceed the
-        accuracy if the finest grid is reached, or the finest one that converges.
+        accuracy if the finest grid is reached, or if Newton's method fails on finer grids.
 
     Examples
     --------

@@ -1,14 +1,14 @@
 """Load of a rough contact, shared between film and asperities (Johnson, Greenwood and Poon 1972).
 
-The film carries the fraction gamma of the load, the asperities the rest. The total pressure deforms the rollers, so the
-film equals that of the load ``gamma w`` on bodies of the modulus ``gamma E'``: W stays the same, U becomes ``U/gamma``
-and G becomes ``gamma G`` (Wear 19, 91).
+The film carries the fraction gamma of the load w, and the asperities carry the other part. The total pressure deforms
+the rollers. Therefore the film thickness equals the film thickness under the load ``gamma w`` between bodies of the
+modulus ``gamma E'``: W stays the same, U becomes ``U/gamma`` and G becomes ``gamma G`` (Wear 19, 91).
 
-The asperities are represented by the springs of the MDR. A line as long as its longest wave stands for a square with
-this edge; its springs of stiffness ``E* dx`` carry ``E* dx`` times their overlap. The contact consists of equal
-squares, so their mean pressure is ``E*/wavelength`` times the mean overlap of the two lines. The lines approach until
-the mean gap equals the film: ``<(d - z)+> = h`` with the distance d of their means; above two rms heights d and h are
-equal.
+The asperities are represented by the springs of the MDR. A line as long as its longest wave represents a square with
+edges of this length; its springs of stiffness ``E* dx`` carry ``E* dx`` times their overlap. The contact consists of
+equal squares, so the mean pressure is ``E*/wavelength`` times the mean overlap of the two lines. The lines approach
+until the mean gap equals the film: ``<(d - z)+> = h``, where d is the distance of the mean lines, z the sum of both
+heights and h the film. Above two rms heights, d and h are nearly equal.
 """
 
 from __future__ import annotations
@@ -19,27 +19,28 @@ from typing import NamedTuple
 
 from scipy.optimize import brentq
 
-#: Asperity load share that is neglected; it would change the film by a quarter of this fraction.
+#: Asperity load share below which the asperity load is neglected. This share would change the film by a quarter of this
+#: fraction.
 _NEGLIGIBLE = 1e-9
-#: Logarithm of the smallest load share of the film that is tried.
+#: Natural logarithm of the smallest load share of the film that is tried.
 _LEAST_LOGARITHM = -256.0
-#: Largest imbalance of the load, over the tolerance.
+#: Largest accepted imbalance of the load, divided by the tolerance.
 _BALANCE = 100.0
-#: Distance of the means of two lines, in rms heights, at which the gap is zero in double precision.
+#: Distance between the means of two lines, in rms heights, at which the mean gap is zero in double precision.
 _CLOSED = -37.0
 #: Largest number of Newton steps; five are usual.
 _MOST_STEPS = 100
-#: Distance in rms heights beyond which lines do not overlap in double precision.
+#: Distance between the means of two lines, in rms heights, beyond which the overlap is zero in double precision.
 _APART = 9.0
 
 
 def mean_overlap(distance: float) -> float:
-    """Return ``<(z - d)+>`` for heights z and a distance d of the means, all in rms heights."""
+    """Return the mean overlap ``<(z - d)+>`` of Gaussian heights z at a distance d of the means, all in rms heights."""
     return max(exp(-(distance**2) / 2) / sqrt(2 * pi) - distance * erfc(distance / sqrt(2)) / 2, 0.0)
 
 
 def distance_of_means(gap: float) -> float:
-    """Return the distance d of the means at which the mean gap ``<(d - z)+>`` is `gap`, both in rms heights."""
+    """Return the distance d of the means at which the mean gap ``<(d - z)+>`` equals `gap`, both in rms heights."""
     if gap > _APART:
         return gap
     # the gap at d is the overlap at -d; its logarithm is concave in d, so Newton's method converges from the left
@@ -94,12 +95,13 @@ def share_load(
     Parameters
     ----------
     film_at : callable, float -> float
-        Film thickness for a load share of the film between 0 and 1; it falls with this share. It may be 0 where the
-        film is too thin to be computed.
+        Returns the film thickness for a load share of the film between 0 and 1. The film thickness falls with this
+        share. It may be 0 where the film is too thin to be computed.
     asperity_share : callable, float -> float
-        Load share of the asperities for a film thickness; it falls with the film.
+        Returns the load share of the asperities for a film thickness; this share falls with the film thickness.
     tolerance : float
-        Relative error of the film's load share; the relative error of the film is about a quarter of it.
+        Allowed relative error of the film's load share. The relative error of the film thickness is about a quarter of
+        this error.
 
     Returns
     -------

@@ -6,7 +6,7 @@ Hertz units as in :mod:`mdr_dask.physics.lubrication.deformation`. The film obey
 
 in finite volumes around the nodes. Cavitation is the complementarity ``P >= 0``, ``R <= 0``, ``P R = 0`` of the
 pressure P and the flow balance R of each volume. The load ``int P dX = pi/2`` is the last equation. The unknowns are
-the nodal pressures and the film at ``X = 0``.
+the nodal pressures and the film at ``X = 0``, called the central film.
 """
 
 from __future__ import annotations
@@ -23,14 +23,15 @@ from mdr_dask.physics.linear import factorise
 from mdr_dask.physics.lubrication.deformation import influence_matrix
 from mdr_dask.physics.outcome import Outcome
 
-#: Weight of the quadratic (QUICK) face value in the second-order upwind Couette flux; the rest is linear from upstream.
+#: Weight of the quadratic (QUICK) face value in the second-order upwind Couette flux. The other part of the flux is
+#: extrapolated linearly from upstream.
 _QUADRATIC = 1.0 / 3.0
-#: Largest fraction of the film at any node that one step may close.
+#: Largest fraction of the film at any node by which one step may reduce the film.
 _FILM_SHARE = 0.8
-#: Smallest fraction of a step that is taken.
+#: Smallest fraction to which a step is shortened.
 _LEAST_SHARE = 1e-9
-#: The factorised Jacobian is reused if the last step was smaller than this fraction of the previous one (first step:
-#: 1).
+#: The factorised Jacobian is reused if the last step was smaller than this fraction of the step before it. The first
+#: step is compared with 1.
 _SHRINKS = 0.1
 
 
@@ -59,12 +60,13 @@ class Pace(NamedTuple):
     Parameters
     ----------
     clip : float
-        Largest change of a pressure in one step, over the largest pressure.
+        Largest change of a pressure in one step, divided by the largest pressure.
     most : int
         Largest number of steps.
     tolerance : float
-        Relative size of the last step; the remaining error is about its square. A step with a reused Jacobian
-        leaves a larger error, so that it has to be a hundred times smaller.
+        The iteration ends after a step whose relative size is below this value; the remaining error is about the square
+        of this size. A step with a reused Jacobian leaves a larger error, so that its size has to be a hundred times
+        smaller.
     """
 
     clip: float
@@ -106,7 +108,10 @@ class Liquid(NamedTuple):
 
 @jit
 def log_viscosity_at(P: float, liquid: Liquid) -> tuple[float, float]:
-    """Return ``ln(eta/eta0)`` at the pressure P (in p0) and its derivative: Barus, or Roelands with an exponent."""
+    """Return ``ln(eta/eta0)`` and its derivative at the pressure P in units of p0.
+
+    Barus' law is used if the exponent of the liquid is zero, otherwise Roelands' law.
+    """
     if liquid.exponent == 0.0:
         return liquid.alpha * P, liquid.alpha
     ratio = 1.0 + P / liquid.pole
@@ -116,7 +121,7 @@ def log_viscosity_at(P: float, liquid: Liquid) -> tuple[float, float]:
 
 @jit
 def log_viscosities(pressure: FloatArray, liquid: Liquid) -> FloatArray:
-    """Return ``ln(eta/eta0)`` at every pressure (in p0)."""
+    """Return ``ln(eta/eta0)`` at every pressure, in units of p0."""
     result = np.empty_like(pressure)
     for i in range(pressure.size):
         result[i] = log_viscosity_at(pressure[i], liquid)[0]
@@ -125,7 +130,10 @@ def log_viscosities(pressure: FloatArray, liquid: Liquid) -> FloatArray:
 
 @jit
 def _mobility(left: float, right: float) -> tuple[float, float, float]:
-    """Return the mean of 1/eta between two log-viscosities, exact for an exponential law, and its two derivatives."""
+    """Return the mean of 1/eta between two nodes with the log-viscosities `left` and `right`, and its two derivatives.
+
+    The mean is exact if ln(eta) is linear between the nodes.
+    """
     rise = right - left
     if abs(rise) < 1e-3:
         mean = 1.0 - rise / 2 + rise * rise / 6 - rise**3 / 24
@@ -140,7 +148,7 @@ def _mobility(left: float, right: float) -> tuple[float, float, float]:
 
 @jit
 def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
-    """Return the weights of nodes f-1, f, f+1 in the value at the face between f and f+1, for flow to the right."""
+    """Return the weights of the nodes f-1, f, f+1 in the value at the face between f and f+1 (flow to the right)."""
     if f == 0:
         return 0.0, 0.5, 0.5
     dx = nodes[f + 1] - nodes[f]
@@ -156,7 +164,8 @@ def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
 class Imbalance(NamedTuple):
     """Inflow minus outflow of every volume, shape (n,), and its derivatives, shape (n, 4).
 
-    The derivatives are with respect to pressure and film at the nodes i - 2 to i + 1.
+    Row i has the derivatives of the imbalance of volume i with respect to pressure and film at the nodes i - 2 to i +
+    1.
     """
 
     value: FloatArray
@@ -213,7 +222,10 @@ def balance(
 def _fill_jacobian_row(
     i: int, influence: FloatArray, by_pressure: FloatArray, by_film: FloatArray, row: FloatArray
 ) -> None:
-    """Write the derivatives of the balance of volume i by all pressures to `row`, including the effect of the film."""
+    """Write the derivatives of the imbalance of volume i with respect to all pressures to `row`.
+
+    They include the effect of the pressures on the film.
+    """
     c0, c1, c2, c3 = by_film[i]
     far, near, own, next_ = influence[max(i - 2, 0)], influence[i - 1], influence[i], influence[i + 1]
     for j in range(row.size):
@@ -225,7 +237,11 @@ def _fill_jacobian_row(
 
 @jit
 def _fill_active(influence: FloatArray, P: FloatArray, found: Imbalance, active: NDArray[np.int64]) -> int:
-    """List the inner nodes with pressure, ``P + R/d > 0`` with the size d of dR/dP there; return their number."""
+    """Write the indices of the active nodes to `active`, and return their number.
+
+    An inner node is active, so that its pressure is unknown, if ``P + R/d > 0``, where d estimates the size of dR/dP at
+    this node.
+    """
     R, by_pressure, by_film = found
     count = 0
     for i in range(1, P.size - 1):
@@ -242,7 +258,10 @@ def _fill_active(influence: FloatArray, P: FloatArray, found: Imbalance, active:
 def _fill_equations(
     grid: Grid, P: FloatArray, found: Imbalance, active: NDArray[np.int64], A: FloatArray, b: FloatArray
 ) -> None:
-    """Write the Newton equations of the active pressures and the central film; all other pressures become zero."""
+    """Write the matrix `A` and the right side `b` of the Newton equations of the active pressures and the central film.
+
+    The step sets all other pressures to zero.
+    """
     R, by_pressure, by_film = found
     count = active.size
     released, row = P.copy(), np.empty(P.size)
@@ -267,7 +286,10 @@ def _fill_equations(
 
 @jit
 def _fill_imbalance(grid: Grid, P: FloatArray, R: FloatArray, active: NDArray[np.int64], b: FloatArray) -> None:
-    """Write the right side of these equations for the case that all other pressures are already zero."""
+    """Write the right side `b` of the Newton equations, if the pressures at all inactive nodes are already zero.
+
+    A step with a reused Jacobian needs only this right side.
+    """
     for k in range(active.size):
         b[k] = -R[active[k]]
     b[active.size] = 0.5 * np.pi
@@ -277,7 +299,10 @@ def _fill_imbalance(grid: Grid, P: FloatArray, R: FloatArray, active: NDArray[np
 
 @jit
 def _add_deformation(influence: FloatArray, P: FloatArray, H: FloatArray) -> None:
-    """Add the deformation by the pressures P to H; four rows at once, so that their sums are computed in parallel."""
+    """Add the deformation by the pressures P to H.
+
+    Four rows are summed at a time, so that the processor can compute the sums in parallel.
+    """
     n = P.size
     for i in range(0, n - 3, 4):
         h0, h1, h2, h3 = H[i], H[i + 1], H[i + 2], H[i + 3]
@@ -303,7 +328,10 @@ def _fill_film(grid: Grid, P: FloatArray, central: float, H: FloatArray) -> None
 
 @jit
 def _step_length(grid: Grid, P: FloatArray, H: FloatArray, step: FloatArray, change: float, clip: float) -> float:
-    """Return the largest fraction of a step that changes no pressure by more than `clip` and keeps the film open."""
+    """Return the largest fraction of a step that keeps the film open and changes no pressure too much.
+
+    A pressure may change by at most `clip` times the largest pressure.
+    """
     largest = np.max(np.abs(step))
     share = min(1.0, clip * np.max(P) / largest) if largest > 0.0 else 1.0
     film_step = np.full_like(H, change)
@@ -353,9 +381,9 @@ def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: flo
     K : float
         ``(3 pi^2/4) U/W^2``.
     guess : array, shape (n,)
-        Guess of the pressure; zero at both ends, never negative.
+        Initial guess of the pressure; zero at both ends, nowhere negative.
     central : float
-        Guess of the film at ``X = 0``, large enough for a positive film at all nodes.
+        Initial guess of the film at ``X = 0``, so large that the film is positive at all nodes.
     pace : Pace
         Limits of the step and of the number of steps.
 

@@ -16,13 +16,13 @@ from mdr_dask.errors import distinguishable
 _MM2 = 1e-6
 #: Density of water at 15.6 C in kg/m^3, the reference of a specific gravity.
 WATER_DENSITY = 999.016
-#: Reference temperature of a specific gravity, 60 F.
+#: Reference temperature of a specific gravity in K, 60 F.
 SPECIFIC_GRAVITY_TEMPERATURE = 288.705555
-#: ASTM D1250 / API 54D, lubricating oils: thermal expansion at 60 F in 1/K is this number over the density at 60 F.
+#: Thermal expansion of lubricating oils at 60 F in 1/K, times the density at 60 F in kg/m^3 (ASTM D1250, table 54D).
 _LUBRICANT_EXPANSION = 0.6278
 
-#: Gold's correlation ``alpha = s nu^t 1e-9`` with nu in mm^2/s: (s, t) for each kind of oil (Gold et al. 2001,
-#: from memory; see docs/evidence/mixed-lubrication.md).
+#: Gold's correlation ``alpha = s nu^t 1e-9`` with nu in mm^2/s: the pair (s, t) for each kind of oil, quoted from
+#: memory from Gold et al. 2001 (see docs/evidence/mixed-lubrication.md).
 GOLD: dict[str, tuple[float, float]] = {
     "gold_mineral": (9.904, 0.1390),
     "gold_polyalphaolefin": (7.382, 0.1335),
@@ -41,7 +41,7 @@ def walther_fit(temperature: FloatArray, viscosity: FloatArray) -> tuple[float, 
     temperature : array, shape (n,)
         Temperatures in K; at least two are different.
     viscosity : array, shape (n,)
-        Kinematic viscosities at these temperatures in m^2/s.
+        Kinematic viscosities in m^2/s at these temperatures.
 
     Raises
     ------
@@ -80,12 +80,12 @@ def walther_constants(T1: float, nu1: float, T2: float, nu2: float) -> tuple[flo
     T1, T2 : float
         Two different temperatures in K.
     nu1, nu2 : float
-        Kinematic viscosities at T1 and T2 in m^2/s, lower at the higher temperature.
+        Kinematic viscosities in m^2/s at T1 and T2; the viscosity at the higher temperature must be lower.
 
     Returns
     -------
     A, B : float
-        ``log10 log10(nu + 0.7) = A - B log10 T`` with nu in mm^2/s and T in K.
+        Constants of ``log10 log10(nu + 0.7) = A - B log10 T`` with nu in mm^2/s and T in K.
 
     Raises
     ------
@@ -129,8 +129,8 @@ def density_at(temperature: ArrayLike, density: float, reference_temperature: fl
     Returns
     -------
     array
-        ``rho_ref exp(-b dT (1 + 0.8 b dT))``, ``b = 0.6278/rho_ref`` (ASTM D1250, table 54D, with 60 F as
-        reference).
+        ``rho_ref exp(-b dT (1 + 0.8 b dT))`` with ``b = 0.6278/rho_ref`` and the temperature difference dT from the
+        reference. In ASTM D1250, table 54D, the reference is 60 F.
     """
     expansion = _LUBRICANT_EXPANSION / density * (np.asarray(temperature, dtype=np.float64) - reference_temperature)
     return np.asarray(density * np.exp(-expansion * (1 + 0.8 * expansion)))
@@ -145,7 +145,7 @@ def pressure_viscosity(correlation: str, kinematic: ArrayLike, dynamic: ArrayLik
         One of `CORRELATIONS`: Gold's power laws of the kinematic viscosity for each kind of oil, or Wooster's
         ``alpha = (0.6 + 0.965 log10(eta0)) 1e-8`` with eta0 in mPa s (mineral oils).
     kinematic, dynamic : array_like
-        Viscosities at ambient pressure in m^2/s and Pa s.
+        Kinematic viscosity in m^2/s and dynamic viscosity in Pa s, both at ambient pressure.
 
     Raises
     ------
@@ -167,9 +167,9 @@ class Oil:
     Parameters
     ----------
     T1, nu1, T2, nu2 : float
-        Two temperatures in K and the kinematic viscosities at them in m^2/s.
+        Two temperatures in K, and the kinematic viscosities in m^2/s at these temperatures.
     density, density_temperature : float
-        Density in kg/m^3 and its temperature in K.
+        Density in kg/m^3, and the temperature in K at which it was measured.
     correlation : str
         Pressure-viscosity correlation, one of `CORRELATIONS`.
     lowest, highest : float
@@ -233,19 +233,22 @@ OILS: dict[str, Oil] = {
 }
 
 
-#: Roelands' constants: reference pressure in Pa, and minus the logarithm of the viscosity (Pa s) at the common pole.
+#: Roelands' constants: the reference pressure p_r in Pa, and the term 9.67 of ``ln eta0 + 9.67`` with eta0 in Pa s.
 ROELANDS_PRESSURE = 1.9609e8
 ROELANDS_LOGARITHM = 9.67
 
 
 def log_viscosity(law: str, pressure: ArrayLike, viscosity: ArrayLike, alpha: ArrayLike) -> FloatArray:
-    """Return the natural logarithm of the viscosity (Pa s) under pressure; unlike the viscosity, it cannot overflow.
+    """Return the natural logarithm of the viscosity (in Pa s) under pressure.
+
+    Unlike the viscosity, the logarithm cannot overflow.
 
     Parameters
     ----------
     law : str
         ``barus``: ``ln eta0 + alpha p`` (thesis eq. B.4); ``roelands``: ``ln eta0 + s ((1 + p/p_r)^z - 1)`` with
-        ``s = ln eta0 + 9.67``, ``z = alpha p_r/s`` and p_r = 196.09 MPa, which has the slope alpha at ambient pressure.
+        ``s = ln eta0 + 9.67``, ``z = alpha p_r/s`` and p_r = 196.09 MPa.
+        Both laws have the slope alpha at ambient pressure.
     pressure : array_like
         Pressure in Pa.
     viscosity, alpha : array_like

@@ -1,7 +1,8 @@
 """Friction of a lubricated line contact from the shear of its film.
 
-The film is computed for rolling of a Newtonian, isothermal liquid, and the shear stress follows from this film. This is
-right for small sliding; heat and shear thinning, which reduce film and traction, are left out.
+The film is computed for pure rolling and a Newtonian liquid of constant temperature; the shear stress follows from this
+film. This is a good approximation for small sliding velocities. Heat and shear thinning, which reduce film and
+traction, are neglected in the film.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from mdr_dask.physics.lubrication.grid_solution import GridSolution
 from mdr_dask.physics.lubrication.line_contact import LineContact
 from mdr_dask.physics.lubrication.newton import log_viscosities
 
-#: Largest exponent of the viscosity ratio that is evaluated; above it, a Newtonian liquid has no physical meaning.
+#: Largest natural logarithm of the viscosity ratio that is evaluated; a Newtonian liquid of higher viscosity has no
+#: physical meaning.
 _LARGEST_EXPONENT = 600.0
 
 
@@ -33,13 +35,13 @@ def shear_stress(
     slide_roll_ratio : float
         ``(u1 - u2)/u`` with the mean velocity u.
     eyring_stress : float or None
-        Eyring's stress in p0, None for a Newtonian liquid.
+        Eyring's stress in units of p0; None for a Newtonian liquid.
 
     Returns
     -------
     array, shape (n,)
-        Stress in p0 at the nodes: ``eta (u1 - u2)/h``, or ``tau_E asinh`` of it over tau_E; zero where the film has
-        ended.
+        Shear stress tau in units of p0 at the nodes. A Newtonian liquid has ``tau = eta (u1 - u2)/h``; Eyring's law
+        gives ``tau_E asinh(tau/tau_E)``. The stress is zero where the film has ended.
     """
     slope = case.film_number * np.sqrt(2 * W / np.pi) / 6 * slide_roll_ratio
     exponent = np.minimum(log_viscosities(grid.pressure, case.liquid), _LARGEST_EXPONENT)
@@ -50,12 +52,12 @@ def shear_stress(
 def sliding_coefficient(
     case: LineContact, grid: GridSolution, W: float, slide_roll_ratio: float, eyring_stress: float | None
 ) -> float:
-    """Return the integral of the shear stress at mid-film over the load; parameters of :func:`shear_stress`."""
+    """Return the integral of the shear stress at mid-film divided by the load; parameters: see :func:`shear_stress`."""
     stress = shear_stress(case, grid, W, slide_roll_ratio, eyring_stress)
     return float(2 / np.pi * np.trapezoid(stress, grid.nodes))
 
 
 def rolling_coefficient(grid: GridSolution, W: float) -> float:
-    """Return the integral of ``(h/2) dp/dx`` over the load: the rolling friction of each surface."""
+    """Return the rolling friction of each surface: the integral of ``(h/2) dp/dx``, divided by the load."""
     film = (grid.film[1:] + grid.film[:-1]) / 2
     return float(2 / np.pi * np.sqrt(8 * W / np.pi) * np.sum(film / 2 * np.diff(grid.pressure)))
