@@ -1,4 +1,4 @@
-"""The line used by the solvers: cubic cells between equidistant nodes, starting at the highest point.
+"""The line used by the solvers: cubic cells between equidistant nodes. A periodic line starts at its highest point.
 
 Lengths are in cells, and slopes are rises per cell. Heights may have any unit and are positive towards the elastomer.
 """
@@ -14,9 +14,9 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.surfaces import shapes
 
-NONE = 2.0  # result if there is no such position in the cell
-STEEPEST_RISE = 4 / 27  # largest rise of a cubic above its ends, over the slopes at the ends
-UNRESOLVED = 0.5  # relative difference of the squared slope, summed over nodes and over cells; white noise has 0.1
+NONE = 2.0  # result of `summit` if the cell has no maximum
+STEEPEST_RISE = 4 / 27  # largest rise of a cubic above its ends, divided by the slopes at the ends
+UNRESOLVED = 0.5  # largest relative difference of two integrals of the squared slope (by nodes, by cells) if resolved
 
 
 class CubicLine(NamedTuple):
@@ -25,14 +25,15 @@ class CubicLine(NamedTuple):
     Parameters
     ----------
     height : array, shape (n + 1,)
-        Heights at the nodes; a periodic line repeats the first at the end.
+        Heights at the nodes; in a periodic line, the last height equals the first.
     enter, leave : array, shape (n,)
-        Slopes at the start and the end of each cell; at a kink of the line, those of adjacent cells differ.
+        Slopes at the start and the end of each cell. At a kink of the line, the end slope of a cell differs from the
+        start slope of the next cell.
     periodic : bool
         Whether the line is periodic; if not, elements are undeformed at its first node.
     smooth : bool
-        Whether the slopes of a periodic line are continuous, so that the integral of their square can be computed
-        with the Euler-Maclaurin formula: exact over the whole line if the nodes resolve it.
+        Whether the line is periodic with continuous slopes. The integral of the squared slope can then be computed with
+        the Euler-Maclaurin formula, which is exact over the whole line if the nodes resolve the line.
     """
 
     height: FloatArray
@@ -49,7 +50,7 @@ def periodic_line(height: FloatArray, slope: FloatArray | None) -> CubicLine:
     ----------
     height : array, shape (n,)
     slope : array, shape (n,), or None
-        Derivative of the height by position over the length of the line.
+        Derivative of the height with respect to the position divided by the length of the line.
     """
     height = np.append(height, height[0])
     if slope is None:
@@ -66,10 +67,10 @@ def indented_line(height: FloatArray, slope: FloatArray | None, body: shapes.Sha
     Parameters
     ----------
     height, slope
-        The roughness, periodic, as in :func:`periodic_line`.
+        Heights and slopes of the periodic roughness, as in :func:`periodic_line`.
     body : Shape
-        The shape under the roughness, with its tip at node n // 2, in units of the line's length and of the
-        heights.
+        The shape under the roughness, with its tip at node n // 2. Its lengths are in units of the length of the line,
+        its heights in the unit of the roughness.
     """
     n = height.size
     smooth, left, right = body.at((np.arange(n + 1) - n // 2) / n)
@@ -82,25 +83,27 @@ def indented_line(height: FloatArray, slope: FloatArray | None, body: shapes.Sha
 
 
 def without_kinks(line: CubicLine) -> CubicLine:
-    """Return the line with the mean of both slopes at every inner node; this rounds a kink over two cells."""
+    """Return the line with the mean of the two slopes at every inner node; this rounds a kink over two cells."""
     slope = 0.5 * (line.leave[:-1] + line.enter[1:])
     return line._replace(enter=np.append(line.enter[0], slope), leave=np.append(slope, line.leave[-1]))
 
 
 class Cells(NamedTuple):
-    """The n cells of a line, starting at the highest point if it is periodic, and one more cell that repeats the first.
+    """The n cells of a line, and one more cell that repeats the first cell.
+
+    A periodic line starts at its highest point.
 
     Parameters
     ----------
     height : array, shape (n + 2,)
-        Heights at the nodes relative to the highest point of the line; they are never positive, which keeps all
-        digits in light contact.
+        Heights at the nodes relative to the highest point of the line, so never positive. Small distances from the
+        highest point, which matter in light contact, keep all digits.
     enter, leave : array, shape (n + 1,)
         Slopes at the start and the end of each cell.
     peak : array, shape (n + 1,)
         Highest point of each cell.
     mean, stretch : array, shape (n + 1,)
-        Integrals of the height and of the slope squared over each cell.
+        Integrals of the height and of the squared slope over each cell.
     start : float
         Position in cell 0 (and cell n) at which a period begins and ends: the highest point of the line.
     top : float
@@ -123,7 +126,7 @@ class Cells(NamedTuple):
 @jit_inline
 def cubic(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> tuple[float, float, float, float]:
     """Return the coefficients of the height in cell i, in ascending powers."""
-    here, after = np.uintp(i), np.uintp(i + 1)  # unsigned, so that compiled code need not test for negative indices
+    here, after = np.uintp(i), np.uintp(i + 1)  # unsigned, so that compiled code does not test for negative indices
     first, last = enter[here], leave[here]
     rise = height[after] - height[here]
     return height[here], first, 3 * rise - 2 * first - last, first + last - 2 * rise
@@ -146,7 +149,7 @@ def _peak(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> t
     here, after = np.uintp(i), np.uintp(i + 1)
     first, last, begin, end = enter[here], leave[here], height[here], height[after]
     rise, place, peak = end - begin, 0.0 if begin >= end else 1.0, max(begin, end)
-    between = 3 * rise - first - last  # Bezier coefficient of the slope; if all three have one sign, no extreme inside
+    between = 3 * rise - first - last  # Bezier coefficient of the slope; no extreme if all three have the same sign
     if not (min(min(first, between), last) >= 0 or max(max(first, between), last) <= 0):
         b, c = 3 * rise - 2 * first - last, first + last - 2 * rise
         inside = summit(first, b, c)
@@ -195,7 +198,10 @@ def running(integrals: FloatArray) -> FloatArray:
 def _turned(
     line: CubicLine, top: float, first: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return the cells in the order from cell `first` on, with that cell repeated; heights are relative to `top`."""
+    """Return the cells in order, starting with cell `first` and ending with a copy of this cell.
+
+    Heights are relative to `top`.
+    """
     nodes, entered, left, n = line.height, line.enter, line.leave, line.enter.size
     height, enter, leave, peak, mean, stretch = (
         np.empty(n + 2),
@@ -221,7 +227,10 @@ def _turned(
 
 
 def _is_resolved(slope: FloatArray, stretch: FloatArray) -> bool:
-    """Return whether the sum over nodes is close to the integral of the squared slope (over two nodes per wave)."""
+    """Return whether the nodes resolve the line, with more than two nodes per shortest wave.
+
+    The sum of the squared slope over the nodes is then close to the integral over the cells.
+    """
     by_nodes, by_cells = np.dot(slope, slope), np.sum(stretch)
     return bool(abs(by_nodes - by_cells) < UNRESOLVED * by_cells)
 
@@ -230,7 +239,8 @@ def _is_resolved(slope: FloatArray, stretch: FloatArray) -> bool:
 def _resum(slope: FloatArray, stretch: FloatArray) -> None:
     """Compute the integrals of the squared slope over cells by the Euler-Maclaurin formula; their total is exact.
 
-    The first cell keeps its polynomial integral, because it is split in two; the other cells share the difference.
+    The first cell keeps the integral of its polynomial, because a period begins and ends inside this cell. The other
+    cells share the difference.
     """
     n, kept = slope.size - 1, stretch[0]
     before, here, after = slope[n - 1] ** 2, slope[0] ** 2, slope[1] ** 2
@@ -250,12 +260,12 @@ def _resum(slope: FloatArray, stretch: FloatArray) -> None:
 
 @jit
 def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float, float]:
-    """Return the cell of the highest point of a periodic cubic line, its position in the cell, 0..1, and its height.
+    """Return the cell of the highest point of a periodic cubic line, the position in the cell (0 to 1), and the height.
 
     Parameters
     ----------
     height, slope : array, shape (n,)
-        Heights and derivatives by position over the length of the line.
+        Heights, and their derivatives with respect to the position divided by the length of the line.
     """
     n, node = height.size, -np.inf
     for i in range(n):

@@ -16,15 +16,15 @@ from mdr_dask.physics.surfaces.spectrum import Spectrum
 
 Order = Literal["none", "mean", "plane", "parabola"]
 
-LEAST_POINTS = 16  # along each axis
-MOST_MISSING = 0.05  # largest fraction of missing points, which are filled
-FAR = 19.0  # robust standard deviations; generated rough surfaces do not reach this value
-BAND = 128  # rows processed together, so that they fit into the processor's cache
-TELLING = 1e-3  # fraction of the largest ring below which a ring may be due to rounding
-MOST_SCATTER = 0.02  # largest mean square of the angular harmonics by chance in an octave of an isotropic surface
+LEAST_POINTS = 16  # smallest number of points along each axis
+MOST_MISSING = 0.05  # largest fraction of missing points that are filled
+FAR = 19.0  # deviation of an outlier, in robust standard deviations; no point of a generated surface reaches it
+BAND = 128  # number of rows processed together, so that they fit into the processor's cache
+TELLING = 1e-3  # a ring with less than this fraction of the largest ring's contribution may be due to rounding
+MOST_SCATTER = 0.02  # octaves are used if angular harmonics due to chance have at most this mean square
 FLAT = 1e-12  # a map is flat if the range of heights over the largest height is below this value
-ROUNDING = 1e-20  # rounding of the transform, as a fraction of the largest ring
-HANN_MODES = 0.3  # independent waves per wave of the transform, under Hann's window
+ROUNDING = 1e-20  # rounding error of the transform, as a fraction of the largest ring
+HANN_MODES = 0.3  # number of independent waves per wave of the transform, with Hann's window
 
 
 class SurfaceMap(NamedTuple):
@@ -64,9 +64,11 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
 
 
 def _off_neighbours(height: FloatArray) -> FloatArray:
-    """Return how far inner points are from the mean of their two neighbours, along the axis where this is less.
+    """Return the distance of inner points from the mean of their two neighbours, along the axis with the smaller
+    distance.
 
-    A point on a crest is close to its neighbours along the crest, although it is far from those across it.
+    A point on a crest is close to its neighbours along the crest, although it is far from its neighbours across the
+    crest.
     """
     middle = height[1:-1, 1:-1]
     along = np.abs(middle - 0.5 * (height[2:, 1:-1] + height[:-2, 1:-1]))
@@ -75,7 +77,7 @@ def _off_neighbours(height: FloatArray) -> FloatArray:
 
 
 def require_points(surface: SurfaceMap) -> None:
-    """Raise DataError for fewer than `LEAST_POINTS` along an axis, or more than `MOST_MISSING` missing points."""
+    """Raise DataError if an axis has fewer than `LEAST_POINTS` points, or if more than `MOST_MISSING` are missing."""
     height = surface.height
     if height.ndim != 2 or min(height.shape) < LEAST_POINTS:
         raise DataError(f"expected a map of {LEAST_POINTS} x {LEAST_POINTS} points or more, got {height.shape}")
@@ -83,7 +85,7 @@ def require_points(surface: SurfaceMap) -> None:
 
 
 def require_few_missing(missing: NDArray[np.bool_]) -> None:
-    """Raise DataError for more than `MOST_MISSING` missing points."""
+    """Raise DataError if the fraction of missing points exceeds `MOST_MISSING`."""
     count = int(np.count_nonzero(missing))
     if count > MOST_MISSING * missing.size:
         share, most = distinguishable(100 * count / missing.size, 100 * MOST_MISSING)
@@ -91,12 +93,12 @@ def require_few_missing(missing: NDArray[np.bool_]) -> None:
 
 
 def filled(surface: SurfaceMap) -> SurfaceMap:
-    """Return a map with missing points filled by Laplace's equation: each one is the mean of its four neighbours.
+    """Return a map with missing points filled by Laplace's equation: each is the mean of its four neighbours.
 
     Raises
     ------
     DataError
-        If there are too few points, or more than `MOST_MISSING` of them are missing.
+        If an axis has too few points, or if the fraction of missing points exceeds `MOST_MISSING`.
     """
     require_points(surface)
     missing = ~np.isfinite(surface.height)
@@ -127,7 +129,9 @@ def _harmonic(height: FloatArray, missing: NDArray[np.bool_]) -> FloatArray:
 
 
 def without_trend(surface: SurfaceMap, order: Order) -> SurfaceMap:
-    """Return a map without its least-squares polynomial: the mean, a plane, or a paraboloid with its mixed term.
+    """Return a map minus its least-squares polynomial.
+
+    The polynomial is the mean, a plane, or a paraboloid with a mixed term x y.
 
     Missing points (NaN) are ignored and stay missing.
     """
@@ -150,7 +154,10 @@ def without_trend(surface: SurfaceMap, order: Order) -> SurfaceMap:
 
 
 def hann_disc(points: tuple[int, int], size: tuple[float, float]) -> FloatArray:
-    """Return Hann's window versus the distance from the centre, mean square 1; 0 beyond half the short side."""
+    """Return Hann's window as a function of the distance from the centre.
+
+    Its mean square is 1, and it is 0 beyond half the shorter side of the map.
+    """
     x, y = (length * np.arange(n // 2 + 1) / n for n, length in zip(points, size, strict=True))
     distance = np.minimum(np.hypot(x[:, None], y) / (0.5 * min(size)), 1.0)
     quarter = 0.5 + 0.5 * np.cos(np.pi * distance)
@@ -169,21 +176,22 @@ class MapSpectrum:
         q = k dq, k = 1, 2, ..., with dq = 2 pi over the shorter side, up to the Nyquist wave number of the wider
         spacing.
     density : array, shape (rings,)
-        C2D, m^4: the power of a ring over its area; so rms height and gradient are preserved.
+        C2D, m^4: the power of a ring divided by its area, so that rms height and rms gradient are preserved.
     count : array, shape (rings,)
-        Number of waves in each ring, both signs.
+        Number of waves in each ring, with both signs of the wave vector.
     independent : float
-        Number of independent waves per wave.
+        Number of independent waves per wave of the transform; below 1 with a window.
     rms_height : float
         rms height of the windowed map, m.
     slopes : tuple of float
-        Mean squares of the slopes along x and y, and of their product.
+        Mean square of the slope along x, mean square of the slope along y, and mean product of both slopes.
     angular : complex array, shape (2, rings)
-        Mean of exp(2 i angle) and exp(4 i angle), weighted by power, in each ring; 0 if isotropic.
+        Mean of exp(2 i angle) and of exp(4 i angle) in each ring, weighted by power; 0 for an isotropic surface.
     cuts : tuple of (array, array)
         Wave numbers and C_cut, m^3, of straight profiles along x and along y.
     axes : tuple of float
-        Power of waves along x, and along y, over the mean power of their ring, median over rings; 1 if isotropic.
+        For the x axis and the y axis: median over the rings of the power of the waves along this axis, divided by the
+        mean power of their ring; 1 for an isotropic surface.
     """
 
     wavenumber: FloatArray
@@ -198,7 +206,7 @@ class MapSpectrum:
 
     @property
     def rms_gradient(self) -> float:
-        """Return the rms of the gradient, both slopes together."""
+        """Return the rms of the gradient, which contains both slopes."""
         return float(np.sqrt(self.slopes[0] + self.slopes[1]))
 
     def spectrum(self) -> Spectrum:
@@ -214,19 +222,23 @@ class MapSpectrum:
         return averaged(*rings)
 
     def along(self, axis: int) -> Spectrum:
-        """Return the C2D whose line equals the straight profile along an axis (0 for x), for sliding across grooves."""
+        """Return the C2D of the isotropic surface whose MDR line has the spectrum of the straight profile along an
+        axis.
+
+        The axis is 0 for x. This spectrum is used for sliding across grooves.
+        """
         q, cut = self.cuts[axis]
         there = cut > ROUNDING * cut.max()
         return Spectrum(q[there], cut[there] / (np.pi * q[there]))
 
     def anisotropy(self) -> float:
-        """Return the anisotropy, 0 if isotropic and 1 if all waves have one direction, corrected for scatter.
+        """Return the anisotropy, corrected for scatter: 0 for an isotropic surface, 1 if all waves have one direction.
 
-        It is the larger of the second and the fourth angular harmonic, rms over octaves with enough waves.
+        It is the larger of the second and the fourth angular harmonic, each as rms over the octaves with enough waves.
         """
         there = np.flatnonzero(telling(self.wavenumber, self.density))
         octave = np.floor(np.log2(self.wavenumber[there] / self.wavenumber[there[0]] + 1e-9)).astype(int)
-        _, octave = np.unique(octave, return_inverse=True)  # leaves out octaves without a ring
+        _, octave = np.unique(octave, return_inverse=True)  # omits octaves without a ring
         power = self.density[there] * self.wavenumber[there]
         weight = np.bincount(octave, power)
         scatter = np.bincount(octave, power**2 * 2 / (self.count[there] * self.independent)) / weight**2
@@ -246,7 +258,7 @@ def spectrum_of_map(surface: SurfaceMap, hann: bool = True) -> MapSpectrum:
     surface : SurfaceMap
         Map without its trend.
     hann : bool
-        Whether to apply the window `hann_disc`, which a periodic map does not need.
+        Whether to apply the window `hann_disc`; a periodic map needs no window.
     """
     points, size = surface.height.shape, surface.size
     height = surface.height - surface.height.mean()
@@ -257,7 +269,7 @@ def spectrum_of_map(surface: SurfaceMap, hann: bool = True) -> MapSpectrum:
     waves = fft.rfft2(height, overwrite_x=True)
     power = np.abs(waves) ** 2 / height.size**2
     power[0, 0] = 0.0
-    power[:, 1 : (points[1] + 1) // 2] *= 2  # rfft2 leaves out the conjugate half of the plane
+    power[:, 1 : (points[1] + 1) // 2] *= 2  # rfft2 omits the conjugate half of the plane
     del waves, height
     q_x, q_y = wavenumbers(points, size)
     return _rings(power, q_x, q_y, points, size, HANN_MODES * (min(size) / max(size)) if hann else 1.0)
@@ -311,19 +323,19 @@ def _rings(
 
 
 def telling(wavenumber: FloatArray, density: FloatArray) -> NDArray[np.bool_]:
-    """Return the rings whose contribution to height or gradient exceeds the rounding of a file."""
+    """Return the rings whose contribution to the height or the gradient exceeds the rounding errors of a file."""
     height, gradient = density * wavenumber, density * wavenumber**3
     return np.asarray((height > TELLING * height.max()) | (gradient > TELLING * gradient.max()))
 
 
 def _cut(power: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-    """Return wave numbers and two-sided C_cut, from the summed power of both signs."""
+    """Return wave numbers and the two-sided C_cut from `power`, the sum of the powers of both signs of the wave number."""
     step = 2 * np.pi / length
     return np.asarray(step * np.arange(1, power.size + 1), dtype=np.float64), power / (2 * step)
 
 
 def _axis(power: FloatArray, ring: NDArray[np.int32], total: FloatArray, count: FloatArray) -> float:
-    """Return the power of waves along an axis over the mean power of their ring, median over rings."""
+    """Return the median over rings of the power of waves along an axis divided by the ring's mean power."""
     number = np.arange(1.0, total.size + 1)
     alive = number[telling(number, total / number)]
     inner = (ring >= 4) & np.isin(ring, alive)

@@ -1,4 +1,4 @@
-"""Measured lines: conversion of recorded positions and heights to a periodic line on a regular grid; statistics."""
+"""Measured lines: conversion of recorded positions and heights to a periodic line on a regular grid, and rms values."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Detrend = Literal["none", "mean", "line", "parabola"]
 
 ORDERS: dict[str, int] = {"mean": 0, "line": 1, "parabola": 2}
 UNEVEN = 1e-3
-"""Spacings with a smaller relative difference count as uniform, because instruments print positions with few digits."""
+"""Relative difference up to which spacings count as uniform, because instruments print positions with few digits."""
 
 LEAST_POINTS = 8
 
@@ -55,15 +55,15 @@ def measured_line(
     Parameters
     ----------
     position, height : array_like, shape (points,)
-        x and z, m; x ascending or descending, not necessarily uniform. The samples form one period: L = points *
-        spacing.
+        Positions x and heights z, m. The positions ascend or descend; their spacing may vary. The samples form one
+        period of the length points * spacing.
     detrend : {"none", "mean", "line", "parabola"}
-        Least-squares polynomial to be subtracted.
+        Least-squares polynomial that is subtracted.
     taper : float
-        Fraction of the line, both ends together, in which a cosine window brings the heights to their mean, so that
-        the line is periodic without a step; 0 to 1.
+        Fraction of the line (0 to 1), at both ends together, in which a cosine window reduces the heights to their
+        mean, so that the periodic line has no step.
     shortest, longest : float
-        Limits of the wavelengths, m, that are kept; 0 for no limit.
+        Shortest and longest wavelength, m, that are kept; 0 for no limit.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def _window(points: int, taper: float) -> FloatArray:
 
 
 def detrended(height: FloatArray, order: Detrend) -> FloatArray:
-    """Return heights minus their least-squares polynomial, named as in `measured_line`."""
+    """Return heights minus their least-squares polynomial; `order` has the names of `detrend` in `measured_line`."""
     if order == "none":
         return height.copy()
     place = np.linspace(-1, 1, height.size)
@@ -126,7 +126,7 @@ def band_limited(height: FloatArray, length: float, shortest: float = 0.0, longe
 def resampled(height: FloatArray, points: int) -> FloatArray:
     """Return a periodic line at another number of points, from its Fourier series; the first point stays the same.
 
-    With fewer points, waves shorter than the new Nyquist wavelength are left out.
+    With fewer points, waves shorter than the new Nyquist wavelength are omitted.
     """
     waves, mean = waves_of(height), height.mean()
     return np.asarray(series(waves.coefficients[: points // 2], points) + mean, dtype=np.float64)
@@ -138,5 +138,5 @@ def rms_height(height: FloatArray) -> float:
 
 
 def rms_slope(height: FloatArray, length: float) -> float:
-    """Return the spectral rms slope of the periodic line through samples, including the wave of two points."""
+    """Return the spectral rms slope of the periodic line through samples, with the wave that is two points long."""
     return waves_of(height).rms_slope() / length

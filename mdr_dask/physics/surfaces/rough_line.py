@@ -1,4 +1,4 @@
-"""A rough line before discretisation: roughness, on a plane or on an indenter."""
+"""A rough line before discretisation: roughness on a plane or on an indenter."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from mdr_dask.physics.surfaces.cubic_line import CubicLine, highest_point, inden
 from mdr_dask.physics.surfaces.shapes import Shape
 from mdr_dask.physics.surfaces.waves import Waves
 
-SEEN = 8  # nodes per Nyquist point with which the highest point of a line is found
+SEEN = 8  # nodes per Nyquist point of the grid on which the highest point of a line is found
 
 
 @dataclass(frozen=True)
 class RoughLine:
-    """A rough line, in units of its length and of one unit of height.
+    """A rough line. Positions are in units of its length; roughness and body have the same unit of height.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class RoughLine:
         return self.through(self.heights(nodes), None)
 
     def from_summit(self) -> RoughLine:
-        """Return the line; if it is periodic, shifted so that its highest point is a node of every grid."""
+        """Return the line; a periodic line is shifted so that its highest point is a node of every grid."""
         if self.body is not None:
             return self
         nodes = SEEN * self.points

@@ -1,4 +1,4 @@
-"""Self-affine rough lines: spectra of exact rms height, phases from a counter-based random stream, lines by FFT."""
+"""Self-affine rough lines: spectra with a given rms height, phases from a counter-based random stream, lines by FFT."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mdr_dask.physics.surfaces.waves import series
 
 ComplexArray = NDArray[np.complex128]
 
-# Taylor coefficients in descending powers of x^2; the error is below rounding for |x| <= pi / 4
+# Taylor coefficients of the sine in descending powers of x^2; for |x| <= pi / 4 the error is below rounding
 SINE = tuple((-1) ** k / math.factorial(2 * k + 1) for k in reversed(range(8)))
 COSINE = tuple((-1) ** k / math.factorial(2 * k) for k in reversed(range(9)))
 
@@ -25,13 +25,13 @@ def amplitudes(modes: int, hurst: float, rolloff: float = 0.0, longest: float = 
     Parameters
     ----------
     modes : int
-        Number M of harmonics: the cut-off wavelength is length / M.
+        Number M of harmonics; the shortest wavelength is length / M.
     hurst : float
         Hurst exponent H, 0..1: A_k ~ k^(-H - 1/2), that is C_1D ~ q^(-2H - 1).
     rolloff : float
-        Harmonic number length / wavelength below which the spectrum is constant; 0 for none.
+        Harmonic number, length / wavelength, below which the spectrum is constant; 0 for no roll-off.
     longest : float
-        Harmonic number length / wavelength below which there is no roughness; 0 for none.
+        Harmonic number, length / wavelength, below which there is no roughness; 0 for no limit.
 
     Returns
     -------
@@ -73,8 +73,9 @@ def spectral_slope(amplitude: FloatArray) -> float:
 def phases(seed: int, realisation: int, modes: int) -> FloatArray:
     """Return the phases of a realisation in [0, 2 pi), shape (modes,).
 
-    They depend only on the seed and the index of the realisation. A longer spectrum begins with the same phases, so
-    lines of any Hurst exponent, rms height or cut-off use common random numbers (thesis Fig. 2.6).
+    The phases depend only on the seed and the index of the realisation, and the phases of a longer spectrum begin with
+    those of a shorter one. So lines of any Hurst exponent, rms height or cut-off have common random numbers (thesis
+    Fig. 2.6).
     """
     phase: FloatArray = 2 * np.pi * _generator(seed, realisation).random(modes)
     return phase
@@ -86,11 +87,11 @@ def _generator(seed: int, realisation: int) -> np.random.Generator:
 
 def phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     """Return exp(i phi_k) for the phases of a realisation, shape (modes,); cached."""
-    # rounded up to a power of two, so that lines with similar numbers of modes share the cache
+    # the number of modes is rounded up to a power of two, so that similar lines share the cache
     return _phase_factors(seed, realisation, 1 << max(modes - 1, 0).bit_length())[:modes]
 
 
-@lru_cache(maxsize=8)  # lengths are powers of two: eight cover a range of a factor 100 in the number of points
+@lru_cache(maxsize=8)  # numbers of modes are powers of two, so eight entries cover a factor of 100
 def _phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     factors = np.empty((modes, 2))
     _turn(_generator(seed, realisation).random(modes), factors)
@@ -128,7 +129,7 @@ def line(amplitude: FloatArray, phase: FloatArray, nodes: int, derivative: int =
     nodes : int
         Number of nodes, at least twice the number of modes.
     derivative : int
-        Order of the derivative with respect to x, for a line of unit length; exact at the nodes.
+        Order of the derivative with respect to x for a line of unit length; 0 for the heights.
 
     Raises
     ------
@@ -146,7 +147,7 @@ def line(amplitude: FloatArray, phase: FloatArray, nodes: int, derivative: int =
 
 
 def line_of_factors(amplitude: FloatArray, factors: ComplexArray, nodes: int, derivative: int = 0) -> FloatArray:
-    """Return the line of :func:`line` from the factors exp(i phi_k) of :func:`phase_factors`."""
+    """Return the same line as :func:`line`, from the factors exp(i phi_k) of :func:`phase_factors`."""
     coefficients = 0.5 * amplitude * factors
     if derivative:
         coefficients *= (2j * np.pi * np.arange(1, amplitude.size + 1)) ** derivative

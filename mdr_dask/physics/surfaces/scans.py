@@ -1,7 +1,8 @@
 """The spectrum of an isotropic surface from straight profiles through it: the inverse Abel transform.
 
 A straight profile (cut) has the spectrum C_cut(q) = 2 int_q^inf C2D(k) k / sqrt(k^2 - q^2) dk, while the line of the
-method has pi q C2D. The harmonics of the cut are smaller; its rms slope is the surface's rms gradient over sqrt(2).
+MDR has the spectrum pi q C2D. The harmonics of the cut are smaller than those of this line: the rms slope of the cut is
+the rms gradient of the surface divided by sqrt(2).
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ from mdr_dask.errors import DataError
 from mdr_dask.physics.surfaces.measured import MeasuredLine
 from mdr_dask.physics.surfaces.spectrum import Spectrum, quadrature
 
-BINS = 10  # per decade of the wave number
+BINS = 10  # number of bins per decade of the wave number
 BEND = 3.0  # prior standard deviation of the change of d log C2D / d log q between bins
-NOISE_SLOPE = -0.5  # a tail of a cut with a flatter slope d log C / d log q is noise; H = 0 has the slope -1
+NOISE_SLOPE = -0.5  # a tail of a cut with d log C / d log q above this slope is noise; a surface with H = 0 has -1
 NOISE_TAIL = 0.5  # decades at the end of the cut that are tested for noise
-STEEPEST = 30.0  # where -d log C / d log q is larger, the spectrum ends
+STEEPEST = 30.0  # the spectrum ends where -d log C / d log q exceeds this value
 
 
 class Cut(NamedTuple):
@@ -43,7 +44,7 @@ class Cut(NamedTuple):
     error: FloatArray
 
     def until(self, wavenumber: float) -> Cut:
-        """Return the bins up to a wave number, ends included."""
+        """Return the bins up to and including a wave number."""
         kept = self.wavenumber <= wavenumber * (1 + 1e-9)
         return Cut(*(column[kept] for column in self))
 
@@ -72,8 +73,8 @@ def cut_of_lines(lines: Sequence[MeasuredLine], hann: bool = True) -> Cut:
     window = hann_window(points) if hann else np.ones(points)
     power = length / (2 * np.pi) * np.mean(np.abs(np.fft.rfft(height * window) / points) ** 2, axis=0)[1:]
     waves = np.arange(1, power.size + 1)
-    last = (points - 1) // 2  # leaves out the wave with two points, for which the phase is unknown
-    independent = len(lines) / (1.94 if hann else 1.0)  # 1 / sum of squares of the window's squared correlation
+    last = (points - 1) // 2  # without the wave of two points, whose phase is unknown
+    independent = len(lines) / (1.94 if hann else 1.0)  # 1.94: a wave's power correlates with its neighbours
     return averaged(2 * np.pi / length * waves[:last], power[:last], independent)
 
 
@@ -83,9 +84,9 @@ def averaged(wavenumber: FloatArray, density: FloatArray, independent: float, co
     Parameters
     ----------
     wavenumber, density : array, shape (waves,)
-        Ascending wave numbers, and the spectrum at them.
+        Ascending wave numbers, and the spectrum at these wave numbers.
     independent : float
-        Number of independent squared amplitudes per wave.
+        Number of independent squared amplitudes per wave, which gives the standard error.
     count : array, shape (waves,), optional
         Number of waves at each wave number; 1 by default.
     """
@@ -104,7 +105,7 @@ def hann_window(points: int) -> FloatArray:
 
 
 def _until_the_end(cut: Cut) -> slice:
-    """Return the bins before the end of the spectrum, which is the first fall steeper than `STEEPEST`."""
+    """Return the slice of the bins before the first fall steeper than `STEEPEST`, where the spectrum ends."""
     with np.errstate(divide="ignore"):
         logs = np.log(cut.density)
     falls = np.flatnonzero(np.diff(logs) < -STEEPEST * np.diff(np.log(cut.wavenumber)))
@@ -128,7 +129,7 @@ def of_cut(cut: Cut) -> Spectrum:
         raise DataError(f"expected a spectrum of three wave numbers or more, got {q.size}")
     edge = (
         q[-1] ** 2 / q[-2]
-    )  # only waves shorter than the last one contribute to the cut there; they are assumed to end one step further
+    )  # the cut at the last wave number needs shorter waves; they are assumed to end one step further
     knots = np.append(q, edge)
     place, weight = quadrature(q, knots)
     where = np.clip(np.searchsorted(knots, place, side="right") - 1, 0, knots.size - 2)

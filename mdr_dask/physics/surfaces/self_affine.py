@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.surfaces.scans import Cut
 
-LEAST_ERROR = 0.05  # smallest relative error of a bin, because no spectrum is a more exact power law
+LEAST_ERROR = 0.05  # smallest relative error assumed for a bin, because real spectra deviate from power laws
 LEAST_BINS = 5  # smallest number of bins for the power law
 LOWEST, HIGHEST = -0.1, 1.2  # range of Hurst exponents
-CHI_SQUARED = 3.84  # 95 % point for one parameter
-STEEPEST, FLATTEST = -6.0, -1.0  # limits of d log C2D / d log q for roughness; H = 1 has -4 and H = 0 has -2
-ABOVE_NOISE = 2.0  # smallest ratio of roughness to noise
+CHI_SQUARED = 3.84  # 95 % quantile of chi squared for one parameter
+STEEPEST, FLATTEST = -6.0, -1.0  # limits of d log C2D / d log q for roughness; it is -4 for H = 1 and -2 for H = 0
+ABOVE_NOISE = 2.0  # smallest ratio of the spectrum to the noise at which roughness is accepted
 
 
 class Interval(NamedTuple):
-    """A value and its 95 % interval."""
+    """A value, with the ends of its 95 % confidence interval."""
 
     value: float
     low: float
@@ -27,12 +27,12 @@ class Interval(NamedTuple):
 
 
 class SelfAffine(NamedTuple):
-    """A power law C2D ~ q^(-2 - 2 H) between two wavelengths, m; None for a cut-off outside the range of the data."""
+    """A power law C2D ~ q^(-2 - 2 H) between two wavelengths, m; None for a cut-off that the data do not show."""
 
     hurst: Interval
     longest: Interval | None
     shortest: Interval | None
-    misfit: float  # rms deviation of log C2D from the law, over the errors
+    misfit: float  # rms deviation of log C2D from the law, divided by the errors
 
 
 def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> float:
@@ -45,7 +45,7 @@ def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> 
     flattest : float
         Slope d log C / d log q above which a tail is noise: -1 for C2D, -0.5 for a straight profile.
     decades : float
-        Length of the tail.
+        Length of the tail in decades of the wave number.
     """
     wavenumber, density = bins.wavenumber, bins.density
     tail = wavenumber > wavenumber[-1] / 10**decades * (1 - 1e-9)
@@ -59,7 +59,7 @@ def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> 
 
 
 def steep_limit(bins: Cut) -> float:
-    """Return the wave number beyond which C2D falls more steeply than roughness can; infinite if there is none."""
+    """Return the wave number beyond which C2D falls more steeply than roughness can; infinite if C2D nowhere does."""
     wavenumber, density = bins.wavenumber, bins.density
     there = density > 0
     x, y = np.log(wavenumber[there]), np.log(density[there])
@@ -71,7 +71,9 @@ def steep_limit(bins: Cut) -> float:
 
 
 def fit_self_affine(bins: Cut) -> SelfAffine | None:
-    """Fit a power law, with cut-offs if the data show them; return None without a power law or with too few bins.
+    """Fit a power law to a spectrum, with cut-offs if the data show them.
+
+    Return None if the spectrum is no power law or has too few bins.
 
     Parameters
     ----------
@@ -81,8 +83,8 @@ def fit_self_affine(bins: Cut) -> SelfAffine | None:
     Returns
     -------
     SelfAffine or None
-        Cut-offs are chosen among the bins by Schwarz's information criterion. Intervals follow from the likelihood
-        and are widened by the misfit.
+        The cut-offs are bins, chosen by Schwarz's information criterion. The confidence intervals follow from the
+        likelihood and are widened by the misfit.
     """
     wavenumber, density, error = bins
     if wavenumber.size < LEAST_BINS:

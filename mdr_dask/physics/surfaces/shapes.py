@@ -1,4 +1,4 @@
-"""Indenters: the MDR rule for power laws, and smooth indenters sliding over a Kelvin foundation in closed form."""
+"""Indenters: the MDR rule for power laws, and the sliding of smooth indenters over a Kelvin foundation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mdr_dask.physics.jit import jit
 
 ITERATIONS = 200
 
-# Columns of the results of `smooth`
+# Indices of the columns of the results of `smooth`
 DEPTH, DRAG, LEADING, TRAILING, STRETCH = range(5)
 COLUMNS = 5
 
@@ -68,7 +68,7 @@ class PowerLaw:
 
     @property
     def breaks(self) -> tuple[float, ...]:
-        """Return no radii: the body is smooth except at its tip."""
+        """Return an empty tuple, because the body is smooth except at its tip."""
         return ()
 
     def body(self, r: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -83,9 +83,10 @@ class PowerLaw:
 
 @dataclass(frozen=True)
 class RoundedCone:
-    """The line of a cone with a rounded tip: f = s r^2 / (2 b) up to r = b, and s (r - b/2) beyond.
+    """The line of a cone with a rounded tip.
 
-    g = s x^2 / b up to x = b, and s x (x / b (1 - sqrt(1 - b^2 / x^2)) + arccos(b / x)) beyond (Popov, Hess and
+    The body is f = s r^2 / (2 b) up to r = b, and f = s (r - b/2) beyond b. Its line is
+    g = s x^2 / b up to x = b, and g = s x (x / b (1 - sqrt(1 - b^2 / x^2)) + arccos(b / x)) beyond b (Popov, Hess and
     Willert, Handbook of Contact Mechanics, 2.5.8).
 
     Parameters
@@ -93,7 +94,7 @@ class RoundedCone:
     steepness : float
         s, the slope of the cone.
     blend : float
-        b, the radius at which the rounded tip ends and the cone begins, without a kink.
+        b, the radius at which the rounded tip ends and the cone begins; the slope is continuous.
     """
 
     steepness: float
@@ -134,7 +135,7 @@ def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatAr
     load : array
         F_N / (4 G), so that ``load = 2 n c a^(n+1) / (n + 1)`` (thesis 3.3.2).
     coefficient, exponent : float
-        c_n > 0 and n of the line after the MDR rule.
+        Coefficient c > 0 and exponent n of the line, after the MDR rule.
     """
     width: FloatArray = ((exponent + 1) * load / (2 * exponent * coefficient)) ** (1 / (exponent + 1))
     return width
@@ -142,7 +143,7 @@ def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatAr
 
 @jit
 def _trailing(drop: float, deborah: float, exponent: float) -> float:
-    """Return the solution b >= 0 of b^n + n deborah b^(n-1) = drop; 0 if there is none (n = 1)."""
+    """Return the solution b >= 0 of b^n + n deborah b^(n-1) = drop; 0 without a solution (possible for n = 1)."""
     if exponent == 1:
         return max(drop - deborah, 0.0)
     # the logarithm of the left side is convex and increasing in y = log b: Newton's method from the right
@@ -160,7 +161,7 @@ def _trailing(drop: float, deborah: float, exponent: float) -> float:
 
 @jit
 def _carried(depth: float, deborah: float, coefficient: float, exponent: float) -> tuple[float, float, float]:
-    """Return F_N / (4 G) at a depth, and the distances of the leading and the trailing edge."""
+    """Return F_N / (4 G) at a depth, and the distances of the leading and the trailing edge from the tip."""
     drop = depth / coefficient
     a = drop ** (1 / exponent)
     b = _trailing(drop, deborah, exponent)
@@ -174,19 +175,19 @@ def smooth(
 ) -> None:
     """Slide smooth lines c |x|^n towards -x at prescribed loads.
 
-    The contact lies between -a and b, where c a^n = d and d = c (b^n + n v tau b^(n-1)), or b = 0 if there is no such
-    b. The load is a convex function of d with the slope a + b + v tau, so Newton's method from the static depth
-    converges to the root from above.
+    The contact lies between -a and b, where d is the depth, c a^n = d and d = c (b^n + n v tau b^(n-1)); b is 0 if
+    the last equation has no solution. The load is a convex function of d with the slope a + b + v tau, so Newton's
+    method from the static depth converges to the root from above.
 
     Parameters
     ----------
     loads, deborah : array, shape (cases,)
         F_N / (4 G) and v tau, positive and finite.
     coefficients, exponents : array, shape (cases,)
-        c_n > 0 and n >= 1 of the lines after the MDR rule.
+        Coefficients c > 0 and exponents n >= 1 of the lines, after the MDR rule.
     results : array, shape (cases, COLUMNS)
-        Written: depth, F_x / (4 G), a, b, and the integral of the squared slope over the contact; NaN if no depth
-        is found.
+        Output: depth, F_x / (4 G), a, b, and the integral of the squared slope over the contact. A row is NaN if no
+        depth is found.
     """
     results[:] = np.nan
     for k in range(loads.size):

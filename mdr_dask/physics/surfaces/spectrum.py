@@ -1,4 +1,6 @@
-"""The isotropic spectrum of a surface: power laws between points; line, straight profile and moments.
+"""The isotropic spectrum of a surface, with its MDR line, its straight profile and its moments.
+
+The spectrum is a power law between adjacent points.
 
 Angular wave numbers q are in rad/m; spectra are two-sided (thesis 2.12 and 2.13).
 """
@@ -16,7 +18,7 @@ from numpy.typing import ArrayLike
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 
-ROUNDING = 1e-9  # relative tolerance for a wave number at an end of the spectrum
+ROUNDING = 1e-9  # relative distance up to which a wave number counts as an end of the spectrum
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 STEP = 0.1  # longest interval of the quadrature, in log q
 
@@ -35,7 +37,7 @@ class Spectrum:
     Raises
     ------
     DataError
-        If there are fewer than two points, they do not ascend, or values are not positive and finite.
+        If there are fewer than two points, if wave numbers do not ascend, or if a number is not positive and finite.
     """
 
     wavenumber: FloatArray
@@ -89,7 +91,7 @@ class Spectrum:
         return amplitude
 
     def between(self, longest: float = 0.0, shortest: float = 0.0) -> Spectrum:
-        """Return the spectrum of the waves between two wavelengths, m; 0 for no limit.
+        """Return the spectrum of the waves between two wavelengths, m; a wavelength of 0 means no limit.
 
         Raises
         ------
@@ -106,10 +108,12 @@ class Spectrum:
         return Spectrum(q, self.at(q))
 
     def continued(self, longest: float = 0.0, shortest: float = 0.0, decades: float = 1.0) -> Spectrum:
-        """Return the spectrum, continued by power laws to wavelengths, m, beyond its ends; 0 for no continuation.
+        """Return the spectrum, continued by power laws to wavelengths, m, beyond its ends.
 
-        Each power law starts at the last point. Its slope is that of a straight line fitted to the logarithms in the
-        last `decades`.
+        A wavelength of 0 means no continuation.
+
+        Each power law starts at the outermost point. Its slope is the slope of a straight line fitted to the logarithms
+        within `decades` of this end.
         """
         q, density = [self.wavenumber], [self.density]
         for index, end in (
@@ -137,14 +141,14 @@ class Spectrum:
         return math.sqrt(2 * np.pi * self._moment(1))
 
     def rms_gradient(self) -> float:
-        """Return the rms of the gradient, both slopes together (thesis 2.23)."""
+        """Return the rms of the gradient, which contains both slopes (thesis 2.23)."""
         return math.sqrt(2 * np.pi * self._moment(3))
 
     def _moment(self, order: int) -> float:
         """Return the integral of q^order C2D; it is exact for the power laws between points."""
         q, value = self._logs[0], np.exp(self._logs[1] + (order + 1) * self._logs[0])
         rise = np.diff(np.log(value))
-        # the integral of exp(v) with a linear v is the width times the logarithmic mean of the end values
+        # the integral of exp(v), where v is linear, is the width times the logarithmic mean of the end values
         small = np.abs(rise) < 1e-8
         safe = np.where(small, 1.0, rise)
         mean = np.where(small, 0.5 * (value[1:] + value[:-1]), np.diff(value) / safe)
@@ -163,7 +167,7 @@ def self_affine(hurst: float, longest: float, shortest: float, rms: float = 1.0,
     rms : float
         Rms height of the surface, m.
     rolloff : float
-        Roll-off wavelength, m; 0 for none.
+        Roll-off wavelength, m; 0 for no roll-off.
     """
     corners = sorted({2 * np.pi / end for end in (longest, shortest, rolloff) if end and shortest <= end <= longest})
     q = np.array(corners)

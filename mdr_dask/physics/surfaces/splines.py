@@ -1,8 +1,8 @@
 """A closed line as a cubic spline with one coefficient per node.
 
 For coefficients c_k and the uniform cubic B-spline, the line between two nodes is ``a0 + a1 t + a2 t^2 + a3 t^3`` with
-t from 0 to 1 and the numbers returned by `piece`. Its values are between the least and the largest of the four
-coefficients involved (de Boor, *A Practical Guide to Splines*, 1978, chapter IX).
+t from 0 to 1 and the numbers returned by `piece`. The values of the line lie between the smallest and the largest of
+the four coefficients of this piece (de Boor, *A Practical Guide to Splines*, 1978, chapter IX).
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ def closest(waves: NDArray[np.complex128], nodes: int) -> FloatArray:
     Returns
     -------
     array, shape (nodes,)
-        Coefficients in the unit of the waves. Each wave is multiplied by the transform of the B-spline and divided
-        by the squared transform, summed over all aliases (Unser, IEEE Signal Process. Mag. 16 (1999) 22).
+        Coefficients in the unit of the waves. Each wave is multiplied by the Fourier transform of the B-spline, and
+        divided by the sum of the squared transform over all aliases (Unser, IEEE Signal Process. Mag. 16 (1999) 22).
     """
     return series(waves * _closest(waves.size, nodes), nodes)
 
@@ -57,7 +57,7 @@ def heights(spline: FloatArray) -> FloatArray:
 
 @lru_cache(maxsize=8)
 def _closest(modes: int, nodes: int) -> FloatArray:
-    """Return the factors of the waves in the least-squares spline."""
+    """Return the factors that convert the waves to the coefficients of the least-squares spline."""
     phase = _phases(modes, nodes)
     cosine = np.cos(phase)
     transform = np.sinc(phase / (2 * np.pi)) ** 4
@@ -67,7 +67,7 @@ def _closest(modes: int, nodes: int) -> FloatArray:
 
 @lru_cache(maxsize=8)
 def _through(modes: int, nodes: int) -> FloatArray:
-    """Return the factors of the waves in the interpolating spline."""
+    """Return the factors that convert the waves to the coefficients of the interpolating spline."""
     return 1 / _at_nodes(_phases(modes, nodes))
 
 
@@ -83,14 +83,14 @@ def _at_nodes(phase: FloatArray) -> FloatArray:
 
 @jit
 def piece(spline: FloatArray, k: int) -> Piece:
-    """Return the polynomial between the second and the third of the four coefficients from index k on."""
+    """Return the polynomial that follows from the four coefficients k to k + 3, between the nodes of the middle two."""
     c0, c1, c2, c3 = spline[k], spline[k + 1], spline[k + 2], spline[k + 3]
     return (c0 + 4 * c1 + c2) / 6, (c2 - c0) / 2, (c0 - 2 * c1 + c2) / 2, (c3 - 3 * c2 + 3 * c1 - c0) / 6
 
 
 @jit
 def value(of: Piece, t: float) -> float:
-    """Return the height of a piece at t."""
+    """Return the value of a piece at t."""
     return of[0] + t * (of[1] + t * (of[2] + t * of[3]))
 
 
@@ -112,7 +112,8 @@ def shares(t: float) -> Piece:
 def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
     """Append the positions between k and k + 1 at which a piece changes sign to `found`; return the new count.
 
-    There are at most three, and none if all four coefficients are positive or none of them is.
+    There are at most three sign changes. There is no sign change if all four coefficients are positive, or if none of
+    the four is positive.
     """
     of = piece(spline, k)
     end = (spline[k + 1] + 4 * spline[k + 2] + spline[k + 3]) / 6  # the same formula as at the start of the next piece
@@ -132,7 +133,7 @@ def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
 
 @jit
 def _extremes(of: Piece) -> tuple[float, float]:
-    """Return the positions of the extremes of a piece, ascending; 0 for an extreme outside 0..1."""
+    """Return the positions of the extremes of a piece, ascending; an extreme outside 0 to 1 is replaced by 0."""
     a, b, c = 3 * of[3], of[2], of[1]  # a t^2 + 2 b t + c
     root = b * b - a * c
     if root <= 0:
@@ -147,7 +148,7 @@ def _extremes(of: Piece) -> tuple[float, float]:
 
 @jit
 def _zero(of: Piece, low: float, at_low: float, high: float, at_high: float) -> float:
-    """Return the zero of a piece between `low` and `high`, where it is monotonic and changes sign."""
+    """Return the zero of a piece between `low` and `high`; the piece is monotonic and changes sign in this interval."""
     t = low + (high - low) * at_low / (at_low - at_high)
     for _ in range(STEPS):
         here = value(of, t)
@@ -165,5 +166,6 @@ def _zero(of: Piece, low: float, at_low: float, high: float, at_high: float) -> 
     return t
 
 
-#: After a Newton step this short, the error is about its square; after this many halvings, any zero is found.
+#: After a Newton step shorter than `CLOSE`, the error is about the square of the step. After `STEPS` halvings, the
+#: interval is as short as the rounding error.
 CLOSE, STEPS = 1e-7, 60

@@ -20,7 +20,7 @@ class Waves:
     coefficients : array, shape (modes,)
         c_k for k = 1..modes, half the complex amplitude of each wave.
     points : int
-        Nyquist points of the line: 2 modes, or one more.
+        Nyquist points of the line: 2 modes or 2 modes + 1.
     """
 
     coefficients: NDArray[np.complex128]
@@ -31,11 +31,14 @@ class Waves:
         return series(self.coefficients, nodes)
 
     def slopes(self, nodes: int) -> FloatArray:
-        """Return dh/dx at x = 0, 1/nodes, ..., exactly."""
+        """Return dh/dx at x = 0, 1/nodes, ...; exact, because each wave is differentiated."""
         return series(self.coefficients * (2j * np.pi * np.arange(1, self.coefficients.size + 1)), nodes)
 
     def from_place(self, place: float) -> Waves:
-        """Return the line shifted by a fraction 0..1 of its length; needs more than two nodes per shortest wave."""
+        """Return the line that starts at the position `place`, a fraction 0..1 of the length.
+
+        A grid for this line needs more than two nodes per shortest wave.
+        """
         wave = np.arange(1, self.coefficients.size + 1)
         return Waves(self.coefficients * np.exp(2j * np.pi * wave * place), self.points)
 
@@ -67,8 +70,8 @@ def series(coefficients: NDArray[np.complex128], nodes: int) -> FloatArray:
 def waves_of(height: FloatArray) -> Waves:
     """Return the waves of the periodic line through equidistant samples, without the mean.
 
-    For an even number of samples, the last wave, two samples long, is the cosine through the samples, with full
-    amplitude.
+    For an even number of samples, the shortest wave is two samples long. It is the cosine through the samples, with its
+    full amplitude.
     """
     coefficients = np.fft.rfft(height)[1:] / height.size
     if height.size % 2 == 0:
