@@ -1,7 +1,7 @@
-"""The models by name; each is imported only when a campaign names it.
+"""The models by name; a model is imported only when a campaign names it.
 
-A model is one of this package (`NAMES`), one in the entry point group `GROUP` of an installed package, or an object
-``package.module:NAME`` of the user.
+There are three kinds of models: those of this package (`NAMES`), those that other installed packages declare in the
+entry point group `GROUP`, and objects ``package.module:NAME`` of the user.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ GROUP = "mdr_dask.models"
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of all installed models: those of this package, then those of others."""
+    """Return the names of all installed models: first the models of this package, then the models of other packages."""
     return (*NAMES, *(name for name in _installed() if name not in NAMES))
 
 
 def load(name: str) -> Model[Any]:
-    """Return the model of that name.
+    """Return the model with a name.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def load(name: str) -> Model[Any]:
     Raises
     ------
     ModelError
-        If there is no such model, or the object is not a model.
+        If there is no model with this name, or the object with this name is not a model.
     """
     if name in NAMES:
         model: Model[Any] = import_module(f"mdr_dask.models.{name}").MODEL
@@ -60,7 +60,7 @@ def load(name: str) -> Model[Any]:
 
 
 def is_own(name: str) -> bool:
-    """Return whether a model is the user's own, not one of this package."""
+    """Return whether a model comes from outside this package."""
     return name not in NAMES
 
 
@@ -90,7 +90,10 @@ def _own(name: str, entry: EntryPoint, module: str) -> Model[Any]:
 
 
 def _guarded(model: str, what: str, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return a function of a user's model whose exceptions, and estimates that are no numbers, are ModelErrors."""
+    """Return a function of a user's model with checks.
+
+    An exception in the function, or an estimate that is not a number, becomes a ModelError.
+    """
 
     def call(argument: Any) -> Any:
         try:

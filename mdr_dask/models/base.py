@@ -1,4 +1,4 @@
-"""The interface of models: a declaration of parameters and outputs, and one pure function from a block to arrays."""
+"""The interface of models: a declaration of parameters and outputs, and a pure function that computes a block."""
 
 from __future__ import annotations
 
@@ -38,16 +38,20 @@ def unquoted(value: Any) -> Any:
 
 
 class Parameters(BaseModel):
-    """Base of every parameter set: SI numbers, checked bounds, no unknown key, immutable.
+    """Base of every parameter set, with numbers in SI units and checked bounds.
+
+    A parameter set cannot be changed, and unknown keys are errors.
 
     A subclass may declare more about its parameters:
 
-    * `renamed`: names of parameters and outputs of earlier versions, each with its replacement for a message.
+    * `renamed`: names of parameters and outputs of earlier versions. Each has a text for the message that says what to
+      write now.
     * `alternatives`: groups of alternatives. A user gives exactly one member of each group. A member is a tuple of
       parameters that are given together; a dot separates the names of nested parameters.
-    * `overrides`: parameters that replace another one, each with the one it replaces.
+    * `overrides`: parameters that replace another parameter, each with the name of the replaced parameter.
     * `settings`: parameters that set the resolution of the solver or the points to store, not the physical problem.
-    * `requires`: parameters that have an effect only if another parameter has a certain value.
+    * `requires`: parameters that have an effect only if another parameter has a certain value, with the name and the
+      value of this other parameter.
     """
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
@@ -60,13 +64,13 @@ class Parameters(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _whole_numbers_in_quotes(cls, data: Any) -> Any:
-        """Convert whole numbers in quotes, because numbers with a unit are strings, too."""
+        """Convert whole numbers in quotes, because numbers with a unit are written in quotes, too."""
         if not isinstance(data, dict):
             return data
         return {**data, **{key: unquoted(data[key]) for key in data.keys() & _whole_fields(cls)}}
 
     def require_one_alternative(self) -> None:
-        """Raise ValueError unless exactly one of each group of alternatives is given."""
+        """Raise ValueError unless exactly one member of each group of alternatives is given."""
         for ways in self.alternatives:
             given = {name for way in ways for name in way if getattr(self, name) is not None}
             if not any(given == set(way) for way in ways):
@@ -109,10 +113,10 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     unit : str
         The coherent SI unit of the value, ``"1"`` for a pure number.
     description : str
-        One line about its meaning.
+        Meaning of the parameter in one line.
     usual : str
-        A common value with its unit, ``"10 MPa"``, for ``mdr-dask init``. ``check`` asks about a number without a unit
-        that is more than three decades away from it.
+        A common value with its unit, ``"10 MPa"``, for ``mdr-dask init``. ``check`` asks the user about a number
+        without a unit that differs from this value by more than three decades.
     **bounds
         ``default``, ``gt``, ``ge``, ``lt``, ``le`` and other arguments of :func:`pydantic.Field`.
 
@@ -123,7 +127,7 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     """
 
     def to_si(value: Any, info: ValidationInfo) -> Any:
-        """Convert ``'20 mm'`` to SI with the converter in the context; keep names such as ``auto``."""
+        """Convert a text such as ``20 mm`` to SI with the converter in the context; keep names such as ``auto``."""
         if info.context is None:
             return value
         convert = info.context["to_si"]
@@ -134,7 +138,7 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     examples = [usual] if usual else None
     field = Field(description=description, json_schema_extra={"unit": unit}, examples=examples, **bounds)
     field.metadata.append(BeforeValidator(to_si))
-    if unit != "m^(1-n)":  # the prefactor of a body r^50 may have any size
+    if unit != "m^(1-n)":  # the coefficient c of a body c r^50 may have any size
         field.metadata.append(AfterValidator(partial(_conceivable, 0.0 if unit == "1" else LEAST)))
     return field
 
@@ -149,13 +153,13 @@ def _conceivable(least: float, value: Any) -> Any:
 
 
 def unit_of(parameters: type[BaseModel], name: str) -> str | None:
-    """Return the SI unit of a field, or None if it is not a quantity."""
+    """Return the SI unit of a field, or None if the field is not a quantity."""
     extra = parameters.model_fields[name].json_schema_extra
     return str(extra["unit"]) if isinstance(extra, dict) and "unit" in extra else None
 
 
 def notes_of(parameters: Any) -> tuple[str, ...]:
-    """Return the notes of a parameter set and its parts, about tables, measured lines and fits."""
+    """Return the notes of a parameter set and of its nested sets, for example about tables, measured lines and fits."""
     notes: tuple[str, ...] = ()
     if isinstance(parameters, list | tuple):
         return tuple(note for part in parameters for note in notes_of(part))
@@ -166,12 +170,15 @@ def notes_of(parameters: Any) -> tuple[str, ...]:
     return notes
 
 
-#: Bits to which dimensionless numbers are rounded; numbers that agree to about 6e-14 belong to the same case.
+#: Number of bits to which dimensionless numbers are rounded. Numbers with a relative difference below about 6e-14
+#: become equal in most cases, so that they share one solution.
 CANONICAL_BITS = 44
 
 
 def canonical(number: ArrayLike) -> Any:
-    """Round to `CANONICAL_BITS`, so that dimensionless numbers that differ by rounding errors alone become equal."""
+    """Return dimensionless numbers, rounded to `CANONICAL_BITS`, so that numbers that differ by rounding errors are
+    equal.
+    """
     mantissa, exponent = np.frexp(number)
     return np.ldexp(np.rint(np.ldexp(mantissa, CANONICAL_BITS)), exponent - CANONICAL_BITS)
 
@@ -203,21 +210,24 @@ class Output:
     name, unit, long_name : str
         Name, SI unit and meaning in the store; a pure number has the unit ``"1"``.
     dims : tuple of str
-        Dimensions of a single case (``("radius",)``); their coordinates come from ``Model.coordinates``.
+        Dimensions of the output of a single case, such as ``("radius",)``; ``Model.coordinates`` gives their
+        coordinates.
     default : bool
-        Whether it is computed when the campaign names no outputs.
+        Whether the output is computed if the campaign names no outputs.
     has_error : bool
-        Whether the solver estimates its discretisation error: it is stored as the companion `error`, unless the
-        campaign has ``errors: false``.
+        Whether the solver estimates the discretisation error of the output. The error is stored as the companion
+        `error`, unless the campaign has ``errors: false``.
     comment : str
-        A limitation, for its attribute ``comment`` in the store.
+        A limitation of the output, stored as its attribute ``comment``.
     scatter : str
-        Name of the output that estimates the standard error from one realisation alone; it is stored with the errors.
+        Name of another output that estimates the standard error from a single realisation. This other output is stored
+        together with the errors.
     floor : float
-        Size, in `unit`, below which errors are relative to `floor` instead of the value: for outputs that are
-        normally zero. An accuracy a allows the error ``a * max(abs(value), floor)``.
+        A value in `unit`, for outputs that can normally be zero. If the output is smaller, its error is relative to
+        `floor` instead of the value. An accuracy a allows the error ``a * max(abs(value), floor)``.
     allow_nan : bool
-        Whether NaN and infinity are normal values. Otherwise a case of a user's own model with such a value has failed.
+        Whether NaN and infinity are normal values. If not, a case of a user's own model with NaN or infinity has
+        failed.
     """
 
     name: str
@@ -245,7 +255,7 @@ class Number:
     Parameters
     ----------
     name, meaning : str
-        Its name and its meaning in one line.
+        Name of the number, and its meaning in one line.
     formula : str
         A formula of parameters (nested names joined by ``_``), outputs and other numbers, for
         `mdr_dask.questions.expression`.
@@ -258,7 +268,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Coordinate:
-    """Values along a dimension of an output, with unit and meaning."""
+    """The values along a dimension of an output, with their unit and meaning."""
 
     values: FloatArray
     unit: str
@@ -272,19 +282,21 @@ class Block(Generic[P]):
     Parameters
     ----------
     parameters : Parameters
-        The fixed parameters. A varied parameter has the value of some case here; read it with `column`.
+        The fixed parameters. For a varied parameter, this set has the value of an arbitrary case; use `column` for the
+        values of all cases.
     columns : mapping of str to array, shape (cases,)
         The varied parameters by dotted path (``velocity``, ``indenter.angle``), one value for each case, in SI units.
     cases : int
         Number of cases.
     realisations : tuple of int
-        Indices of the realisations; together with `seed` they determine every random number.
+        Indices of the realisations. The index and `seed` determine every random number of a realisation.
     seed : int
         Seed of the campaign.
     outputs : tuple of str
-        Names of the arrays to compute, including the companions with errors.
+        Names of the arrays to compute, including the companions that hold errors.
     accuracy : float or None
-        Largest relative discretisation error of every output that has a companion (see `Output.floor`).
+        Largest relative discretisation error allowed for every output that has a companion (see `Output.floor`); None
+        if the campaign states no accuracy.
     """
 
     parameters: P
@@ -296,7 +308,7 @@ class Block(Generic[P]):
     accuracy: float | None = None
 
     def column(self, path: str) -> NDArray[Any]:
-        """Return the values of one parameter, varied or fixed; shape (cases,)."""
+        """Return the values of one parameter for all cases, whether it is varied or fixed; shape (cases,)."""
         if path in self.columns:
             return self.columns[path]
         value: Any = reduce(getattr, path.split("."), self.parameters)
@@ -339,7 +351,7 @@ class Result:
     status : int8 array, shape (cases, realisations)
         Values of `Status`.
     messages : dict of (case, realisation position) to str
-        For a failed result the reason, for any other result a warning.
+        The reason why a result failed, or warnings about a result that did not fail.
     solves : int
         Number of solutions computed; several cases may share one solution.
     """
@@ -364,34 +376,36 @@ class Model(Generic[P]):
     name : str
         Name for the key ``model`` of a campaign file.
     version : int
-        Increased when a change of the code changes results; a store can only be extended by the same version.
+        Version number, increased when a change of the code changes results. A store can be extended only by the version
+        that created it.
     summary : str
         One line for ``mdr-dask models``.
     parameters : type
         The parameter set.
     outputs : tuple of Output
-        All arrays that the model can compute, without ``status`` and the companions with errors.
+        All arrays that the model can compute, except ``status`` and the companions that hold errors.
     compute : callable, Block -> Result
         A pure function: the value of a case depends on its parameters, the seed and its realisation, not on the other
         cases of the block. It does not raise an exception for a case that fails.
     seconds : callable, Block -> float
-        Estimated time of `compute`; cheap, vectorised over the cases.
+        Estimated computing time of `compute` in seconds. The function must be fast, so it is vectorised over the cases.
     whole : tuple of str
-        Parameters whose axes are not divided among blocks, because their cases share work. If a block becomes too
-        large, the axis of the last one is divided first.
+        Parameters whose axes are not divided among blocks, because cases along these axes share work. If a block
+        becomes too large, the axis of the last parameter in this list is divided first.
     coordinates : callable, Parameters -> dict of str to Coordinate
-        Coordinates of the dimensions of outputs beyond case and realisation.
+        Coordinates of the dimensions of outputs other than case and realisation.
     distinct : callable, Block -> int, optional
-        Number of different solutions among the cases of a block, for ``check``; None if cases share nothing.
+        Number of different solutions among the cases of a block, for ``check``; None if every case has its own
+        solution.
     units : callable, Parameters -> dict of str to str
-        Units of outputs and parameters that differ from the declared ones, as in a campaign of dimensionless numbers.
+        Units of outputs and parameters that differ from the declared units, for example in a dimensionless campaign.
     memory : callable, Block -> float
-        Estimated peak memory of `compute` in bytes, beyond its outputs.
+        Estimated peak memory of `compute` in bytes, without the memory of the outputs.
     notes : callable, sequence of Parameters -> tuple of str
-        Notes for ``check`` about a study, from its parameter sets with one axis varied at a time. Notes about a single
-        part of a parameter set come from the method `notes` of that part.
+        Notes for ``check`` about a study. The argument has the parameter sets of the study in which one axis at a time
+        is varied. Notes about a nested parameter set come from its own method `notes`.
     compiling : float
-        Seconds to compile the kernels of the model, the first time on a machine.
+        Time in seconds to compile the kernels of the model when it first runs on a machine.
     numbers : tuple of Number
         Dimensionless numbers of the cases.
     """
@@ -414,15 +428,17 @@ class Model(Generic[P]):
 
     @property
     def companions(self) -> dict[str, Output]:
-        """The companions with errors, by the names of their outputs."""
+        """The companions that hold errors, by the names of their outputs."""
         return {output.name: output.error for output in self.outputs if output.has_error}
 
     def output(self, name: str) -> Output:
-        """Return a declared output or a companion by its name; raise KeyError if there is none."""
+        """Return the output or companion with a name; raise KeyError if there is no output with this name."""
         return {output.name: output for output in (*self.outputs, *self.companions.values())}[name]
 
     def with_companions(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Return the given names and those of scatter outputs, each followed by its companion if it has one."""
+        """Return the given names and the names of scatter outputs, each followed by the name of its companion if it has
+        one.
+        """
         companions = self.companions
         asked = {*names, *(self.output(name).scatter for name in names)}
         kept = [output.name for output in self.outputs if output.name in asked]

@@ -12,12 +12,15 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.tables import decoded, described
 
-#: Size of a file in bytes from which no notes on its columns are made.
+#: File size in bytes. For files of this size and larger files, there are no notes about the columns.
 LARGEST_TABLE = 10**7
 
 
 class DataFile(BaseModel):
-    """A file that a campaign names. Its digest is stored when the campaign is read, and compared when it is used."""
+    """A file that a campaign names.
+
+    The digest of the file is stored when the campaign is read, and compared when the file is used.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     name: str
@@ -47,7 +50,7 @@ class DataFile(BaseModel):
         return decoded(self.read_bytes(), self.path)
 
     def notes(self) -> tuple[str, ...]:
-        """Return a note with the columns and ranges of a table; nothing for other files."""
+        """Return a note with the columns of a table and their ranges; no note for other files."""
         return _notes_of_file(self) if Path(self.path).stat().st_size < LARGEST_TABLE else ()
 
 

@@ -1,4 +1,4 @@
-"""Find the parameters of a case that are numbers, by the names of their coordinates in a store."""
+"""The parameters of a case that are numbers, by the names of their coordinates in a store."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from mdr_dask.models.data_file import DataFile
 
 
 def numbers_of(parameters: BaseModel, prefix: str = "") -> dict[str, tuple[float, str, str]]:
-    """Return value, unit and meaning of each number that has an effect; nested names are joined by ``_``."""
+    """Return value, unit and meaning of each parameter that is a number and has an effect.
+
+    The names of nested parameters are joined by ``_``.
+    """
     found: dict[str, tuple[float, str, str]] = {}
     idle = parameters.inactive if isinstance(parameters, Parameters) else {}
     for name, field in type(parameters).model_fields.items():

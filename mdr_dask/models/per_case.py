@@ -1,4 +1,7 @@
-"""Make the function `compute` of a model from a function that solves one case: the shortest way to your own model."""
+"""Make the function `compute` of a model from a function that solves one case.
+
+This is the shortest way to a model of your own.
+"""
 
 from __future__ import annotations
 
@@ -14,28 +17,29 @@ from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.models.base import Block, Result, Status
 
-#: Seconds after which a case raises TimeoutError, in a process that handles the alarm signal.
+#: Time in seconds after which a case raises TimeoutError, in a process that handles the alarm signal; None for no
+#: limit.
 time_limit: float | None = None
 
 Solve = Callable[[Any, np.random.Generator], Mapping[str, ArrayLike]]
 
 
 def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
-    """Return a function for ``Model(compute=...)`` that solves the cases of a block one after the other.
+    """Return a function for ``Model(compute=...)`` that solves the cases of a block one after another.
 
     Parameters
     ----------
     solve : callable, (parameters, random generator) -> mapping of output to number or array
-        Takes the parameters of one case, in SI, and the random numbers of a realisation, the same for all cases.
-        Returns every output of the model by name, and the error of an output that has one as ``<output>_error``.
-        A case has failed if `solve` raises anything, also SystemExit, or if an output is missing, is not a real number
-        or an array of them, is not finite (unless declared with ``allow_nan=True``) or has another shape than declared,
-        or if an error is negative.
+        Receives the parameters of one case, in SI units, and the random generator of a realisation; all cases of a
+        realisation have the same random numbers. Returns every output of the model by name. If an output has an error,
+        the error is returned as ``<output>_error``. A case has failed if `solve` raises any exception, even SystemExit,
+        or if an error is negative. It has also failed if an output is missing, is not a real number or an array of real
+        numbers, is not finite (unless declared with ``allow_nan=True``), or has a shape other than the declared one.
 
     Notes
     -----
-    If the outputs of two cases differ in shape, the function raises. The runner then computes the cases one by one and
-    compares each with the declared shapes.
+    If the outputs of two cases differ in shape, the function raises an exception. The runner then computes the cases
+    one by one and compares each with the declared shapes.
     """
 
     def compute(block: Block[Any]) -> Result:
@@ -66,7 +70,7 @@ def _stream(seed: int, realisation: int) -> np.random.Generator:
 
 
 def _limited(solve: Solve, parameters: Any, random: np.random.Generator) -> Any:
-    """Solve a case, with an alarm if there is a time limit."""
+    """Solve a case; if there is a time limit, an alarm interrupts the solution."""
     if time_limit is None:
         return solve(parameters, random)
     signal.setitimer(signal.ITIMER_REAL, time_limit)
@@ -77,16 +81,19 @@ def _limited(solve: Solve, parameters: Any, random: np.random.Generator) -> Any:
 
 
 def is_interrupt(error: BaseException) -> bool:
-    """Return whether an exception comes from Ctrl-C, which only the main thread receives, if it handles SIGINT."""
+    """Return whether an exception comes from Ctrl-C.
+
+    Only the main thread receives Ctrl-C, and only if it handles SIGINT.
+    """
     is_main = threading.current_thread() is threading.main_thread()
     return isinstance(error, KeyboardInterrupt) and is_main and signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
 
 
 def reason(error: BaseException) -> str:
-    """Return the text of an exception, the reason why a case failed."""
+    """Return the type and the text of an exception, as the reason why a case failed."""
     try:
         text = str(error)
-    except Exception:  # the exception class itself may have a fault
+    except Exception:  # the method that gives the text may itself be faulty
         text = ""
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
@@ -107,7 +114,8 @@ def real_numbers(name: str, value: Any) -> NDArray[np.float64]:
     Raises
     ------
     ValueError
-        If it is not a real number or an array of real numbers, but for example True, text or a quantity with a unit.
+        If the value is not a real number or an array of real numbers, but for example True, a text or a quantity with a
+        unit.
     """
     if type(value) is float:
         return np.asarray(value)

@@ -12,12 +12,13 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import distinguishable
 from mdr_dask.models.base import Alternatives, Block, Coordinate, Model, Number, Output, Parameters, deferred, quantity
 
-#: Contact modulus of steel on steel, with E = 210 GPa and nu = 0.3 for both.
+#: Contact modulus of steel on steel in Pa, with E = 210 GPa and nu = 0.3 for both bodies.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
 #: Relative error of the films if the campaign states no accuracy.
 ACCURACY = 1e-3
 
-#: Each dimensionless number, its dimensional counterpart, and the further parameters that the counterpart needs.
+#: Each dimensionless number with the dimensional quantity that can replace it, and the further parameters that this
+#: quantity needs.
 _PAIRS = (
     ("load_parameter", "line_load", ("radius",)),
     ("speed_parameter", "mean_velocity", ("radius", "viscosity")),
@@ -26,7 +27,7 @@ _PAIRS = (
 
 
 class EhlLineParameters(Parameters):
-    """A line contact by dimensionless numbers or by dimensional quantities: one of each pair."""
+    """A line contact, given by one parameter of each pair of a dimensionless number and a dimensional quantity."""
 
     renamed: ClassVar[Mapping[str, str]] = {
         "neighbours": "every case is solved alone, so leave it out",
@@ -74,7 +75,7 @@ class EhlLineParameters(Parameters):
 
     @model_validator(mode="after")
     def _one_of_each_pair(self) -> Self:
-        """Require one parameter of each pair, and the parameters that it needs."""
+        """Require exactly one parameter of each pair, and the further parameters that a dimensional quantity needs."""
         for number, dimensional, companions in _PAIRS:
             given = [name for name in (number, dimensional) if getattr(self, name) is not None]
             if len(given) != 1:
@@ -125,7 +126,7 @@ OUTPUTS = (
 
 
 def groups(lookup: Callable[[str], Any]) -> tuple[Any, Any, Any]:
-    """Return W, U and G from one quantity of each pair.
+    """Return W, U and G from the given parameter of each pair.
 
     Parameters
     ----------
@@ -152,7 +153,10 @@ distinct = deferred("mdr_dask.models.ehl_line.solve", "distinct")
 
 
 def seconds(block: Block[EhlLineParameters]) -> float:
-    """Return the estimated time of `compute`: about 6 ms per solution; the finest grid if a spike must be accurate."""
+    """Return the estimated time of `compute` in seconds.
+
+    A solution takes about 6 ms, but more if an accurate pressure spike requires the finest grid.
+    """
     accuracy = block.accuracy or ACCURACY
     is_sharp = block.accuracy is not None and {"pressure", "spike_pressure", "spike_position"} & set(block.outputs)
     each = 1.5 if is_sharp else 0.006 * float(np.clip((ACCURACY / accuracy) ** 0.4, 0.8, 30.0))
@@ -160,7 +164,9 @@ def seconds(block: Block[EhlLineParameters]) -> float:
 
 
 def memory(_: Block[EhlLineParameters]) -> float:
-    """Return the memory of one solution on the finest grid: about three dense matrices of 1281 nodes."""
+    """Return the memory, in bytes, of one solution on the finest grid: about three dense matrices of 1281 x 1281
+    numbers.
+    """
     return 3.0 * 8 * 1281**2
 
 

@@ -29,7 +29,7 @@ from mdr_dask.physics.lubrication.line_contact import (
 )
 from mdr_dask.physics.outcome import Outcome
 
-#: Outputs whose errors are relative to the half width, which is their unit.
+#: Outputs that are positions; their unit is the half width, and their errors are relative to the half width.
 _POSITIONS = {"minimum_position", "rupture_position", "spike_position"}
 
 
@@ -43,7 +43,7 @@ def _groups(block: Block[EhlLineParameters]) -> Groups:
 
 
 def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
-    """Return the dimensionless form of every case; equal ones share a solution."""
+    """Return the dimensionless form of every case; cases with equal dimensionless forms share a solution."""
     names = ("contact_modulus", "viscosity_law", "viscosity", "compressible", "inlet")
     columns = zip(*(block.column(name).tolist() for name in names), strict=True)
     return [
@@ -83,7 +83,7 @@ def highest_pressure(contact_modulus: float, W: float) -> float:
 def _estimates(
     case: EhlLineParameters, W: float, solution: LineSolution, outputs: Collection[str]
 ) -> dict[str, Estimate]:
-    """Return the requested outputs of a solution, each with its error, in their units."""
+    """Return the requested outputs of a solution and their errors, in the units of the outputs."""
     film, p0 = square_of_half_width(W), highest_pressure(case.contact_modulus, W)
     metres = film * (np.nan if case.radius is None else case.radius)
     place, readings = positions(case), _readings(case, W, solution.case)

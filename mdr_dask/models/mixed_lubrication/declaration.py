@@ -28,9 +28,10 @@ from mdr_dask.physics.lubrication.film_formulas import HertzLine, hertz_line
 from mdr_dask.physics.lubrication.oil import OILS, Oil
 
 Positive = Annotated[float, Field(gt=0)]
-#: Contact modulus of steel on steel, with E = 210 GPa and nu = 0.3 for both.
+#: Contact modulus of steel on steel in Pa, with E = 210 GPa and nu = 0.3 for both bodies.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
-#: Largest number of points of a line; least spacings per shortest wave, if the accuracy determines the points.
+#: Largest number of points of a line, and smallest number of spacings per shortest wave if the accuracy determines the
+#: points.
 MOST_POINTS, LEAST_PER_WAVE = 10**7, 2.5
 #: Number of shortest waves around a roller, if neither shortest_wavelength nor points are given.
 WAVES = 100_000
@@ -142,7 +143,7 @@ class MixedLubrication(Parameters):
         return 2 * float(np.pi) * self.roller_radius
 
     def source(self) -> Source:
-        """Return the source of the lines; it is equal for cases that can share lines."""
+        """Return the source of the lines. Cases with equal sources can share lines."""
         one, two = self.surface_1, self.surface_2
         if one is not None and two is not None and one.profile is not None and two.profile is not None:
             return Measured(one.profile, two.profile, self.rms_roughness is not None)
@@ -278,7 +279,7 @@ DRAWN = {output.name for output in OUTPUTS if output.dims}
 
 
 def coordinates(parameters: MixedLubrication) -> dict[str, Coordinate]:
-    """Return the angles of a trace and the positions, in half widths, of the profiles."""
+    """Return the coordinates of the outputs: angles of a trace, and positions of the profiles in half widths."""
     angles = 2 * np.pi * np.arange(parameters.trace_points) / parameters.trace_points
     return {
         "angle": Coordinate(angles, "rad", "rolling angle"),
@@ -286,7 +287,7 @@ def coordinates(parameters: MixedLubrication) -> dict[str, Coordinate]:
     }
 
 
-#: Parameters that change the lines; cases with equal values of these share their lines.
+#: Parameters on which the lines depend; cases with equal values of these parameters share their lines.
 OF_LINES = {
     *("points", "hurst", "longest_wavelength", "shortest_wavelength", "cutoff_force", "surface_1", "surface_2"),
     *("roller_radius", "roller_width", "contact_modulus"),
@@ -294,7 +295,10 @@ OF_LINES = {
 
 
 def seconds(block: Block[MixedLubrication]) -> float:
-    """Return the estimated time of a block, from numbers of lines, points, cases and films, creep, and profiles."""
+    """Return the estimated time of a block in seconds.
+
+    The time depends on the numbers of lines, points, cases and films, on creep, and on whether profiles are requested.
+    """
     millions = _expected_points(block) / 1e6
     creep = np.asarray(block.column("slide_roll_ratio"), dtype=np.float64) != 0
     of_case = np.where(creep, 0.012 + 0.06 * millions, 0.0025 + 0.011 * millions)
@@ -306,7 +310,10 @@ def seconds(block: Block[MixedLubrication]) -> float:
 
 
 def _expected_points(block: Block[MixedLubrication]) -> FloatArray:
-    """Return the points of every case; if the accuracy determines them, those for a usual boundary layer."""
+    """Return the expected points of every case.
+
+    If the accuracy determines the points, the number for a usual boundary layer is returned.
+    """
     per_wave = LEAST_PER_WAVE * max(1.0, float(0.033 / (block.accuracy or 0.01)) ** 0.28)
     columns = (block.column(name) for name in ("points", "shortest_wavelength", "roller_radius"))
     expected = np.empty(block.cases)

@@ -1,4 +1,7 @@
-"""The two rough lines of a case: generated, from measured surfaces, or measured; with the reasons for invalid input."""
+"""The two rough lines of a case, and the reasons why input is invalid.
+
+The lines are generated, generated with the spectra of measured surfaces, or measured.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ from mdr_dask.models.parts.surface import Surface, lines_of
 
 @dataclass(frozen=True)
 class _Random:
-    """Two lines with random phases; the parameters they have in common, without phases and spectra."""
+    """Base of pairs of lines with random phases: the parameters that both lines share, without spectra."""
 
     points: int
     longest: float  # harmonic number of the longest wavelength
@@ -50,9 +53,10 @@ class _Random:
         return _slope(self) / perimeter
 
     def lines(self, seed: int, realisation: int, other: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Return the least-squares splines of both lines; if `other`, the interpolating splines, which are less close.
+        """Return the least-squares splines of both lines, or, if `other`, the less accurate interpolating splines.
 
-        Both lines take their phases in turn from one random stream, so a shorter cut-off keeps the longer waves.
+        Both lines take their phases in turn from one random stream. So a shorter cut-off wavelength does not change the
+        longer waves.
         """
         from mdr_dask.physics.surfaces.splines import closest, through
 
@@ -104,7 +108,9 @@ class Generated(_Random):
 
 @dataclass(frozen=True)
 class OfSurfaces(_Random):
-    """Two lines with the spectra of measured surfaces, in m; realisations use several files in turn."""
+    """Two lines with the spectra of measured surfaces, in m. If a surface has several files, realisations use them in
+    turn.
+    """
 
     surface_1: Surface
     surface_2: Surface
@@ -155,7 +161,7 @@ class Measured:
         return np.inf
 
     def spacing(self, _: float) -> float:
-        """Return the distance between points in m, which is that of the files for any perimeter."""
+        """Return the distance between points in m, as in the files; it does not depend on the perimeter."""
         return line_of(self.file_1).spacing
 
     def problem(self, _: float) -> str:
@@ -166,15 +172,16 @@ class Measured:
         return ""
 
     def combined_rms(self) -> float:
-        """Return the rms height of both lines together, in m unless scaled."""
+        """Return the rms height of both lines together, in m, or in the unit of the scaled lines."""
         return float(np.sqrt(sum(np.mean(line**2) for line in self._pair())))
 
     def lines(self, seed: int, realisation: int, other: bool = False) -> tuple[FloatArray, FloatArray]:
         """Return interpolating splines of both lines; each begins at a random point of its ring.
 
-        With creep, one revolution of the mean surface covers 1 + S/2 of line 1 and 1 - S/2 of line 2. Means over
-        realisations are therefore unbiased only if both lines begin at random points. `other` gives splines through
-        every second point.
+        With the slide-roll ratio S, the contact passes 1 + S/2 times the length of line 1, and 1 - S/2 times the length
+        of line 2, in one revolution at the mean velocity. Means over
+        realisations are therefore unbiased only if both lines begin at random points. If
+        `other`, the splines pass through every second point.
         """
         from mdr_dask.physics.surfaces.splines import through_heights
 
@@ -197,7 +204,7 @@ class Measured:
         return np.add(*self.lines(seed, realisation, other))
 
     def _pair(self) -> tuple[FloatArray, FloatArray]:
-        """Return the lines without mean and tilt, so that the step between their ends is small."""
+        """Return the lines without mean and tilt, so that the step where the ends of a line meet is small."""
         from mdr_dask.physics.surfaces.measured import detrended, rms_height
 
         lines = [detrended(line_of(file).height[: self.points], "line") for file in (self.file_1, self.file_2)]

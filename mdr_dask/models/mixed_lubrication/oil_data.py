@@ -20,7 +20,7 @@ _TWO = ("temperature_1", "viscosity_1", "temperature_2", "viscosity_2")
 
 
 class OilData(Parameters):
-    """An oil by the numbers of its data sheet, or by a table of viscosities."""
+    """An oil, given by the numbers of its data sheet or by a table of viscosities."""
 
     alternatives: ClassVar[tuple[Alternatives, ...]] = ((_TWO, ("viscosities",)),)
     temperature_1: float | None = quantity(
@@ -55,7 +55,7 @@ class OilData(Parameters):
     @model_validator(mode="after")
     def _is_an_oil(self, info: ValidationInfo) -> OilData:
         self.require_one_alternative()
-        if self.viscosities is None or info.context is not None:  # a table is read only in a campaign, with context
+        if self.viscosities is None or info.context is not None:  # a table is read only in a campaign
             try:
                 walther_constants(*self.two_viscosities)
             except DataError as problem:
@@ -64,7 +64,9 @@ class OilData(Parameters):
 
     @property
     def two_viscosities(self) -> tuple[float, float, float, float]:
-        """Two temperatures in K, each followed by the kinematic viscosity in m^2/s, given or from the fitted law."""
+        """Two temperatures in K, each followed by its kinematic viscosity in m^2/s, which is given or follows from the
+        fit.
+        """
         if self.viscosities is not None:
             found = _fitted(self.viscosities, self.density, self.density_temperature)
             low, high = float(found.temperature[0]), float(found.temperature[-1])
@@ -102,7 +104,7 @@ class OilData(Parameters):
 
 
 class _Fit(NamedTuple):
-    """Temperatures of a table in K, ascending, constants of the law, and relative deviations of the viscosities."""
+    """The fit to a table: ascending temperatures in K, constants of the law, relative deviations of the viscosities."""
 
     temperature: FloatArray
     constants: tuple[float, float]
@@ -120,7 +122,7 @@ def _fitted(file: DataFile, density: float, density_temperature: float) -> _Fit:
     Raises
     ------
     DataError
-        If columns are missing, or the viscosities are not those of an oil.
+        If columns are missing, or the law cannot describe the viscosities.
     """
     text = file.read_text()
     is_dynamic = any(_is_dynamic(unit) for unit in read_sheet(text, file.name).units)

@@ -72,11 +72,14 @@ class Operation:
 
     @property
     def coarseness(self) -> float:
-        """Spacing of the points over the length ``slope/s`` of cut pieces of clusters that break the layer."""
+        """Spacing of the points divided by ``slope/s``, the length of the pieces of cut clusters that break the layer.
+
+        Here `slope` is the rms slope and s the layer strength.
+        """
         return self.spacing * self.strength / self.source.slope(self.case.perimeter)
 
     def on(self, source: Source) -> Operation:
-        """Return the case with another source, which has the same lines on other points."""
+        """Return the case with another source, which gives the same lines at another number of points."""
         return replace(self, source=source)
 
     def pair(self, lines: tuple[FloatArray, FloatArray]) -> breakthrough.Pair:
@@ -85,7 +88,7 @@ class Operation:
 
     @property
     def squares(self) -> float:
-        """Number of squares, with the longest wavelength as edge, across the width of the rollers.
+        """Number of squares across the width of the rollers; the edge of a square is the longest wavelength.
 
         One line represents one square.
         """
@@ -98,12 +101,12 @@ class Operation:
 
 
 def operation_of(case: MixedLubrication, accuracy: float | None = None) -> Operation:
-    """Return the smooth contact and the film of a case; they do not depend on other cases of a block.
+    """Return the smooth contact and the film of a case; the result does not depend on other cases of a block.
 
     Raises
     ------
     NoFilmError
-        If the EHL solution is requested but has not been found.
+        If the film of the EHL solution is requested, but the solution fails.
     """
     data, source = case.oil_data(), case.source()
     viscosity = float(data.dynamic(case.temperature))
@@ -141,7 +144,7 @@ def _radius(case: MixedLubrication) -> float:
 
 
 def _mean_pressure(case: MixedLubrication) -> float:
-    """Return the normal force over the area of the Hertzian contact in Pa."""
+    """Return the mean pressure in Pa: the normal force divided by the area of the Hertzian contact."""
     return case.normal_force / (2 * float(case.dry_contact(case.normal_force).half_width) * case.roller_width)
 
 
@@ -169,7 +172,7 @@ def _shared_load(
 def _film_of(
     case: MixedLubrication, viscosity: float, alpha: float, accuracy: float
 ) -> tuple[Callable[[float], Film], str]:
-    """Return the film as a function of its load share, and a warning if a formula is outside its range."""
+    """Return a function that gives the film for its load share, and a warning if the formula is outside its range."""
     E_star, radius = case.contact_modulus, _radius(case)
     velocity = case.rotation_speed * case.roller_radius
     line_load = case.normal_force / case.roller_width
@@ -194,7 +197,9 @@ def _film_of(
 
 @lru_cache(maxsize=1024)
 def _solved(contact: line_contact.LineContact, accuracy: float) -> Film:
-    """Return the central film of the EHL solution in ``a^2/R`` and its relative error; cached for all realisations."""
+    """Return the central film of the EHL solution in units of ``a^2/R``, and its relative error; cached for all
+    realisations.
+    """
     solution = line_contact.solve_film(contact, accuracy)
     if solution.outcome == Outcome.FILM_COLLAPSED:
         return Film(0.0)  # the film is too thin for the grids; nearly all load will be on the asperities
@@ -215,7 +220,7 @@ def fixed_values(operation: Operation) -> dict[str, float]:
     }
     errors = dict.fromkeys(values, 0.0)
     if error > 0:
-        # the error of the film changes the asperity load: take the load for a film that is thinner by this error
+        # error of the asperity load: its change if the film is thinner by the film's error
         asperities = Asperities(operation.rms, operation.case.longest(), operation.case.contact_modulus)
         loaded = asperities.pressure(film * (1 - error)) / _mean_pressure(operation.case)
         errors = {
@@ -234,7 +239,7 @@ def fixed_values(operation: Operation) -> dict[str, float]:
 
 
 def friction(operation: Operation, film: float, asperity_share: float) -> float:
-    """Return the coefficient of friction: boundary friction of the asperities plus shear of the film between them."""
+    """Return the coefficient of friction: boundary friction of the asperities plus shear of the film."""
     case = operation.case
     sliding = case.slide_roll_ratio * case.rotation_speed * case.roller_radius
     if sliding == 0:

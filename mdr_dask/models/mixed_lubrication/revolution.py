@@ -19,7 +19,7 @@ from mdr_dask.physics.surfaces.splines import heights
 
 #: Relative error if the campaign states no accuracy.
 ACCURACY = 0.01
-#: Errors of smaller probabilities are judged relative to this probability, because a probability of 0 is normal.
+#: The error of a probability below this value is relative to this value, because a probability of 0 is normal.
 FLOOR = 0.1
 #: Outputs that follow from the lengths in contact of the windows.
 OF_LENGTH = {
@@ -30,19 +30,22 @@ OF_LENGTH = {
     "upper_profile",
     "lower_profile",
 }
-#: With creep, windows follow at an eighth of their width; closer windows would have nearly the same contact.
+#: Windows per window width in rolling with creep. Windows at a smaller distance would have nearly the same contact.
 STRIDES = 8
-#: Largest number of parts of a revolution. The other spline is compared in a quarter of the parts, but at least in 4.
+#: `PARTS` is the largest number of parts of a revolution. The other spline is computed in the fraction 1/`SAMPLE` of
+#: the parts, but in at least `FEWEST` parts.
 PARTS, SAMPLE, FEWEST = 16, 4, 4
-#: Ratio of the error to the standard deviation of the changes among parts.
+#: Factor on the standard deviation, among parts, of the changes between the two splines, in the estimated error.
 SCATTER = 0.75
-#: Number of clusters near breaking that are judged wrongly, times (points per shortest wave)^(3/2).
+#: Number of clusters close to breaking for which all splines give the wrong result, times (points per shortest
+#: wave)^(3/2).
 CLUSTERS = 18.0
-#: First guess of the error at the fewest points, 0.2 r^0.6, where r is the length of the shortest wave over that of the
-#: pieces that break; and the order at which the error falls with the spacing. It only sets the points of the first
-#: line; the error itself is estimated from results.
+#: First guess of the error with the fewest points: `FIRST` r^`COARSE`, where r is the length of the shortest wave
+#: divided by the length of the pieces that break the layer. `ORDER` is the order with which the error falls with the
+#: spacing. The guess only sets the points of the first line; the stated error is estimated from results.
 FIRST, COARSE, ORDER = 0.2, 0.6, 3.6
-#: Points grow in steps of a quarter of an octave, so that cases can share lines, up to four times the first number.
+#: The number of points increases in `STEPS` steps per factor of two, so that cases can share lines, up to `MOST_TIMES`
+#: times the first number.
 STEPS, MOST_TIMES = 4, 4
 
 
@@ -61,7 +64,8 @@ class Revolution:
     apart : int
         Number of time steps after which the window no longer overlaps the first one.
     parts : int
-        Number of parts in which contact is counted; each is at least two windows long.
+        Number of parts of the revolution in which contact is counted. A part is at least two windows long, unless there
+        is only one part.
     overlaps : bool
         Whether the lines overlap anywhere.
     """
@@ -100,21 +104,21 @@ class Revolution:
     def errors(self, other: Revolution) -> FloatArray:
         """Return the errors of the probability and of the length in m.
 
-        They follow from the change to another spline through the same waves in the first parts of the revolution. Two
-        errors that this change does not show are added: contact begins and ends between two time steps, and all splines
-        may judge a cluster near breaking wrongly.
+        The errors follow from the difference to a revolution with another spline of the same waves, in the first parts
+        of the revolution. Two errors that this difference does not show are added: contact begins and ends between two
+        time steps, and all splines may give the wrong result for a cluster close to breaking.
         """
         changes = self._means()[:, : other.parts] - other._means()
         change = np.abs(changes.mean(axis=1))
         if self.parts >= FEWEST:
             change += SCATTER * changes.std(axis=1, ddof=1)
-        steps = 2 * np.sqrt(self._counts.ends.sum() / 12)  # two standard errors of all ends, each uniform in a step
+        steps = 2 * np.sqrt(self._counts.ends.sum() / 12)  # two standard errors; each end is uniform in its step
         clusters = CLUSTERS / self.per_wave**1.5 * self.apart if self.overlaps else 0.0
         in_contact = self.length / self.probability if self.length else self.spacing * min(self.per_wave, STRIDES)
         return np.asarray(change + (steps + clusters) / self.contact.size * np.array([1, in_contact]))
 
     def sizes(self) -> dict[str, float]:
-        """Return the sizes that divide the errors of probability and length; for rare contact they have a floor."""
+        """Return the values to which the errors of probability and length are relative; they have a lower limit."""
         probability = max(self.probability, FLOOR)
         length = self.length * probability / self.probability if self.length else np.inf
         return {"breakthrough_probability": probability, "contact_length": length}
@@ -126,7 +130,10 @@ class Revolution:
 
 
 def _course(operation: Operation, points: int, sample: bool) -> tuple[float, float, int, int]:
-    """Return spacing, window width in nodes, positions and parts of a revolution; if `sample`, of its first parts."""
+    """Return the spacing in m, the window width in spacings, and the numbers of positions and parts of a revolution.
+
+    If `sample`, the positions and parts are those of the first parts of the revolution.
+    """
     spacing = operation.length / points
     parts = whole = max(1, min(PARTS, int(operation.length / (2 * operation.width))))
     if sample:
@@ -148,7 +155,7 @@ def creeping(operation: Operation, lines: tuple[FloatArray, FloatArray], sample:
     """Return a revolution with creep, or its first parts if `sample`, from the splines of both lines."""
     spacing, width, positions, parts = _course(operation, lines[0].size, sample)
     stride = max(1, int(width / STRIDES))
-    begin = stride // 2 if sample else 0  # shifted, so that the change includes the error of the window positions
+    begin = stride // 2 if sample else 0  # shifted, so that the difference includes the error of the window positions
     steps = np.arange(begin, positions, stride)
     starts = breakthrough.creep_positions(steps, lines[0].size, operation.case.slide_roll_ratio)
     contact = breakthrough.judge_windows(operation.pair(lines), width, starts, operation.case.edge_rule)
@@ -162,7 +169,7 @@ def values(
 ) -> dict[str, float]:
     """Return the requested scalar outputs of a realisation and their errors.
 
-    Conductance and resistance apply to the whole width, in which the squares conduct in parallel.
+    Conductance and resistance are those of the whole roller width, across which the squares conduct in parallel.
     """
     specific = operation.case.resistivity / operation.squares
     length = revolution.length
@@ -202,7 +209,7 @@ def trace(
 def profiles(
     operation: Operation, revolution: Revolution, lines: tuple[FloatArray, FloatArray]
 ) -> dict[str, FloatArray]:
-    """Return both surfaces around the contact, at the moment with the largest length in intimate contact."""
+    """Return both surfaces around the contact, at the time step with the largest length in intimate contact."""
     case, points = operation.case, operation.source.points
     steps = np.linspace(0, points, revolution.contact.size, endpoint=False)
     starts = breakthrough.creep_positions(steps[[np.argmax(revolution.contact)]], points, case.slide_roll_ratio)
@@ -218,7 +225,10 @@ def profiles(
 
 
 def with_first_points(operation: Operation, accuracy: float | None) -> Operation:
-    """Return the case with the points that layer and shortest wave are expected to need, unless points are given."""
+    """Return the case with the expected number of points; a number that the user gives is not changed.
+
+    The expected number follows from the strength of the layer and the shortest wave.
+    """
     source = operation.source
     if isinstance(source, Measured) or operation.case.points != "auto":
         return operation
@@ -233,7 +243,7 @@ def with_more_points(
     accuracy: float | None,
     outputs: Collection[str],
 ) -> Operation | None:
-    """Return the case with more points if its revolution misses the accuracy and more are allowed; otherwise None."""
+    """Return the case with more points if its revolution misses the accuracy and more points are allowed, else None."""
     here = operation.source
     if accuracy is None or isinstance(here, Measured) or operation.case.points != "auto":
         return None
@@ -250,7 +260,7 @@ def with_more_points(
 
 
 def _on(operation: Operation, times: float) -> Operation:
-    """Return the case with at least `times` the fewest points, rounded up to a step and a fast length for FFTs."""
+    """Return the case with at least `times` times the fewest points, rounded up to a step and a fast FFT length."""
     from scipy.fft import next_fast_len
 
     assert not isinstance(operation.source, Measured)

@@ -18,11 +18,11 @@ from mdr_dask.models.mixed_lubrication.operation import NoFilmError, Operation, 
 from mdr_dask.models.mixed_lubrication.revolution import Revolution
 from mdr_dask.models.parts.accuracy import missed_accuracy
 
-#: Below this film ratio, overlapping asperities merge into clusters that do not break.
+#: Film ratio below which overlapping asperities merge into large clusters that do not break the layer.
 LEAST_FILM_RATIO = 0.5
-#: Outputs for which the rough lines are computed.
+#: Outputs that need the rough lines.
 _OF_LINES = {"breakthrough_probability", "revolution_error"} | revolution.OF_LENGTH
-#: Magnitude of an output below which its error is absolute.
+#: Outputs, each with a magnitude. If the output is smaller, its error is relative to this magnitude.
 _FLOORS = {"asperity_load_share": 1.0}
 _PROFILES = {"upper_profile", "lower_profile"}
 _ELECTRICAL = {"contact_conductance", "contact_resistance"}
@@ -114,7 +114,7 @@ def _realise(
     members: list[tuple[int, Operation]],
     position: int,
 ) -> None:
-    """Compute one realisation of all cases that share lines; repeat those that miss the accuracy on more points."""
+    """Compute one realisation of all cases that share lines; repeat cases that miss the accuracy with more points."""
     drawn = block.seed, block.realisations[position]
     lines, together = cache(partial(source.lines, *drawn)), cache(partial(source.together, *drawn))
 

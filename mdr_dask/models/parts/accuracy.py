@@ -1,8 +1,8 @@
-"""The check whether results meet the accuracy of a campaign, and the message if not: one rule for all models.
+"""The check whether results meet the accuracy of a campaign, and the message if they do not; equal for all models.
 
-The error of an output is relative to its value. For a profile or a history, the largest error is relative to the
-largest value. For an output that can be zero, the model gives a floor: an absolute value to which the error is relative
-if the output is smaller.
+The relative error of an output is its error divided by its value. For a profile or a history, it is the largest error
+divided by the largest value. For an output that can be zero, the model gives a floor, which is an absolute value. If
+the output is smaller than the floor, the error is divided by the floor.
 """
 
 from __future__ import annotations
@@ -24,9 +24,10 @@ def relative_errors(
     Parameters
     ----------
     values, errors : mapping of str to array, shape (cases, ...)
-        Results and their absolute errors by output; entries where either is NaN are ignored.
+        Results and their absolute errors, by the name of the output. Entries are ignored where the result or the error
+        is NaN.
     floors : mapping of str to array, shape (cases,), or float
-        Absolute values by output to which the error is relative if the result is smaller.
+        Absolute values by the name of the output. If the result is smaller, its error is relative to this value.
     """
     found = {}
     for name, value in values.items():
@@ -49,7 +50,7 @@ def missed_accuracy(
     floors: Mapping[str, ArrayLike] | None = None,
     where: str = "",
 ) -> dict[int, str]:
-    """Return a message for every case with an output that misses the accuracy, by the index of the case.
+    """Return messages, by the index of the case, for all cases with outputs that miss the accuracy.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ def missed_accuracy(
     accuracy : float
         Allowed relative error of every output.
     where : str
-        Added to the message, such as ``" on the finest grid"``.
+        Text that is added to the message, such as ``" on the finest grid"``.
     """
     shares = relative_errors(values, errors, floors)
     late = np.flatnonzero(np.any([~(share <= accuracy) for share in shares.values()], axis=0)) if shares else ()
@@ -66,7 +67,7 @@ def missed_accuracy(
 
 
 def missed(shares: Mapping[str, float], accuracy: float, where: str = "") -> str:
-    """Return the message about the outputs that miss an accuracy, or an empty string if there are none."""
+    """Return a message about the outputs that miss an accuracy, or an empty string if all outputs reach it."""
     named = [f"{name} by {_amount(share, accuracy)}" for name, share in shares.items() if share > accuracy]
     return f"an accuracy of {accuracy:.12g} is missed{where}: {', '.join(named)} (estimated)" if named else ""
 

@@ -1,4 +1,4 @@
-"""Heights from files of instruments and users: maps and line scans, as text, numpy arrays or in instrument formats."""
+"""Heights of maps and line scans from files: text, numpy arrays, or the formats of instruments."""
 
 from __future__ import annotations
 
@@ -21,13 +21,16 @@ if TYPE_CHECKING:
 #: File name extensions of text tables and of workbooks.
 TEXT = (".csv", ".txt", ".dat", ".xyz", ".asc", ".tsv", ".grd", ".prn", ".xlsx")
 SAME = 0.01
-"""Relative difference up to which two lengths count as equal: numbers in files are rounded, and positions vary."""
+"""Relative difference up to which two lengths count as equal, because numbers in files are rounded."""
 MOST_COLUMNS = 6
-"""Largest number of columns of a line scan or a table of x, y, z, including further columns; a map has more."""
+"""Largest number of columns in a file that holds a line scan or a table of x, y, z; a map has more columns."""
 
 
 class Units(NamedTuple):
-    """Units of heights and positions, and distances between points, m; empty if they are not stated."""
+    """Units of heights and positions, and distances between points in m.
+
+    A unit that is not stated is empty, and a distance that is not stated is None.
+    """
 
     height: str = ""
     position: str = ""
@@ -51,7 +54,7 @@ class Scan(NamedTuple):
 
 
 class _Grid(NamedTuple):
-    """Heights in the unit of the file, rows along x, and steps of the positions along x and y in their own unit."""
+    """Heights in the unit of the file, with rows along x, and the steps along x and y in the unit of the positions."""
 
     rows: FloatArray
     steps: tuple[float | None, float | None] = (None, None)
@@ -62,7 +65,7 @@ class _Grid(NamedTuple):
 def read_map(file: DataFile, units: Units) -> Recorded:
     """Return the heights of a map.
 
-    Units and spacings stated in the file are used. Rows of text and npy files run along x and are stacked along y.
+    Units and spacings that the file states are used. Rows of text and npy files run along x and are stacked along y.
 
     Parameters
     ----------
@@ -74,7 +77,7 @@ def read_map(file: DataFile, units: Units) -> Recorded:
     Raises
     ------
     DataError
-        If the file holds no map, if a unit or spacing is missing, or if statements of file and user differ.
+        If the file holds no map, if a unit or spacing is missing, or if the file and the user state different values.
     """
     from mdr_dask.physics.surfaces.maps import SurfaceMap
 
@@ -103,7 +106,7 @@ def read_scan(file: DataFile, units: Units) -> Scan:
     Raises
     ------
     DataError
-        If the file does not hold a line, if a unit is missing, or if statements of file and user differ.
+        If the file holds no line, if a unit is missing, or if the file and the user state different values.
     """
     import numpy as np
 
@@ -154,7 +157,7 @@ def dimensions(file: DataFile) -> int:
 
 
 def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[float, float]]:
-    """Return the unit of the heights and the spacings along x and y, in m, from the statements of file and user."""
+    """Return the unit of the heights and the spacings along x and y, all in m, as stated by the file or the user."""
     height = _one_unit(file, "unit", grid.stated.height, units.height)
     position = _one_unit(file, "x_unit", grid.stated.position, units.position)
     metre = _metre(file, position, "x_unit") if position else _implied_unit(file, grid.steps, units)
@@ -185,7 +188,10 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
 
 
 def _implied_unit(file: DataFile, steps: tuple[float | None, float | None], units: Units) -> float | None:
-    """Return the unit of positions, m, a power of ten that follows from the spacing stated by the user."""
+    """Return the unit of the positions in m, a power of ten that follows from the spacing stated by the user.
+
+    Return None if no power of ten agrees with this spacing.
+    """
     import math
 
     for step, spacing in zip(steps, (units.spacing, units.spacing_y or units.spacing), strict=True):
@@ -201,7 +207,7 @@ def _implied_unit(file: DataFile, steps: tuple[float | None, float | None], unit
 
 
 def _one_unit(file: DataFile, option: str, stated: str, given: str) -> str:
-    """Return the unit stated by the file or by the user; raise DataError if both are given and differ."""
+    """Return the unit stated by the file or by the user; raise DataError if both state units and these differ."""
     if stated and given and abs(_metre(file, stated, option) / _metre(file, given, option) - 1) > SAME:
         raise DataError(f"{file.name}: the file says {stated}, got {given!r}: leave out `{option}` or correct the file")
     return stated or given
@@ -220,7 +226,7 @@ def _channel(file: DataFile) -> Any:
 
     This module reads text files in which SurfaceTopography finds no unit.
     """
-    file.read_bytes()  # raises an error if the file has changed
+    file.read_bytes()  # to raise an error if the file has changed
     is_text = file.name.lower().endswith(TEXT)
     try:
         import SurfaceTopography
@@ -230,7 +236,7 @@ def _channel(file: DataFile) -> Any:
         raise DataError(f"{file.name}: this format needs SurfaceTopography: pip install 'mdr_dask[formats]'") from None
     try:
         channel = SurfaceTopography.open_topography(file.path).default_channel
-    except Exception as problem:  # its readers raise errors of many types
+    except Exception as problem:  # the readers raise errors of many types
         if is_text:
             return None
         reason = type(problem).__name__
@@ -318,8 +324,8 @@ def _without_positions(file: DataFile, rows: FloatArray, stated: Units, remarks:
 def _stated(file: DataFile, head: list[str], first: str) -> Units:
     """Return the units and spacings stated in the lines before the heights, or in a corner cell such as ``y [um]``.
 
-    If a line ends in a unit of length, it states the unit of the quantity it names; if it names a spacing, it states
-    its value.
+    A line that names heights or positions and ends in a unit of length states the unit of this quantity. A line that
+    names a spacing states the value of the spacing.
     """
     corner = re.split(r"[\t;,]", first)[0]
     head = [*head, f"position {corner}"] if re.search(r"[\[(]", corner) else head
@@ -334,7 +340,7 @@ def _stated(file: DataFile, head: list[str], first: str) -> Units:
         if number and names & {"spacing", "pitch", "pixel", "step", "dx", "dy", "distance"}:
             key = "spacing_y" if names & {"y", "dy"} and not names & {"x", "dx"} else "spacing"
             found.setdefault(key, {})[f"{words[-2]} {words[-1]}"] = line
-        elif not number and bool(along) != bool(upwards):  # a line with both names lists the columns
+        elif not number and bool(along) != bool(upwards):  # a line that names heights and positions lists the columns
             found.setdefault("position" if along else "height", {})[words[-1]] = line
         elif not number and "unit" in names:
             found.setdefault("height", {})[words[-1]] = line
@@ -356,7 +362,7 @@ def _is_length(unit: str) -> bool:
 
 
 def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
-    """Return the numeric rows of a text as a table, NaN for words, and the index of the first such line."""
+    """Return the numeric rows of a text as a table, with NaN for words, and the index of the first numeric line."""
     import pandas as pd
 
     kept = [line for line in lines if line.strip() and line.lstrip()[0] not in "#%"]
@@ -378,14 +384,14 @@ def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
     common = max(set(stripped), key=stripped.count, default=0)
 
     def cells_of(line: str) -> list[str]:
-        """Return the entries of a row; an empty last entry is a missing point, unless the row is longer than others."""
+        """Return the entries of a row; an empty last entry is a missing point, unless the row is too long."""
         cells = line.split(separator)
         while len(cells) > common and not cells[-1].strip():
             cells.pop()
         return cells
 
     width = [len(cells_of(line)) for line in kept[first : last + 1]]
-    while width and width[0] != common:  # skips numbers in the preamble
+    while width and width[0] != common:  # skip numbers in the preamble
         first, width = first + 1, width[1:]
     try:
         table = pd.read_csv(
@@ -438,7 +444,7 @@ def _esri(file: DataFile, lines: list[str]) -> _Grid:
     return _Grid(rows[::-1], (step, step))
 
 
-#: Columns of a table of points of a map.
+#: Columns of a table that holds the points of a map.
 COORDINATES = (
     Column("x", "m"),
     Column("y", "m", ("Y",)),
@@ -447,9 +453,9 @@ COORDINATES = (
 
 
 def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame) -> tuple[tuple[int, str], ...]:
-    """Return index and unit of the columns x, y and z of a table, from their names; empty if any is missing.
+    """Return index and unit of the columns x, y and z of a table, from their names; empty if a column is missing.
 
-    Without names, they are the three columns that remain after those with row numbers are left out.
+    Without names, x, y and z are the three columns that do not hold row numbers.
     """
     try:
         sheet = read_sheet("\n".join(lines[: first + 10]), file.name)
@@ -497,7 +503,10 @@ def _spaced(file: DataFile, height: FloatArray, units: Units) -> FloatArray:
 
 
 def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]:
-    """Return positions and heights, m, of a table, found by column names or, without names, by the numbers in them."""
+    """Return positions and heights, m, of a table.
+
+    The columns are found by their names, or, without names, by their numbers.
+    """
     text = file.read_text()
     sheet = read_sheet(text, file.name)
     if sheet.names:

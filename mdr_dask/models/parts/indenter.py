@@ -20,7 +20,7 @@ class Plane(Parameters):
     shape: Literal["plane"] = "plane"
 
     def line(self) -> None:
-        """Return None, because there is no shape besides the roughness."""
+        """Return None, because a plane has no shape besides the roughness."""
 
 
 class _PowerLaw(Parameters):
@@ -72,7 +72,7 @@ class Power(_PowerLaw):
 
 
 class RoundedCone(Parameters):
-    """A cone with a rounded tip; the slope is continuous where they meet."""
+    """A cone with a rounded tip; the slope is continuous where the tip meets the cone."""
 
     shape: Literal["rounded_cone"]
     angle: float = quantity("rad", "angle between the cone's surface and the plane", gt=0, lt=np.pi / 2)

@@ -21,7 +21,7 @@ Numbers = Annotated[tuple[float, ...], Field(strict=False)]
 
 
 class Jump(Parameters):
-    """One jump of the velocity by `velocity_change` out of steady sliding."""
+    """A single jump of the velocity by `velocity_change`; before the jump, sliding is steady."""
 
     shape: Literal["jump"] = "jump"
 
@@ -49,7 +49,7 @@ class Steps(_History):
 
 
 class Ramp(_History):
-    """Velocity and load that change linearly from t = 0 for a duration, and are constant afterwards."""
+    """Velocity and load that change linearly, from t = 0, during a given time, and are constant afterwards."""
 
     shape: Literal["ramp"]
     duration: float = quantity("s", "time that the ramp takes", usual="4 ms", gt=0)
@@ -67,7 +67,7 @@ class Oscillation(_History):
 
 
 class TableFile(_History):
-    """Velocity and load from a table, linear between its rows; two rows at the same time are a jump."""
+    """Velocity and load from a table, interpolated linearly between its rows; two rows with equal times give a jump."""
 
     shape: Literal["table"]
     file: NamedFile = Field(description="table with columns time, velocity and optionally force")
@@ -96,12 +96,14 @@ def _check_rows(times: tuple[float, ...], velocities: tuple[float, ...], forces:
 
 
 def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> tuple[tuple[float, float], list[Piece]]:
-    """Return velocity and normal force before t = 0, and the pieces of the history from t = 0 on, without an end.
+    """Return velocity and normal force before t = 0, and the pieces of the history from t = 0 on.
+
+    The last piece has no end.
 
     Raises
     ------
     DataError
-        If a table is not a loading history, or contradicts the state before t = 0.
+        If a table is not a loading history, or if it contradicts the state before t = 0.
     """
     from mdr_dask.physics.transients.elements.loading_history import Piece
 

@@ -21,14 +21,14 @@ Numbers = Annotated[tuple[float, ...], Field(strict=False)]
 
 
 class Kelvin(Parameters):
-    """A spring and a dashpot side by side."""
+    """A spring and a dashpot in parallel."""
 
     shear_modulus: float = quantity("Pa", "shear modulus G", usual="10 MPa", gt=0)
     relaxation_time: float = quantity("s", "relaxation time tau = eta / G", usual="1 ms", gt=0)
 
 
 class StandardSolid(Parameters):
-    """A spring beside one Prony term."""
+    """A spring and one Prony term in parallel."""
 
     static_modulus: float = quantity("Pa", "shear modulus of slow deformation", usual="3 MPa", gt=0)
     glass_modulus: float = quantity(
@@ -38,7 +38,7 @@ class StandardSolid(Parameters):
 
 
 class PronySeries(Parameters):
-    """A spring beside any number of Prony terms, with or without a dashpot."""
+    """A spring and any number of Prony terms in parallel, with or without a dashpot."""
 
     static_modulus: float = quantity("Pa", "shear modulus of slow deformation", usual="3 MPa", gt=0)
     moduli: Numbers = quantity("Pa", "shear modulus of each Prony term", usual="10 MPa")
@@ -64,7 +64,7 @@ class PowerLaw(Parameters):
 
 
 KINDS = ("kelvin", "standard_solid", "prony", "power_law", "dma_table")
-SOFTEST, STIFFEST = 100.0, 1e12  # range of the shear moduli of solids, Pa: from a gel to above diamond
+SOFTEST, STIFFEST = 100.0, 1e12  # range of the shear moduli of solids in Pa, from a gel to above diamond
 LAWS = ("wlf", "arrhenius", "shift_factors")
 
 
@@ -86,7 +86,7 @@ class Material(Parameters):
 
     @property
     def law(self) -> Law | None:
-        """The law that describes how relaxation times depend on the temperature, or None."""
+        """The law of the temperature dependence of the relaxation times, or None if no law is given."""
         return self.wlf or self.arrhenius or self.shift_factors
 
     @model_validator(mode="after")
@@ -128,7 +128,9 @@ def solid_of(material: Material) -> LinearSolid:
 
 
 def _shift(material: Material) -> float | None:
-    """Return the factor of relaxation times from the temperature of the data to the temperature of the material."""
+    """Return the factor by which relaxation times change from the temperature of the data to the material's
+    temperature.
+    """
     law, temperature = material.law, material.temperature
     if law is None or temperature is None:
         return None
@@ -199,7 +201,7 @@ def frequencies(material: Material) -> tuple[float, float] | None:
 
 
 def fit_notes(material: Material | None) -> tuple[str, ...]:
-    """Return a note with the error of the Prony series fitted to a power law or a table, if there is one."""
+    """Return a note with the error of the Prony series fitted to a power law or a table, if a series was fitted."""
     fit = None if material is None else _fit_of(material)
     if material is None or fit is None:
         return ()

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class ProfileFile(NamedByFile):
-    """A measured line, given by a file name alone or with options."""
+    """A measured line, given by a file name, or by a file name with options."""
 
     file: NamedFile = Field(
         description="two columns x, z; other formats are read by SurfaceTopography if it is installed"
@@ -46,7 +46,9 @@ class ProfileFile(NamedByFile):
         return self
 
     def notes(self) -> tuple[str, ...]:
-        """Return notes with points, length, rms height and rms slope of the line, and with remarks about the file."""
+        """Return a note with points, length, rms height and rms slope of the line, and notes with remarks about the
+        file.
+        """
         remarks = (*_scan(self).remarks, *doubts_of_line(line_of(self), self.detrend))
         return (_statistics(self), *(f"profile {self.file.name}: {remark}" for remark in remarks))
 

@@ -1,4 +1,4 @@
-"""Tables of a dynamic mechanical analysis as parameters, and the curve of moduli that follows from a table."""
+"""Parameters of a table from a dynamic mechanical analysis, and the curve of moduli that follows from the table."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from mdr_dask.models.parts.temperature import Law
 from mdr_dask.tables import Column, Read, TableError, is_called, plain, read_sheet, read_table
 from mdr_dask.units import shown
 
-#: Names of columns of moduli in tension, after `plain`.
+#: Names of columns that hold moduli in tension; the names are first simplified by `plain`.
 _IN_TENSION = re.compile(r"(?<!\w)e(?:'|1|[ _]?stor|$)|young|tensile|tension")
-SAME_TEMPERATURE = 1.0  # K; temperatures of one curve scatter by less
-#: Gap between the moduli of neighbouring curves, in decades, that cannot be due to the scatter of an instrument.
+SAME_TEMPERATURE = 1.0  # largest scatter, in K, of the temperatures of one curve
+#: Gap between the moduli of neighbouring curves, in decades; a wider gap cannot be due to the scatter of an instrument.
 APART = 0.02
 
 
@@ -90,7 +90,9 @@ class Moduli:
 
 
 def one_curve(chosen: ModulusTable, law: Law | None) -> Moduli:
-    """Return the shear moduli of a table at one temperature; several temperatures are superposed unless one is chosen.
+    """Return the shear moduli of a table at one temperature.
+
+    The curves of several temperatures are superposed, unless the user chooses one temperature.
 
     Raises
     ------
@@ -152,7 +154,7 @@ def _by_law(
 def _by_curves(
     reference: float, law: Law | None, rows: Rows, member: IntArray, levels: FloatArray, ends: tuple[float, float]
 ) -> Moduli:
-    """Return the moduli of all temperatures, shifted to the reference so that the curves of both moduli overlap."""
+    """Return the moduli of all temperatures, shifted to the reference temperature so that the curves overlap."""
     _require_overlap(rows[1], member, levels)
     across, along, text = _superposed(reference, tuple(levels), member.tobytes(), *(each.tobytes() for each in rows))
     omega, storage, loss = rows
@@ -165,7 +167,7 @@ def _by_curves(
 def _superposed(
     reference: float, levels: tuple[float, ...], member: bytes, *rows: bytes
 ) -> tuple[FloatArray, FloatArray, str]:
-    """Return horizontal and vertical shift factors of each temperature, and a text about them."""
+    """Return horizontal and vertical shift factors of each temperature, and a text about these factors."""
     from mdr_dask.physics.superposition.master_curve import rereference, superpose
 
     points, groups = np.log10([np.frombuffer(row) for row in rows]), np.frombuffer(member, dtype=np.intp)
@@ -184,7 +186,7 @@ def _superposed(
 
 
 def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, reference: float) -> str:
-    """Return a text with the largest difference between the shift factors from the curves and those of a law."""
+    """Return a text with the largest difference between shift factors from the curves and shift factors from a law."""
     if law is None:
         return ""
     try:

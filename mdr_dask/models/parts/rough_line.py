@@ -1,4 +1,7 @@
-"""The roughness of a line: generated, generated with the spectrum of a measured surface, measured, or none."""
+"""The roughness of a line, in one of four kinds.
+
+It is self-affine, generated with the spectrum of a measured surface, measured, or absent.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ class Generated:
 
     hurst: float
     points: int
-    rolloff: float  # harmonic number: length over wavelength, 0 for no limit
+    rolloff: float  # harmonic number, the length divided by the roll-off wavelength; 0 for no roll-off
     longest: float
     is_random = True
 
@@ -34,7 +37,7 @@ class Generated:
 
 
 def _with_random_phases(amplitude: FloatArray, points: int, seed: int, realisation: int) -> Waves:
-    """Return one realisation of a line with these amplitudes."""
+    """Return one realisation of a line with the given amplitudes and random phases."""
     from mdr_dask.physics.surfaces import roughness
     from mdr_dask.physics.surfaces.waves import Waves
 
@@ -69,7 +72,7 @@ class OfSurface:
     is_random = True
 
     def height(self) -> float:
-        """Return the unit of height, m: the rms height of the lines of all files."""
+        """Return the unit of height in m, which is the rms height of the lines of all files together."""
         return _height(self)
 
     def waves(self, seed: int, realisation: int) -> Waves:
@@ -108,7 +111,7 @@ class Measured:
         return int(line_of(self.profile).height.size)
 
     def height(self) -> float:
-        """Return the unit of height, m: the rms height, or the length if the line is flat."""
+        """Return the unit of height in m, which is the rms height, or the length of the line if the line is flat."""
         line = line_of(self.profile)
         return float(line.height.std()) or line.length
 

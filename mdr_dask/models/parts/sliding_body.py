@@ -35,7 +35,10 @@ NUMBERS = (
 
 
 class SlidingBody(Parameters):
-    """A viscoelastic body under a load on a generated or a measured rough line, flat or of an indenter's shape."""
+    """A viscoelastic body under a load on a rough line, which is generated or measured.
+
+    The rough line is flat, or has the shape of an indenter.
+    """
 
     renamed: ClassVar[Mapping[str, str]] = {
         "profile": "write surface: {profile: ...}",
@@ -115,7 +118,7 @@ class SlidingBody(Parameters):
 
 
 def frequency_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
-    """Return notes that compare the frequencies q v of a study with those of a law or a table, for every material."""
+    """Return notes that compare the frequencies q v of a study with the range of the law or table of each material."""
     velocities = [one.velocity for one in sets]
     waves = [one.wavelengths() for one in sets]
     low = 2 * math.pi * min(velocities) / max(longest for _, longest in waves)

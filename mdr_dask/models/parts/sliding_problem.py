@@ -34,13 +34,16 @@ STATUS = np.array(
     ],
     dtype=np.int8,
 )
-"""The status in a store for each outcome of a solver."""
-LEAST = 1e-100  # squares and products of dimensionless numbers between LEAST and 1 / LEAST can be represented
+"""The status that is stored for each outcome of a solver."""
+LEAST = 1e-100  # squares and products of numbers between LEAST and 1 / LEAST do not overflow or underflow
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Dimensionless roughness, shape (None for a plane) and Prony terms (None for a Kelvin solid) of some cases."""
+    """The roughness, the shape and the Prony terms that some cases share, in dimensionless form.
+
+    The shape of a plane is None; the Prony terms of a Kelvin solid are None.
+    """
 
     roughness: Roughness
     body: Shape | None
@@ -49,7 +52,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class SlidingProblems:
-    """The cases of a block as dimensionless numbers; the dimensionless solution depends on nothing else.
+    """The cases of a block as dimensionless numbers; the dimensionless solution depends only on these numbers.
 
     Parameters
     ----------
@@ -62,9 +65,10 @@ class SlidingProblems:
     deborah : array, shape (cases,)
         eta v / (G_inf L): the Deborah number v tau / L of a Kelvin body.
     length, height : array, shape (cases,)
-        L and h, m: the units of length and height. h is the rms height, or L if there is no roughness.
+        L and h in m, the units of length and height. L is the length of the line; h is the rms height, or L if there is
+        no roughness.
     faults : dict of int to str
-        Messages about cases that cannot be solved.
+        Messages about cases that cannot be solved, by the index of the case.
     """
 
     settings: list[Setting]
@@ -86,13 +90,13 @@ class SlidingProblems:
             yield self.settings[self.which[sound[k]]], members
 
     def different(self, members: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Return the different pairs of Deborah number and load in some cases, and the pair of each case."""
+        """Return Deborah number and load of the different pairs in some cases, and the index of the pair of each case."""
         pairs, which = np.unique(self.deborah[members] + 1j * self.loads[members], return_inverse=True)
         return pairs.real.copy(), pairs.imag.copy(), which
 
 
 def combinations(*columns: NDArray[Any]) -> tuple[IntArray, IntArray]:
-    """Return the first row of every different combination of values in some columns, and the combination of each row.
+    """Return the first row of every different combination of values, and the index of the combination of each row.
 
     Objects are compared by identity.
     """
@@ -154,7 +158,7 @@ def _without_units(body: Shape | None, length: float, height: float) -> Shape | 
 
 
 def _travelling(term: tuple[FloatArray, FloatArray] | None, velocity: float, length: float) -> PronyTerms | None:
-    """Return Prony terms with times over L / v, the time in which the body slides by the length of the line."""
+    """Return Prony terms with relaxation times divided by L / v, the time in which the body slides by L."""
     from mdr_dask.physics.sliding.problem import PronyTerms
 
     if term is None:
@@ -163,7 +167,7 @@ def _travelling(term: tuple[FloatArray, FloatArray] | None, velocity: float, len
 
 
 def refuse_immense(numbers: dict[str, FloatArray], faults: dict[int, str]) -> None:
-    """Add a message for every case with a dimensionless number that is too large or too small for arithmetic."""
+    """Add a message for every case with a dimensionless number that is too large or too small for the arithmetic."""
     for name, column in numbers.items():
         for j in np.flatnonzero(~((column > LEAST) & (column < 1 / LEAST))):
             number, least, most = distinguishable(column[j], LEAST, 1 / LEAST, digits=6)
@@ -171,7 +175,10 @@ def refuse_immense(numbers: dict[str, FloatArray], faults: dict[int, str]) -> No
 
 
 def each(block: Block[Any], name: str) -> tuple[list[Any], IntArray]:
-    """Return the different values of a nested parameter, any part of which may vary, and the index for every case."""
+    """Return the different values of a nested parameter, and, for every case, the index of its value.
+
+    Any part of the nested parameter may vary between the cases.
+    """
     varied = [column for path, column in block.columns.items() if path.partition(".")[0] == name]
     if not varied:
         return [getattr(block.parameters, name)], np.zeros(block.cases, np.int64)
@@ -180,7 +187,7 @@ def each(block: Block[Any], name: str) -> tuple[list[Any], IntArray]:
 
 
 def _numbers(block: Block[Any], name: str) -> FloatArray:
-    """Return a number for every case, NaN if it is not given."""
+    """Return the value of a parameter for every case, NaN if the parameter is not given."""
     if name not in block.columns:
         value = getattr(block.parameters, name)
         return np.full(block.cases, np.nan if value is None else value, dtype=np.float64)

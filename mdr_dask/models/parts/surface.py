@@ -1,4 +1,4 @@
-"""A measured surface in a campaign: given by its spectrum, by maps or scans, or by a line that is used unchanged."""
+"""A measured surface in a campaign, given by its spectrum, by maps, by scans, or by a line that is used unchanged."""
 
 from __future__ import annotations
 
@@ -60,13 +60,13 @@ class Surface(Parameters):
         return self
 
     def without_spectrum(self) -> tuple[str, ...]:
-        """Return the reasons why files have no isotropic spectrum, one sentence for each file."""
+        """Return one sentence for each file without an isotropic spectrum, with the reason."""
         if self.map is None:
             return ()
         return tuple(reason for file in self.map.files if (reason := anisotropic(self.map, file)))
 
     def notes(self) -> tuple[str, ...]:
-        """Return notes on range, rms height and rms gradient of the spectra."""
+        """Return notes on wavelength range, rms height and rms gradient of the spectra."""
         if self.profile is not None:
             return ()
         spectra = zip(self.measured.files, self.measured.found(), spectra_of(self), strict=False)
@@ -117,7 +117,7 @@ def spectra_of(surface: Surface) -> tuple[Spectrum, ...]:
     Raises
     ------
     DataError
-        If a file has no spectrum, or if the cut-offs are outside its range.
+        If a file has no spectrum, or if the cut-offs are outside the range of the spectrum.
     """
     return tuple(
         _within(surface, found, file)

@@ -1,4 +1,4 @@
-"""Files of a measured surface, and the computation of a spectrum from each: tables, maps and scans."""
+"""Files of a measured surface (tables, maps and scans), and the computation of a spectrum from each file."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
 CUT_ERROR = 0.05  # relative error of every point of a tabulated spectrum of straight profiles
-MOST_ANISOTROPY = 0.25  # beyond it, the slopes in two directions differ by more than a fifth
-STRIPES = 10.0  # smallest power of waves along an axis that means stripes, over that of an isotropic surface
-FORM = 0.9  # least fraction of the mean square explained by a parabola that means form; for roughness it is less
-MOST_OUTLIERS = 0.05  # largest fraction of outliers; if there are more, they belong to the surface
+MOST_ANISOTROPY = 0.25  # largest anisotropy of a surface that counts as isotropic; above it, slopes differ by over 1/5
+STRIPES = 10.0  # power of waves along an axis, relative to an isotropic surface, above which a map has stripes
+FORM = 0.9  # if a parabola explains more than this fraction of the mean square, the heights contain a form
+MOST_OUTLIERS = 0.05  # largest fraction of outliers; if there are more, they count as parts of the surface
 
 Window = Literal["hann", "none"]
 
@@ -36,11 +36,11 @@ class Found(NamedTuple):
     Parameters
     ----------
     spectrum : Spectrum
-        C2D, over the range of the data.
+        C2D within the range of the data.
     resolution : float
         Wavelength, m, below which there is only noise; 0 if no noise was found.
     remarks : tuple of str
-        Observations and changes: missing points, outliers, stripes.
+        Remarks about missing points, outliers and stripes, and about changes of the data.
     """
 
     spectrum: Spectrum
@@ -61,7 +61,10 @@ class Files(NamedByFile):
 
 
 class SpectrumTables(Files):
-    """Tables of a spectrum: wave number or wavelength, and C2D, the C1D of the method or the C of a straight cut."""
+    """Tables with wave number or wavelength, and a spectrum.
+
+    The spectrum is C2D, the C1D of the MDR line, or the spectrum of a straight profile.
+    """
 
     def found(self) -> tuple[Found, ...]:
         """Return the spectrum of every table."""
@@ -69,7 +72,7 @@ class SpectrumTables(Files):
 
 
 class ScanFiles(Files):
-    """Scans of an isotropic surface, as a stylus records them: straight cuts."""
+    """Scans of an isotropic surface along straight lines, as a stylus records them."""
 
     spacing: float | None = quantity("m", "distance of points, of a file of heights alone", default=None, gt=0)
     unit: str = Field(default="", description="unit of the heights, where the file does not say")
@@ -170,7 +173,7 @@ def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
 
 
 def _form(level: FloatArray, curved: FloatArray) -> tuple[str, ...]:
-    """Return a warning if a parabola explains most of the levelled heights: this is the form of a part."""
+    """Return a warning if a parabola explains most of the levelled heights, because they contain the form of a part."""
     import numpy as np
 
     square, rest = (float(np.nanmean((height - np.nanmean(height)) ** 2)) for height in (level, curved))
@@ -194,7 +197,7 @@ def scanned(scans: ScanFiles, file: DataFile) -> Found:
     """Return the spectrum of the surface from one scan."""
     from mdr_dask.physics.surfaces.scans import cut_of_lines
 
-    line = line_of_scan(scans, file)  # outside `try`: its errors contain the file name already
+    line = line_of_scan(scans, file)  # outside `try`, because its errors already contain the file name
     try:
         found = of_surface_cut(cut_of_lines([line], scans.window == "hann"))
         return found._replace(remarks=(*_scan(scans, file).remarks, *doubts_of_line(line, scans.detrend)))
@@ -203,7 +206,7 @@ def scanned(scans: ScanFiles, file: DataFile) -> Found:
 
 
 def of_surface_cut(cut: Cut) -> Found:
-    """Return the spectrum of the surface from that of a straight profile, without the noise at its end."""
+    """Return the spectrum of the surface from the spectrum of a straight profile, without the noise at its end."""
     import numpy as np
 
     from mdr_dask.physics.surfaces.scans import NOISE_SLOPE, NOISE_TAIL, of_cut

@@ -1,4 +1,4 @@
-"""Report on the files of a measured surface: heights, slopes, spectra, power law with cut-offs, resolution."""
+"""Report on the files of a measured surface: heights, slopes, spectra, fitted power law, resolution."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ UNITS = {
     "resolution": "m",
     "length": "m",
 }
-"""Columns of a report and their units; NaN if a file does not determine the quantity.
+"""Columns of a report and their units. A value is NaN if a file does not determine the quantity.
 
 Sq and Sa are the rms and the mean absolute height of the levelled map, and Pq the rms height of the levelled profile,
 all without a window. Gradient, slopes and anisotropy are computed from the windowed heights.
@@ -55,7 +55,7 @@ class FileReport(NamedTuple):
     row : dict of str to number or str
         Values of the columns of `UNITS`.
     found : Found
-        The spectrum C2D, the wavelength below which there is noise, and remarks.
+        The spectrum C2D, the wavelength below which there is only noise, and remarks.
     bins : Cut
         C2D in logarithmic bins with relative errors.
     cuts : dict of str to (array, array)
@@ -130,7 +130,8 @@ def _of_scan(
 def mean_spectrum(spectra: tuple[Spectrum, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the wave numbers of the first spectrum, the mean C2D of all spectra, and its relative standard error.
 
-    The error is NaN for a single spectrum. At wave numbers beyond its range, a spectrum is left out of the mean.
+    The error is NaN for a single spectrum. Outside its own range of wave numbers, a spectrum is not included in the
+    mean.
     """
     q = spectra[0].wavenumber
     each = np.array([spectrum.at(q) for spectrum in spectra])

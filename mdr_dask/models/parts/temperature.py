@@ -24,7 +24,9 @@ class Wlf(Parameters):
     reference: float = quantity("K", "temperature of c1 and c2, at which a_T is 1", usual="20 degC", gt=0)
 
     def factor(self, temperature: FloatArray | float) -> FloatArray:
-        """Return a_T for temperatures in K, of the same shape; raise ValueError outside the range of the law."""
+        """Return a_T for temperatures in K, in the same shape; raise ValueError for temperatures outside the law's
+        range.
+        """
         from mdr_dask.physics.solids import wlf_factor
 
         lowest, end = float(np.min(temperature)), self.reference - self.c2
@@ -41,14 +43,14 @@ class Arrhenius(Parameters):
     reference: float = quantity("K", "temperature at which a_T is 1", usual="20 degC", gt=0)
 
     def factor(self, temperature: FloatArray | float) -> FloatArray:
-        """Return a_T for temperatures in K, of the same shape."""
+        """Return a_T for temperatures in K, in the same shape."""
         from mdr_dask.physics.solids import arrhenius_factor
 
         return arrhenius_factor(temperature, self.reference, self.activation_energy)
 
 
 class ShiftFactors(Parameters):
-    """Measured shift factors, given by a file name alone or with `file`."""
+    """Measured shift factors, given by a file name or by `file: name`."""
 
     file: NamedFile = Field(description="table with columns temperature and a_T or log10 a_T; its a_T passes 1")
 
@@ -69,12 +71,14 @@ class ShiftFactors(Parameters):
 
     @property
     def reference(self) -> float:
-        """Temperature at which a_T is 1, K."""
+        """Temperature in K at which a_T is 1."""
         temperature, decades = _shifts(self)
         return float(np.interp(0.0, decades[::-1], temperature[::-1]))
 
     def factor(self, temperature: FloatArray | float) -> FloatArray:
-        """Return a_T for temperatures in K, by linear interpolation of log a_T; raise ValueError outside the table."""
+        """Return a_T for temperatures in K, by linear interpolation of log a_T; raise ValueError outside the range of
+        the table.
+        """
         known, decades = _shifts(self)
         wanted = np.asarray(temperature, dtype=np.float64)
         for outside in wanted[(wanted < known[0]) | (wanted > known[-1])].ravel():
@@ -85,7 +89,7 @@ class ShiftFactors(Parameters):
 
 @lru_cache(maxsize=16)
 def _shifts(factors: ShiftFactors) -> tuple[FloatArray, FloatArray]:
-    """Return the temperatures of a table, ascending, and log10 a_T, descending."""
+    """Return the ascending temperatures of a table and the descending values of log10 a_T."""
     name = factors.file.name
     columns = (
         Column("temperature", "K", ("T", "temp"), above=0),

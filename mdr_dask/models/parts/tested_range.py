@@ -14,13 +14,14 @@ from mdr_dask.models.parts.sliding_body import SlidingBody
 from mdr_dask.models.parts.sliding_problem import Setting
 
 LARGEST_LOAD = 1.0
-"""F_N / (E* L h) with E* = 4 G of an incompressible solid. Above it a line is closer to full contact than a surface."""
-LARGEST_FRACTION = 0.5  # part of the line in contact
+"""Largest tested F_N / (E* L h), with E* = 4 G of an incompressible solid. Above it the line is closer to full contact
+than the surface that it represents."""
+LARGEST_FRACTION = 0.5  # largest tested fraction of the line in contact
 PAGE = "docs/validity.md"
 
 
 def load_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
-    """Return a note if the loads of a study exceed the loads at which friction on a rough surface was tested."""
+    """Return a note if loads of a study exceed the range in which the friction on a rough surface was tested."""
     from mdr_dask.models.parts.material import solid_of
 
     loads = []
@@ -44,17 +45,17 @@ def load_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
 
 
 def beyond_tested(setting: Setting, loads: FloatArray, fractions: FloatArray) -> dict[int, str]:
-    """Return a message for every case outside the tested range, by the index of the case.
+    """Return messages, by the index of the case, for all cases outside the tested range.
 
     Parameters
     ----------
     setting : Setting
-        Line and solid of the cases. There is a tested range only for a plane body on lines that represent a measured
-        surface.
+        Line and solid of the cases. The tested range applies only to a plane body on lines that represent a measured
+        surface; other cases give no message.
     loads : array, shape (cases,)
-        F_N / (4 G_inf L h); the largest value during a history.
+        F_N / (4 G_inf L h); for a history, its largest value.
     fractions : array, shape (cases,)
-        Length in contact over length of the line; the largest value during a history; NaN if it is unknown.
+        Length in contact divided by the length of the line; for a history, its largest value. NaN if it is unknown.
     """
     if setting.body is not None or not isinstance(setting.roughness, OfSurface):
         return {}

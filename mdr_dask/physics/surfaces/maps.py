@@ -329,7 +329,7 @@ def telling(wavenumber: FloatArray, density: FloatArray) -> NDArray[np.bool_]:
 
 
 def _cut(power: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-    """Return wave numbers and the two-sided C_cut from `power`, the sum of the powers of both signs of the wave number."""
+    """Return wave numbers and the two-sided C_cut from `power`, the power summed over both signs."""
     step = 2 * np.pi / length
     return np.asarray(step * np.arange(1, power.size + 1), dtype=np.float64), power / (2 * step)
 
