@@ -176,8 +176,9 @@ CANONICAL_BITS = 44
 
 
 def canonical(number: ArrayLike) -> Any:
-    """Return dimensionless numbers, rounded to `CANONICAL_BITS`, so that numbers that differ by rounding errors are
-    equal.
+    """Return dimensionless numbers, rounded to `CANONICAL_BITS` bits.
+
+    So numbers that differ only by rounding errors become equal.
     """
     mantissa, exponent = np.frexp(number)
     return np.ldexp(np.rint(np.ldexp(mantissa, CANONICAL_BITS)), exponent - CANONICAL_BITS)
@@ -436,8 +437,9 @@ class Model(Generic[P]):
         return {output.name: output for output in (*self.outputs, *self.companions.values())}[name]
 
     def with_companions(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Return the given names and the names of scatter outputs, each followed by the name of its companion if it has
-        one.
+        """Return the given names and the names of their scatter outputs.
+
+        Each name is followed by the name of its companion if the output has one.
         """
         companions = self.companions
         asked = {*names, *(self.output(name).scatter for name in names)}

@@ -164,9 +164,7 @@ def seconds(block: Block[EhlLineParameters]) -> float:
 
 
 def memory(_: Block[EhlLineParameters]) -> float:
-    """Return the memory, in bytes, of one solution on the finest grid: about three dense matrices of 1281 x 1281
-    numbers.
-    """
+    """Return the memory, in bytes, of a solution on the finest grid: about three matrices of 1281 x 1281 numbers."""
     return 3.0 * 8 * 1281**2
 
 

@@ -95,8 +95,7 @@ def _factor(block: Block[FrettingWear], name: str, normal: FloatArray) -> FloatA
 
 
 def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str]]:
-    """Return n, g_c and N of every case and its units a0, d0, E* d0 a0, with messages about cases that cannot be
-    solved.
+    """Return n, g_c, N and the units a0, d0, E* d0 a0 of every case, and messages about cases that cannot be solved.
 
     For sliding g_c is 0, and N is the dimensionless path s.
     """

@@ -173,8 +173,9 @@ def _is_plain(block: Block[FrettingWear]) -> bool:
 def _solve_plain(
     block: Block[FrettingWear], numbers: Numbers, values: dict[str, FloatArray], good: NDArray[np.bool_]
 ) -> int:
-    """Compute the limiting profiles or fast rules of all power-law cases together; return the number of different
-    cases.
+    """Compute the limiting profiles or fast rules of all power-law cases together.
+
+    Return the number of different cases.
     """
     is_fast = np.asarray(block.column("wear_rule") == "fast")
     fast = np.broadcast_to(is_fast[:, None], good.shape)[good]
@@ -237,8 +238,9 @@ def _solve_each(
 
 
 def _answer(records: Sequence[Worn], name: str, places: FloatArray) -> float | FloatArray:
-    """Return one output of a solution. Outputs whose name begins with `block_` have one row for each block of a
-    history.
+    """Return one output of a solution.
+
+    An output whose name begins with `block_` has one row for each block of a history.
     """
     plain, is_error = _plain_name(name)
     answers = [
@@ -270,8 +272,9 @@ class _Demand:
         return missed_accuracy(values, errors, self.accuracy).get(0, "")
 
     def _finite(self, records: Sequence[Worn], name: str) -> FloatArray:
-        """Return an output with a first axis for the case. Infinite values, such as the pressure at a sharp tip, become
-        NaN.
+        """Return an output with a first axis for the case.
+
+        Infinite values, such as the pressure at a sharp tip, become NaN.
         """
         answer = np.asarray(_answer(records, name, self.places))
         return np.where(np.isfinite(answer), answer, np.nan)[None]

@@ -108,8 +108,9 @@ class Generated(_Random):
 
 @dataclass(frozen=True)
 class OfSurfaces(_Random):
-    """Two lines with the spectra of measured surfaces, in m. If a surface has several files, realisations use them in
-    turn.
+    """Two lines with the spectra of measured surfaces, in m.
+
+    If a surface has several files, the realisations use them in turn.
     """
 
     surface_1: Surface

@@ -64,8 +64,9 @@ class OilData(Parameters):
 
     @property
     def two_viscosities(self) -> tuple[float, float, float, float]:
-        """Two temperatures in K, each followed by its kinematic viscosity in m^2/s, which is given or follows from the
-        fit.
+        """Two temperatures in K, each followed by the kinematic viscosity in m^2/s.
+
+        The viscosities are given, or follow from the fit to the table.
         """
         if self.viscosities is not None:
             found = _fitted(self.viscosities, self.density, self.density_temperature)

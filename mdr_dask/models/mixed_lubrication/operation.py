@@ -197,8 +197,9 @@ def _film_of(
 
 @lru_cache(maxsize=1024)
 def _solved(contact: line_contact.LineContact, accuracy: float) -> Film:
-    """Return the central film of the EHL solution in units of ``a^2/R``, and its relative error; cached for all
-    realisations.
+    """Return the central film of the EHL solution in units of ``a^2/R``, and its relative error.
+
+    The result is cached for all realisations.
     """
     solution = line_contact.solve_film(contact, accuracy)
     if solution.outcome == Outcome.FILM_COLLAPSED:

@@ -128,9 +128,7 @@ def solid_of(material: Material) -> LinearSolid:
 
 
 def _shift(material: Material) -> float | None:
-    """Return the factor by which relaxation times change from the temperature of the data to the material's
-    temperature.
-    """
+    """Return the factor of the relaxation times between the temperature of the data and the material's temperature."""
     law, temperature = material.law, material.temperature
     if law is None or temperature is None:
         return None

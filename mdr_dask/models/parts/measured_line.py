@@ -46,9 +46,7 @@ class ProfileFile(NamedByFile):
         return self
 
     def notes(self) -> tuple[str, ...]:
-        """Return a note with points, length, rms height and rms slope of the line, and notes with remarks about the
-        file.
-        """
+        """Return notes on points, length, rms height and rms slope of the line, and remarks about the file."""
         remarks = (*_scan(self).remarks, *doubts_of_line(line_of(self), self.detrend))
         return (_statistics(self), *(f"profile {self.file.name}: {remark}" for remark in remarks))
 

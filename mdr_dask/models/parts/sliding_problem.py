@@ -90,7 +90,7 @@ class SlidingProblems:
             yield self.settings[self.which[sound[k]]], members
 
     def different(self, members: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Return Deborah number and load of the different pairs in some cases, and the index of the pair of each case."""
+        """Return Deborah number and load of the different pairs in some cases, and the pair index of each case."""
         pairs, which = np.unique(self.deborah[members] + 1j * self.loads[members], return_inverse=True)
         return pairs.real.copy(), pairs.imag.copy(), which
 

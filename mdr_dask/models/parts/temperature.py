@@ -24,8 +24,9 @@ class Wlf(Parameters):
     reference: float = quantity("K", "temperature of c1 and c2, at which a_T is 1", usual="20 degC", gt=0)
 
     def factor(self, temperature: FloatArray | float) -> FloatArray:
-        """Return a_T for temperatures in K, in the same shape; raise ValueError for temperatures outside the law's
-        range.
+        """Return a_T for temperatures in K, in the same shape.
+
+        Raise ValueError for temperatures outside the range of the law.
         """
         from mdr_dask.physics.solids import wlf_factor
 
@@ -76,8 +77,9 @@ class ShiftFactors(Parameters):
         return float(np.interp(0.0, decades[::-1], temperature[::-1]))
 
     def factor(self, temperature: FloatArray | float) -> FloatArray:
-        """Return a_T for temperatures in K, by linear interpolation of log a_T; raise ValueError outside the range of
-        the table.
+        """Return a_T for temperatures in K, by linear interpolation of log a_T.
+
+        Raise ValueError for temperatures outside the range of the table.
         """
         known, decades = _shifts(self)
         wanted = np.asarray(temperature, dtype=np.float64)

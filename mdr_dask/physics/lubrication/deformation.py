@@ -46,8 +46,7 @@ def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
 
 @jit
 def influence_matrix(nodes: FloatArray) -> FloatArray:
-    """Return the matrix that gives, from nodal pressures, the deformations at the nodes minus the deformation at ``X =
-    0``.
+    """Return the matrix that converts nodal pressures to deformations at the nodes, relative to ``X = 0``.
 
     Parameters
     ----------

@@ -67,8 +67,7 @@ def _placed(positions: FloatArray, density: FloatArray, number: FloatArray, want
 def aligned(
     positions: FloatArray, density: FloatArray, count: int, rupture: float, front: float = np.nan
 ) -> tuple[FloatArray, float]:
-    """Return nodes with a given density, such that the film ends at a node and no node is within half a cell of the
-    front.
+    """Return nodes with a given density; the film ends at a node, and no node is within half a cell of the front.
 
     The error of a film changes by up to a tenth with the position, within its cell, at which the film ends. The error
     is least if the film ends at a node. So grids can be compared only if the film ends at a node on all of them. Behind
@@ -110,8 +109,9 @@ def _halved_by(share: float, cells: int) -> int:
 
 
 def _cells_before(position: float, positions: FloatArray, density: FloatArray, number: FloatArray) -> float:
-    """Return the number of cells before a position; `number` has the numbers of cells before the positions of the
-    density.
+    """Return the number of cells before a position.
+
+    `number` has the numbers of cells before the positions of the density.
     """
     before = int(np.clip(np.searchsorted(positions, position) - 1, 0, positions.size - 2))
     rest = position - positions[before]

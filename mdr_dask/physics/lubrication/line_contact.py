@@ -258,8 +258,7 @@ class LineSolution:
         return found._replace(error=np.maximum(found.error, PLACED * (nodes[after] - nodes[after - 1])))
 
     def spike(self) -> tuple[Estimate, Estimate]:
-        """Return position (in half widths) and pressure (in units of p0) of the pressure spike; NaN if there is no
-        spike.
+        """Return position (in half widths) and pressure (in units of p0) of the spike; NaN if there is no spike.
 
         Values are from the finest grid. If the pressure behind the spike falls within one cell, the height of the spike
         depends on the nodes; its error is then infinite.
@@ -333,8 +332,9 @@ def _first_solution(case: LineContact) -> tuple[Outcome, GridSolution]:
 def _refined(
     case: LineContact, before: Sequence[GridSolution], source: GridSolution, count: int
 ) -> tuple[Outcome, GridSolution]:
-    """Solve on about `count` nodes with the density of `source`, starting from the last one or two solutions in
-    `before`.
+    """Solve on about `count` nodes with the density of `source`.
+
+    The initial guess follows from the last one or two solutions in `before`.
     """
     last = before[-1]
     spacing = last.spacing * (last.nodes.size - 1) / (count - 1)

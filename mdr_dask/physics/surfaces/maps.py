@@ -64,8 +64,7 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
 
 
 def _off_neighbours(height: FloatArray) -> FloatArray:
-    """Return the distance of inner points from the mean of their two neighbours, along the axis with the smaller
-    distance.
+    """Return the distance of inner points from the mean of two neighbours, along the axis where it is smaller.
 
     A point on a crest is close to its neighbours along the crest, although it is far from its neighbours across the
     crest.
@@ -222,8 +221,7 @@ class MapSpectrum:
         return averaged(*rings)
 
     def along(self, axis: int) -> Spectrum:
-        """Return the C2D of the isotropic surface whose MDR line has the spectrum of the straight profile along an
-        axis.
+        """Return the C2D of an isotropic surface whose MDR line has the spectrum of the profile along an axis.
 
         The axis is 0 for x. This spectrum is used for sliding across grooves.
         """

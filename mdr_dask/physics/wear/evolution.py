@@ -135,9 +135,7 @@ class Resolution(NamedTuple):
         return self._replace(accuracy=self.accuracy / factor, newton=0.01 * self.newton)
 
     def halfway_to(self, finer: Resolution) -> Resolution:
-        """Return this resolution, but with the geometric mean of its own step tolerance and the step tolerance of
-        `finer`.
-        """
+        """Return this resolution with the geometric mean of its step tolerance and the tolerance of `finer`."""
         return self._replace(wider=float(np.sqrt(self.wider * finer.wider)))
 
     def rougher(self) -> tuple[Resolution, Resolution]:

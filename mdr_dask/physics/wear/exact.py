@@ -1,8 +1,7 @@
-"""Worn contacts by the exact evolution, with their errors: fretting at constant depth, fretting at constant force,
-sliding.
+"""Worn contacts by the exact evolution, with errors.
 
-Each contact is solved three times, with coarser panels and longer steps each time, and the error is estimated from the
-differences.
+The conditions are fretting at constant depth, fretting at constant force, and sliding. Each contact is solved three
+times, with coarser panels and longer steps each time, and the error is estimated from the differences.
 """
 
 from __future__ import annotations

@@ -322,9 +322,7 @@ class ForcedSlip:
         return float(0.5 * np.sqrt(self.body.width * place.width) * self.panels.weights @ share)
 
     def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return the quantities whose step error is controlled: s at the nodes, the depth, and the border while it
-        moves.
-        """
+        """Return the quantities whose step error is controlled: s at the nodes, the depth, and a moving border."""
         weight = BORDER_WEIGHT * (1.0 - self.virgin.inner_radius) / self.eta
         tail = unknowns[self.size :] * ([1.0, weight] if self.border is None else 1.0)
         return np.append(self.slip(unknowns), tail)
@@ -332,8 +330,9 @@ class ForcedSlip:
     def moment(
         self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Pressed]
     ) -> Pressed:
-        """Return the moment at the end of a solved step; its worn depth is the past contribution plus the wear in the
-        step.
+        """Return the moment at the end of a solved step.
+
+        Its worn depth is the past contribution plus the wear in the step.
         """
         size, place, before = self.size, self.place(unknowns), past[0]
         worn = known[size : 2 * size] + theta * self.rate(unknowns) * self.slip(unknowns)

@@ -166,8 +166,9 @@ def _state(grid: UniformGrid, image: FloatArray, block: LoadBlock) -> _State:
 def _record(
     grid: UniformGrid, profile: Profile, worn: FloatArray, state: _State, block: LoadBlock, energy: float
 ) -> Worn:
-    """Turn the state at the end of a block into a worn contact; beyond the grid, its image is NaN and its pressure
-    zero.
+    """Turn the state at the end of a block into a worn contact.
+
+    Beyond the grid, the image of the contact is NaN and the pressure is zero.
     """
     stuck = np.flatnonzero(state.depth - state.image < block.slip_share)
     k = int(stuck[0]) if stuck.size else 0

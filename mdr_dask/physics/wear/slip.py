@@ -122,8 +122,9 @@ class _Step(NamedTuple):
 
 @jit
 def _slip_rows(table: LogTable, step: _Step, stress: FloatArray, slip: FloatArray) -> None:
-    """Replace the slip by the residual of `PartialSlip`; the last row is the condition that s is continuous at the
-    edge.
+    """Replace the slip by the residual of `PartialSlip`.
+
+    The last row is the condition that s is continuous at the edge.
     """
     last = slip.size - 1
     for i in range(slip.size):
