@@ -85,10 +85,11 @@ class Mesh:
     series : Series
         The series, with the values of adaptive axes in the order in which they were added.
     shares : mapping of int to array, shape (values,)
-        For each adaptive axis, by its index: the positions of its values, as fractions of its range from 0 to 1.
+        Positions of the values of each adaptive axis, as fractions of its range from 0 to 1; the key is the index of
+        the axis.
     used : mapping of int to bool array, shape (values of the other axes that are not adaptive..., values)
-        For each adaptive axis, by its index: whether each of its values is needed, for each combination of values of
-        the non-adaptive axes.
+        Whether a value of an adaptive axis is needed, for each combination of values of the non-adaptive axes; the key
+        is the index of the adaptive axis.
     """
 
     series: Series

@@ -66,7 +66,7 @@ def growth_needed(
     until : mapping of str to Tolerance
         Largest allowed standard error of the mean, by output.
     scatter : mapping of str to array, shape (..., realisations), optional
-        For some outputs, each realisation contains an estimate of its own standard error; these estimates.
+        Standard error of each single realisation, for outputs of which a realisation gives such an estimate.
 
     Returns
     -------

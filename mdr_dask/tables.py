@@ -280,7 +280,7 @@ class Sheet:
 
     @property
     def remark(self) -> str:
-        """A text that names the lines left out; empty if there are none."""
+        """A text that names the lines left out; empty if no line is left out."""
         shown = dict.fromkeys(repr(cell.text[:60]) for cell in self.notes)
         return f"lines below the numbers, left out: {', '.join(shown)}" if shown else ""
 
@@ -299,7 +299,7 @@ class Read(dict[str, FloatArray]):
 
     @property
     def remark(self) -> str:
-        """A text that names the columns not used and the lines left out; empty if there are none."""
+        """A text that names the unused columns and the lines left out; empty if everything is used."""
         unused = f"not used: {', '.join(self.unused)}" if self.unused else ""
         return "; ".join(filter(None, (unused, self.left_out)))
 
@@ -941,7 +941,7 @@ def _in_si(number: str, unit: str, wanted: str) -> float:
 
 
 def _factor(unit: str) -> tuple[float, str]:
-    """Return the number before a unit (1 if there is none), and the unit without it."""
+    """Return the number before a unit, or 1 for a unit without a number, and the unit without the number."""
     found = _FACTOR.match(unit)
     if not found:
         return 1.0, unit

@@ -165,7 +165,7 @@ def to_si(value: str, unit: str) -> float:
 
 
 def unit_behind(value: str) -> str:
-    """Return the unit after a number in a text, or an empty text if there is none."""
+    """Return the unit after a number in a text, or an empty text if the number has no unit."""
     match = _QUANTITY.match(value)
     return match[2] if match and match[2] and is_unit(match[2]) else ""
 

@@ -64,7 +64,7 @@ def draft(name: str, model: Model[Any], file: str) -> str:
 
 
 def _entries(parameters: type[Parameters]) -> Iterator[str]:
-    """Yield the lines of all parameters; optional ones are comments."""
+    """Yield the lines of all parameters; the lines of optional parameters are comments."""
     needed = _needed(parameters)
     written: dict[str, None] = {}
     for group in parameters.alternatives:

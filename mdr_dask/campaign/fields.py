@@ -94,7 +94,7 @@ def owner(parameters: type[BaseModel], path: Path, data: Any) -> tuple[type[Base
 
 
 def is_independent(parameters: type[BaseModel], path: Path, data: Any) -> bool:
-    """Return whether the field at a path is checked by its own bounds alone, not together with other parameters."""
+    """Return whether the check of the field at a path needs no other parameters, only the bounds of the field."""
     pairs = (owner(parameters, path[:depth], data) for depth in range(1, len(path) + 1))
     decorators = [kind.__pydantic_decorators__ for kind in (parameters, *(pair[0] for pair in pairs if pair))]
     return not any(

@@ -50,7 +50,7 @@ class Measured:
     lines : tuple of int
         The line of each measurement in the table, counted from 1.
     remark : str
-        Describes unused columns and rows without a number; empty if there are none.
+        Text on unused columns and on rows without a number; empty if all columns and rows are used.
     """
 
     source: str

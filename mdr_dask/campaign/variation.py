@@ -90,7 +90,8 @@ def find(
     drawn : bool
         Whether values are drawn from the ranges, which then have no number of values.
     problems : Problems
-        Receives wrong ranges and empty lists; the variation of such a parameter has neither items nor an interval.
+        Receives wrong ranges and empty lists. The variation of a parameter with a problem has neither items nor an
+        interval.
     """
     search = _Search(document, parameters, data, drawn, problems)
     return tuple(found for name, value in data.items() for found in search.below((name,), value, paths[name]))

@@ -21,7 +21,7 @@ class Event:
     facts : mapping
         Details, as values that JSON can represent.
     sentence : str
-        A message for the user; empty if there is none.
+        A message for the user; empty for an event that is only written to the log.
     """
 
     name: str

@@ -49,7 +49,7 @@ class TaskWindow:
     most : int
         Largest number of threads of an adaptive cluster; 0 for other clusters.
     replace_lost : callable
-        Requests new workers in place of lost ones.
+        Requests new workers in place of lost workers.
     last_message : callable
         Returns the last error message of the cluster, or an empty string.
     case_timeout : float or None

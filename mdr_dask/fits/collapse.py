@@ -70,7 +70,7 @@ def kelvins(temperatures: FloatArray, unit: str, groups: FloatArray | None = Non
     ----------
     temperatures : array
     unit : str
-        Unit as written in the table; empty if there is none.
+        Unit as written in the table; empty if the table has no unit.
     groups : array, optional
         All temperatures of the table, for the median; by default `temperatures`.
     """

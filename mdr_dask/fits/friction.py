@@ -70,7 +70,7 @@ def numbers(data: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]
 
 
 def one_value(data: xr.Dataset, name: str) -> float:
-    """Return the only value of a parameter; raise FitError if there is none, or if the cases differ."""
+    """Return the only value of a parameter; raise FitError if the study lacks it, or if it differs between cases."""
     require(data, name)
     values = data[name]
     if values.size != 1:
@@ -415,7 +415,7 @@ def law_error(departures: FloatArray, suffix: str, which: str) -> Variables:
 
 
 def rising(force: FloatArray, velocity: FloatArray, mean: FloatArray, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which known cases are in regions I to III: velocities up to that of the largest friction at their load."""
+    """Return which known cases are in regions I to III: at each load, velocities up to that of the largest friction."""
     used = known & (mean > 0)
     for load in np.unique(force[used]):
         same = np.flatnonzero(used & (force == load))

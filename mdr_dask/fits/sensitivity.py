@@ -28,7 +28,7 @@ GROUPS = 20
 def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
     """Return the Sobol indices of an output for every varied input of a sampled study.
 
-    For Saltelli's design, first-order indices are those of Saltelli et al. (2010), total indices those of Jansen
+    For Saltelli's design, first-order indices follow Saltelli et al. (2010), and total indices follow Jansen
     (1999). Any other sampled design gives first-order indices only: the cases are sorted by an input, and the outputs
     of neighbours are multiplied (Gamboa et al., 2022, with several neighbours).
 
@@ -99,7 +99,7 @@ def _inputs(dataset: xr.Dataset) -> dict[str, FloatArray]:
 def _values(dataset: xr.Dataset, output: str) -> tuple[FloatArray, int]:
     """Return the output, shape (realisations, cases), and the number of cases without a value.
 
-    If some realisations of a case failed, the mean of the others replaces them.
+    Failed realisations of a case are replaced by the mean of its successful realisations.
     """
     array = dataset[output]
     others = [str(dim) for dim in array.dims if dim not in ("case", "realisation")]

@@ -301,7 +301,7 @@ def parameters_of(data: xr.Dataset) -> dict[str, Any]:
 
 
 def parameters_at(case: xr.Dataset) -> dict[str, Any]:
-    """Return the parameters of one case: those of its series, with the values of its axes."""
+    """Return the parameters of one case: the parameters of its series, with the values of the axes for this case."""
     parameters = parameters_of(case)
     for axis in case.attrs.get("axes", []):
         *above, last = axis["path"].split(".")

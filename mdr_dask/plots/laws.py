@@ -104,7 +104,7 @@ def _is_rough_indenter(data: xr.Dataset) -> bool:
 
 
 def _jump(data: xr.Dataset) -> xr.DataArray:
-    """Return the jump of friction by its law, from the stored friction before the jump."""
+    """Return the jump of friction by eq. 4.11, from the stored friction before the jump."""
     from mdr_dask.fits.jumps import LAW, jump_law
 
     slope = spectral_slope(data)

@@ -32,8 +32,8 @@ def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings
         A group of a study, or a Dataset derived from it.
     selections : sequence of str
         Each is a name, ``=``, and values or ranges separated by commas: ``velocity=1 mm/s..1 m/s``, ``hurst=0.3,0.7``,
-        ``radius=..2``. The name is that of an axis, a column of a sampled study, ``case`` or ``realisation``. Both ends
-        of a range are included; numbers without a unit are in SI. A number between two values selects the nearest one.
+        ``radius=..2``. The name is an axis, a column of a sampled study, ``case`` or ``realisation``. Both ends of a
+        range are included; numbers without a unit are in SI. A number between two values selects the nearest value.
     tell : callable, str -> object
         Receives a message when the nearest value differs from the given one.
 

@@ -181,7 +181,7 @@ def _shows_no_errors(figure: Json) -> bool:
 
 
 def who_is_at_work(url: str) -> str:
-    """Return a text with the processes that are working on a study; empty if there are none."""
+    """Return a text with the processes that are working on a study; empty if no process is."""
     try:
         runner, parts = store.at_work(url)
     except StoreError as error:

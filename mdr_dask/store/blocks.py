@@ -143,7 +143,7 @@ def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
 
 @lru_cache(maxsize=64)
 def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict[str, Buffer]]:
-    """Return arrays in memory with the metadata of the stored ones, and the dictionary of their encoded chunks."""
+    """Return arrays in memory with the metadata of the stored arrays, and the dictionary of their encoded chunks."""
     shown, encoded = _arrays(url, series, layout), dict[str, Buffer]()
     memory = zarr.storage.MemoryStore(encoded)
     empty = {name: array_of(_whole_chunks(array), memory, array.path) for name, array in shown.items()}

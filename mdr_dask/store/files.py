@@ -126,7 +126,10 @@ def parsed(content: bytes) -> Any:
 
 
 def read_many(url: str, files: Iterable[str]) -> Iterator[tuple[str, bytes | None]]:
-    """Yield name and content of many files in order, None for missing ones; a server sends many at the same time."""
+    """Yield name and content of many files in order; the content of a missing file is None.
+
+    Many files are requested from a server at the same time.
+    """
     path = local(url)
     if path is not None:
         with guarded(url, "reading its files"):
@@ -293,7 +296,7 @@ def conditional(url: str) -> bool:
 
 
 def remove(url: str, files: Iterable[str]) -> None:
-    """Remove files; missing ones are ignored."""
+    """Remove files; missing files are ignored."""
     path = local(url)
 
     async def delete() -> None:
@@ -366,7 +369,7 @@ def group_name(series: str, member: str = "") -> str:
 
 
 def chunk_name(series: str, array: str, block: Iterable[int], further: int = 0) -> str:
-    """Return the name of the chunk of a block; `further` is the number of dimensions beyond those of the ledger."""
+    """Return the name of the chunk of a block; `further` is the number of dimensions that the ledger does not have."""
     return group_name(series, "/".join([array, "c", *map(str, block), *["0"] * further]))
 
 

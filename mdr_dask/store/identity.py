@@ -1,4 +1,4 @@
-"""Compare a campaign with the store that it extends: name all differences, and append new values to stored ones."""
+"""Compare a campaign with the store that it extends: name all differences, and append new values to stored values."""
 
 from __future__ import annotations
 

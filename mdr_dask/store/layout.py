@@ -154,7 +154,7 @@ def copy_of(series: str, files: Mapping[str, bytes], before: Mapping[str, str]) 
 
 
 def read_copy(url: str, series: str) -> Copy | None:
-    """Return the copy of the layout of a group, or None if there is none.
+    """Return the copy of the layout of a group, or None if the store has no copy.
 
     Raises
     ------

@@ -93,7 +93,7 @@ class Lock:
 
 @dataclass(frozen=True, order=True)
 class Part:
-    """One of several disjoint sets of blocks, each computed by a process of its own.
+    """One of several disjoint sets of blocks; a separate process computes each set.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class Part:
 
     @classmethod
     def of(cls, position: int, count: int) -> Part:
-        """Return the part that a block belongs to, by its position among all blocks.
+        """Return the part that a block belongs to, from the position of the block among all blocks.
 
         With n parts, the first n blocks are assigned to the parts 1, 2, ..., n, the next n blocks to 2, 3, ..., n, 1,
         and so on. Without this shift, if an axis has n blocks, all blocks at one value of the axis would belong to the

@@ -18,7 +18,9 @@ _HINTS = {".yaml": "; 'mdr-dask run {}' runs a campaign", ".zip": "; unpack it f
 
 
 def document(url: str, series: str = "") -> Mapping[str, Any] | None:
-    """Return the checked metadata of a group, or None if there are none. Do not change the result, which is cached.
+    """Return the checked metadata of a group, or None if the group does not exist.
+
+    Do not change the result, which is cached.
 
     Raises
     ------

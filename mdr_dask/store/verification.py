@@ -34,7 +34,7 @@ from mdr_dask.store.locks import at_work, exclusive
 from mdr_dask.store.records import decoded, folder, lines, name_of
 from mdr_dask.store.study import attributes, document, refuse_file, series_names
 
-IGNORED = (".partial", ASIDE, "status/seal.json")  # the last one was written by development versions
+IGNORED = (".partial", ASIDE, "status/seal.json")  # development versions wrote status/seal.json
 #: Folder in a published store with the files that do not belong to the study itself.
 PUBLISHED = "published/"
 CHECKSUMS = f"{PUBLISHED}checksums.sha256"
@@ -155,7 +155,7 @@ def repair(url: str) -> tuple[Inspection, Inspection]:
 
 
 def of_store(names: Iterable[str]) -> Iterator[str]:
-    """Yield the names of files that belong to a study; leave out those of a run, a repair or a publication."""
+    """Yield the names of files that belong to a study; leave out files of a run, a repair or a publication."""
     for name in names:
         if not name.endswith(IGNORED) and not name.startswith((CLAIMS, PUBLISHED)) and name != _CRATE:
             yield name
@@ -276,7 +276,7 @@ def _parsed(content: bytes) -> Any:
 
 
 def _reading(url: str, path: str, block: BlockIndex | None = None) -> str | None:
-    """Read an array or one of its blocks; return the error of Zarr, or None if there is none."""
+    """Read an array or one of its blocks; return the error of Zarr as text, or None if reading succeeds."""
     try:
         array: Any = zarr.open_group(bytes_of(url), mode="r", use_consolidated=True, zarr_format=3)[path]
         if block is None:
