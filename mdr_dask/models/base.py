@@ -363,7 +363,7 @@ class Result:
     solves: int = 0
 
     def add_message(self, case: int, realisation: int, message: str) -> None:
-        """Add a message to those of a case; `realisation` is its position in the block."""
+        """Append a message to the messages of a case; `realisation` is the position of the realisation in the block."""
         before = self.messages.get((case, realisation))
         self.messages[case, realisation] = f"{before}; {message}" if before else message
 
@@ -386,8 +386,8 @@ class Model(Generic[P]):
     outputs : tuple of Output
         All arrays that the model can compute, except ``status`` and the companions that hold errors.
     compute : callable, Block -> Result
-        A pure function: the value of a case depends on its parameters, the seed and its realisation, not on the other
-        cases of the block. It does not raise an exception for a case that fails.
+        A pure function. The value of a case depends on its parameters, the seed and its realisation, but not on the
+        other cases of the block. The function does not raise an exception for a case that fails.
     seconds : callable, Block -> float
         Estimated computing time of `compute` in seconds. The function must be fast, so it is vectorised over the cases.
     whole : tuple of str

@@ -131,7 +131,7 @@ def _plain_name(name: str) -> tuple[str, bool]:
 
 
 def _sizes(parameters: FrettingWear, name: str) -> tuple[int, ...]:
-    """Return the sizes of the dimensions of an output, without those of cases and realisations."""
+    """Return the sizes of the dimensions of an output, without the dimensions of cases and realisations."""
     lengths = {"block": max(len(parameters.history), 1)}
     return tuple(lengths.get(dim, parameters.points) for dim in MODEL.output(name).dims)
 

@@ -216,7 +216,7 @@ class MixedLubrication(Parameters):
         return ""
 
     def oil_data(self) -> Oil:
-        """Return the oil, either by its name or from the given data."""
+        """Return the oil, found by its name or made from the given data."""
         return OILS[self.oil] if isinstance(self.oil, str) else self.oil.oil
 
     def dry_contact(self, force: float) -> HertzLine:

@@ -35,7 +35,7 @@ class _Random:
         return perimeter / self.points
 
     def problem(self, perimeter: float) -> str:
-        """Return the reason why such lines are impossible around a roller, or an empty string."""
+        """Return the reason why these lines are impossible around a roller, or an empty string."""
         if self.longest > self.modes:
             longest, shortest = distinguishable(perimeter / self.longest, perimeter / max(self.modes, 1), digits=4)
             return f"expected the longest wavelength above the shortest, got {longest} m and {shortest} m"
@@ -128,7 +128,7 @@ class OfSurfaces(_Random):
         return first, second
 
     def problem(self, perimeter: float) -> str:
-        """Return the reason why such lines are impossible, or an empty string."""
+        """Return the reason why these lines are impossible, or an empty string."""
         flat = "expected waves of both surfaces between longest_wavelength and shortest_wavelength"
         return super().problem(perimeter) or (
             "" if all(np.any(line) for both in self._both() for line in both) else flat

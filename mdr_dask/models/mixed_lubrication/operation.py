@@ -34,8 +34,9 @@ class Film(NamedTuple):
 class Operation:
     """Contact, film and boundary layer of a case, converted to the units of its rough lines.
 
-    `shared` holds the film in m, and `film_error` its relative error. `scale` is the unit of the lines' heights in m,
-    and `strength` the layer strength for lines in this unit. `width` is the width of the contact in m.
+    `shared` holds the film in m, and `film_error` is the relative error of the film. `scale` is the unit, in m, of the
+    heights of the lines, and `strength` is the layer strength for lines in this unit. `width` is the width of the
+    contact in m.
     """
 
     case: MixedLubrication

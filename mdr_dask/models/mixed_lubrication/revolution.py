@@ -62,7 +62,7 @@ class Revolution:
     per_wave : float
         Nodes per shortest wave.
     apart : int
-        Number of time steps after which the window no longer overlaps the first one.
+        Number of time steps after which a window no longer overlaps the window at the start.
     parts : int
         Number of parts of the revolution in which contact is counted. A part is at least two windows long, unless there
         is only one part.

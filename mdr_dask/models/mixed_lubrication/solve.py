@@ -137,7 +137,7 @@ def _realise(
         found: dict[str, Any] = revolution.values(operation, window, errors, block.outputs)
         advice = "" if operation.case.points == "auto" else "; raise points"
         sizes = window.sizes()
-        if window.length:  # the relative errors of conductance and resistance equal that of the length
+        if window.length:  # conductance and resistance have the relative error of the length
             factor = sizes["contact_length"] / window.length
             sizes |= {name: factor * found[name] for name in _ELECTRICAL & found.keys()}
         _note(result, index, position, _missed(block, found, advice, sizes))

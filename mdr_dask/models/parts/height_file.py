@@ -214,7 +214,7 @@ def _one_unit(file: DataFile, option: str, stated: str, given: str) -> str:
 
 
 def _metre(file: DataFile, unit: str, option: str) -> float:
-    """Return a unit of length, converted to m."""
+    """Return the value of a unit of length in m."""
     try:
         return to_si(f"1 {unit}", "m")
     except ValueError as error:

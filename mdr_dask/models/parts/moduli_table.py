@@ -22,7 +22,7 @@ from mdr_dask.units import shown
 
 #: Names of columns that hold moduli in tension; the names are first simplified by `plain`.
 _IN_TENSION = re.compile(r"(?<!\w)e(?:'|1|[ _]?stor|$)|young|tensile|tension")
-SAME_TEMPERATURE = 1.0  # largest scatter, in K, of the temperatures of one curve
+SAME_TEMPERATURE = 1.0  # largest difference, in K, between temperatures that count as equal
 #: Gap between the moduli of neighbouring curves, in decades; a wider gap cannot be due to the scatter of an instrument.
 APART = 0.02
 

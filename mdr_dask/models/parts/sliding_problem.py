@@ -61,7 +61,7 @@ class SlidingProblems:
     which : int array, shape (cases,)
         Index into `settings` for every case, -1 for a case that cannot be solved.
     loads : array, shape (cases,)
-        F_N / (4 G_inf L h).
+        Dimensionless load F_N / (4 G_inf L h), with the static shear modulus G_inf.
     deborah : array, shape (cases,)
         eta v / (G_inf L): the Deborah number v tau / L of a Kelvin body.
     length, height : array, shape (cases,)

@@ -49,7 +49,7 @@ class Found(NamedTuple):
 
 
 class Files(NamedByFile):
-    """Files of one surface; a bare file name means the file with all options at their defaults."""
+    """Files of one surface; a file name alone means this file with the default options."""
 
     files: tuple[NamedFile, ...] = Field(
         strict=False, min_length=1, description="one file, or several of the same surface: each realisation takes one"
@@ -235,7 +235,9 @@ def mapped(maps: MapFiles, file: DataFile) -> Found:
 
 
 def anisotropic(maps: MapFiles, file: DataFile) -> str:
-    """Return the reason why a map has no isotropic spectrum; empty if it has one or if a sliding direction is given."""
+    """Return the reason why a map has no isotropic spectrum; empty if the map is isotropic or a sliding direction is
+    given.
+    """
     import numpy as np
 
     rings = levelled_map(maps, file).spectrum

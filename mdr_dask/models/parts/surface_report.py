@@ -52,6 +52,7 @@ class FileReport(NamedTuple):
     Parameters
     ----------
     file : DataFile
+        The file.
     row : dict of str to number or str
         Values of the columns of `UNITS`.
     found : Found
@@ -61,6 +62,7 @@ class FileReport(NamedTuple):
     cuts : dict of str to (array, array)
         Wave numbers and C_cut, m^3, for each direction of straight profiles; empty for a table.
     law : SelfAffine or None
+        The fitted power law; None if no power law fits.
     """
 
     file: DataFile

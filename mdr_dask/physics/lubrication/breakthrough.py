@@ -1,10 +1,10 @@
 """Breakthrough of a boundary layer between two rough lines that roll on a film (thesis section 5.2.2).
 
-The film ``h0`` separates the two lines; where the sum of their heights ``z`` exceeds it, they overlap. A cluster is one
-connected interval of overlap, with the length ``D`` and the force ``F = E* int (z - h0) dx`` (eq. 5.5). A cluster
-breaks the layer if ``pi tau0 D^3/(12 F) < h_c`` (eq. 5.6), that is, if ``int (z - h0) dx > s D^3`` with the layer
-strength ``s = pi tau0/(12 E* h_c)``. tau0, E* and h_c enter only through s. Lines are closed (periodic) cubic splines,
-for which these integrals are exact. The contact is a window; one window begins at each node.
+The film ``h0`` separates the two lines; where the sum ``z`` of their heights exceeds the film, they overlap. A cluster
+is one connected interval of overlap, with the length ``D`` and the force ``F = E* int (z - h0) dx`` (eq. 5.5). A
+cluster breaks the layer if ``pi tau0 D^3/(12 F) < h_c`` (eq. 5.6), that is, if ``int (z - h0) dx > s D^3`` with the
+layer strength ``s = pi tau0/(12 E* h_c)``. tau0, E* and h_c enter only through s. Lines are closed (periodic) cubic
+splines, for which these integrals are exact. The contact is a window; one window begins at each node.
 """
 
 from __future__ import annotations
@@ -240,7 +240,10 @@ def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work
 
 @jit
 def _judge(pair: Pair, position: tuple[int, int], window: float, rule: int, work: FloatArray) -> int:
-    """Return the length in intimate contact of one window; `work` is workspace for its overlap and its crossings."""
+    """Return the length in intimate contact of one window.
+
+    `work` is workspace for the overlap of the lines in the window and the crossings of this overlap.
+    """
     points, pieces = pair.line_1.size, int(np.ceil(window))
     overlap, found, beyond = work[: pieces + 3], work[pieces + 3 : 4 * pieces + 3], work[4 * pieces + 3 :]
     limit = pair.strength * pair.spacing**2
@@ -285,6 +288,7 @@ def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray
     Parameters
     ----------
     pair : Pair
+        The two lines and the film.
     window : float
         Width of the window in spacings, at most the length of the line.
     positions : tuple of two int arrays, shape (n,)

@@ -13,7 +13,7 @@ from mdr_dask.physics.surfaces.splines import integral, piece, zeros
 
 
 class Clusters(NamedTuple):
-    """Clusters of a closed line, in the order of their starts.
+    """Clusters of a closed line, in the order of their beginnings.
 
     Parameters
     ----------

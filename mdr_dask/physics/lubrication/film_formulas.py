@@ -212,7 +212,9 @@ FORMULAS: dict[str, FilmFormula] = {
 
 
 def square_of_half_width(W: float) -> float:
-    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact; it converts films in ``a^2/R`` to films over R."""
+    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact, the factor that converts films in units of ``a^2/R`` to units of
+    R.
+    """
     return 8 * W / np.pi
 
 
@@ -281,8 +283,9 @@ def regime(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> NDArray[np.intp]:
     """Return the index in `REGIMES` of the regime of each case.
 
     Elastic flattening makes an isoviscous film thicker and a piezoviscous film thinner. So the isoviscous film is the
-    thicker of its two limits, and the piezoviscous film is the thinner of its two limits. The regime is that of the
-    thicker of these two films. This is the limit of Moes' interpolation for a sharp transition.
+    thicker of its two limits, and the piezoviscous film is the thinner of its two limits. The limit
+    that gives the thicker of these two films determines the regime. This is the limit of Moes' interpolation for a
+    sharp transition.
     """
     rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(W, U, G)
     isoviscous = np.where(elastic_iso > rigid_iso, 2, 0)

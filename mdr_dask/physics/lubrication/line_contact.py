@@ -95,9 +95,9 @@ class LineContact(NamedTuple):
     M, L : float
         Moes' load and lubricant parameters.
     pole, exponent : float
-        Roelands' pressure p_r over p0, and his exponent z; zeros for Barus.
+        Roelands' pressure p_r divided by p0, and his exponent z; both are zero for Barus' law.
     density_rise, density_saturation : float
-        Constants of the density law times p0; zeros for an incompressible liquid.
+        Constants of the density law, multiplied by p0; both are zero for an incompressible liquid.
     inlet : float or None
         Beginning of the oil in half widths (negative); None for a fully flooded inlet.
     """
@@ -394,7 +394,7 @@ def solve_film(
     if outcome != Outcome.CONVERGED:
         return _no_solution(case, outcome, source)
     solved: list[GridSolution] = []
-    # both films get the larger of their two relative errors, since two grids may agree on one film by chance
+    # both films get the larger of the two relative errors, because two grids may agree on one film by chance
     scales = np.array([source.central_film, source.minimum[1]])
     wanted: list[Reading] = [lambda grid: np.array([grid.central_film, grid.minimum[1]]) / scales, *readings]
 

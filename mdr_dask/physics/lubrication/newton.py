@@ -92,11 +92,11 @@ class Liquid(NamedTuple):
     alpha : float
         Slope of ``ln eta`` at ambient pressure, ``alpha p0``.
     pole : float
-        Roelands' pressure over p0; not used if `exponent` is zero.
+        Roelands' pressure p_r divided by p0; not used if `exponent` is zero.
     exponent : float
-        Roelands' exponent z; zero for Barus.
+        Roelands' exponent z; zero for Barus' law.
     density_rise, density_saturation : float
-        ``rho/rho0 = 1 + rise P/(1 + saturation P)``; zero for an incompressible liquid.
+        Constants of ``rho/rho0 = 1 + rise P/(1 + saturation P)``; both are zero for an incompressible liquid.
     """
 
     alpha: float

@@ -41,9 +41,9 @@ def nearly_limit(profile: Profile, stick_radius: float, cycles: Sequence[float],
     profile : Profile
         The virgin body; its image must increase with the radius.
     stick_radius : float
-        c, between 0 and 1.
+        Stick radius c of the virgin contact, between 0 and 1.
     cycles : sequence of float
-        N >= 0.
+        Numbers of cycles N >= 0, in units of N0.
     accuracy : float
         Largest relative error of volume and force; the error of f, relative to the largest possible wear, is
         smaller.

@@ -112,8 +112,8 @@ class Resolution(NamedTuple):
     def panels(self, near: int, fewest_digits: float = 2.0, sharpness: float = 1.0, coarser: float = 1.0) -> Panels:
         """Return graded panels.
 
-        The panels at the inner border are halved `near` times more often than those at the edge; this number of
-        halvings is multiplied by `sharpness`.
+        The panels at the inner border have `near` more halvings than the panels at the edge. The number of halvings at
+        the inner border is then multiplied by `sharpness`.
         """
         digits = max(-np.log10(coarser * self.accuracy), fewest_digits)
         # with fewer halvings, the error of the panels at the moving edge would make the steps very short
@@ -221,7 +221,7 @@ def march(
     end : float
         Time to reach.
     tolerance : float
-        Error of `Problem.worn` allowed in one step.
+        Allowed error of the quantity `Problem.worn` in one step.
     first : float
         Length of the first step.
     start : Moment, optional

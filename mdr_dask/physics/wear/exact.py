@@ -62,7 +62,8 @@ def exact(
     profile : Profile
         The virgin body, pressed to the depth 1.
     stick_radius : float
-        c of the virgin contact, between 0 and 1; 0 is gross slip in one direction, df/ds = p in the whole contact.
+        c of the virgin contact, between 0 and 1; 0 means gross slip in one direction, with df/ds = p in
+        the whole contact.
     amounts : sequence of float
         Cycles N >= 0 in units of N0, or sliding paths s = k E* l / (sigma0 a0); any order.
     accuracy : float
@@ -71,7 +72,7 @@ def exact(
     constant_force : bool
         Keep the force of the virgin contact instead of its depth.
     errors : bool
-        Whether to estimate the errors; this takes about as long again.
+        Whether to estimate the errors; this about doubles the computing time.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Partial slip under constant force as the equations of one step for `evolution.march`.
+"""The equations of one time step of partial slip under constant force, for `evolution.march`.
 
 The depth d grows, and the stick border b moves outwards until the image jumps there; then it no longer moves. Inside
 the border the image is frozen: g(b) = d - eta at the time when the border passed. The slip is s = (f - f_star) / eta.
@@ -28,7 +28,8 @@ from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear.evolution import Moment, settled
 from mdr_dask.physics.wear.slip import LogTable, PartialSlip, log_slip, partial_slip
 
-#: Weight of the border relative to the depth in the step error: f rises like a square root beyond the border.
+#: Weight of the border relative to the depth in the step error. It is large, because f rises like a square root beyond
+#: the border.
 BORDER_WEIGHT = 30.0
 #: Position on the panels up to which the rise of the plateau is stored; the border is at 0, the edge at 1.
 BEYOND = 1.25
@@ -181,7 +182,7 @@ class ForcedSlip:
         return place.width > 0.0 and self.body.width * place.border > -0.5 * self.body.square
 
     def radius(self, place: float) -> float:
-        """Return the radius for a squared radius that is counted from c^2."""
+        """Return the radius that belongs to a squared radius, which is counted from c^2 in units of 1 - c^2."""
         return float(np.sqrt(self.body.square + self.body.width * place))
 
     def start(self) -> Pressed:

@@ -45,12 +45,13 @@ SETTINGS = Settings()
 
 @dataclass(frozen=True)
 class LoadBlock:
-    """Cycles under one amplitude and one load.
+    """A number of cycles with constant amplitude and constant depth or force.
 
     Parameters
     ----------
     cycles : float
-        N in units of N0 of this block's own amplitude: the sliding path 4 U0 n k E* / (sigma0 a0).
+        Dimensionless number of cycles N = 4 U0 n k E* / (sigma0 a0), with the number n of cycles and the amplitude U0
+        of this block.
     slip_share : float
         eta = G* U0 / (mu E* d0) > 0 with the first depth d0. The slip is gross if eta exceeds the depth in units of
         d0; an infinite eta means sliding.
@@ -84,7 +85,7 @@ def history(
     profile : Profile
         The virgin body; its first contact under depth 1 has radius 1.
     blocks : sequence of LoadBlock
-        The blocks in their order in time.
+        The blocks in the order of time.
     cells : int
         Number of cells of the grid. The error is about proportional to the cell width, and, once the image has a jump,
         to the square root of the cell width.

@@ -135,11 +135,11 @@ def fast(profile: Profile, stick_radius: float, cycles: float, xi: float = THESI
     profile : Profile
         The virgin body.
     stick_radius : float
-        c, between 0 and 1.
+        Stick radius c, between 0 and 1.
     cycles : float
-        N >= 0.
+        Number of cycles N >= 0, in units of N0.
     xi : float
-        Factor of the order of one.
+        Factor xi in the exponent xi N / a(c) of the fast rule, of the order of one.
     """
     radius = limit_radius(profile, stick_radius)
     rest = max(math.exp(-xi * cycles / radius), SETTINGS.least)

@@ -1,4 +1,4 @@
-"""Partial slip at constant depth, and gross slip, as the equations of one step for `evolution.march`.
+"""The equations of one time step of partial slip at constant depth and of gross slip, for `evolution.march`.
 
 Nodes lie at r^2 = c^2 + z (a^2 - c^2), where z is the position on the panels, from 0 to 1. The unknown for the edge is
 the width a^2 - c^2 divided by its value in the virgin contact. So the equations are well conditioned even near full

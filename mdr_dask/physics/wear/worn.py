@@ -330,9 +330,9 @@ def largest_wear(scar: Scar) -> float:
 def _change_beyond(scar: Scar, position: FloatArray) -> FloatArray:
     """Return g - g0 outside a scar of radius a, where f = f0.
 
-    The image is the unique continuation for which the half-integral vanishes beyond a:
-    (2x/pi) sqrt(x^2 - a^2) int_c^a (g - g0) / ((x^2 - t^2) sqrt(a^2 - t^2)) dt, by substituting sin(phi) = (s/a)
-    sinh(w).
+    Beyond a, the change of the image follows from the condition that its half-integral vanishes there:
+    g - g0 at x is (2x/pi) sqrt(x^2 - a^2) int_c^a (g - g0) / ((x^2 - t^2) sqrt(a^2 - t^2)) dt. The integral is computed
+    with the substitutions t = a cos(phi) and a sin(phi) = sqrt(x^2 - a^2) sinh(w).
     """
     c, a = scar.border, scar.radius
     s = np.sqrt((position - a) * (position + a))
