@@ -243,7 +243,9 @@ def with_more_points(
     accuracy: float | None,
     outputs: Collection[str],
 ) -> Operation | None:
-    """Return the case with more points if its revolution misses the accuracy and more points are allowed, else None."""
+    """Return the case with more points if its revolution misses the accuracy and more points are allowed, otherwise
+    None.
+    """
     here = operation.source
     if accuracy is None or isinstance(here, Measured) or operation.case.points != "auto":
         return None

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
 CUT_ERROR = 0.05  # relative error of every point of a tabulated spectrum of straight profiles
-MOST_ANISOTROPY = 0.25  # largest anisotropy of a surface that counts as isotropic; above it, slopes differ by over 1/5
+MOST_ANISOTROPY = 0.25  # a surface up to this anisotropy counts as isotropic; its slopes differ by less than 1/5
 STRIPES = 10.0  # power of waves along an axis, relative to an isotropic surface, above which a map has stripes
 FORM = 0.9  # if a parabola explains more than this fraction of the mean square, the heights contain a form
 MOST_OUTLIERS = 0.05  # largest fraction of outliers; if there are more, they count as parts of the surface

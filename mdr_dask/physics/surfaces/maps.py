@@ -22,7 +22,7 @@ FAR = 19.0  # deviation of an outlier, in robust standard deviations; no point o
 BAND = 128  # number of rows processed together, so that they fit into the processor's cache
 TELLING = 1e-3  # a ring with less than this fraction of the largest ring's contribution may be due to rounding
 MOST_SCATTER = 0.02  # octaves are used if angular harmonics due to chance have at most this mean square
-FLAT = 1e-12  # a map is flat if the range of heights over the largest height is below this value
+FLAT = 1e-12  # a map is flat if the range of heights, divided by the largest height, is below this value
 ROUNDING = 1e-20  # rounding error of the transform, as a fraction of the largest ring
 HANN_MODES = 0.3  # number of independent waves per wave of the transform, with Hann's window
 
@@ -43,7 +43,10 @@ class SurfaceMap(NamedTuple):
 
 
 def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
-    """Return the points more than `FAR` robust standard deviations from their neighbours along both axes."""
+    """Return the points that deviate from their neighbours along both axes by more than `FAR` standard deviations.
+
+    The standard deviation is a robust estimate.
+    """
     height = surface.height
     away = np.empty((max(height.shape[0] - 2, 0), max(height.shape[1] - 2, 0)))
     for first in range(0, away.shape[0], BAND):
@@ -172,8 +175,8 @@ class MapSpectrum:
     Parameters
     ----------
     wavenumber : array, shape (rings,)
-        q = k dq, k = 1, 2, ..., with dq = 2 pi over the shorter side, up to the Nyquist wave number of the wider
-        spacing.
+        q = k dq, k = 1, 2, ..., up to the Nyquist wave number of the wider spacing; dq is 2 pi divided by the shorter
+        side.
     density : array, shape (rings,)
         C2D, m^4: the power of a ring divided by its area, so that rms height and rms gradient are preserved.
     count : array, shape (rings,)

@@ -83,8 +83,8 @@ def fit_self_affine(bins: Cut) -> SelfAffine | None:
     Returns
     -------
     SelfAffine or None
-        The cut-offs are bins, chosen by Schwarz's information criterion. The confidence intervals follow from the
-        likelihood and are widened by the misfit.
+        The cut-offs lie at bins that are chosen by Schwarz's information criterion. The confidence intervals follow
+        from the likelihood and are widened by the misfit.
     """
     wavenumber, density, error = bins
     if wavenumber.size < LEAST_BINS:

@@ -4,7 +4,8 @@ Let s be the slip divided by its amplitude: ds/dN = p s / eta. Wear at other rad
 radius. Therefore, if s_1 <= s_2 everywhere and s_1 = s_2 at one radius, the pressure at this radius is at least as high
 in the second body as in the first (maximum principle of the half-space). So a function stays below the true slip if it
 starts below the virgin slip and grows no faster than its own pressure allows. One such function is the half-integral of
-y = m min(y0 / y0(x_1), 1) for any x_1 > c, where dm/dN = m (1 - m) / (pi w), starting at m = y0(x_1):
+y = m min(y0 / y0(x_1), 1) for any x_1 > c, where y0 = (g0 - g_c) / eta, and dm/dN = m (1 - m) / (pi w), starting at m =
+y0(x_1):
 
 * its relative growth is at most (1 - m) / (pi w), with w^2 = a^2 - c^2;
 * its image jumps from m to 1 at the radius a of the final scar. The pressure of this jump alone is

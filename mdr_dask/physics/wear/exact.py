@@ -219,8 +219,8 @@ def _fretted_contact(problem: PartialSlip, dense: Dense, time: float, energy: fl
 
     The worn depth is eta s0 (exp(accumulated) - 1), a formula without cancellation. Where `accumulated` exceeds 1,
     eta (s - s0) is used instead, because the long late steps accumulate a larger error than the slip has. The worn
-    depth over sqrt(r^2 - c^2) is interpolated: it is smooth next to c, both before and after the image has jumped
-    there.
+    depth divided by sqrt(r^2 - c^2) is interpolated: this quotient is smooth next to c, before and after the image
+    jumps at c.
     """
     profile, panels, c, eta = problem.profile, problem.panels, problem.inner_radius, problem.eta
     unknowns = dense.unknowns(time) if time > 0.0 else problem.start().unknowns

@@ -1,6 +1,6 @@
 """The exact evolution of wear under constant force, and the limiting profile.
 
-The evolution has two parts: the stick border moves, and later stops.
+The evolution has two parts: first the stick border moves, then it no longer moves.
 
 See `mdr_dask.physics.wear.forced_slip` for the equations. The constant force is the force of the virgin contact.
 """
@@ -125,7 +125,7 @@ def border_moves(stick_radius: float, accuracy: float) -> bool:
 
 
 def least_edge_error(stick_radius: float, accuracy: float) -> float:
-    """Return the least error to be stated for the radii under constant force."""
+    """Return the least stated error of the radii under constant force."""
     return SETTINGS.least_edge_error * min(accuracy, SETTINGS.coarsest) * (1.0 - stick_radius)
 
 

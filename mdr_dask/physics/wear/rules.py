@@ -114,7 +114,7 @@ def limit_radius(profile: Profile, stick_radius: float) -> float:
 
 
 def limit(profile: Profile, stick_radius: float) -> Worn:
-    """Return the limiting profile at constant depth: g = g0 up to c, and 1 beyond.
+    """Return the limiting profile at constant depth; its image is g = g0 up to c, and g = 1 beyond c.
 
     Examples
     --------
