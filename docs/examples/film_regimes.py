@@ -29,7 +29,7 @@ def main(store: str, target: str = "film_regimes.png") -> None:
         numbers = moes_parameters(W, U, G)
         axes.plot(np.ravel(numbers.M), np.ravel(numbers.L), ".", label=name or "cases")
     axes.set(xscale="log", yscale="log", xlabel="load M = W / √(2U)", ylabel="lubricant L = G (2U)^(1/4)")
-    axes.legend()
+    axes.legend(loc="upper left")
     figure.savefig(target)
 
 
