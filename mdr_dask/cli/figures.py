@@ -99,7 +99,8 @@ def plot(
         if where:
             groups = selection.where_all(groups, where)
             figures = {name: _without(figure, where) for name, figure in figures.items()}
-        figures = {name: _warned(figure, _warnings(urls)) for name, figure in figures.items()}
+        warnings = _warnings(urls)
+        figures = {name: _warned(figure, warnings) for name, figure in figures.items()}
         if measured is not None:
             from mdr_dask.plots.measured import with_points
 

@@ -40,9 +40,6 @@ LEGEND_SHARE = 0.35
 GAP = 3
 #: Largest number of lines of a title.
 MOST_LINES = 7
-#: Largest number of decades of a vertical logarithmic axis; with a value such as 1e-90 on it, all other values would
-#: coincide.
-DECADES = 15
 #: Curves with at least this number of points are drawn without markers.
 MANY_POINTS = 60
 #: Cases without a value are marked at this height above the lower edge, as a fraction of the height of the panel.
@@ -186,9 +183,6 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
 def _finish_axis(axes: Axes, name: str, axis: Axis) -> None:
     if axis.low is not None or axis.high is not None:
         getattr(axes, f"set_{name}lim")(axis.low, axis.high)
-    elif axis.log and name == "y":
-        low, high = axes.get_ylim()
-        axes.set_ylim(max(low, high / 10.0**DECADES), high)
     if axis.reverse:
         getattr(axes, f"invert_{name}axis")()
     if axis.ticks:
