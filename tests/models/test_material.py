@@ -151,8 +151,12 @@ def test_a_table_that_is_no_dma_is_refused(tmp_path, text, message):
         moduli(tmp_path, text)
 
 
-#: Curves of a fluid-like solid at three temperatures, moved by the law of Williams, Landel and Ferry.
+#: Curves of one solid at several temperatures, shifted by the law of Williams, Landel and Ferry and divided by b_T.
 LAW = {"c1": 10.0, "c2": 100.0, "reference": 300.0}
+
+
+def b_t(temperature):
+    return LAW["reference"] / temperature * (1 + 6e-4 * (temperature - LAW["reference"]))
 
 
 def shifted_table(path, temperatures, decades=3):
@@ -161,7 +165,7 @@ def shifted_table(path, temperatures, decades=3):
     for temperature in temperatures:
         difference = temperature - LAW["reference"]
         reduced = omega * 10 ** (-LAW["c1"] * difference / (LAW["c2"] + difference))
-        modulus = 1e6 * (1 + (1j * reduced) ** 0.3)
+        modulus = 1e6 * (1 + (1j * reduced) ** 0.3) / b_t(temperature)
         lines += [
             f"{w!r},{s!r},{ls!r},{temperature!r}"
             for w, s, ls in zip(omega.tolist(), modulus.real.tolist(), modulus.imag.tolist(), strict=True)
@@ -184,6 +188,25 @@ def test_known_shift_factors_superpose_a_table(tmp_path):
         np.testing.assert_allclose(solid_of(same).moduli, at_reference.moduli, rtol=1e-6, atol=1.0)
         warm = solid_of(same.model_copy(update={"temperature": 310.0}))
         np.testing.assert_allclose(warm.times, at_reference.times * 10 ** rows[2][1], rtol=1e-9)
+
+
+def test_moduli_of_a_table_are_proportional_to_density_times_temperature(tmp_path):
+    """The curves at three temperatures are found again, at a measured temperature and at the reference."""
+    file = shifted_table(tmp_path / "dma.csv", (280.0, 300.0, 330.0))
+    omega = np.logspace(-1, 1, 5)
+    for temperature in (280.0, 300.0, 330.0):
+        warm = material(dma_table={"file": file, "terms_per_decade": 2.0}, temperature=temperature, wlf=LAW)
+        difference = temperature - LAW["reference"]
+        reduced = omega * 10 ** (-LAW["c1"] * difference / (LAW["c2"] + difference))
+        expected = 1e6 * (1 + (1j * reduced) ** 0.3) / b_t(temperature)
+        np.testing.assert_allclose(complex_modulus(solid_of(warm), omega), expected, rtol=0.02)
+        assert any("divided by b_T = " in note for note in warm.notes()) == (temperature != 300.0)
+    assert "multiplied by b_T = rho0 T0 / (rho T), with an expansion of 0.0006 1/K" in warm.notes()[0]
+    plain = material(dma_table={"file": file, "vertical": "none"}, temperature=330.0, wlf=LAW)
+    assert "not multiplied by b_T" in plain.notes()[0]
+    assert abs(complex_modulus(solid_of(plain), 1.0) / complex_modulus(solid_of(warm), 1.0) - 1) > 0.01
+    shifted = material(dma_table={"file": file, "reference": 300.0})
+    np.testing.assert_allclose(complex_modulus(solid_of(shifted), omega), 1e6 * (1 + (1j * omega) ** 0.3), rtol=0.05)
 
 
 def test_a_table_moves_from_its_own_temperature(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
@@ -10,7 +11,7 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Alternatives, Parameters, quantity
-from mdr_dask.models.parts.moduli_table import SAME_TEMPERATURE, Moduli, ModulusTable, one_curve
+from mdr_dask.models.parts.moduli_table import SAME_TEMPERATURE, Moduli, ModulusTable, one_curve, vertical_factor
 from mdr_dask.models.parts.temperature import Arrhenius, Law, ShiftFactors, Wlf
 from mdr_dask.units import shown
 
@@ -109,7 +110,7 @@ class Material(Parameters):
 
     def notes(self) -> tuple[str, ...]:
         """Return notes on the error of a fitted Prony series, and on unusual temperatures and moduli."""
-        return (*fit_notes(self), *_outside(self), *_unusual(self))
+        return (*fit_notes(self), *_scaled(self), *_outside(self), *_unusual(self))
 
 
 @lru_cache(maxsize=256)
@@ -124,7 +125,10 @@ def solid_of(material: Material) -> LinearSolid:
     from mdr_dask.physics import solids as rheology
 
     solid, factor = _solid(material), _shift(material)
-    return solid if factor is None else rheology.at_temperature(solid, factor)
+    if factor is not None:
+        solid = rheology.at_temperature(solid, factor)
+    rise = _vertical(material)
+    return replace(solid, static_modulus=solid.static_modulus / rise, moduli=solid.moduli / rise)
 
 
 def _shift(material: Material) -> float | None:
@@ -134,6 +138,18 @@ def _shift(material: Material) -> float | None:
         return None
     own = None if material.dma_table is None else _curve(material.dma_table, law).temperature
     return float(law.factor(temperature)) / (1.0 if own is None else float(law.factor(own)))
+
+
+def _vertical(material: Material) -> float:
+    """Return b_T of the material's temperature for moduli from a table, and 1 for other materials.
+
+    Moduli at this temperature are those of the curve divided by b_T.
+    """
+    table, temperature = material.dma_table, material.temperature
+    if table is None or temperature is None:
+        return 1.0
+    own = _curve(table, material.law).temperature
+    return 1.0 if own is None else float(vertical_factor(table, np.array([temperature]), own)[0])
 
 
 def _solid(material: Material) -> LinearSolid:
@@ -211,6 +227,17 @@ def fit_notes(material: Material | None) -> tuple[str, ...]:
     return (
         f"{what}: {how and how + '; '}{fit.solid.times.size} Prony terms for {lowest:.3g} to {highest:.3g} rad/s, "
         f"rms error {', '.join(errors)}, largest {fit.largest_error:.1%} at {fit.worst_frequency:.3g} rad/s",
+    )
+
+
+def _scaled(material: Material) -> tuple[str, ...]:
+    """Return a note if the moduli of a table are scaled to the material's temperature."""
+    rise = _vertical(material)
+    if rise == 1 or material.dma_table is None or material.temperature is None:
+        return ()
+    return (
+        f"table {material.dma_table.file.name}: moduli at {shown(material.temperature, 'K')} are divided by "
+        f"b_T = {rise:.4g} (`vertical: none` turns this off)",
     )
 
 

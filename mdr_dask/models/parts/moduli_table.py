@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
@@ -43,6 +43,10 @@ class ModulusTable(NamedByFile):
         "table_temperature they are shifted by wlf, arrhenius or shift_factors",
         default=None,
         gt=0,
+    )
+    vertical: Literal["modulus", "none"] = Field(
+        default="modulus",
+        description="modulus: moduli of different temperatures differ by b_T = rho0 T0 / (rho T); none: they do not",
     )
     poisson_ratio: float | None = quantity(
         "1", "for moduli in tension, which are divided by 2 (1 + nu)", default=None, ge=-1, le=0.5
@@ -118,7 +122,7 @@ def _as_measured(chosen: ModulusTable, law: Law | None) -> Moduli:
     member, levels = _levels(temperature)
     if chosen.reference is None:
         return _by_law(chosen, law, (omega, storage, loss), member, levels, ends)
-    return _by_curves(chosen.reference, law, (omega, storage, loss), member, levels, ends)
+    return _by_curves(chosen, chosen.reference, law, (omega, storage, loss), member, levels, ends)
 
 
 def _near(temperature: FloatArray, wanted: float) -> FloatArray:
@@ -147,32 +151,63 @@ def _by_law(
         )
     omega, storage, loss = rows
     reference = law.reference
-    text = f"superposed at {shown(reference, 'K')} by the shift factors given, moduli not shifted (b_T = 1)"
-    return Moduli(omega * law.factor(levels)[member], storage, loss, reference, ends, text)
+    rise = vertical_factor(chosen, levels, reference)[member]
+    text = f"superposed at {shown(reference, 'K')} by the shift factors given, moduli {_vertical(chosen)}"
+    return Moduli(omega * law.factor(levels)[member], storage * rise, loss * rise, reference, ends, text)
+
+
+def vertical_factor(chosen: ModulusTable, temperature: FloatArray, reference: float) -> FloatArray:
+    """Return b_T = rho0 T0 / (rho T), by which moduli at a temperature in K are multiplied to obtain them at T0.
+
+    T0 is the reference in K. The factor is 1 with `vertical: none`.
+    """
+    from mdr_dask.physics.superposition.master_curve import known_rise
+
+    return np.asarray(10 ** known_rise(np.append(reference, temperature), chosen.vertical)[1:], dtype=np.float64)
+
+
+def _vertical(chosen: ModulusTable) -> str:
+    """Return a text on the vertical factors."""
+    from mdr_dask.physics.superposition.master_curve import EXPANSION
+
+    if chosen.vertical == "none":
+        return "not multiplied by b_T"
+    return f"multiplied by b_T = rho0 T0 / (rho T), with an expansion of {EXPANSION:g} 1/K"
 
 
 def _by_curves(
-    reference: float, law: Law | None, rows: Rows, member: IntArray, levels: FloatArray, ends: tuple[float, float]
+    chosen: ModulusTable,
+    reference: float,
+    law: Law | None,
+    rows: Rows,
+    member: IntArray,
+    levels: FloatArray,
+    ends: tuple[float, float],
 ) -> Moduli:
     """Return the moduli of all temperatures, shifted to the reference temperature so that the curves overlap."""
     _require_overlap(rows[1], member, levels)
-    across, along, text = _superposed(reference, tuple(levels), member.tobytes(), *(each.tobytes() for each in rows))
+    across, along, text = _superposed(
+        reference, chosen.vertical, tuple(levels), member.tobytes(), *(each.tobytes() for each in rows)
+    )
     omega, storage, loss = rows
     rise = 10 ** np.array(along)[member]
-    text = f"superposed at {shown(reference, 'K')} by both moduli{text}{_compared(levels, across, law, reference)}"
+    text = (
+        f"superposed at {shown(reference, 'K')} by both moduli, {_vertical(chosen)}{text}"
+        f"{_compared(levels, across, law, reference)}"
+    )
     return Moduli(omega * 10 ** np.array(across)[member], storage * rise, loss * rise, reference, ends, text)
 
 
 @lru_cache(maxsize=16)
 def _superposed(
-    reference: float, levels: tuple[float, ...], member: bytes, *rows: bytes
+    reference: float, vertical: Literal["modulus", "none"], levels: tuple[float, ...], member: bytes, *rows: bytes
 ) -> tuple[FloatArray, FloatArray, str]:
     """Return horizontal and vertical shift factors of each temperature, and a text about these factors."""
     from mdr_dask.physics.superposition.master_curve import rereference, superpose
 
     points, groups = np.log10([np.frombuffer(row) for row in rows]), np.frombuffer(member, dtype=np.intp)
     parts = [groups == number for number in range(len(levels))]
-    free = superpose(levels, [(points[0, part], points[1:, part]) for part in parts], "modulus")
+    free = superpose(levels, [(points[0, part], points[1:, part]) for part in parts], vertical)
     found = rereference(free, reference)
     low, high = found.interval()[:, : len(levels)]
     ends = ", ".join(
