@@ -65,7 +65,7 @@ def test_check_tells_axes_tables_lines_and_how_they_meet(capsys):
     ):
         assert line in said
     text = "\n".join(said)
-    assert "table rubber.csv: superposed at 20 degC by the shift factors given, moduli not shifted (b_T = 1); " in text
+    assert "table rubber.csv: superposed at 20 degC by the shift factors given, moduli multiplied by b_T" in text
     for temperature in (0, 20, 50):
         assert f"q v of 0.0063 to 3.1e+05 rad/s at {temperature} degC, data from" in text
     assert " uncompressed, about " in text
