@@ -232,12 +232,15 @@ def fit_notes(material: Material | None) -> tuple[str, ...]:
 
 def _scaled(material: Material) -> tuple[str, ...]:
     """Return a note if the moduli of a table are scaled to the material's temperature."""
-    rise = _vertical(material)
-    if rise == 1 or material.dma_table is None or material.temperature is None:
+    table = material.dma_table
+    if table is None or material.temperature is None or table.vertical == "none":
+        return ()
+    own = _curve(table, material.law).temperature
+    if own is None:
         return ()
     return (
-        f"table {material.dma_table.file.name}: moduli at {shown(material.temperature, 'K')} are divided by "
-        f"b_T = {rise:.4g} (`vertical: none` turns this off)",
+        f"table {table.file.name}: at other temperatures than {shown(own, 'K')}, moduli are divided by "
+        "b_T = rho0 T0 / (rho T) (`vertical: none` turns this off)",
     )
 
 
