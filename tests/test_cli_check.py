@@ -154,7 +154,7 @@ def test_moduli_of_no_solid_are_asked_about(files, capsys, unit):
     """Softer than a gel, stiffer than diamond."""
     (files / "rubber.csv").write_text(rubber((0, 20, 50)).replace("MPa", unit))
     assert main(["check", "tyre.yaml"]) == 0
-    told = rf"rubber.csv: shear moduli of [\d.]+ \w+ to [\d.]+ \w+ are those of no solid: is the unit right\?"
+    told = r"rubber.csv: shear moduli of [\d.]+ \w+ to [\d.]+ \w+ are those of no solid: is the unit right\?"
     assert re.search(told, capsys.readouterr().out)
 
 
