@@ -67,12 +67,17 @@ def distinguishable(
 #: Names of parameters and outputs in this package, by other common names of the same quantity.
 _SYNONYMS = {
     "load": ("normal_force", "line_load"),
+    "force": ("normal_force", "line_load"),
+    "pressure": ("normal_force", "line_load"),
     "speed": ("velocity", "mean_velocity", "rotation_speed"),
+    "velocity": ("mean_velocity", "rotation_speed"),
+    "rpm": ("rotation_speed",),
+    "diameter": ("radius", "roller_radius", "tip_radius"),
+    "hv": ("hardness",),
     "mu": ("friction_coefficient", "friction"),
     "friction": ("friction_coefficient",),
     "roughness": ("rms_roughness",),
     "modulus": ("shear_modulus", "contact_modulus"),
-    "youngs_modulus": ("shear_modulus", "contact_modulus"),
     "repeats": ("realisations",),
     "samples": ("realisations",),
     "profile": ("surface",),
@@ -80,6 +85,8 @@ _SYNONYMS = {
     "alpha": ("pressure_viscosity",),
     "slip": ("slide_roll_ratio",),
 }
+#: How quantities with related names differ from the suggested parameter.
+_DIFFERENCES = {"diameter": ", half the diameter", "pressure": ", a load instead of a pressure"}
 
 
 def did_you_mean(word: Any, known: Sequence[str]) -> str:
@@ -88,8 +95,14 @@ def did_you_mean(word: Any, known: Sequence[str]) -> str:
 
     folded = {name.casefold(): name for name in known}
     typed = str(word).casefold()
-    near = [name for name in _SYNONYMS.get(typed, ()) if name in folded] or get_close_matches(typed, list(folded), n=1)
-    near = near or [name for name in folded if len(typed) > 2 and typed in name]
+    quantity = typed.rpartition("_")[2]  # the last word of a compound name, such as roller_diameter
+    synonyms = [name for name in _SYNONYMS.get(quantity, ()) if name in folded]
+    alike = get_close_matches(typed, list(folded), n=1)
+    if synonyms and quantity in _DIFFERENCES:
+        return f" (did you mean {folded[synonyms[0]]!r}{_DIFFERENCES[quantity]}?)"
+    near = (synonyms if quantity == typed and synonyms else alike or synonyms) or [
+        name for name in folded if len(typed) > 2 and typed in name
+    ]
     if near:
         return f" (did you mean {folded[near[0]]!r}?)"
     return f" (known: {', '.join(known)})" if 0 < len(known) <= 12 else ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from contextlib import suppress
 from decimal import Decimal
 from functools import lru_cache
@@ -68,6 +69,7 @@ pascal = newton / meter ** 2 = Pa
 bar = 1e5 * pascal
 atmosphere = 101325 * pascal = atm
 psi = pound_force / inch ** 2
+vickers = kilogram_force / millimeter ** 2 = HV
 joule = newton * meter = J
 electron_volt = 1.602176634e-19 * joule = eV
 watt = joule / second = W
@@ -241,26 +243,54 @@ def seconds(duration: float) -> str:
     return f"{minutes // 60} h {minutes % 60} min"
 
 
-#: ``check`` asks about a number without a unit if it is more than this number of decades from the usual value. The
-#: second limit is for temperatures.
-_FAR, _FAR_TEMPERATURE = 3.0, 0.3
+#: ``check`` asks about a number without a unit if it is more than this number of decades from the usual value.
+_FAR = 3.0
 
 
-def is_far(value: float, unit: str, usual: str) -> bool:
-    """Return whether a number in SI is more than 3 decades (0.3 for a temperature) from a usual value, ``10 MPa``."""
-    return value != 0 and _decades(value, to_si(usual, unit)) > (_FAR_TEMPERATURE if unit == "K" else _FAR) + 1e-9
+def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
+    """Return whether a number without a unit may have been meant in another unit than the SI unit.
+
+    This is so if the number in SI is more than 3 decades from the first usual value. It is also so if a usual value has
+    a unit that is no decimal multiple of the SI unit (rpm, degC), and the number is nearer to the usual value when it
+    is read in this unit.
+
+    Parameters
+    ----------
+    value : float
+        The number as written.
+    unit : str
+        The SI unit.
+    usual : sequence of str
+        Usual values with their units: ``["2 GPa", "200 HV"]``.
+    """
+    if value == 0:
+        return False
+    in_si = _decades(value, unit, usual[0])
+    units = [each for each in map(unit_behind, usual) if not _is_decimal(each, unit)]
+    return in_si > _FAR + 1e-9 or any(
+        _decades(to_si(f"{value!r} {each}", unit), unit, usual[0]) < in_si for each in units
+    )
 
 
-def likely(value: float, unit: str, usual: str) -> str:
-    """Return a number with the unit of the usual value, if it is near the usual value in this unit; else empty."""
-    meant = f"{value:g} {unit_behind(usual)}"
-    with suppress(ValueError):  # the converted number is too large
-        return "" if is_far(to_si(meant, unit), unit, usual) else meant
-    return ""
+def likely(value: float, unit: str, usual: Sequence[str]) -> str:
+    """Return a number with the unit of that usual value to which it is nearest; empty if it is far from all of them."""
+    found = {}
+    for each in usual:
+        meant = f"{value:g} {unit_behind(each)}"
+        with suppress(ValueError):  # the converted number is too large
+            found[meant] = _decades(to_si(meant, unit), unit, usual[0])
+    nearest = min(found, key=lambda meant: found[meant], default="")
+    return nearest if nearest and found[nearest] <= _FAR + 1e-9 else ""
 
 
-def _decades(value: float, usual: float) -> float:
-    return abs(math.log10(abs(value)) - math.log10(abs(usual))) if value else math.inf
+def _decades(value: float, unit: str, usual: str) -> float:
+    """Return the distance of a number in SI from a usual value in decades."""
+    return abs(math.log10(abs(value)) - math.log10(abs(to_si(usual, unit)))) if value else math.inf
+
+
+def _is_decimal(given: str, unit: str) -> bool:
+    factor, zero = conversion(given, unit) if given else (1.0, 0.0)
+    return zero == 0 and math.isclose(factor, 10.0 ** round(math.log10(factor)))
 
 
 def example_unit(unit: str) -> str:

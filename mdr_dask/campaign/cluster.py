@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from mdr_dask.campaign.document import parse, read_text
-from mdr_dask.campaign.problems import Problems, shown
+from mdr_dask.campaign.problems import shown
 from mdr_dask.errors import did_you_mean
 
 _EXPECTED = {
@@ -25,15 +25,14 @@ def load_cluster(path: FilePath) -> dict[str, Any]:
     CampaignError
         With every problem of the file, by line.
     """
-    problems = Problems()
-    document = parse(read_text(path), str(path), problems)
+    document = parse(read_text(path), str(path))
     data = document.data if isinstance(document.data, dict) else {}
     for key, value in data.items():
         if key not in _EXPECTED:
-            problems.add(document.key_place((key,)), key, f"unknown key{did_you_mean(key, list(_EXPECTED))}")
+            document.report((key,), f"unknown key{did_you_mean(key, list(_EXPECTED))}", key=True)
         elif not (isinstance(value, dict) if key != "class" else isinstance(value, str) and "." in value):
-            problems.add(document.place((key,)), key, f"expected {_EXPECTED[key]}, got {shown(value)}")
-    if "class" not in data and not problems:
-        problems.add(document.place(()), "", f"expected a mapping with the key class, got {shown(document.data)}")
-    problems.raise_if_any()
+            document.report((key,), f"expected {_EXPECTED[key]}, got {shown(value)}")
+    if "class" not in data and not document.problems:
+        document.report((), f"expected a mapping with the key class, got {shown(document.data)}")
+    document.problems.raise_if_any()
     return data

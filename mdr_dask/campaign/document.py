@@ -36,11 +36,14 @@ class Document:
         Path of the file, and its text.
     data : object
         Mappings, lists, texts, numbers, truth values and None.
+    problems : Problems
+        All problems of the file that have been found.
     """
 
     source: str
     text: str
     data: Any = None
+    problems: Problems = field(default_factory=Problems)
     _nodes: dict[Path, Node] = field(default_factory=dict)
     _keys: dict[Path, Node] = field(default_factory=dict)
 
@@ -53,6 +56,10 @@ class Document:
     def key_place(self, path: Path) -> Place:
         """Return the position of the key at a path; for an entry of a list, the position of its value."""
         return self._at(self._keys[path]) if path in self._keys else self.place(path)
+
+    def report(self, path: Path, what: str, key: bool = False) -> None:
+        """Add a problem of the value at a path, or of its key."""
+        self.problems.add(self.key_place(path) if key else self.place(path), dotted(path), what)
 
     def flow(self, path: Path) -> str:
         """Return the value at a path as YAML on one line, scalars as in the file."""
@@ -78,17 +85,18 @@ def read_text(path: str | FilePath) -> str:
         raise CampaignError(f"{path}: cannot be read: {error.strerror}") from None
 
 
-def parse(text: str, source: str, problems: Problems) -> Document:
+def parse(text: str, source: str) -> Document:
     """Return the document in a YAML 1.2 text.
+
+    Its `problems` are syntax errors, duplicate keys, keys that are not strings, and unknown tags.
 
     Parameters
     ----------
     text, source : str
         The text, and its name in messages.
-    problems : Problems
-        Receives syntax errors, duplicate keys, keys that are not strings, and unknown tags.
     """
     document = Document(source, text)
+    problems = document.problems
     if len(text) > _LONGEST:
         what = f"expected at most {_LONGEST} characters, got {len(text)}: a range or a table holds many values"
         problems.add(Place(source, 1, 1), "", what)
@@ -110,7 +118,7 @@ def parse(text: str, source: str, problems: Problems) -> Document:
     else:
         if root is not None:
             with suppress(_EndlessError):
-                document.data = _Reader(document, problems).read(root, ())
+                document.data = _Reader(document).read(root, ())
     return document
 
 
@@ -152,9 +160,9 @@ class _EndlessError(Exception):
 class _Reader:
     """Reads the data of a document node by node."""
 
-    def __init__(self, document: Document, problems: Problems) -> None:
+    def __init__(self, document: Document) -> None:
         self.document = document
-        self.problems = problems
+        self.problems = document.problems
 
     def read(self, node: Node, path: Path) -> Any:
         """Return the plain data of a node and remember its position."""
@@ -192,19 +200,17 @@ class _Reader:
         if kind == "bool":
             return text.casefold() == "true"
         if len(text) > _MOST_DIGITS and kind in ("int", "float"):
-            what = f"expected a shorter number, got {len(text)} digits"
-            self.problems.add(self.document._at(node), dotted(path), what)
+            self.document.report(path, f"expected a shorter number, got {len(text)} digits")
             return None
         if _NO_TEXT.search(text):
-            what = "expected text without null or incomplete characters"
-            self.problems.add(self.document._at(node), dotted(path), what)
+            self.document.report(path, "expected text without null or incomplete characters")
             return None
         if kind == "int":
             return _integer(text.replace("_", ""))
         if kind == "float":
             return _real(text.replace("_", "").casefold())
         if kind not in _KEPT_AS_TEXT:
-            self.problems.add(self.document._at(node), dotted(path), f"unknown tag {str(node.tag)!r}")
+            self.document.report(path, f"unknown tag {str(node.tag)!r}")
         return text
 
 

@@ -142,9 +142,8 @@ def _scalar(parameters: type[BaseModel], name: str) -> str:
         return shown(default, unit, 12)
     if default is not None:
         return text if len(text := yaml_text(default)) <= _LONGEST else "[...]"
-    usual = fields.usual(info)
-    if usual:
-        return f"[{usual}]" if fields.holds_list(info) else usual
+    if usual := fields.usual(info):
+        return f"[{usual[0]}]" if fields.holds_list(info) else usual[0]
     if DataFile in kinds or info.annotation == tuple[NamedFile, ...]:
         return f"[{_EXAMPLE_FILE}]" if fields.holds_list(info) else _EXAMPLE_FILE
     if bool in kinds:

@@ -14,11 +14,11 @@ from mdr_dask.campaign import fields, sampling, variation
 from mdr_dask.campaign.definition import SAME_DIGITS, Axis, Series
 from mdr_dask.campaign.document import Document
 from mdr_dask.campaign.messages import report_errors, value_at
-from mdr_dask.campaign.problems import Path, Place, Problems, dotted
-from mdr_dask.campaign.remarks import remarks
+from mdr_dask.campaign.problems import Path, Place, dotted
 from mdr_dask.campaign.spec import CampaignSpec, Drawn, TableSpec
 from mdr_dask.campaign.tolerances import refinement
 from mdr_dask.campaign.variation import Origin, Variation
+from mdr_dask.campaign.written import questions
 from mdr_dask.models.base import Model, Parameters, with_value
 from mdr_dask.units import to_si
 
@@ -32,9 +32,10 @@ def expand(
     spec: CampaignSpec,
     directory: str,
     outputs: Sequence[str],
-    problems: Problems,
 ) -> tuple[tuple[Series, ...], tuple[str, ...]]:
-    """Return the series of a campaign, and questions about their bare numbers.
+    """Return the series of a campaign without problems, and questions about numbers without a unit.
+
+    Every problem of parameters, ranges and tables is added to the problems of the document.
 
     Parameters
     ----------
@@ -48,8 +49,6 @@ def expand(
         Folder to which the names of files in the campaign are relative.
     outputs : sequence of str
         Names of the requested outputs.
-    problems : Problems
-        Receives every problem of parameters, ranges and tables; a series with a problem is left out.
     """
     found = []
     asked: dict[str, None] = {}
@@ -57,13 +56,13 @@ def expand(
         paths: dict[str, Path] = {key: ("parameters", key) for key in spec.parameters}
         if spec.series:
             paths |= {key: ("series", name, key) for key in spec.series[name]}
-        expansion = _Expansion(document, model.parameters, spec, directory, problems, paths)
+        expansion = _Expansion(document, model.parameters, spec, directory, paths)
         series = expansion.series(name, model, outputs)
         if series is not None:
             found.append(series)
             units = model.units(series.parameters)
             asked |= dict.fromkeys(expansion.remarks)
-            asked |= dict.fromkeys(map(str, remarks(document, model.parameters, expansion.data, paths, units)))
+            asked |= dict.fromkeys(questions(document, model.parameters, expansion.data, paths, units))
     return tuple(found), tuple(asked)
 
 
@@ -73,7 +72,6 @@ class _Expansion:
     parameters: type[Parameters]
     spec: CampaignSpec
     directory: str
-    problems: Problems
     paths: Mapping[str, Path]
     data: dict[str, Any] = field(init=False)
     remarks: list[str] = field(default_factory=list)
@@ -120,13 +118,13 @@ class _Expansion:
     def _variations(self) -> tuple[Variation, ...] | None:
         design = self.spec.sampling
         drawn = isinstance(design, Drawn)
-        found = variation.find(self.document, self.parameters, self.data, self.paths, drawn, self.problems)
+        found = variation.find(self.document, self.parameters, self.data, self.paths, drawn)
         origin = Origin("sampling", self.document.place(("sampling",)))
         if isinstance(design, TableSpec):
             for one in found:
                 self._complain(one.origin, f"expected one value, because {design.table} has the parameters that vary")
             return found or sampling.tabled(
-                design.table, self.directory, origin, self.parameters, self.data, self.problems, self.remarks
+                design.table, self.directory, origin, self.parameters, self.data, self.document.problems, self.remarks
             )
         if drawn and not found:
             self._complain(origin, "expected at least one range among the parameters, got none")
@@ -218,10 +216,10 @@ class _Expansion:
         except ValidationError as error:
             origins: dict[Path, Origin] = {one.path: one.items[position].origin for one in variations}
 
-            def report(path: Path, key: bool, what: str) -> None:
+            def report(path: Path, what: str, key: bool) -> None:
                 if not any(path[: len(start)] == start for start in broken):
                     place, name = self._locate(path, key, origins)
-                    self.problems.add(place, name, what)
+                    self.document.problems.add(place, name, what)
 
             report_errors(error, self.parameters, tree, report)
         return None
@@ -269,13 +267,13 @@ class _Expansion:
         """Yield the axes, each adaptive axis with its refinement."""
         for axis, one in zip(axes, variations, strict=True):
             if one.written and one.spread:
-                found = refinement(self.document, one.written, one.spread, model, outputs, self.problems)
+                found = refinement(self.document, one.written, one.spread, model, outputs)
                 yield replace(axis, refinement=found)
             else:
                 yield axis
 
     def _complain(self, origin: Origin, what: str) -> None:
-        self.problems.add(origin.place, origin.name, what)
+        self.document.problems.add(origin.place, origin.name, what)
 
 
 def _checked(base: Parameters | None, data: Mapping[str, Any], varied: set[str | int]) -> dict[str, Any]:

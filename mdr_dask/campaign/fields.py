@@ -36,9 +36,9 @@ def holds_whole_numbers(info: FieldInfo) -> bool:
     return int in kinds and float not in kinds
 
 
-def usual(info: FieldInfo) -> str:
-    """Return a common value of a field with its unit; an empty text if the field declares no common value."""
-    return str(info.examples[0]) if info.examples else ""
+def usual(info: FieldInfo) -> tuple[str, ...]:
+    """Return the usual values that a field declares, with their units; ``mdr-dask init`` writes the first one."""
+    return tuple(map(str, info.examples or ()))
 
 
 def structures(info: FieldInfo) -> tuple[type[BaseModel], ...]:

@@ -17,9 +17,9 @@ from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.units import expected, likely, spelt
 
-#: Function that adds a problem. Its arguments are the path in the data, whether the problem concerns the key instead of
-#: the value, and the message.
-Report = Callable[[Path, bool, str], None]
+#: Function that adds a problem. Its arguments are the path in the data, the message, and whether the problem concerns
+#: the key instead of the value.
+Report = Callable[[Path, str, bool], None]
 
 _BOUNDS = {"greater_than": ("gt", "above"), "greater_than_equal": ("ge", "of at least")}
 _BOUNDS |= {"less_than": ("lt", "below"), "less_than_equal": ("le", "of at most")}
@@ -115,16 +115,16 @@ def _report_group(path: Path, group: list[ErrorDetails], kind: type[BaseModel], 
     own = next((details for details in group if details["type"] in ("value_error", "assertion_error")), None)
     if own is not None:
         what = str(own["ctx"]["error"])
-        report((*path, *_entry(value_at(data, path), what)), False, what)
+        report((*path, *_entry(value_at(data, path), what)), what, False)
     elif first["type"] == "missing":
-        report(path, False, _missing(path, kind, data))
+        report(path, _missing(path, kind, data), False)
     elif first["type"] == "extra_forbidden":
-        report(path, True, _unknown(path, kind, data))
+        report(path, _unknown(path, kind, data), True)
     else:
         value = value_at(data, path)
         wanted = " or ".join(dict.fromkeys(_wanted(details, path, kind, data) for details in group))
         hint = _hint(group, value) or _forgotten_unit(group, path, kind, data) or _meant(path, kind, data)
-        report(path, False, f"expected {wanted}, got {shown(value)}{hint}")
+        report(path, f"expected {wanted}, got {shown(value)}{hint}", False)
 
 
 def _entry(value: Any, what: str) -> Path:
@@ -149,7 +149,7 @@ def _hint(group: list[ErrorDetails], value: Any) -> str:
 def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel], data: Any) -> str:
     """Return a hint to a unit that may be missing after a number out of bounds."""
     value, info, unit = value_at(data, path), _field(kind, path, data), fields.unit_at(kind, path, data)
-    usual = fields.usual(info) if info else ""
+    usual = fields.usual(info) if info else ()
     if not isinstance(value, int | float) or group[0]["type"] not in _BOUNDS:
         return ""
     if unit == "1" and value in range(1, 101) and next(iter(group[0]["ctx"].values())) == 1:

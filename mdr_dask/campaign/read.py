@@ -13,12 +13,11 @@ from mdr_dask.campaign.document import Document, parse, read_text
 from mdr_dask.campaign.expand import expand
 from mdr_dask.campaign.measured import require_readable
 from mdr_dask.campaign.messages import report_errors
-from mdr_dask.campaign.problems import Path, Problems, dotted, shown
+from mdr_dask.campaign.problems import Path, shown
 from mdr_dask.campaign.spec import AdaptiveSpec, CampaignSpec
 from mdr_dask.campaign.tolerances import answers, is_of_fit, tolerances
 from mdr_dask.errors import DataError, ModelError, did_you_mean
 from mdr_dask.models.base import Model
-from mdr_dask.models.data_file import DataFile
 from mdr_dask.units import to_si
 
 
@@ -56,29 +55,33 @@ def loads(text: str, source: str, directory: str) -> Campaign:
     CampaignError
         With every problem of the text, by line.
     """
-    problems = Problems()
-    document = parse(text, source, problems)
+    document = parse(text, source)
     if not isinstance(document.data, dict):
-        if not problems:
-            what = f"expected a mapping with the keys name, model and parameters, got {shown(document.data)}"
-            problems.add(document.place(()), "", what)
-        problems.raise_if_any()
-    spec, wrong = _spec(document, directory, problems)
-    model = None if "model" in wrong else _model(document, spec, problems)
+        if not document.problems:
+            document.report(
+                (), f"expected a mapping with the keys name, model and parameters, got {shown(document.data)}"
+            )
+        document.problems.raise_if_any()
+    spec, wrong = _spec(document, directory)
+    model = None if "model" in wrong else _model(document, spec)
     if model is None:
-        problems.raise_if_any()
+        document.problems.raise_if_any()
     assert model is not None
     series: tuple[Series, ...] = ()
     remarks: tuple[str, ...] = ()
-    outputs = _outputs(document, spec, model, problems)
+    outputs = _outputs(document, spec, model)
     if not wrong & {"parameters", "series", "sampling"}:
-        series, remarks = expand(document, model, spec, directory, outputs, problems)
-    replication = _replication(document, spec, model, outputs, problems)
-    _check_blocks(document, spec, series, problems)
+        series, remarks = expand(document, model, spec, directory, outputs)
+    replication = _replication(document, spec, model, outputs)
+    _check_blocks(document, spec, series)
     measured = spec.measured.table if spec.measured else None
     if measured and series:
-        _check_measured(document, measured, spec.model, outputs, series, problems)
-    problems.raise_if_any()
+        try:
+            require_readable(measured.read_text(), measured.name, spec.model, outputs, series)
+        except DataError as error:
+            for line in str(error).splitlines():
+                document.report(("measured", "table"), line)
+    document.problems.raise_if_any()
     return Campaign(
         name=spec.name,
         model=spec.model,
@@ -96,13 +99,13 @@ def loads(text: str, source: str, directory: str) -> Campaign:
     )
 
 
-def _spec(document: Document, directory: str, problems: Problems) -> tuple[CampaignSpec, set[str]]:
+def _spec(document: Document, directory: str) -> tuple[CampaignSpec, set[str]]:
     """Return the checked keys, with default values for wrong keys, and the names of the wrong keys."""
     wrong: set[str] = set()
 
-    def report(path: Path, key: bool, what: str) -> None:
+    def report(path: Path, what: str, key: bool) -> None:
         wrong.add(str(path[0]))
-        problems.add(document.key_place(path) if key else document.place(path), dotted(path), what)
+        document.report(path, what, key)
 
     context = {"to_si": to_si, "directory": directory}
     try:
@@ -114,71 +117,50 @@ def _spec(document: Document, directory: str, problems: Problems) -> tuple[Campa
     return CampaignSpec.model_validate(stand_in, context=context), wrong
 
 
-def _model(document: Document, spec: CampaignSpec, problems: Problems) -> Model[Any] | None:
+def _model(document: Document, spec: CampaignSpec) -> Model[Any] | None:
     try:
         return models.load(spec.model)
     except ModelError as error:
         hint = did_you_mean(spec.model, models.names()) if str(error).startswith("unknown") else ""
-        problems.add(document.place(("model",)), "model", f"{error}{hint}")
+        document.report(("model",), f"{error}{hint}")
     return None
 
 
-def _outputs(document: Document, spec: CampaignSpec, model: Model[Any], problems: Problems) -> tuple[str, ...]:
+def _outputs(document: Document, spec: CampaignSpec, model: Model[Any]) -> tuple[str, ...]:
     names = [output.name for output in model.outputs]
     errors = {companion.name: name for name, companion in model.companions.items()}
     wanted = spec.outputs or [output.name for output in model.outputs if output.default]
     for index, name in enumerate(spec.outputs or ()):
         path = ("outputs", index)
         if name in errors:
-            what = f"this error comes with its output: expected {errors[name]!r}, and not errors: false, got {name!r}"
-            problems.add(document.place(path), dotted(path), what)
+            what = f"this error is stored with its output: write {errors[name]!r}, without errors: false, got {name!r}"
+            document.report(path, what)
         elif name in model.parameters.renamed:
-            what = f"there is no {name} any more: {model.parameters.renamed[name]}"
-            problems.add(document.place(path), dotted(path), what)
+            document.report(path, f"there is no {name} any more: {model.parameters.renamed[name]}")
         elif name not in names:
-            problems.add(document.place(path), dotted(path), f"unknown output {name!r}{did_you_mean(name, names)}")
+            document.report(path, f"unknown output {name!r}{did_you_mean(name, names)}")
         elif name in wanted[:index]:
-            problems.add(document.place(path), dotted(path), f"this output is given twice: {name}")
+            document.report(path, f"this output is given twice: {name}")
     kept = [name for name in names if name in wanted]
     return model.with_companions(kept) if spec.errors else tuple(kept)
 
 
-def _replication(
-    document: Document, spec: CampaignSpec, model: Model[Any], outputs: tuple[str, ...], problems: Problems
-) -> Replication:
+def _replication(document: Document, spec: CampaignSpec, model: Model[Any], outputs: tuple[str, ...]) -> Replication:
     wanted = spec.realisations
     if not isinstance(wanted, AdaptiveSpec):
         return Replication(wanted, wanted, {})
     if wanted.at_least > wanted.at_most:
-        path: Path = ("realisations", "at_most")
         what = f"expected a whole number of at least {wanted.at_least} (at_least), got {wanted.at_most}"
-        problems.add(document.place(path), dotted(path), what)
+        document.report(("realisations", "at_most"), what)
     path = ("realisations", "until")
     fitted = {name: given for name, given in wanted.until.items() if is_of_fit(name, model)}
     of_outputs = {name: given for name, given in wanted.until.items() if name not in fitted}
-    until = tolerances(document, path, of_outputs, model, outputs, problems)
-    return Replication(wanted.at_least, wanted.at_most, until, answers(document, path, fitted, problems))
+    until = tolerances(document, path, of_outputs, model, outputs)
+    return Replication(wanted.at_least, wanted.at_most, until, answers(document, path, fitted))
 
 
-def _check_measured(
-    document: Document,
-    table: DataFile,
-    model: str,
-    outputs: tuple[str, ...],
-    series: tuple[Series, ...],
-    problems: Problems,
-) -> None:
-    path: Path = ("measured", "table")
-    try:
-        require_readable(table.read_text(), table.name, model, outputs, series)
-    except DataError as error:
-        for line in str(error).splitlines():
-            problems.add(document.place(path), dotted(path), line)
-
-
-def _check_blocks(document: Document, spec: CampaignSpec, series: tuple[Series, ...], problems: Problems) -> None:
+def _check_blocks(document: Document, spec: CampaignSpec, series: tuple[Series, ...]) -> None:
     dims = list(dict.fromkeys([*(axis.dim for one in series for axis in one.axes), "realisation"]))
     for name in spec.store.blocks if series else ():
         if name not in dims:
-            path = ("store", "blocks", name)
-            problems.add(document.key_place(path), dotted(path), f"unknown dimension{did_you_mean(name, dims)}")
+            document.report(("store", "blocks", name), f"unknown dimension{did_you_mean(name, dims)}", key=True)

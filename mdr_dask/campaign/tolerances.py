@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from mdr_dask.campaign.definition import Refinement, Spread, Tolerance
 from mdr_dask.campaign.document import Document
 from mdr_dask.campaign.messages import report_errors, value_at
-from mdr_dask.campaign.problems import Path, Problems, dotted
+from mdr_dask.campaign.problems import Path
 from mdr_dask.campaign.spec import RefinedSpec, ToleranceSpec
 from mdr_dask.errors import did_you_mean
 from mdr_dask.models.base import Model
@@ -25,9 +25,8 @@ def tolerances(
     given: Mapping[str, Written],
     model: Model[Any],
     outputs: Sequence[str],
-    problems: Problems,
 ) -> dict[str, Tolerance]:
-    """Return the tolerance of every output named at a path of a document.
+    """Return the tolerance of every output named at a path of a document; report unknown names and wrong tolerances.
 
     Parameters
     ----------
@@ -41,20 +40,18 @@ def tolerances(
         The model, with the units of its outputs.
     outputs : sequence of str
         The outputs of the campaign.
-    problems : Problems
-        Receives unknown names and wrong tolerances.
     """
     known = [output.name for output in model.outputs if output.name in outputs]
     found = {}
     for name, written in given.items():
         at = (*path, name)
         if name not in known:
-            problems.add(document.key_place(at), dotted(at), f"not among the outputs{did_you_mean(name, known)}")
+            document.report(at, f"not among the outputs{did_you_mean(name, known)}", key=True)
             continue
         try:
             found[name] = tolerance(written, model.output(name).unit)
         except ValueError as error:
-            problems.add(document.place(at), dotted(at), str(error))
+            document.report(at, str(error))
     return found
 
 
@@ -63,7 +60,7 @@ def is_of_fit(name: str, model: Model[Any]) -> bool:
     return "did you mean" not in did_you_mean(name, [output.name for output in model.outputs])
 
 
-def answers(document: Document, path: Path, given: Mapping[str, Written], problems: Problems) -> dict[str, Tolerance]:
+def answers(document: Document, path: Path, given: Mapping[str, Written]) -> dict[str, Tolerance]:
     """Return the tolerances of fitted constants, by the name ``fit.constant``; a number with ``%`` is relative."""
     found = {}
     for name, written in given.items():
@@ -71,7 +68,7 @@ def answers(document: Document, path: Path, given: Mapping[str, Written], proble
         try:
             wanted = tolerance(written, "1")
         except ValueError as error:
-            problems.add(document.place((*path, name)), dotted((*path, name)), str(error))
+            document.report((*path, name), str(error))
             continue
         is_part = isinstance(written, ToleranceSpec) or (isinstance(written, str) and "%" in written)
         place = str(document.key_place((*path, name)))
@@ -99,14 +96,13 @@ def tolerance(given: Written, unit: str) -> Tolerance:
 
 
 def refinement(
-    document: Document, path: Path, spread: Spread, model: Model[Any], outputs: Sequence[str], problems: Problems
+    document: Document, path: Path, spread: Spread, model: Model[Any], outputs: Sequence[str]
 ) -> Refinement | None:
     """Return the refinement of the adaptive axis at a path of a document; None if there is a problem."""
     data = value_at(document.data, path)
 
-    def report(inner: Path, key: bool, what: str) -> None:
-        at = (*path, *inner)
-        problems.add(document.key_place(at) if key else document.place(at), dotted(at), what)
+    def report(inner: Path, what: str, key: bool = False) -> None:
+        document.report((*path, *inner), what, key)
 
     try:
         spec = RefinedSpec.model_validate(data, context={"to_si": to_si})
@@ -114,17 +110,17 @@ def refinement(
         report_errors(error, RefinedSpec, data, report)
         return None
     if isinstance(spec.until, dict):
-        until = tolerances(document, (*path, "until"), spec.until, model, outputs, problems)
+        until = tolerances(document, (*path, "until"), spec.until, model, outputs)
         numbers = {name: kept for name, kept in until.items() if not model.output(name).dims}
         for name in until.keys() - numbers.keys():
-            report(("until", name), True, "expected an output of one number a case, this one has more dimensions")
+            report(("until", name), "expected an output of one number a case, this one has more dimensions", key=True)
         return Refinement(spread, numbers, spec.at_most)
     single = [output.name for output in model.outputs if output.name in outputs and not output.dims]
     if not single:
-        report(("until",), False, "expected an output of one number a case to refine by, this study has none")
+        report(("until",), "expected an output of one number a case to refine by, this study has none")
         return None
     try:
         return Refinement(spread, {single[0]: tolerance(spec.until, "1")}, spec.at_most)
     except ValueError as error:
-        report(("until",), False, str(error))
+        report(("until",), str(error))
     return None

@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.definition import Spread, tidy
 from mdr_dask.campaign.document import Document
-from mdr_dask.campaign.problems import Path, Place, Problems, dotted, shown
+from mdr_dask.campaign.problems import Path, Place, dotted, shown
 from mdr_dask.units import expected, to_si
 
 #: Largest number of values on one axis; a larger number is taken to be a mistake in the file.
@@ -73,9 +73,10 @@ def find(
     data: Mapping[str, Any],
     paths: Mapping[str, Path],
     drawn: bool,
-    problems: Problems,
 ) -> tuple[Variation, ...]:
-    """Return the varied parameters, in the order of the data.
+    """Return the varied parameters, in the order of the data, and report wrong ranges and empty lists.
+
+    The variation of a parameter with a problem has neither values nor an interval.
 
     Parameters
     ----------
@@ -89,11 +90,8 @@ def find(
         Path of each parameter in the document.
     drawn : bool
         Whether values are drawn from the ranges, which then have no number of values.
-    problems : Problems
-        Receives wrong ranges and empty lists. The variation of a parameter with a problem has neither items nor an
-        interval.
     """
-    search = _Search(document, parameters, data, drawn, problems)
+    search = _Search(document, parameters, data, drawn)
     return tuple(found for name, value in data.items() for found in search.below((name,), value, paths[name]))
 
 
@@ -107,7 +105,6 @@ class _Search:
     parameters: type[BaseModel]
     data: Mapping[str, Any]
     drawn: bool
-    problems: Problems
 
     def below(self, path: tuple[str, ...], value: Any, at: Path) -> Iterator[Variation]:
         """Yield the variations of one parameter and of the parameters nested in it."""
@@ -236,7 +233,7 @@ class _Search:
         return Origin(dotted(name), self.document.place(path), path)
 
     def _complain(self, at: Path, what: str, name: Path) -> NoReturn:
-        self.problems.add(self.document.place(at), dotted(name), what)
+        self.document.problems.add(self.document.place(at), dotted(name), what)
         raise _MalformedError
 
 

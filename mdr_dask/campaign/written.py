@@ -1,15 +1,18 @@
-"""The units in which a campaign file is written, for tables and figures."""
+"""The numbers of a campaign file as they are written: their units, and questions about numbers without a unit."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from typing import Any
 
-from mdr_dask.campaign.document import parse
-from mdr_dask.campaign.problems import Problems
+from pydantic import BaseModel
+
+from mdr_dask.campaign import fields
+from mdr_dask.campaign.document import Document, parse
+from mdr_dask.campaign.problems import Path, Problem, dotted
 from mdr_dask.campaign.variation import RANGES
-from mdr_dask.units import unit_behind
+from mdr_dask.units import is_doubtful, likely, unit_behind
 
 
 @lru_cache(maxsize=16)
@@ -26,23 +29,70 @@ def written_units(text: str) -> dict[str, str]:
     dict of str to str
         Units by the name of the parameter's coordinate: ``{"rotation_speed": "rpm", "indenter_radius": "mm"}``.
     """
-    whole = parse(text, "", Problems()).data
+    whole = parse(text, "").data
     data = whole if isinstance(whole, dict) else {}
     series = data.get("series")
     found: dict[str, set[str]] = {}
     for parameters in (data.get("parameters"), *(series.values() if isinstance(series, dict) else ())):
-        for name, unit in _below("", parameters):
-            found.setdefault(name, set()).add(unit)
+        for field, _, value in _scalars(parameters, (), ()):
+            if isinstance(value, str) and (unit := unit_behind(value)):
+                found.setdefault("_".join(map(str, field)), set()).add(unit)
     return {name: unit for name, (unit, *others) in found.items() if not others}
 
 
-def _below(name: str, value: Any) -> Iterator[tuple[str, str]]:
-    """Yield parameter and unit of every quantity; lists and ranges belong to the parameter that they vary."""
+def questions(
+    document: Document,
+    parameters: type[BaseModel],
+    data: Mapping[str, Any],
+    paths: Mapping[str, Path],
+    units: Mapping[str, str],
+) -> Iterator[str]:
+    """Yield a question for each parameter with a number without a unit that may have been meant in another unit.
+
+    Parameters
+    ----------
+    document : Document
+        The campaign file.
+    parameters : type
+        The parameter set of the model.
+    data : mapping
+        Values of the parameters as read from the file, by name.
+    paths : mapping of str to path
+        Path of each parameter in the document.
+    units : mapping of str to str
+        Units that differ from the declared units of parameters, as in a dimensionless campaign.
+    """
+    asked: set[Path] = set()
+    for name, given in data.items():
+        for field, at, value in _scalars(given, (name,), paths[name]):
+            found = fields.owner(parameters, field, data)
+            if found is None or field in asked or isinstance(value, bool) or not isinstance(value, int | float):
+                continue
+            unit = units.get(dotted(field), fields.unit_at(parameters, field, data) or "1")
+            usual = fields.usual(found[0].model_fields[found[1]])
+            if usual and unit != "1" and is_doubtful(value, unit, usual):
+                asked.add(field)
+                yield str(Problem(document.place(at), dotted(at), _question(value, unit, usual)))
+
+
+def _question(value: float, unit: str, usual: tuple[str, ...]) -> str:
+    read = f"{value:g} {unit}"
+    meant = likely(value, unit, usual)
+    if meant:
+        return f"{value:g} is read as {read}: write {meant!r} if you mean that, {read!r} if not"
+    return f"{value:g} is read as {read}, far from a usual {usual[0]}: write {read!r} if you mean it"
+
+
+def _scalars(value: Any, field: Path, at: Path) -> Iterator[tuple[Path, Path, Any]]:
+    """Yield parameter, position and value of every number and text; a list or range belongs to the varied parameter."""
     if isinstance(value, dict):
         for key, inner in value.items():
-            yield from _below(name if key in RANGES else f"{name}_{key}".strip("_"), inner)
+            if key in RANGES and isinstance(inner, list):
+                yield from _scalars(inner if key == "values" else inner[:2], field, (*at, key))
+            else:
+                yield from _scalars(inner, (*field, key), (*at, key))
     elif isinstance(value, list):
-        for inner in value:
-            yield from _below(name, inner)
-    elif isinstance(value, str) and (unit := unit_behind(value)):
-        yield name, unit
+        for index, inner in enumerate(value):
+            yield from _scalars(inner, field, (*at, index))
+    else:
+        yield field, at, value

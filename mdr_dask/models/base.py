@@ -116,7 +116,8 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
         Meaning of the parameter in one line.
     usual : str
         A common value with its unit, ``"10 MPa"``, for ``mdr-dask init``. ``check`` asks the user about a number
-        without a unit that differs from this value by more than three decades.
+        without a unit that differs from this value by more than three decades. Further values after commas,
+        ``"2 GPa, 200 HV"``, name other units in which people write the quantity.
     **bounds
         ``default``, ``gt``, ``ge``, ``lt``, ``le`` and other arguments of :func:`pydantic.Field`.
 
@@ -135,7 +136,7 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
             return tuple(convert(item, unit) if _looks_numeric(item) else item for item in value)
         return convert(value, unit) if _looks_numeric(value) else value
 
-    examples = [usual] if usual else None
+    examples = usual.split(", ") if usual else None
     field = Field(description=description, json_schema_extra={"unit": unit}, examples=examples, **bounds)
     field.metadata.append(BeforeValidator(to_si))
     if unit != "m^(1-n)":  # the coefficient c of a body c r^50 may have any size

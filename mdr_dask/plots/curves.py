@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from mdr_dask import aggregation
+from mdr_dask import aggregation, models
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Status
 from mdr_dask.plots import colours, labels
@@ -261,8 +261,16 @@ def _names(part: xr.Dataset, dims: Sequence[str]) -> list[str]:
 
 
 def scalars(data: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Return the parameters of a series that have one value."""
-    return {str(name): value for name, value in data.coords.items() if value.ndim == 0 and name != "realisation"}
+    """Return the parameters of a series that have one value and an effect."""
+    requires = models.load(data.attrs["model"]).parameters.requires if "model" in data.attrs else {}
+    idle = {name for name, (other, value) in requires.items() if value not in _given(data, other)}
+    kept = {str(name): value for name, value in data.coords.items() if value.ndim == 0 and name != "realisation"}
+    return {name: value for name, value in kept.items() if name not in idle}
+
+
+def _given(data: xr.Dataset, name: str) -> list[Any]:
+    """Return all values that a parameter has in a series."""
+    return list(np.ravel(data[name].values)) if name in data.coords else [parameters_of(data).get(name)]
 
 
 def fixed_by_all(held: Sequence[Mapping[str, xr.DataArray]]) -> dict[str, xr.DataArray]:

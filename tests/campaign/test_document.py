@@ -5,14 +5,13 @@ import math
 import pytest
 
 from mdr_dask.campaign.document import parse
-from mdr_dask.campaign.problems import Place, Problems
+from mdr_dask.campaign.problems import Place
 from mdr_dask.errors import CampaignError
 
 
 def read(text):
-    problems = Problems()
-    document = parse(text, "a.yaml", problems)
-    problems.raise_if_any()
+    document = parse(text, "a.yaml")
+    document.problems.raise_if_any()
     return document
 
 

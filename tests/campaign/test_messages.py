@@ -31,7 +31,7 @@ def problems(data):
     found = []
     with pytest.raises(ValidationError, match="Undiscriminated") as caught:
         Undiscriminated.model_validate(data)
-    report_errors(caught.value, Undiscriminated, data, lambda path, key, what: found.append(f"{dotted(path)}: {what}"))
+    report_errors(caught.value, Undiscriminated, data, lambda path, what, key: found.append(f"{dotted(path)}: {what}"))
     return found
 
 

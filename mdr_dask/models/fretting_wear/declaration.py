@@ -165,7 +165,7 @@ class FrettingWear(Parameters):
     friction: float | None = quantity("1", "coefficient of friction", usual="0.6", gt=0, default=None)
     normal_force: float | None = quantity("N", "normal force of the virgin contact", usual="50 N", gt=0, default=None)
     depth: float | None = quantity("m", "indentation depth of the virgin contact", usual="1 um", gt=0, default=None)
-    hardness: float | None = quantity("Pa", "hardness in the wear law", usual="2 GPa", gt=0, default=None)
+    hardness: float | None = quantity("Pa", "hardness in the wear law", usual="2 GPa, 200 HV", gt=0, default=None)
     wear_coefficient: float | None = quantity(
         "1", "wear coefficient k of the law V = k F u / hardness", usual="1e-4", ge=0, default=None
     )
