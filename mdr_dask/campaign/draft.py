@@ -11,7 +11,6 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from mdr_dask.campaign import fields
-from mdr_dask.campaign.reference import yaml_text
 from mdr_dask.models.base import Model, Parameters, describe, unit_of
 from mdr_dask.models.data_file import DataFile, NamedFile
 from mdr_dask.units import is_unit, shown
@@ -82,8 +81,7 @@ def _entries(parameters: type[Parameters]) -> Iterator[str]:
 def _needed(parameters: type[BaseModel]) -> set[str]:
     """Return the required parameters, and the first parameter of each group of alternatives, with dotted names."""
     ways = getattr(parameters, "alternatives", ())
-    required = {name for name, info in parameters.model_fields.items() if info.is_required()}
-    return required | {name for each in ways for name in each[0]}
+    return {*fields.required(parameters), *(name for each in ways for name in each[0])}
 
 
 def _entry(parameters: type[BaseModel], name: str, needed: set[str]) -> Iterator[str]:
@@ -110,7 +108,7 @@ def _choices(info: FieldInfo) -> list[str]:
 def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str]:
     """Return examples of a value as text: one example, or one for each structure that the value may have."""
     info = parameters.model_fields[name]
-    kinds = [kind for kind in fields.structures(info) if kind is not DataFile]
+    kinds = list(fields.structures(info))
     if inner:
         kinds.sort(key=lambda kind: not inner <= set(kind.model_fields))
     found = [text for kind in kinds for text in _structures(kind, inner)]
@@ -121,15 +119,11 @@ def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str
 
 def _structures(kind: type[BaseModel], inner: set[str]) -> list[str]:
     """Return a structure on one line, once for each of its alternatives."""
-    needed, fixed, ways = _needed(kind), fields.fixed(kind), getattr(kind, "alternatives", ())
-    required = {name for name, info in kind.model_fields.items() if info.is_required()}
-    alternatives: list[set[str]] = [required.union(way) for way in next(iter(ways), ())] or [needed]
-    texts = []
-    for way in alternatives:
-        keys = [key for key in kind.model_fields if key in fixed or key in way or key in inner]
-        parts = [f"{key}: {fixed[key] if key in fixed else _values(kind, key, set())[0]}" for key in keys]
-        texts.append(f"{{{', '.join(parts)}}}")
-    return texts
+    ways = next(iter(getattr(kind, "alternatives", ())), ())
+    wanted = [{*fields.required(kind), *way} for way in ways] or [_needed(kind)]
+    open_keys = [key for key in kind.model_fields if key not in fields.fixed(kind)]
+    texts = {key: _values(kind, key, set())[0] for key in open_keys if key in inner.union(*wanted)}
+    return [fields.written(kind, {key: texts[key] for key in texts if key in keys | inner}) for keys in wanted]
 
 
 def _scalar(parameters: type[BaseModel], name: str) -> str:
@@ -141,7 +135,7 @@ def _scalar(parameters: type[BaseModel], name: str) -> str:
     if isinstance(default, int | float) and not isinstance(default, bool) and unit is not None:
         return shown(default, unit, 12)
     if default is not None:
-        return text if len(text := yaml_text(default)) <= _LONGEST else "[...]"
+        return text if len(text := fields.yaml_text(default)) <= _LONGEST else "[...]"
     if usual := fields.usual(info):
         return f"[{usual[0]}]" if fields.holds_list(info) else usual[0]
     if DataFile in kinds or info.annotation == tuple[NamedFile, ...]:

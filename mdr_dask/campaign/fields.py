@@ -1,17 +1,51 @@
-"""Properties of the fields of parameter sets: types, units, nested structures."""
+"""The keys that a campaign file may have: types, units and nested structures of the fields of parameter sets."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from types import UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from mdr_dask.campaign.problems import Path
 from mdr_dask.models.base import unit_of
+from mdr_dask.models.data_file import DataFile
+
+
+class Entry(NamedTuple):
+    """A key that a campaign file may have.
+
+    Attributes
+    ----------
+    path : str
+        Dotted name, such as ``indenter.angle``.
+    parameters : type
+        The parameter set with this key.
+    info : FieldInfo
+        The field of pydantic.
+    structures : tuple of type
+        Nested parameter sets that may be written as the value.
+    """
+
+    path: str
+    parameters: type[BaseModel]
+    info: FieldInfo
+    structures: tuple[type[BaseModel], ...]
+
+
+def walk(parameters: type[BaseModel], before: str = "") -> Iterator[Entry]:
+    """Yield all keys of a parameter set and of its nested sets, except keys with only one possible value.
+
+    `before` is the start of the dotted names.
+    """
+    for name, info in parameters.model_fields.items():
+        if name not in fixed(parameters):
+            yield Entry(f"{before}{name}", parameters, info, structures(info))
+            for structure in structures(info):
+                yield from walk(structure, f"{before}{name}.")
 
 
 def members(annotation: Any) -> tuple[Any, ...]:
@@ -43,7 +77,8 @@ def usual(info: FieldInfo) -> tuple[str, ...]:
 
 def structures(info: FieldInfo) -> tuple[type[BaseModel], ...]:
     """Return the parameter sets that a value of this field may be."""
-    return tuple(kind for kind in members(info.annotation) if isinstance(kind, type) and issubclass(kind, BaseModel))
+    kinds = [kind for kind in members(info.annotation) if isinstance(kind, type) and issubclass(kind, BaseModel)]
+    return tuple(kind for kind in kinds if kind is not DataFile)
 
 
 def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
@@ -80,6 +115,17 @@ def fixed(kind: type[BaseModel]) -> dict[str, Any]:
     }
 
 
+def required(kind: type[BaseModel]) -> list[str]:
+    """Return the required fields of a parameter set, except fields with only one possible value."""
+    return [name for name, info in kind.model_fields.items() if info.is_required() and name not in fixed(kind)]
+
+
+def written(kind: type[BaseModel], values: Mapping[str, str]) -> str:
+    """Return a parameter set on one line, with the given values: ``{shape: power, radius: ...}``."""
+    texts = {**values, **fixed(kind)}
+    return "{" + ", ".join(f"{key}: {texts[key]}" for key in kind.model_fields if key in texts) + "}"
+
+
 def owner(parameters: type[BaseModel], path: Path, data: Any) -> tuple[type[BaseModel], str] | None:
     """Return the parameter set and the name of the field at a path into the data; None if there is no such field."""
     kind: type[BaseModel] | None = parameters
@@ -111,12 +157,29 @@ def choices(parameters: type[BaseModel], path: Path) -> tuple[str, ...]:
     found: list[str] = []
     for kind in structures(parameters.model_fields[str(name)]):
         if rest[0] in kind.model_fields:
-            needed = [key for key, info in kind.model_fields.items() if info.is_required() and key != rest[0]]
-            only = fixed(kind)
-            keys = [f"{key}: {only.get(key, '...')}" for key in dict.fromkeys([*only, *needed])]
-            deeper = [[*keys, one] for one in choices(kind, tuple(rest))] if len(rest) > 1 else [keys]
-            found.extend(f"{name}: {{{', '.join(parts)}}}" for parts in deeper)
+            others = {key: "..." for key in required(kind) if key != rest[0]}
+            deeper = [one.partition(": ") for one in choices(kind, tuple(rest))]
+            inside = [{**others, key: text} for key, _, text in deeper] if len(rest) > 1 else [others]
+            found += [f"{name}: {written(kind, texts)}" for texts in inside]
     return tuple(found)
+
+
+def plain(number: float) -> str:
+    """Return a number as a short text: a whole number in full, any other with at most 12 digits."""
+    return str(number) if isinstance(number, int) else f"{number:.12g}"
+
+
+def yaml_text(value: Any) -> str:
+    """Return a value as YAML on one line."""
+    if isinstance(value, BaseModel):
+        return yaml_text(value.model_dump(exclude_none=True))
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {yaml_text(inner)}" for key, inner in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(yaml_text, value)) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return plain(value) if isinstance(value, float) else str(value)
 
 
 def unit_at(parameters: type[BaseModel], path: Path, data: Any) -> str | None:

@@ -166,9 +166,8 @@ def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
     for one in fields.structures(info):
         if value in one.model_fields:
             return f" (write {{{value}: ...}})"
-        for key, only in fields.fixed(one).items():
-            if value == only:
-                return f" (write {{{', '.join([f'{key}: {only}', *(f'{name}: ...' for name in required(one))])}}})"
+        if value in fields.fixed(one).values():
+            return f" (write {fields.written(one, dict.fromkeys(fields.required(one), '...'))})"
     if fields.holds_list(info):
         return f" (write [{value}])"
     first = next((name for one in fields.structures(info) for name in one.model_fields), "")
@@ -181,12 +180,11 @@ def _of_file(info: FieldInfo) -> list[str]:
     """Return the names of the entries in the structures of a field whose value is the name of a file."""
     inner = [entry for one in fields.structures(info) for entry in one.model_fields.items()]
     named = (DataFile, NamedByFile)
-    return [name for name, entry in inner if any(issubclass(one, named) for one in fields.structures(entry))]
-
-
-def required(kind: type[BaseModel]) -> list[str]:
-    """Return the required fields of a parameter set, except fields with only one possible value."""
-    return [name for name, info in kind.model_fields.items() if info.is_required() and name not in fields.fixed(kind)]
+    return [
+        name
+        for name, entry in inner
+        if any(isinstance(one, type) and issubclass(one, named) for one in fields.members(entry.annotation))
+    ]
 
 
 def _wanted(details: ErrorDetails, path: Path, kind: type[BaseModel], data: Any) -> str:
@@ -197,7 +195,7 @@ def _wanted(details: ErrorDetails, path: Path, kind: type[BaseModel], data: Any)
         bound = context[key]
         noun = "whole number" if isinstance(bound, int) else "number"
         behind = f" {unit}" if bound and unit not in (None, "1") else ""
-        return f"a {noun} {words} {plain(bound)}{behind}"
+        return f"a {noun} {words} {fields.plain(bound)}{behind}"
     if error == "float_type" and unit is not None:
         return expected(unit)
     if context.get("class_name") == "DataFile":
@@ -223,11 +221,6 @@ def _kinds(path: Path, kind: type[BaseModel], data: Any) -> str:
         return "a mapping"
     name = keys[0][0]
     return f"a mapping with {name}: {_listed(value for key, value in keys if key == name)}"
-
-
-def plain(number: float) -> str:
-    """Return a number as a short text: a whole number in full, any other with at most 12 digits."""
-    return str(number) if isinstance(number, int) else f"{number:.12g}"
 
 
 def _choices(details: ErrorDetails) -> list[str]:

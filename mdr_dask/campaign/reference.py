@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Iterable, Iterator
+from functools import lru_cache
 from typing import Any
 
 from pydantic import BaseModel
@@ -12,10 +13,8 @@ from pydantic.fields import FieldInfo
 
 from mdr_dask import models
 from mdr_dask.campaign import fields
-from mdr_dask.campaign.messages import plain
 from mdr_dask.campaign.spec import CampaignSpec
 from mdr_dask.models.base import Model, describe, unit_of
-from mdr_dask.models.data_file import DataFile
 from mdr_dask.units import DEFINITIONS
 
 _HEAD = """\
@@ -93,15 +92,12 @@ def parameter_rows(model: Model[Any]) -> list[dict[str, str]]:
 
 def alternatives_of(model: Model[Any]) -> list[str]:
     """Return the alternatives of a model, one line for each group: ``length with rms_roughness, or profile``."""
-    return list(_ways(model.parameters, ""))
-
-
-def _ways(parameters: type[BaseModel], before: str) -> Iterator[str]:
-    for ways in getattr(parameters, "alternatives", ()):
-        yield describe(tuple(tuple(f"{before}{name}" for name in way) for way in ways))
-    for name, info in parameters.model_fields.items():
-        for structure in fields.structures(info):
-            yield from _ways(structure, f"{before}{name}.")
+    nested = [(f"{entry.path}.", kind) for entry in fields.walk(model.parameters) for kind in entry.structures]
+    return [
+        describe(tuple(tuple(f"{before}{name}" for name in way) for way in ways))
+        for before, kind in [("", model.parameters), *nested]
+        for ways in getattr(kind, "alternatives", ())
+    ]
 
 
 def output_rows(model: Model[Any]) -> list[dict[str, str]]:
@@ -165,52 +161,33 @@ def _symbols(line: str) -> str:
     return "/".join(f"`{word}`" for word in [name, *others] if word != "_")
 
 
-def _rows(parameters: type[BaseModel], first: str, before: str = "", condition: str = "") -> Iterator[dict[str, str]]:
-    properties = parameters.model_json_schema()["properties"]
-    for name, info in parameters.model_fields.items():
-        if name in fields.fixed(parameters):
-            continue
-        structures = [structure for structure in fields.structures(info) if structure is not DataFile]
+def _rows(parameters: type[BaseModel], first: str) -> Iterator[dict[str, str]]:
+    for path, kind, info, structures in fields.walk(parameters):
+        name = path.rpartition(".")[2]
+        condition = ", ".join(f"{key}: {value}" for key, value in fields.fixed(kind).items())
+        nested = [
+            fields.written(each, dict.fromkeys(each.model_fields, "...")).replace(": ...", "") for each in structures
+        ]
         yield {
-            first: f"{before}{name}",
-            "unit": unit_of(parameters, name) or "",
+            first: path,
+            "unit": unit_of(kind, name) or "",
             "default": _default(info),
-            "allowed": " or ".join(filter(None, [_allowed(properties[name]), *map(_shape, structures)])),
-            "meaning": f"{condition}{info.description or ''}",
+            "allowed": " or ".join(filter(None, [_allowed(_properties(kind)[name]), *nested])),
+            "meaning": f"({condition}) {info.description}" if condition else info.description or "",
         }
-        for structure in structures:
-            yield from _rows(structure, first, f"{before}{name}.", _condition(structure))
 
 
-def _condition(structure: type[BaseModel]) -> str:
-    fixed = ", ".join(f"{key}: {value}" for key, value in fields.fixed(structure).items())
-    return f"({fixed}) " if fixed else ""
-
-
-def _shape(structure: type[BaseModel]) -> str:
-    fixed = fields.fixed(structure)
-    entries = [f"{key}: {fixed[key]}" if key in fixed else key for key in structure.model_fields]
-    return f"{{{', '.join(entries)}}}"
+@lru_cache
+def _properties(kind: type[BaseModel]) -> dict[str, Any]:
+    found: dict[str, Any] = kind.model_json_schema()["properties"]
+    return found
 
 
 def _default(info: FieldInfo) -> str:
     if info.is_required():
         return "required"
     value = info.get_default(call_default_factory=True, validated_data={})
-    return "" if value is None or value == {} else yaml_text(value)
-
-
-def yaml_text(value: Any) -> str:
-    """Return a value as YAML on one line."""
-    if isinstance(value, BaseModel):
-        return yaml_text(value.model_dump(exclude_none=True))
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{key}: {yaml_text(inner)}" for key, inner in value.items()) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(yaml_text, value)) + "]"
-    if isinstance(value, bool):
-        return str(value).lower()
-    return plain(value) if isinstance(value, float) else str(value)
+    return "" if value is None or value == {} else fields.yaml_text(value)
 
 
 def _allowed(node: dict[str, Any]) -> str:
@@ -238,7 +215,7 @@ _NOUNS = {
 
 def _bounds(node: dict[str, Any]) -> list[str]:
     signs = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
-    return [f"{sign} {plain(node[key])}" for key, sign in signs.items() if key in node]
+    return [f"{sign} {fields.plain(node[key])}" for key, sign in signs.items() if key in node]
 
 
 if __name__ == "__main__":
