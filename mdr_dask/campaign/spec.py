@@ -26,59 +26,66 @@ FileName = Annotated[str, AfterValidator(_usable_as_file_name)]
 
 
 class ToleranceSpec(Parameters):
-    """Largest error of an output; it is enough to meet one part."""
+    """The largest accepted error of an output; an error within one of both parts is accepted."""
 
-    relative: float = quantity("1", "relative to the mean, such as 1 %", default=0.0, ge=0)
-    absolute: float | str = Field(0.0, description="in the unit of the output, such as 2 um")
+    relative: float = quantity("1", "largest error relative to the mean, such as 1 %", default=0.0, ge=0)
+    absolute: float | str = Field(0.0, description="largest error in the unit of the output, such as 2 um")
 
 
 class AdaptiveSpec(Parameters):
-    """Realisations until the standard errors are small enough."""
+    """More realisations of a case until its standard errors are small enough."""
 
-    at_least: int = Field(20, ge=2, description="number of realisations of every case")
-    at_most: int = Field(description="largest number of realisations of a case", ge=2)
+    at_least: int = Field(20, ge=2, description="number of realisations that every case gets")
+    at_most: int = Field(description="largest number of realisations that a case may get", ge=2)
     until: dict[str, float | str | ToleranceSpec] = Field(
         min_length=1,
-        description="largest standard error of outputs: 1 %, or {relative: 1 %, absolute: 2 um}; or largest half width "
-        "of the interval of fitted constants: zone_one.alpha: 0.01, plateau: 2 %",
+        description="largest accepted standard error of each named output: 1 %, or {relative: 1 %, absolute: 2 um}. A "
+        "fitted constant may also be named: zone_one.alpha: 0.01 is the half width of its 95 % interval",
     )
 
 
 class RefinedSpec(Parameters):
-    """An adaptive axis, whose values the study chooses."""
+    """An adaptive axis: the study chooses its values so that outputs can be interpolated between them."""
 
-    adaptive: list[Any] = Field(description="first and last value")
+    adaptive: list[Any] = Field(description="first and last value of the axis")
     until: float | str | dict[str, float | str | ToleranceSpec] = Field(
-        description="largest error of interpolation, relative to the largest value of the first output: 1 %; or by "
-        "output: {friction_coefficient: 1 %, indentation_depth: {absolute: 2 um}}"
+        description="largest interpolation error: 1 % of the largest value of the first output, or for each "
+        "named output: {friction_coefficient: 1 %, indentation_depth: {absolute: 2 um}}"
     )
     at_most: int = Field(
-        60, ge=5, le=10**4, description="largest number of values along the axis, for each case of the other axes"
+        60,
+        ge=5,
+        le=10**4,
+        description="largest number of values of the axis, for each combination of values of the other axes",
     )
 
 
 class SobolSpec(Parameters):
-    """Scrambled Sobol points."""
+    """Cases drawn as a scrambled Sobol sequence."""
 
-    sobol: int = Field(ge=1, le=10**6, description="number of cases, the points of a scrambled Sobol sequence")
+    sobol: int = Field(
+        ge=1, le=10**6, description="number of cases, drawn from the ranges as a scrambled Sobol sequence"
+    )
 
 
 class LatinHypercubeSpec(Parameters):
-    """A Latin hypercube."""
+    """Cases drawn as a Latin hypercube."""
 
     latin_hypercube: int = Field(
-        ge=1, le=10**6, description="number of cases, one in each of as many intervals of every range"
+        ge=1,
+        le=10**6,
+        description="number n of cases, drawn as a Latin hypercube: one case in each of n intervals of every range",
     )
 
 
 class SaltelliSpec(Parameters):
-    """Saltelli's design for Sobol indices."""
+    """Cases drawn as the design of Saltelli for Sobol indices."""
 
     saltelli: int = Field(
         ge=2,
         le=10**5,
-        description="number n of base points of a design for `mdr-dask sensitivity`: n (d + 2) cases for d varied "
-        "parameters",
+        description="number n of base points of the design of Saltelli for `mdr-dask sensitivity`; d varied parameters "
+        "give n (d + 2) cases",
     )
 
 
@@ -86,11 +93,11 @@ Drawn = SobolSpec | LatinHypercubeSpec | SaltelliSpec
 
 
 class TableSpec(Parameters):
-    """Cases from a file."""
+    """Cases from a table."""
 
     table: str = Field(
-        description="CSV file, relative to the campaign file: a column for each varied parameter, headed by its "
-        "dotted name and perhaps a unit, such as velocity [mm/s]"
+        description="name of a CSV file, relative to the campaign file, with one case in each line. The heading of a "
+        "column is the dotted name of a parameter, if needed with a unit: velocity [mm/s]"
     )
 
 
@@ -119,57 +126,61 @@ Realisations = Annotated[
 
 
 class StoreSpec(Parameters):
-    """The store of the results."""
+    """The store of the results: its place and its chunks."""
 
     path: str | None = Field(
-        None, min_length=1, description="path or URL of the Zarr store; by default results/<name>.zarr"
+        None,
+        min_length=1,
+        description="path or URL of the Zarr store that receives the results; by default results/<name>.zarr",
     )
     blocks: dict[str, Annotated[int, BeforeValidator(unquoted), Field(ge=1)]] = Field(
         default_factory=dict,
-        description="chunk length along an axis or along realisation; chosen automatically by default",
+        description="number of values in a chunk, along an axis or along realisation; chosen automatically by default",
     )
 
 
 class MeasuredSpec(Parameters):
-    """Measured points."""
+    """Measured points, to find unknown parameters."""
 
     table: NamedFile = Field(
-        description="table of measured points, relative to the campaign file: columns for conditions, for one output, "
-        "and perhaps for its standard_error, with units in brackets"
+        description="name of a table, relative to the campaign file, with units in brackets. Its columns are conditions of "
+        "the test, one measured output, and optionally the standard_error of this output"
     )
 
 
 class CampaignSpec(Parameters):
-    """A campaign file."""
+    """The keys of a campaign file."""
 
-    name: FileName = Field(description="name of the campaign and of its store")
-    model: str = Field(description="name of the model")
-    seed: int = Field(0, ge=0, description="seed of all random numbers")
+    name: FileName = Field(description="name of the campaign, and of its store unless store gives another path")
+    model: str = Field(description="name of the model that computes the results")
+    seed: int = Field(0, ge=0, description="seed of all random numbers; the same seed gives the same results")
     realisations: Realisations = Field(
-        1, description="number of independent rough lines, or other random samples, for each case"
+        1, description="number of random samples of each case, such as independent rough lines of the same statistics"
     )
     parameters: dict[str, Any] = Field(
-        description="parameters of the model, varied by a list, {linear: [a, b, n]}, {geometric: [a, b, n]} or "
-        "{values: [...]}"
+        description="parameters of the model. A list, {linear: [a, b, n]}, {geometric: [a, b, n]} or {values: [...]} "
+        "varies a parameter"
     )
     series: dict[FileName, dict[str, Any]] | None = Field(
-        None, min_length=1, description="groups of cases by name, each replacing some of the parameters above"
+        None,
+        min_length=1,
+        description="named groups of cases; in each group, the given parameters replace those under `parameters`",
     )
-    sampling: Sampling = Field("grid", description="how varied parameters are combined")
+    sampling: Sampling = Field("grid", description="how the values of the varied parameters are combined to cases")
     measured: MeasuredSpec | None = Field(
         None,
-        description="measured points for `mdr-dask fit STORE calibration`, which finds the varied parameters that the "
-        "table lacks",
+        description="measured points for `mdr-dask fit STORE calibration`, which finds the varied parameters that are not "
+        "columns of the table",
     )
     accuracy: float | None = quantity(
-        "1", "largest relative discretisation error of every output", default=None, gt=0, lt=1
+        "1", "largest accepted discretisation error of every output, relative to its value", default=None, gt=0, lt=1
     )
     outputs: Annotated[list[str], Field(min_length=1)] | None = Field(
-        None, description="outputs to compute; by default those marked in the tables of the models"
+        None, description="outputs to compute; by default those that the tables of the models below mark"
     )
     errors: bool = Field(
         True,
-        description="whether to store the estimated discretisation error of each output as <output>_error; false saves "
-        "its computation",
+        description="whether to store the estimated discretisation error of each output as <output>_error; false saves the "
+        "time to estimate it",
     )
     store: StoreSpec = Field(default_factory=StoreSpec, description="the store of the results")

@@ -27,7 +27,10 @@ _PAIRS = (
 
 
 class EhlLineParameters(Parameters):
-    """A line contact, given by one parameter of each pair of a dimensionless number and a dimensional quantity."""
+    """A lubricated line contact.
+
+    Load, speed and material are each given by a dimensionless number (W, U, G) or by a quantity with a unit.
+    """
 
     renamed: ClassVar[Mapping[str, str]] = {
         "neighbours": "every case is solved alone, so leave it out",
@@ -39,39 +42,55 @@ class EhlLineParameters(Parameters):
     )
     settings: ClassVar[frozenset[str]] = frozenset({"profile_start", "profile_end", "profile_points"})
     load_parameter: float | None = quantity(
-        "1", "load parameter W = w/(E' R), E' = 2 E*", usual="2e-5", gt=0, default=None
+        "1", "load parameter W = w/(E' R) of the line load w, E' = 2 E*", usual="2e-5", gt=0, default=None
     )
     speed_parameter: float | None = quantity(
-        "1", "speed parameter U = eta0 u/(E' R)", usual="1e-11", gt=0, default=None
+        "1", "speed parameter U = eta0 u/(E' R) (eta0: viscosity, u: velocity)", usual="1e-11", gt=0, default=None
     )
     material_parameter: float | None = quantity(
-        "1", "material parameter G = alpha E'", usual="5000", ge=0, default=None
+        "1", "material parameter G = alpha E' (alpha: pressure_viscosity)", usual="5000", ge=0, default=None
     )
     line_load: float | None = quantity(
-        "N/m", "normal force per length of the line w", usual="100 N/mm", gt=0, default=None
+        "N/m", "line load w, the normal force per length of the contact", usual="100 N/mm", gt=0, default=None
     )
     mean_velocity: float | None = quantity(
-        "m/s", "mean velocity of the surfaces u = (u1 + u2)/2", usual="1 m/s", gt=0, default=None
+        "m/s", "mean velocity of the surfaces (entrainment) u = (u1 + u2)/2", usual="1 m/s", gt=0, default=None
     )
     pressure_viscosity: float | None = quantity(
         "1/Pa", "pressure-viscosity coefficient alpha", usual="20 1/GPa", ge=0, default=None
     )
-    radius: float | None = quantity("m", "reduced radius of curvature R", usual="10 mm", gt=0, default=None)
-    viscosity: float | None = quantity(
-        "Pa*s", "viscosity at ambient pressure eta0", usual="80 mPa s", gt=6.4e-5, default=None
+    radius: float | None = quantity(
+        "m", "reduced radius of curvature R of the two bodies, 1/R = 1/R1 + 1/R2", usual="10 mm", gt=0, default=None
     )
-    contact_modulus: float = quantity("Pa", "contact modulus E*", usual="115 GPa", gt=0, default=STEEL)
-    viscosity_law: Literal["barus", "roelands"] = Field("barus", description="viscosity over pressure")
+    viscosity: float | None = quantity(
+        "Pa*s", "dynamic viscosity eta0 at ambient pressure", usual="80 mPa s", gt=6.4e-5, default=None
+    )
+    contact_modulus: float = quantity(
+        "Pa", "contact modulus E*, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2", usual="115 GPa", gt=0, default=STEEL
+    )
+    viscosity_law: Literal["barus", "roelands"] = Field("barus", description="law of the viscosity under pressure")
     compressible: bool = Field(True, description="whether the density follows the law of Dowson and Higginson")
     inlet: float | None = quantity(
-        "1", "where the oil begins, over the half width (negative); fully flooded if not given", lt=0, default=None
+        "1",
+        "position where the oil film begins, in Hertzian half widths before the middle (negative); fully flooded if "
+        "not given",
+        lt=0,
+        default=None,
     )
-    slide_roll_ratio: float = quantity("1", "slide-roll ratio (u1 - u2)/u", ge=0, default=0.0)
-    shear_law: Literal["newtonian", "eyring"] = Field("newtonian", description="shear stress over shear rate")
-    eyring_stress: float = quantity("Pa", "Eyring stress of the shear law eyring", usual="5 MPa", gt=0, default=5e6)
-    profile_start: float = quantity("1", "first position of film and pressure, over the half width", default=-4.0)
-    profile_end: float = quantity("1", "last position of film and pressure, over the half width", default=2.0)
-    profile_points: int = quantity("1", "number of positions of film and pressure", ge=2, default=241)
+    slide_roll_ratio: float = quantity("1", "slide-roll ratio (u1 - u2)/u; 0 is pure rolling", ge=0, default=0.0)
+    shear_law: Literal["newtonian", "eyring"] = Field(
+        "newtonian", description="law of the shear stress as a function of the shear rate"
+    )
+    eyring_stress: float = quantity(
+        "Pa", "Eyring stress of the oil, for shear_law: eyring", usual="5 MPa", gt=0, default=5e6
+    )
+    profile_start: float = quantity(
+        "1", "first position at which film and pressure are stored, in Hertzian half widths", default=-4.0
+    )
+    profile_end: float = quantity(
+        "1", "last position at which film and pressure are stored, in Hertzian half widths", default=2.0
+    )
+    profile_points: int = quantity("1", "number of positions at which film and pressure are stored", ge=2, default=241)
 
     @model_validator(mode="after")
     def _one_of_each_pair(self) -> Self:
@@ -92,36 +111,48 @@ class EhlLineParameters(Parameters):
 
 
 OUTPUTS = (
-    Output("central_film", "1", "central film thickness over the radius h_c/R", has_error=True),
-    Output("minimum_film", "1", "minimum film thickness over the radius h_min/R", has_error=True),
+    Output("central_film", "1", "relative central film thickness h_c/R", has_error=True),
+    Output("minimum_film", "1", "relative minimum film thickness h_min/R", has_error=True),
     Output("central_film_thickness", "m", "central film thickness h_c (needs radius)", default=False, has_error=True),
     Output("minimum_film_thickness", "m", "minimum film thickness h_min (needs radius)", default=False, has_error=True),
     Output(
         "film",
         "1",
-        "film thickness over the radius h/R; where the film is torn, the gap",
+        "relative film thickness h/R; behind the film, the gap",
         ("position",),
         default=False,
         has_error=True,
     ),
     Output("pressure", "Pa", "pressure in the film", ("position",), default=False, has_error=True),
-    Output("formula_central_film", "1", "h_c/R by Pan and Hamrock", default=False),
-    Output("formula_minimum_film", "1", "h_min/R by Pan and Hamrock", default=False),
+    Output("formula_central_film", "1", "relative central film thickness h_c/R by Pan and Hamrock", default=False),
+    Output("formula_minimum_film", "1", "relative minimum film thickness h_min/R by Pan and Hamrock", default=False),
     Output("moes_load", "1", "Moes' load parameter M = W (2U)^(-1/2)", default=False),
     Output("moes_lubricant", "1", "Moes' lubricant parameter L = G (2U)^(1/4)", default=False),
-    Output("minimum_position", "1", "position of the minimum film over the half width", default=False, has_error=True),
-    Output("rupture_position", "1", "position where the film ends over the half width", default=False, has_error=True),
-    Output("spike_position", "1", "position of the pressure spike over the half width", default=False, has_error=True),
+    Output("minimum_position", "1", "position x/a of the minimum film thickness", default=False, has_error=True),
+    Output("rupture_position", "1", "position x/a of the end of the film", default=False, has_error=True),
+    Output("spike_position", "1", "position x/a of the pressure spike", default=False, has_error=True),
     Output(
         "spike_pressure",
         "Pa",
-        "pressure of the spike; its height does not converge with Barus' law",
+        "largest pressure of the spike; it does not converge for Barus' law",
         default=False,
         has_error=True,
     ),
-    Output("load_error", "1", "relative deviation of the pressure's integral from the load", default=False),
-    Output("traction_coefficient", "1", "shear force at mid-film over the load", default=False, has_error=True),
-    Output("rolling_coefficient", "1", "rolling friction of each surface over the load", default=False, has_error=True),
+    Output("load_error", "1", "relative difference between the integral of the pressure and the load", default=False),
+    Output(
+        "traction_coefficient",
+        "1",
+        "traction coefficient; the shear force in the middle of the film divided by the load",
+        default=False,
+        has_error=True,
+    ),
+    Output(
+        "rolling_coefficient",
+        "1",
+        "rolling friction coefficient; the rolling resistance of each surface divided by the load",
+        default=False,
+        has_error=True,
+    ),
 )
 
 
@@ -170,7 +201,11 @@ def memory(_: Block[EhlLineParameters]) -> float:
 
 def coordinates(parameters: EhlLineParameters) -> dict[str, Coordinate]:
     """Return the coordinate of film and pressure."""
-    return {"position": Coordinate(positions(parameters), "1", "position over the half width x/a, flow to the right")}
+    return {
+        "position": Coordinate(
+            positions(parameters), "1", "position x/a in Hertzian half widths, positive in the direction of flow"
+        )
+    }
 
 
 MODEL = Model(

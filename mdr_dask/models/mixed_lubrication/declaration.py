@@ -10,17 +10,7 @@ from pydantic import Field, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, distinguishable
-from mdr_dask.models.base import (
-    Alternatives,
-    Block,
-    Coordinate,
-    Model,
-    Number,
-    Output,
-    Parameters,
-    deferred,
-    quantity,
-)
+from mdr_dask.models.base import Alternatives, Block, Coordinate, Model, Number, Output, Parameters, deferred, quantity
 from mdr_dask.models.mixed_lubrication.lines import Generated, Measured, OfSurfaces, Source
 from mdr_dask.models.mixed_lubrication.oil_data import OilData
 from mdr_dask.models.parts.surface import NO_AREA, Surface, without_exponent
@@ -40,7 +30,7 @@ POSITIONS = np.linspace(-1.5, 1.5, 1501)
 
 
 class MixedLubrication(Parameters):
-    """Two equal rough rollers pressed together on an oil film; the defaults are the twin-disc rig of the thesis."""
+    """Two equal rough rollers with an oil film between them; the defaults describe the twin-disc rig of the thesis."""
 
     renamed: ClassVar[Mapping[str, str]] = {
         "young_modulus": "write contact_modulus, E* = E/(2 (1 - nu^2)) of two rollers of one material",
@@ -58,72 +48,82 @@ class MixedLubrication(Parameters):
     rotation_speed: float = quantity("rad/s", "mean rotation speed of the two rollers", usual="100 rpm", gt=0)
     temperature: float = quantity("K", "temperature of rollers and oil", usual="60 degC", gt=0)
     slide_roll_ratio: float = quantity(
-        "1", "creep (v1 - v2)/u with the mean velocity u; 0 is pure rolling", default=0.0, ge=-2, le=2
+        "1", "slide-roll ratio (v1 - v2)/u with the mean velocity u; 0 is pure rolling", default=0.0, ge=-2, le=2
     )
     rms_roughness: Positive | None = quantity(
-        "m", "rms height of each roller; needed unless surfaces are given", usual="0.2 um", default=None
+        "m", "rms height of each roller; required unless surfaces are given", usual="0.2 um", default=None
     )
     hurst: float | None = quantity("1", "Hurst exponent H of the roughness", default=0.7, ge=0, le=1)
     points: Annotated[int, Field(ge=64, le=MOST_POINTS)] | Literal["auto"] = quantity(
-        "1",
-        "points of each line around the roller; auto has those that the accuracy needs",
-        default="auto",
+        "1", "points of the rough line around each roller; auto takes as many as the accuracy requires", default="auto"
     )
     longest_wavelength: Positive | Literal["auto"] = quantity(
         "m",
-        "wavelength above which there is no roughness; auto is 2a at cutoff_force. Of measured lines only the "
-        "load on their asperities needs it",
+        "longest wavelength of the roughness; auto is the Hertzian contact width 2a under cutoff_force. With measured "
+        "profiles it is used only for the load on asperities",
         usual="0.4 mm",
         default="auto",
     )
     cutoff_force: float = quantity(
-        "N", "normal force whose contact width is the longest wavelength", usual="1600 N", default=1600, gt=0
+        "N", "normal force that sets longest_wavelength: auto", usual="1600 N", default=1600, gt=0
     )
     shortest_wavelength: Positive | Literal["auto"] = quantity(
         "m",
-        "wavelength below which there is no roughness; auto is ten spacings of points that are given, else the "
-        "perimeter over 100 000",
+        "shortest wavelength of the roughness; auto is ten times the spacing of `points` if their number is given, "
+        "otherwise the circumference of a roller divided by 100 000",
         usual="3 um",
         default="auto",
     )
     surface_1: Surface | None = Field(default=None, description="measured surface of roller 1")
     surface_2: Surface | None = Field(default=None, description="measured surface of roller 2")
     layer_thickness: float = quantity(
-        "m", "critical thickness h_c of the boundary layer", usual="5 nm", default=5e-9, gt=0
+        "m", "critical thickness h_c; a thinner boundary layer breaks", usual="5 nm", default=5e-9, gt=0
     )
     layer_shear_strength: float = quantity(
-        "Pa", "limiting shear stress tau0 of the boundary layer", usual="1 MPa", default=1e6, ge=0
+        "Pa", "shear strength tau0 of the boundary layer", usual="1 MPa", default=1e6, ge=0
     )
     oil: Literal["mobilgear_shc_xmp_320"] | OilData = Field(
-        default="mobilgear_shc_xmp_320", description="a named oil, or the numbers of a data sheet or a table"
+        default="mobilgear_shc_xmp_320", description="a named oil, or the viscosities of a data sheet or a table"
     )
     pressure_viscosity: (
         Positive | Literal["oil", "gold_mineral", "gold_polyalphaolefin", "gold_ester", "gold_polyglycol", "wooster"]
     ) = quantity(
         "1/Pa",
-        "pressure-viscosity coefficient alpha, or the correlation that gives it",
+        "pressure-viscosity coefficient alpha, or the name of the correlation that gives it; oil stands for the "
+        "correlation of the oil",
         usual="20 1/GPa",
         default="oil",
     )
     film_formula: Literal["pan_hamrock", "pan_hamrock_minimum", "dowson_higginson", "ehl"] = Field(
-        default="pan_hamrock", description="formula of the film thickness, or the central film of the EHL solution"
+        default="pan_hamrock",
+        description="formula for the film thickness; ehl solves the contact as in the model ehl_line",
     )
     film_thickness: Positive | None = quantity(
-        "m", "film thickness, instead of the formula's", usual="100 nm", default=None
+        "m", "film thickness in place of the result of film_formula", usual="100 nm", default=None
     )
     edge_rule: Literal["part", "clip", "whole", "inside"] = Field(
-        default="part", description="what becomes of a cluster that the edge of the contact cuts"
+        default="part",
+        description="cluster of asperities at an edge of the contact: test and count its part inside (part), test all of "
+        "it and count its part inside (clip), test and count all of it (whole), or ignore it (inside)",
     )
     roller_radius: float = quantity("m", "radius of each roller", usual="50 mm", default=0.05, gt=0)
-    roller_width: float = quantity("m", "length L' of the contact line", usual="10 mm", default=0.01, gt=0)
-    contact_modulus: float = quantity("Pa", "contact modulus E*", usual="115 GPa", default=STEEL, gt=0)
-    resistivity: float = quantity("ohm m", "electrical resistivity of the rollers", default=2e-7, gt=0)
-    boundary_friction: float = quantity("1", "coefficient of friction of intimate contact", default=0.1, ge=0)
-    eyring_stress: float = quantity("Pa", "Eyring stress of the oil under shear", usual="5 MPa", default=5e6, gt=0)
-    viscosity_law: Literal["barus", "roelands"] = Field(
-        default="barus", description="viscosity under pressure, for the friction of the film and the EHL solution"
+    roller_width: float = quantity(
+        "m", "width of the rollers, which is the length L' of the contact", usual="10 mm", default=0.01, gt=0
     )
-    trace_points: int = quantity("1", "angles of contact_length_trace in one revolution", default=3600, ge=2, le=10**6)
+    contact_modulus: float = quantity(
+        "Pa", "contact modulus E*, E/(2 (1 - nu^2)) for two equal materials", usual="115 GPa", default=STEEL, gt=0
+    )
+    resistivity: float = quantity("ohm m", "electrical resistivity of the rollers", default=2e-7, gt=0)
+    boundary_friction: float = quantity(
+        "1", "coefficient of friction where the rollers are in intimate contact", default=0.1, ge=0
+    )
+    eyring_stress: float = quantity("Pa", "Eyring stress of the oil", usual="5 MPa", default=5e6, gt=0)
+    viscosity_law: Literal["barus", "roelands"] = Field(
+        default="barus", description="law of the viscosity under pressure, for friction and for film_formula: ehl"
+    )
+    trace_points: int = quantity(
+        "1", "number of angles in one revolution at which contact_length_trace is stored", default=3600, ge=2, le=10**6
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -228,50 +228,53 @@ OUTPUTS = (
     Output(
         "breakthrough_probability",
         "1",
-        "share of time with the boundary layer broken anywhere on one line (P of the thesis)",
+        "fraction of time in which the boundary layer is broken somewhere on one line (P of the thesis)",
         has_error=True,
         scatter="revolution_error",
     ),
-    Output("contact_length", "m", "mean length in intimate contact on one line", has_error=True, comment=NO_AREA),
+    Output(
+        "contact_length", "m", "mean length of one line that is in intimate contact", has_error=True, comment=NO_AREA
+    ),
     Output("film", "m", "film thickness h0", has_error=True),
-    Output("film_ratio", "1", "film thickness over combined rms height", has_error=True),
-    Output("asperity_load_share", "1", "share of the load on asperities, the rest is on the film", has_error=True),
+    Output("film_ratio", "1", "film thickness divided by the combined rms height of the rollers", has_error=True),
+    Output("asperity_load_share", "1", "fraction of the load carried by asperities, not by the film", has_error=True),
     Output(
         "independent_squares",
         "1",
-        "squares with the longest wavelength as edge, side by side in the width of the rollers; one line is one square",
+        "number of independent squares; the width of the rollers divided by the longest wavelength, one line for each "
+        "square",
     ),
     Output(
         "revolution_error",
         "1",
-        "standard error of the probability of one revolution, from its parts",
+        "standard error of breakthrough_probability in one revolution, estimated from parts of the revolution",
         default=False,
     ),
     Output(
         "contact_conductance",
         "S",
-        "mean electrical conductance of the spots in contact, over the whole width of the rollers",
+        "mean electrical conductance of all contact spots in the width of the rollers",
         default=False,
         has_error=True,
     ),
     Output(
         "contact_resistance",
         "ohm",
-        "reciprocal of the mean conductance of the whole width, infinite without contact",
+        "electrical contact resistance; the reciprocal of contact_conductance, infinite without contact",
         default=False,
         has_error=True,
     ),
     Output(
-        "friction_coefficient",
-        "1",
-        "coefficient of friction of asperities and film",
-        default=False,
-        has_error=True,
+        "friction_coefficient", "1", "coefficient of friction of asperities and oil film", default=False, has_error=True
     ),
     Output("contact_half_width", "m", "half width a of the Hertzian contact", default=False),
-    Output("contact_length_trace", "m", "length in intimate contact during one revolution", ("angle",), default=False),
-    Output("upper_profile", "m", "surface of roller 1 where contact is greatest", ("position",), default=False),
-    Output("lower_profile", "m", "surface of roller 2 where contact is greatest", ("position",), default=False),
+    Output("contact_length_trace", "m", "length in intimate contact against rolling angle", ("angle",), default=False),
+    Output(
+        "upper_profile", "m", "profile of roller 1 at the angle with the longest contact", ("position",), default=False
+    ),
+    Output(
+        "lower_profile", "m", "profile of roller 2 at the angle with the longest contact", ("position",), default=False
+    ),
 )
 
 
@@ -283,7 +286,7 @@ def coordinates(parameters: MixedLubrication) -> dict[str, Coordinate]:
     angles = 2 * np.pi * np.arange(parameters.trace_points) / parameters.trace_points
     return {
         "angle": Coordinate(angles, "rad", "rolling angle"),
-        "position": Coordinate(POSITIONS, "1", "distance from the middle of the contact over its half width"),
+        "position": Coordinate(POSITIONS, "1", "distance from the middle of the contact divided by its half width a"),
     }
 
 
@@ -353,10 +356,14 @@ MODEL = Model(
         Number(
             "rig_probability",
             "1 - (1 - breakthrough_probability) ** independent_squares",
-            "share of time with the boundary layer broken anywhere in the width of the rollers, squares independent",
+            "fraction of time in which the layer is broken somewhere in the width of the rollers (independent squares)",
         ),
-        Number("film_over_layer", "film / layer_thickness", "film over the critical thickness of the boundary layer"),
-        Number("touching_share", "contact_length / (2 * contact_half_width)", "contact length over the Hertzian width"),
+        Number("film_over_layer", "film / layer_thickness", "film thickness divided by layer_thickness"),
+        Number(
+            "touching_share",
+            "contact_length / (2 * contact_half_width)",
+            "contact length divided by the Hertzian width",
+        ),
     ),
     compiling=2.0,
 )

@@ -24,32 +24,32 @@ class OilData(Parameters):
 
     alternatives: ClassVar[tuple[Alternatives, ...]] = ((_TWO, ("viscosities",)),)
     temperature_1: float | None = quantity(
-        "K", "first temperature of the two viscosities", usual="40 degC", gt=0, default=None
+        "K", "temperature at which viscosity_1 was measured", usual="40 degC", gt=0, default=None
     )
     viscosity_1: float | None = quantity(
         "m^2/s", "kinematic viscosity at temperature_1", usual="320 mm^2/s", gt=0, default=None
     )
     temperature_2: float | None = quantity(
-        "K", "second temperature of the two viscosities", usual="100 degC", gt=0, default=None
+        "K", "temperature at which viscosity_2 was measured", usual="100 degC", gt=0, default=None
     )
     viscosity_2: float | None = quantity(
         "m^2/s", "kinematic viscosity at temperature_2", usual="40 mm^2/s", gt=0, default=None
     )
     viscosities: NamedFile | None = Field(
         default=None,
-        description="table with the columns temperature and kinematic viscosity, or dynamic viscosity, which the law "
-        "of the two is fitted to",
+        description="table with the columns temperature and kinematic viscosity (or dynamic viscosity), to which "
+        "Walther's law is fitted; in place of the two viscosities",
     )
-    density: float = quantity("kg/m^3", "density at density_temperature", usual="870 kg/m^3", gt=0)
-    density_temperature: float = quantity("K", "temperature of the density", default=288.15, gt=0)
+    density: float = quantity("kg/m^3", "density of the oil at density_temperature", usual="870 kg/m^3", gt=0)
+    density_temperature: float = quantity("K", "temperature at which the density was measured", default=288.15, gt=0)
     correlation: Literal["gold_mineral", "gold_polyalphaolefin", "gold_ester", "gold_polyglycol", "wooster"] = Field(
-        default="gold_mineral", description="pressure-viscosity correlation"
+        default="gold_mineral", description="correlation that gives the pressure-viscosity coefficient"
     )
     lowest_temperature: float | None = quantity(
-        "K", "where the data begin; else the lowest of them", default=None, gt=0
+        "K", "lowest allowed temperature of the oil; by default that of the viscosities", default=None, gt=0
     )
     highest_temperature: float | None = quantity(
-        "K", "where the data end; else the highest of them", default=None, gt=0
+        "K", "highest allowed temperature of the oil; by default that of the viscosities", default=None, gt=0
     )
 
     @model_validator(mode="after")

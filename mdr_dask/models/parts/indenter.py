@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Plane(Parameters):
-    """A nominally flat body: the rough line is periodic."""
+    """A nominally flat body with a periodic rough line."""
 
     shape: Literal["plane"] = "plane"
 
@@ -24,7 +24,7 @@ class Plane(Parameters):
 
 
 class _PowerLaw(Parameters):
-    """A body of revolution whose height is a power of the radius."""
+    """A body of revolution whose height is a power of the distance from its axis."""
 
     def power_law(self) -> tuple[float, float]:
         """Return coefficient and exponent of the body c r^n."""
@@ -41,7 +41,9 @@ class Cone(_PowerLaw):
     """A cone."""
 
     shape: Literal["cone"]
-    angle: float = quantity("rad", "angle between the cone's surface and the plane", usual="10 deg", gt=0, lt=np.pi / 2)
+    angle: float = quantity(
+        "rad", "angle between the surface of the cone and the plane that it touches", usual="10 deg", gt=0, lt=np.pi / 2
+    )
 
     def power_law(self) -> tuple[float, float]:
         """Return coefficient and exponent of the body c r^n."""
@@ -60,11 +62,13 @@ class Parabola(_PowerLaw):
 
 
 class Power(_PowerLaw):
-    """A body of revolution c r^n."""
+    """A body of revolution with the height c r^n at the distance r from its axis."""
 
     shape: Literal["power"]
-    exponent: float = quantity("1", "exponent n of the body c r^n", usual="2", ge=1, le=100)
-    coefficient: float = quantity("m^(1-n)", "coefficient c of the body c r^n, in metres", gt=0)
+    exponent: float = quantity("1", "exponent n of the height c r^n", usual="2", ge=1, le=100)
+    coefficient: float = quantity(
+        "m^(1-n)", "coefficient c of the height c r^n, with heights and radii in metres", gt=0
+    )
 
     def power_law(self) -> tuple[float, float]:
         """Return coefficient and exponent of the body c r^n."""
@@ -75,7 +79,9 @@ class RoundedCone(Parameters):
     """A cone with a rounded tip; the slope is continuous where the tip meets the cone."""
 
     shape: Literal["rounded_cone"]
-    angle: float = quantity("rad", "angle between the cone's surface and the plane", gt=0, lt=np.pi / 2)
+    angle: float = quantity(
+        "rad", "angle between the surface of the cone and the plane that it touches", gt=0, lt=np.pi / 2
+    )
     tip_radius: float = quantity("m", "radius of curvature R of the tip", gt=0)
 
     def line(self) -> Shape:

@@ -21,7 +21,7 @@ Numbers = Annotated[tuple[float, ...], Field(strict=False)]
 
 
 class Jump(Parameters):
-    """A single jump of the velocity by `velocity_change`; before the jump, sliding is steady."""
+    """One jump of the velocity by `velocity_change`, after steady sliding."""
 
     shape: Literal["jump"] = "jump"
 
@@ -30,17 +30,21 @@ class _History(Parameters):
     """Base of all histories except the jump."""
 
     start: Literal["steady", "rest"] = Field(
-        default="steady", description="before t = 0: steady sliding at `velocity`, or rest, under `normal_force`"
+        default="steady", description="state before t = 0 under `normal_force`: steady sliding at `velocity`, or rest"
     )
 
 
 class Steps(_History):
-    """Velocity and load that are constant between times."""
+    """Velocity and normal force that change in steps."""
 
     shape: Literal["steps"]
-    times: Numbers = quantity("s", "times at which velocity and force change, from 0 on", min_length=1)
-    velocities: Numbers = quantity("m/s", "velocity from each time on", min_length=1)
-    forces: Numbers | None = quantity("N", "normal force from each time on; else `normal_force`", default=None)
+    times: Numbers = quantity(
+        "s", "times at which velocity and normal force change, the first not before 0", min_length=1
+    )
+    velocities: Numbers = quantity("m/s", "velocity after each of the times", min_length=1)
+    forces: Numbers | None = quantity(
+        "N", "normal force after each of the times; by default `normal_force`", default=None
+    )
 
     @model_validator(mode="after")
     def _rows(self) -> Steps:
@@ -49,28 +53,32 @@ class Steps(_History):
 
 
 class Ramp(_History):
-    """Velocity and load that change linearly, from t = 0, during a given time, and are constant afterwards."""
+    """Velocity and normal force that change linearly from t = 0 during a given time, and are constant afterwards."""
 
     shape: Literal["ramp"]
-    duration: float = quantity("s", "time that the ramp takes", usual="4 ms", gt=0)
-    velocity: float | None = quantity("m/s", "velocity at its end; else `velocity`", default=None)
-    force: float | None = quantity("N", "normal force at its end; else the same", default=None, gt=0)
+    duration: float = quantity("s", "duration of the ramp", usual="4 ms", gt=0)
+    velocity: float | None = quantity("m/s", "velocity at the end of the ramp; by default `velocity`", default=None)
+    force: float | None = quantity(
+        "N", "normal force at the end of the ramp; by default `normal_force`", default=None, gt=0
+    )
 
 
 class Oscillation(_History):
-    """A velocity that oscillates about `velocity`, and optionally a load about `normal_force`."""
+    """A velocity that oscillates about `velocity`; the normal force may oscillate about `normal_force`."""
 
     shape: Literal["oscillation"]
-    amplitude: float = quantity("m/s", "amplitude of the velocity", usual="20 mm/s", ge=0)
-    frequency: float = quantity("Hz", "frequency", usual="250 Hz", gt=0)
-    force_amplitude: float = quantity("N", "amplitude of the normal force, below it", default=0.0, ge=0)
+    amplitude: float = quantity("m/s", "amplitude of the oscillating velocity", usual="20 mm/s", ge=0)
+    frequency: float = quantity("Hz", "frequency of the oscillation", usual="250 Hz", gt=0)
+    force_amplitude: float = quantity(
+        "N", "amplitude of the oscillating normal force, less than `normal_force`", default=0.0, ge=0
+    )
 
 
 class TableFile(_History):
     """Velocity and load from a table, interpolated linearly between its rows; two rows with equal times give a jump."""
 
     shape: Literal["table"]
-    file: NamedFile = Field(description="table with columns time, velocity and optionally force")
+    file: NamedFile = Field(description="table with the columns time and velocity, and optionally force")
 
     @model_validator(mode="after")
     def _holds_a_history(self, info: ValidationInfo) -> TableFile:

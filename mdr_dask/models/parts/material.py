@@ -24,16 +24,16 @@ Numbers = Annotated[tuple[float, ...], Field(strict=False)]
 class Kelvin(Parameters):
     """A spring and a dashpot in parallel."""
 
-    shear_modulus: float = quantity("Pa", "shear modulus G", usual="10 MPa", gt=0)
+    shear_modulus: float = quantity("Pa", "static shear modulus G", usual="10 MPa", gt=0)
     relaxation_time: float = quantity("s", "relaxation time tau = eta / G", usual="1 ms", gt=0)
 
 
 class StandardSolid(Parameters):
     """A spring and one Prony term in parallel."""
 
-    static_modulus: float = quantity("Pa", "shear modulus of slow deformation", usual="3 MPa", gt=0)
+    static_modulus: float = quantity("Pa", "shear modulus under slow deformation", usual="3 MPa", gt=0)
     glass_modulus: float = quantity(
-        "Pa", "shear modulus of sudden deformation, above the static one", usual="1 GPa", gt=0
+        "Pa", "shear modulus under sudden deformation, larger than static_modulus", usual="1 GPa", gt=0
     )
     relaxation_time: float = quantity("s", "relaxation time of the Prony term", usual="1 ms", gt=0)
 
@@ -41,10 +41,10 @@ class StandardSolid(Parameters):
 class PronySeries(Parameters):
     """A spring and any number of Prony terms in parallel, with or without a dashpot."""
 
-    static_modulus: float = quantity("Pa", "shear modulus of slow deformation", usual="3 MPa", gt=0)
+    static_modulus: float = quantity("Pa", "shear modulus under slow deformation", usual="3 MPa", gt=0)
     moduli: Numbers = quantity("Pa", "shear modulus of each Prony term", usual="10 MPa")
     times: Numbers = quantity("s", "relaxation time of each Prony term", usual="1 ms")
-    viscosity: float = quantity("Pa s", "viscosity of the dashpot", default=0.0, ge=0)
+    viscosity: float = quantity("Pa s", "viscosity of a dashpot in parallel with the spring", default=0.0, ge=0)
 
     @model_validator(mode="after")
     def _a_time_for_every_modulus(self) -> PronySeries:
@@ -56,12 +56,14 @@ class PronySeries(Parameters):
 class PowerLaw(Parameters):
     """A Prony series whose loss modulus is a power of the frequency."""
 
-    static_modulus: float = quantity("Pa", "shear modulus of slow deformation", usual="3 MPa", gt=0)
-    loss_modulus: float = quantity("Pa", "loss modulus G'' at the frequency given", usual="1 MPa", gt=0)
-    frequency: float = quantity("rad/s", "angular frequency at which the loss modulus holds", usual="1000 rad/s", gt=0)
+    static_modulus: float = quantity("Pa", "shear modulus under slow deformation", usual="3 MPa", gt=0)
+    loss_modulus: float = quantity("Pa", "loss modulus G'' at the given frequency", usual="1 MPa", gt=0)
+    frequency: float = quantity("rad/s", "angular frequency at which loss_modulus is given", usual="1000 rad/s", gt=0)
     exponent: float = quantity("1", "exponent beta of G'' ~ omega^beta", usual="0.2", gt=0, lt=1)
-    lowest: float = quantity("rad/s", "lowest angular frequency of the law", usual="0.1 rad/s", gt=0)
-    highest: float = quantity("rad/s", "highest angular frequency of the law", usual="1e5 rad/s", gt=0)
+    lowest: float = quantity("rad/s", "lowest angular frequency at which the power law holds", usual="0.1 rad/s", gt=0)
+    highest: float = quantity(
+        "rad/s", "highest angular frequency at which the power law holds", usual="1e5 rad/s", gt=0
+    )
 
 
 KINDS = ("kelvin", "standard_solid", "prony", "power_law", "dma_table")
@@ -73,17 +75,29 @@ class Material(Parameters):
     """One linear viscoelastic material, with or without a temperature."""
 
     alternatives: ClassVar[tuple[Alternatives, ...]] = (tuple((kind,) for kind in KINDS),)
-    kelvin: Kelvin | None = Field(default=None, description="spring and dashpot")
-    standard_solid: StandardSolid | None = Field(default=None, description="spring and one Prony term")
-    prony: PronySeries | None = Field(default=None, description="spring and any number of Prony terms")
-    power_law: PowerLaw | None = Field(default=None, description="loss modulus as a power of frequency")
-    dma_table: ModulusTable | None = Field(default=None, description="fit to measured moduli")
-    temperature: float | None = quantity(
-        "K", "temperature, with wlf, arrhenius or shift_factors", usual="20 degC", default=None, gt=0
+    kelvin: Kelvin | None = Field(default=None, description="Kelvin body, a spring and a dashpot in parallel")
+    standard_solid: StandardSolid | None = Field(
+        default=None, description="standard solid, a spring and one Prony term in parallel"
     )
-    wlf: Wlf | None = Field(default=None, description="shift of relaxation times by Williams, Landel and Ferry")
-    arrhenius: Arrhenius | None = Field(default=None, description="shift of relaxation times by an activation energy")
-    shift_factors: ShiftFactors | None = Field(default=None, description="measured shift of relaxation times")
+    prony: PronySeries | None = Field(
+        default=None, description="Prony series, a spring and any number of Prony terms in parallel"
+    )
+    power_law: PowerLaw | None = Field(default=None, description="solid whose loss modulus is a power of the frequency")
+    dma_table: ModulusTable | None = Field(
+        default=None, description="Prony series fitted to a table of measured moduli (dynamic mechanical analysis)"
+    )
+    temperature: float | None = quantity(
+        "K", "temperature of the material; needs wlf, arrhenius or shift_factors", usual="20 degC", default=None, gt=0
+    )
+    wlf: Wlf | None = Field(
+        default=None, description="law of Williams, Landel and Ferry for the relaxation times at other temperatures"
+    )
+    arrhenius: Arrhenius | None = Field(
+        default=None, description="Arrhenius law for the relaxation times at other temperatures"
+    )
+    shift_factors: ShiftFactors | None = Field(
+        default=None, description="measured factors a_T of the relaxation times at other temperatures"
+    )
 
     @property
     def law(self) -> Law | None:
@@ -226,7 +240,7 @@ def fit_notes(material: Material | None) -> tuple[str, ...]:
     errors = [f"{error:.1%} in {modulus}" for modulus, error in _errors(fit).items()]
     return (
         f"{what}: {how and how + '; '}{fit.solid.times.size} Prony terms for {lowest:.3g} to {highest:.3g} rad/s, "
-        f"rms error {', '.join(errors)}, largest {fit.largest_error:.1%} at {fit.worst_frequency:.3g} rad/s",
+        f"rms error {', '.join(errors)}, largest {fit.largest_error:.1%} at {fit.worst_frequency:.3g} rad/s"
     )
 
 
@@ -254,9 +268,7 @@ def _outside(material: Material) -> tuple[str, ...]:
     if low - SAME_TEMPERATURE <= temperature <= high + SAME_TEMPERATURE:
         return ()
     ends = shown(low, "K") if high - low < SAME_TEMPERATURE else f"{shown(low, 'K')} to {shown(high, 'K')}"
-    return (
-        f"table {table.file.name}: measured at {ends}; {shown(temperature, 'K')} is reached by shift factors alone",
-    )
+    return f"table {table.file.name}: measured at {ends}; {shown(temperature, 'K')} is reached by shift factors alone"
 
 
 def _unusual(material: Material) -> tuple[str, ...]:

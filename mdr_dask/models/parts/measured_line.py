@@ -20,20 +20,28 @@ if TYPE_CHECKING:
 
 
 class ProfileFile(NamedByFile):
-    """A measured line, given by a file name, or by a file name with options."""
+    """A measured height profile, given by a file name, or by a file name with options."""
 
     file: NamedFile = Field(
-        description="two columns x, z; other formats are read by SurfaceTopography if it is installed"
+        description="file with two columns x, z; SurfaceTopography reads other formats if it is installed"
     )
-    unit: str = Field(default="", description="unit of the heights, if the file has none")
-    x_unit: str = Field(default="", description="unit of the positions, if the file has none")
-    spacing: float | None = quantity("m", "distance of points, of a file of heights alone", default=None, gt=0)
-    detrend: Literal["none", "mean", "line", "parabola"] = Field(default="mean", description="polynomial subtracted")
-    taper: float = quantity("1", "part of the line faded to its mean so that the ends meet", default=0.0, ge=0, le=1)
+    unit: str = Field(default="", description="unit of the heights, if the file does not state it")
+    x_unit: str = Field(default="", description="unit of the positions, if the file does not state it")
+    spacing: float | None = quantity(
+        "m", "distance between neighbouring points, for a file of heights without positions", default=None, gt=0
+    )
+    detrend: Literal["none", "mean", "line", "parabola"] = Field(
+        default="mean", description="polynomial that is subtracted from the heights"
+    )
+    taper: float = quantity(
+        "1", "part of the line in which heights fade to their mean, so that the ends meet", default=0.0, ge=0, le=1
+    )
     shortest_wavelength: float | None = quantity(
-        "m", "wavelength below which there is no roughness", default=None, gt=0
+        "m", "shortest wavelength of the roughness; shorter waves are removed", default=None, gt=0
     )
-    longest_wavelength: float | None = quantity("m", "wavelength above which there is no roughness", default=None, gt=0)
+    longest_wavelength: float | None = quantity(
+        "m", "longest wavelength of the roughness; longer waves are removed", default=None, gt=0
+    )
 
     @model_validator(mode="after")
     def _holds_a_line(self, info: ValidationInfo) -> ProfileFile:

@@ -32,15 +32,18 @@ class ModulusTable(NamedByFile):
 
     renamed: ClassVar[Mapping[str, str]] = {"arms_per_decade": "write terms_per_decade"}
     file: NamedFile = Field(
-        description="table with columns frequency, storage modulus, loss modulus or tan delta, optionally temperature"
+        description="table with the columns frequency, storage modulus, and loss modulus or tan delta; optionally "
+        "temperature"
     )
-    frequency_unit: str = Field(default="", description="unit of the frequencies, if the table has none")
-    modulus_unit: str = Field(default="", description="unit of the moduli, if the table has none")
-    table_temperature: float | None = quantity("K", "measured temperature to use", default=None, gt=0)
+    frequency_unit: str = Field(default="", description="unit of the frequencies, if the table does not state it")
+    modulus_unit: str = Field(default="", description="unit of the moduli, if the table does not state it")
+    table_temperature: float | None = quantity(
+        "K", "use only the curves that were measured at this temperature", default=None, gt=0
+    )
     reference: float | None = quantity(
         "K",
-        "temperature to which the curves of several temperatures are shifted until they overlap; without it and "
-        "table_temperature they are shifted by wlf, arrhenius or shift_factors",
+        "reference temperature; the curves of all other temperatures are shifted along the frequency until they "
+        "overlap. Without reference and table_temperature, wlf, arrhenius or shift_factors shift the curves",
         default=None,
         gt=0,
     )
@@ -49,9 +52,11 @@ class ModulusTable(NamedByFile):
         description="modulus: moduli of different temperatures differ by b_T = rho0 T0 / (rho T); none: they do not",
     )
     poisson_ratio: float | None = quantity(
-        "1", "for moduli in tension, which are divided by 2 (1 + nu)", default=None, ge=-1, le=0.5
+        "1", "Poisson's ratio nu; it divides moduli measured in tension by 2 (1 + nu)", default=None, ge=-1, le=0.5
     )
-    terms_per_decade: float = quantity("1", "Prony terms per factor of ten in time", default=1.0, gt=0, le=5)
+    terms_per_decade: float = quantity(
+        "1", "number of Prony terms for each decade of the relaxation times", default=1.0, gt=0, le=5
+    )
 
     @model_validator(mode="after")
     def _holds_moduli(self, info: ValidationInfo) -> ModulusTable:

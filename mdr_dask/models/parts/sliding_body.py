@@ -29,13 +29,13 @@ NUMBERS = (
     Number(
         "velocity_number",
         "velocity * relaxation_time * rms_slope / (sqrt(2) * rms_roughness)",
-        "velocity number v tau s / (sqrt 2 h), s the rms slope (thesis eq. 3.19)",
+        "velocity number v tau s / (sqrt 2 h) with the rms slope s (thesis eq. 3.19)",
     ),
 )
 
 
 class SlidingBody(Parameters):
-    """A viscoelastic body under a load on a rough line, which is generated or measured.
+    """A viscoelastic body that slides over a rough line, which is generated or measured.
 
     The rough line is flat, or has the shape of an indenter.
     """
@@ -49,30 +49,32 @@ class SlidingBody(Parameters):
         (("shear_modulus", "relaxation_time"), ("material",)),
     )
     length: float | None = quantity(
-        "m", "length L of the line, and period of its roughness", usual="10 mm", default=None, gt=0
+        "m", "length L of the rough line, after which the roughness repeats", usual="10 mm", default=None, gt=0
     )
     points: int = quantity(
-        "1", "Nyquist points: the cut-off wavelength is 2 length / points", default=5000, ge=16, le=10**6
+        "1", "points of the rough line; its shortest wavelength is 2 length / points", default=5000, ge=16, le=10**6
     )
     hurst: float | None = quantity("1", "Hurst exponent H of the self-affine roughness", default=0.7, ge=0, le=1)
     rms_roughness: float | None = quantity("m", "rms height h of the roughness", usual="0.5 um", default=None, ge=0)
     rolloff_wavelength: float | None = quantity(
-        "m", "wavelength above which the spectrum is constant", usual="1 mm", default=None, gt=0
+        "m", "wavelength above which the power spectrum is constant", usual="1 mm", default=None, gt=0
     )
     longest_wavelength: float | None = quantity(
-        "m", "wavelength above which there is no roughness", usual="1 mm", default=None, gt=0
+        "m", "longest wavelength of the roughness; by default the length of the line", usual="1 mm", default=None, gt=0
     )
-    surface: Surface | None = Field(default=None, description="a measured surface in place of a generated one")
+    surface: Surface | None = Field(default=None, description="a measured surface in place of generated roughness")
     shear_modulus: float | None = quantity(
-        "Pa", "static shear modulus G of the incompressible Kelvin body", usual="10 MPa", default=None, gt=0
+        "Pa", "static shear modulus G of an incompressible Kelvin body", usual="10 MPa", default=None, gt=0
     )
     relaxation_time: float | None = quantity(
-        "s", "relaxation time tau = eta / G of the Kelvin body", usual="1 ms", default=None, gt=0
+        "s", "relaxation time tau = eta / G of the Kelvin body (viscosity eta)", usual="1 ms", default=None, gt=0
     )
-    material: Material | None = Field(default=None, description="any linear material in place of the Kelvin body")
+    material: Material | None = Field(
+        default=None, description="a general linear viscoelastic material in place of a Kelvin body"
+    )
     normal_force: float = quantity("N", "normal force F_N", usual="1 N", gt=0)
     velocity: float = quantity("m/s", "sliding velocity v", usual="100 mm/s", gt=0)
-    indenter: Indenter = Field(default=Plane(), description="the shape under the roughness")
+    indenter: Indenter = Field(default=Plane(), description="shape of the body on which the roughness lies")
 
     @model_validator(mode="before")
     @classmethod

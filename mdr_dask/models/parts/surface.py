@@ -19,24 +19,30 @@ if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
 
-NO_AREA = "length in contact of the line: it says nothing of the area in contact of a rough surface (docs/validity.md)"
-NO_GAP = "approach of the line: it says nothing of mean separation and gaps of a rough surface (docs/validity.md)"
+NO_AREA = "contact length of the line; it does not give the contact area of a rough surface (docs/validity.md)"
+NO_GAP = "approach of the line; it does not give the mean separation or the gaps of a rough surface (docs/validity.md)"
 
 
 class Surface(Parameters):
     """A measured surface, in place of a generated one."""
 
     alternatives: ClassVar[tuple[Alternatives, ...]] = ((("spectrum",), ("map",), ("scan",), ("profile",)),)
-    spectrum: SpectrumTables | None = Field(default=None, description="table of the spectrum")
-    map: MapFiles | None = Field(default=None, description="areal map")
-    scan: ScanFiles | None = Field(default=None, description="scan of an isotropic surface, a straight cut")
-    profile: ProfileFile | None = Field(default=None, description="line that is taken as it is")
-    longest_wavelength: float | None = quantity("m", "wavelength above which there is no roughness", default=None, gt=0)
+    spectrum: SpectrumTables | None = Field(default=None, description="table with the power spectrum of the surface")
+    map: MapFiles | None = Field(default=None, description="map of heights z(x, y)")
+    scan: ScanFiles | None = Field(
+        default=None, description="height profile along a straight line on an isotropic surface; its spectrum is used"
+    )
+    profile: ProfileFile | None = Field(
+        default=None, description="height profile that is used unchanged as the rough line"
+    )
+    longest_wavelength: float | None = quantity(
+        "m", "longest wavelength of the roughness; longer waves are removed", default=None, gt=0
+    )
     shortest_wavelength: float | None = quantity(
-        "m", "wavelength below which there is no roughness", default=None, gt=0
+        "m", "shortest wavelength of the roughness; shorter waves are removed", default=None, gt=0
     )
     extrapolate: bool = Field(
-        default=False, description="whether the spectrum goes on to these wavelengths by a power law"
+        default=False, description="whether a power law extends the spectrum to the two wavelengths"
     )
 
     @model_validator(mode="after")

@@ -52,7 +52,7 @@ class Files(NamedByFile):
     """Files of one surface; a file name alone means this file with the default options."""
 
     files: tuple[NamedFile, ...] = Field(
-        strict=False, min_length=1, description="one file, or several of the same surface: each realisation takes one"
+        strict=False, min_length=1, description="files of the same surface; each realisation uses one of them"
     )
 
     def found(self) -> tuple[Found, ...]:
@@ -74,11 +74,17 @@ class SpectrumTables(Files):
 class ScanFiles(Files):
     """Scans of an isotropic surface along straight lines, as a stylus records them."""
 
-    spacing: float | None = quantity("m", "distance of points, of a file of heights alone", default=None, gt=0)
-    unit: str = Field(default="", description="unit of the heights, where the file does not say")
-    x_unit: str = Field(default="", description="unit of the positions, where the file does not say")
-    detrend: Literal["none", "mean", "line", "parabola"] = Field(default="line", description="polynomial subtracted")
-    window: Window = Field(default="hann", description="window of each scan; none only if it closes")
+    spacing: float | None = quantity(
+        "m", "distance between neighbouring points, for a file of heights without positions", default=None, gt=0
+    )
+    unit: str = Field(default="", description="unit of the heights, if the file does not state it")
+    x_unit: str = Field(default="", description="unit of the positions, if the file does not state it")
+    detrend: Literal["none", "mean", "line", "parabola"] = Field(
+        default="line", description="polynomial that is subtracted from the heights"
+    )
+    window: Window = Field(
+        default="hann", description="window for the Fourier transform of each scan; none only for a periodic scan"
+    )
 
     def found(self) -> tuple[Found, ...]:
         """Return the spectrum of the surface from each scan."""
@@ -88,17 +94,25 @@ class ScanFiles(Files):
 class MapFiles(Files):
     """Areal maps of a surface."""
 
-    spacing: float | None = quantity("m", "distance of points, of text and npy", default=None, gt=0)
-    spacing_y: float | None = quantity("m", "distance of lines where it is another", default=None, gt=0)
-    unit: str = Field(default="", description="unit of the heights, where the file does not say")
-    x_unit: str = Field(default="", description="unit of positions in the file, where the file does not say")
-    detrend: Literal["none", "mean", "plane", "parabola"] = Field(default="plane", description="polynomial subtracted")
-    window: Window = Field(default="hann", description="window of the map; none only if it is periodic")
+    spacing: float | None = quantity(
+        "m", "distance between neighbouring points of a row, for text and npy files", default=None, gt=0
+    )
+    spacing_y: float | None = quantity(
+        "m", "distance between neighbouring rows, if it differs from `spacing`", default=None, gt=0
+    )
+    unit: str = Field(default="", description="unit of the heights, if the file does not state it")
+    x_unit: str = Field(default="", description="unit of the positions, if the file does not state it")
+    detrend: Literal["none", "mean", "plane", "parabola"] = Field(
+        default="plane", description="polynomial that is subtracted from the heights"
+    )
+    window: Window = Field(
+        default="hann", description="window for the Fourier transform of the map; none only for a periodic map"
+    )
     outliers: Literal["keep", "fill"] = Field(
-        default="keep", description="whether points far from their neighbours are kept or replaced"
+        default="keep", description="whether heights far from those of their neighbours are kept or replaced"
     )
     direction: Literal["x", "y"] | None = Field(
-        default=None, description="of sliding over an anisotropic surface: the line is the cut along it"
+        default=None, description="sliding direction on an anisotropic surface; the rough line is a cut along it"
     )
 
     def found(self) -> tuple[Found, ...]:
@@ -181,7 +195,7 @@ def _form(level: FloatArray, curved: FloatArray) -> tuple[str, ...]:
         return ()
     return (
         f"a parabola explains {100 * (1 - rest / square):.3g} % of the mean square: form of the part, not "
-        "roughness? (`detrend: parabola` removes it)",
+        "roughness? (`detrend: parabola` removes it)"
     )
 
 

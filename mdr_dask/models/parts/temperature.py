@@ -19,9 +19,9 @@ from mdr_dask.units import shown_apart
 class Wlf(Parameters):
     """The law of Williams, Landel and Ferry."""
 
-    c1: float = quantity("1", "constant c1 of the law", usual="17.4", gt=0)
-    c2: float = quantity("K", "constant c2 of the law", usual="51.6 K", gt=0)
-    reference: float = quantity("K", "temperature of c1 and c2, at which a_T is 1", usual="20 degC", gt=0)
+    c1: float = quantity("1", "constant c1 of log10 a_T = -c1 (T - reference)/(c2 + T - reference)", usual="17.4", gt=0)
+    c2: float = quantity("K", "constant c2 of the same law", usual="51.6 K", gt=0)
+    reference: float = quantity("K", "reference temperature for c1 and c2, at which a_T = 1", usual="20 degC", gt=0)
 
     def factor(self, temperature: FloatArray | float) -> FloatArray:
         """Return a_T for temperatures in K, in the same shape.
@@ -40,8 +40,10 @@ class Wlf(Parameters):
 class Arrhenius(Parameters):
     """The law of Arrhenius, with an activation energy."""
 
-    activation_energy: float = quantity("J/mol", "activation energy", usual="100 kJ/mol", gt=0)
-    reference: float = quantity("K", "temperature at which a_T is 1", usual="20 degC", gt=0)
+    activation_energy: float = quantity(
+        "J/mol", "activation energy E_a of a_T = exp(E_a/R (1/T - 1/reference))", usual="100 kJ/mol", gt=0
+    )
+    reference: float = quantity("K", "reference temperature, at which a_T = 1", usual="20 degC", gt=0)
 
     def factor(self, temperature: FloatArray | float) -> FloatArray:
         """Return a_T for temperatures in K, in the same shape."""
@@ -53,7 +55,9 @@ class Arrhenius(Parameters):
 class ShiftFactors(Parameters):
     """Measured shift factors, given by a file name or by `file: name`."""
 
-    file: NamedFile = Field(description="table with columns temperature and a_T or log10 a_T; its a_T passes 1")
+    file: NamedFile = Field(
+        description="table with the columns temperature, and a_T or log10 a_T; a_T must pass through 1"
+    )
 
     @model_validator(mode="before")
     @classmethod

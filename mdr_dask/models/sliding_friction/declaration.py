@@ -13,33 +13,30 @@ from mdr_dask.models.parts.tested_range import load_notes
 
 
 class SlidingFriction(SlidingBody):
-    """A viscoelastic body under a load, sliding at constant speed over a rough line."""
+    """A viscoelastic body that slides over a rough line at constant velocity and constant normal force."""
 
     settings: ClassVar[frozenset[str]] = frozenset({"oversampling"})
     oversampling: Annotated[int, Field(ge=1, le=256)] | Literal["auto"] = quantity(
-        "1", "grid points for every Nyquist point, 1 for the papers' grid; auto meets the accuracy", default="auto"
+        "1",
+        "number of grid points for each of the `points`; 1 is the grid of the original papers, auto refines the grid "
+        "until the accuracy is met",
+        default="auto",
     )
     scheme: Literal["hermite", "piecewise_linear", "backward_euler"] = Field(
         default="hermite",
-        description="exact sweep over cubic or straight cells, or the papers' time steps; of a Kelvin body",
+        description="integration along the line, for a Kelvin body only: exact between grid points that are joined by "
+        "cubic polynomials (hermite) or straight lines (piecewise_linear), or by the time steps of the original papers "
+        "(backward_euler)",
     )
 
 
 OUTPUTS = (
     Output("friction_coefficient", "1", "coefficient of friction", has_error=True),
-    Output(
-        "indentation_depth",
-        "m",
-        "penetration of the mean line into the undeformed body",
-        has_error=True,
-        comment=NO_GAP,
-    ),
-    Output("contact_fraction", "1", "length in contact over length of the line", has_error=True, comment=NO_AREA),
-    Output("contact_slope", "1", "rms slope of the line over the contact", has_error=True),
-    Output("rms_slope", "1", "spectral rms slope of the line"),
-    Output(
-        "material_error", "1", "rms relative error of the material's Prony series, 0 where none is fitted", (), False
-    ),
+    Output("indentation_depth", "m", "penetration of the mean line of the roughness", has_error=True, comment=NO_GAP),
+    Output("contact_fraction", "1", "fraction of the line that is in contact", has_error=True, comment=NO_AREA),
+    Output("contact_slope", "1", "rms slope of the line inside the contact", has_error=True),
+    Output("rms_slope", "1", "rms slope of the whole line"),
+    Output("material_error", "1", "rms relative error of the fitted Prony series, 0 without a fit", (), False),
 )
 
 SOLVE = "mdr_dask.models.sliding_friction.solve"
@@ -61,7 +58,7 @@ MODEL = Model(
         Number(
             "scaled_friction",
             "friction_coefficient / (sqrt(2) * rms_slope)",
-            "friction over sqrt 2 times the rms slope",
+            "coefficient of friction / (sqrt 2 x rms slope)",
         ),
     ),
     compiling=10.0,

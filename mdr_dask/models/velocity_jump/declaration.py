@@ -21,21 +21,29 @@ TIMES = tuple(float(f"{time:.4g}") for time in np.geomspace(1e-4, 20, 54))
 
 
 class VelocityJump(SlidingBody):
-    """A viscoelastic body under a load that slides over a rough line and whose velocity jumps from v_1 to v_1 + dv."""
+    """A viscoelastic body that slides over a rough line under a normal force; its velocity jumps from v_1 to v_2."""
 
     settings: ClassVar[frozenset[str]] = frozenset({"oversampling", "steps_per_decade"})
     rms_roughness: float | None = quantity("m", "rms height h of the roughness", usual="2 um", default=None, gt=0)
     velocity: float = quantity("m/s", "sliding velocity v_1 before the jump", usual="50 mm/s", gt=0)
     oversampling: int = quantity(
-        "1", "grid points per Nyquist point for the transient", default=4, ge=2, le=256, multiple_of=2
+        "1", "number of grid points for each of the `points`, after the jump", default=4, ge=2, le=256, multiple_of=2
     )
     steps_per_decade: int = quantity(
-        "1", "time steps per factor of ten in time, 8 or more for large jumps", default=8, ge=4, le=400
+        "1", "time steps in each decade of time; use 8 or more for large jumps", default=8, ge=4, le=400
     )
-    velocity_change: float = quantity("1", "jump of the velocity dv / v_1", default=0.2, gt=-1)
-    protocol: Protocol = Field(default=Jump(), description="history of velocity and load from t_0 = 0 on")
+    velocity_change: float = quantity(
+        "1", "relative change of the velocity at the jump, (v_2 - v_1) / v_1", default=0.2, gt=-1
+    )
+    protocol: Protocol = Field(
+        default=Jump(), description="history of velocity and normal force from t_0 = 0 on; by default one jump"
+    )
     relaxation_times: tuple[float, ...] = quantity(
-        "1", "times (t - t_0) / tau at which friction is computed", default=TIMES, strict=False, min_length=2
+        "1",
+        "times after the jump at which results are stored, divided by the longest relaxation time: (t - t_0) / tau",
+        default=TIMES,
+        strict=False,
+        min_length=2,
     )
 
     @field_validator("relaxation_times")
@@ -73,23 +81,35 @@ class VelocityJump(SlidingBody):
 
 
 OUTPUTS = (
-    Output("friction_coefficient_before", "1", "coefficient of friction mu_1, steady at v_1", has_error=True),
+    Output("friction_coefficient_before", "1", "steady coefficient of friction mu_1 before the jump", has_error=True),
     Output("friction_coefficient_jump", "1", "immediate change d_mu_0 of the coefficient of friction", has_error=True),
-    Output("friction_coefficient_after", "1", "coefficient of friction mu_2, steady at v_2", has_error=True),
+    Output(
+        "friction_coefficient_after", "1", "steady coefficient of friction mu_2 long after the jump", has_error=True
+    ),
     Output(
         "friction_coefficient", "1", "coefficient of friction after the jump", ("relaxation_times",), has_error=True
     ),
     Output(
-        "indentation_depth", "m", "penetration of the mean line", ("relaxation_times",), False, True, comment=NO_GAP
+        "indentation_depth",
+        "m",
+        "penetration of the mean line of the roughness",
+        ("relaxation_times",),
+        False,
+        True,
+        comment=NO_GAP,
     ),
-    Output("rms_slope", "1", "spectral rms slope of the line"),
+    Output("rms_slope", "1", "rms slope of the whole line"),
 )
 
 
 def coordinates(parameters: VelocityJump) -> dict[str, Coordinate]:
     """Return the times at which friction is stored."""
     times = np.array(parameters.relaxation_times)
-    return {"relaxation_times": Coordinate(times, "1", "time after the jump over the relaxation time, (t - t_0) / tau")}
+    return {
+        "relaxation_times": Coordinate(
+            times, "1", "time after the jump divided by the relaxation time, (t - t_0) / tau"
+        )
+    }
 
 
 SOLVE = "mdr_dask.models.velocity_jump.solve"
@@ -110,7 +130,7 @@ MODEL = Model(
         Number(
             "relative_jump",
             "friction_coefficient_jump / friction_coefficient_before",
-            "immediate change of the friction over the friction before",
+            "immediate change of the coefficient of friction divided by its value before the jump",
         ),
     ),
     notes=lambda sets: (*frequency_notes(sets), *load_notes(sets)),
