@@ -143,8 +143,8 @@ class MeasuredSpec(Parameters):
     """Measured points, to find unknown parameters."""
 
     table: NamedFile = Field(
-        description="name of a table, relative to the campaign file, with units in brackets. Its columns are conditions of "
-        "the test, one measured output, and optionally the standard_error of this output"
+        description="name of a table, relative to the campaign file, with units in brackets. Its columns are "
+        "conditions of the test, one measured output, and optionally the standard_error of this output"
     )
 
 
@@ -169,8 +169,8 @@ class CampaignSpec(Parameters):
     sampling: Sampling = Field("grid", description="how the values of the varied parameters are combined to cases")
     measured: MeasuredSpec | None = Field(
         None,
-        description="measured points for `mdr-dask fit STORE calibration`, which finds the varied parameters that are not "
-        "columns of the table",
+        description="measured points for `mdr-dask fit STORE calibration`, which finds the varied parameters that are "
+        "not columns of the table",
     )
     accuracy: float | None = quantity(
         "1", "largest accepted discretisation error of every output, relative to its value", default=None, gt=0, lt=1
@@ -180,7 +180,7 @@ class CampaignSpec(Parameters):
     )
     errors: bool = Field(
         True,
-        description="whether to store the estimated discretisation error of each output as <output>_error; false saves the "
-        "time to estimate it",
+        description="whether to store the estimated discretisation error of each output as <output>_error; false saves "
+        "the time to estimate it",
     )
     store: StoreSpec = Field(default_factory=StoreSpec, description="the store of the results")

@@ -103,8 +103,8 @@ class MixedLubrication(Parameters):
     )
     edge_rule: Literal["part", "clip", "whole", "inside"] = Field(
         default="part",
-        description="cluster of asperities at an edge of the contact: test and count its part inside (part), test all of "
-        "it and count its part inside (clip), test and count all of it (whole), or ignore it (inside)",
+        description="cluster of asperities at an edge of the contact: test and count its part inside (part), test all "
+        "of it and count its part inside (clip), test and count all of it (whole), or ignore it (inside)",
     )
     roller_radius: float = quantity("m", "radius of each roller", usual="50 mm", default=0.05, gt=0)
     roller_width: float = quantity(
