@@ -144,7 +144,7 @@ def run(
     with reporter(not progress) as report:
         outcome = execute(found, url, resources or Resources(), report, retry_failed)
     if outcome.failed:
-        what = f"{outcome.failed} of {outcome.total} results failed; mdr-dask status {url} --failures says why"
+        what = f"{outcome.failed} of {outcome.total} results failed; mdr-dask status {url} --failures shows the reasons"
         warnings.warn(what, stacklevel=2)
     return open_study(url)
 
@@ -302,7 +302,7 @@ def plot(study: Study, figure: str, select: Words = (), **view: Any) -> Figure:
     groups = _groups(study)
     model = _model(groups)
     if not view and any(figure in data.data_vars for data in groups.values()):
-        raise DataError(f"{figure} is an output: name the axis to draw it over, as in over='velocity'")
+        raise DataError(f"{figure} is an output: name an axis to draw it against, such as over='velocity'")
     found = _of_output(figure, **view) if view else _named(plots.available(model), figure, f"figure of {model}")
     drawn: Figure = found.figure(selection.select_all(groups, _several(select)))
     return drawn
@@ -422,7 +422,7 @@ def _groups(study: Study) -> dict[str, xr.Dataset]:
     for data in found.values():
         if "status" not in data or "realisation" not in data["status"].dims:
             kept = "with its status and realisations (isel(realisation=[0]) keeps one)"
-            raise DataError(f"expected a study as run or open returns it, {kept}, got a Dataset without them")
+            raise DataError(f"expected a study as returned by run or open_study, {kept}, got a Dataset without them")
     return found
 
 

@@ -95,7 +95,7 @@ def _adaptive(refinement: Refinement, first: int) -> str:
     for name, tolerance in refinement.until.items():
         parts = [f"{100 * tolerance.relative:.3g} % of its largest value"] * bool(tolerance.relative)
         parts += [f"{tolerance.absolute:.3g} in SI"] * bool(tolerance.absolute)
-        wanted.append(f"{name} is interpolated within {' or '.join(parts)}")
+        wanted.append(f"{name} is interpolated with an error below {' or '.join(parts)}")
     scale = "geometric" if refinement.spread.geometric else "linear"
     return f"{first} to {refinement.at_most} values, {scale}, until {' and '.join(wanted)}"
 
@@ -121,15 +121,15 @@ def cost_lines(costs: Estimate) -> Iterator[str]:
     solves, remain = _counted("solve", costs.solves, more), "remains" if costs.solves * more == 1 else "remain"
     yield f"{solves} {remain} after sharing, in {_counted('block', costs.blocks, more)}"
     if costs.solves == 0:
-        yield "no case can be solved: all will fail, and mdr-dask status --failures will say why"
+        yield "no case can be computed: all will fail (mdr-dask status --failures shows the reasons)"
     yield f"about {_counted('file', costs.files, more)} in the store"
     sizes = " to ".join(dict.fromkeys(human_bytes(count * costs.bytes) for count in (1, more)))
     times = " to ".join(dict.fromkeys(seconds(START + count * costs.seconds) for count in (1, more)))
     compiling = f"; compiling, the first time, about {seconds(costs.compiling)} more" if costs.compiling else ""
     yield f"{sizes} uncompressed, about {times} on one core{compiling}"
-    yield "the time is the model's estimate: nothing was timed on this machine"
+    yield "the time is an estimate of the model, not a measurement on this machine"
     if more > 1:
-        yield "from the first round to the last one, if no case meets its tolerance before"
+        yield "ranges: from the first round to the last one, if no case meets its tolerance earlier"
 
 
 def human_bytes(size: float) -> str:

@@ -395,7 +395,11 @@ def test_a_figure_has_the_values_that_each_curve_needed(study, url):
             "film, minimum_film",
             "speed_parameter.until.film: expected an output of one number a case, this",
         ),
-        ("1 %", "film", "until: expected an output of one number a case to refine by, this study has none"),
+        (
+            "1 %",
+            "film",
+            "until: expected at least one output with a single number for each case",
+        ),
     ],
 )
 def test_an_axis_is_refined_by_outputs_of_one_number(until, outputs, message):

@@ -276,10 +276,7 @@ def test_an_interrupted_process_group_ends_quietly_and_leaves_nobody_behind(camp
     os.killpg(process.pid, word)
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
-    assert (
-        " ".join(errors.split())
-        == "interrupted; finished results are kept, and the same command goes on with the others"
-    )
+    assert " ".join(errors.split()) == "interrupted; finished results are kept; the same command computes the others"
     _, alive = psutil.wait_procs(children, timeout=PATIENCE)
     assert not alive
     assert not list(Path().glob(".live.zarr.*.runner"))

@@ -65,9 +65,9 @@ def test_check_tells_axes_tables_lines_and_how_they_meet(capsys):
     ):
         assert line in said
     text = "\n".join(said)
-    assert "table rubber.csv: superposed at 20 degC by the shift factors given, moduli multiplied by b_T" in text
+    assert "table rubber.csv: superposed at 20 degC by the given shift factors, moduli multiplied by b_T" in text
     for temperature in (0, 20, 50):
-        assert f"q v of 0.0063 to 3.1e+05 rad/s at {temperature} degC, data from" in text
+        assert f"roughness excites 0.0063 to 3.1e+05 rad/s at {temperature} degC, data from" in text
     assert " uncompressed, about " in text
 
 
@@ -96,12 +96,12 @@ REFUSED = {
     "reference outside the data": (
         lambda _: None,
         ("dma_table: {file: rubber.csv}", "dma_table: {file: rubber.csv, table_temperature: 90 degC}"),
-        "rubber.csv: got no rows at 90 degC; it was measured at 0 degC, 20 degC, 50 degC",
+        "rubber.csv: got no rows at 90 degC; the table was measured at 0 degC, 20 degC, 50 degC",
     ),
     "the law ends": (
         lambda _: None,
         ("[0 degC, 20 degC, 50 degC]", "[-90 degC, 20 degC]"),
-        "material: wlf holds above reference - c2 = -80 degC, got -90 degC",
+        "material: expected a temperature above reference - c2 = -80 degC for wlf, got -90 degC",
     ),
 }
 
@@ -187,8 +187,8 @@ def test_check_says_how_measured_points_meet_each_series(tmp_path, monkeypatch, 
         "measured rig.csv: 4 rows of friction_coefficient, 0.2 to 0.3, standard_error",
         "measured rig.csv: conditions velocity 1 mm/s to 10.01 mm/s, relaxation_times 0.01 to 100",
         "measured rig.csv: unknowns material_kelvin_relaxation_time",
-        "measured rig.csv: outside the study, and refused by the fit: line 4, velocity 10.01 mm/s; "
-        "line 5, relaxation_times 100",
+        "measured rig.csv: outside the ranges of the study, so that the fit will refuse the table: line 4, velocity "
+        "10.01 mm/s; line 5, relaxation_times 100",
     ):
         assert f"  {line}\n" in told
 

@@ -72,7 +72,7 @@ def test_a_table_can_be_given_to_a_calibration_and_to_nothing_else(store, capsys
     (found,) = json.loads(capsys.readouterr().out)["rows"]
     assert found["normal_force_low"] < force < found["normal_force_high"]
     assert main(["fit", store, "plateau", "--measured", "rig.csv"]) == 2
-    assert "--measured and --figure are for `calibration` alone" in capsys.readouterr().err
+    assert "--measured and --figure can be used only with `calibration`" in capsys.readouterr().err
 
 
 def test_a_run_tells_its_counts_as_json(tmp_path, monkeypatch, capsys):

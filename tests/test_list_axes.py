@@ -104,8 +104,8 @@ def test_what_sets_the_places_of_an_output_is_no_axis_of_it():
     text = WEAR.replace("history: LISTS", "extent: [1.2, 1.6]")
     assert len(loads(text, "", ".").series[0].axes) == 1
     message = (
-        "parameters.extent: expected one value, because it sets the values of radius for worn_profile "
-        r"\(give each value a series of its own\)"
+        "parameters.extent: expected one value, because this parameter sets the values of radius, along which "
+        r"worn_profile is stored \(write a series for each value\)"
     )
     with pytest.raises(CampaignError, match=message):
         loads(text.replace("wear_volume", "worn_profile"), "", ".")

@@ -243,7 +243,7 @@ def test_values_may_be_any_sequence_of_numbers(made):
 
 def test_failed_results_are_a_warning(toy, tmp_path):
     asked = {"model": "toy", "realisations": 2, "parameters": {"position": [1, 2, 3], "fail_above": 2}}
-    with pytest.warns(UserWarning, match=r"2 of 6 results failed; mdr-dask status .* --failures says why"):
+    with pytest.warns(UserWarning, match=r"2 of 6 results failed; mdr-dask status .* --failures shows the reasons"):
         found = mdr_dask.run(asked, tmp_path / "toy.zarr", progress=False)
     assert found.mdr.states.to_numpy().tolist() == ["done", "done", "2 failed"]
 

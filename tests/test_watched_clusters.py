@@ -117,7 +117,7 @@ def test_no_worker_and_a_worker_that_dies_and_a_scheduler_that_dies(folder, star
     assert mdr_dask("run", "long.yaml", "--store", "whole.zarr", PAUSE="0").returncode == 0
     assert digests("long.zarr") == digests("whole.zarr")
     assert {"run begun", "laid out", "block begun", "block done", "worker lost"} <= set(events())
-    assert events().count("run broken off") == 3
+    assert events().count("run interrupted") == 3
 
 
 def test_a_scheduler_that_is_stopped_ends_a_run_in_one_sentence(folder, start):

@@ -21,7 +21,7 @@ _TAG = "tag:yaml.org,2002:"
 _DEEPEST = 50
 _LARGEST = 200_000
 _LONGEST = 300_000  # characters of a file; reading them takes about a second
-_TOO_DEEP = "nested too deeply, or refers to itself"
+_TOO_DEEP = "too deeply nested, or an alias that contains itself"
 _MOST_DIGITS = 300
 _KEPT_AS_TEXT = ("str", "timestamp", "merge", "value")
 
@@ -98,7 +98,10 @@ def parse(text: str, source: str) -> Document:
     document = Document(source, text)
     problems = document.problems
     if len(text) > _LONGEST:
-        what = f"expected at most {_LONGEST} characters, got {len(text)}: a range or a table holds many values"
+        what = (
+            f"expected at most {_LONGEST} characters, got {len(text)} (write many values as a range, or put "
+            "them into a table)"
+        )
         problems.add(Place(source, 1, 1), "", what)
         return document
     try:
@@ -130,18 +133,18 @@ _COLON_WITHIN = re.compile(r"\s*(?:- )?\w+: +[^\s'\"{\[#][^#]*: ")
 def _hint(text: str, index: int) -> str:
     """Return a hint to the likely mistake at a syntax error or in the lines just above the error."""
     if text[index : index + 1] == "\t":
-        return " (indent with blanks, not with tabs)"
+        return " (indent with spaces, not with tabs)"
     end = text.find("\n", index)
     above = text[: end if end >= 0 else len(text)].splitlines()
     for back, line in enumerate(reversed(above[-3:])):
         found = _NO_BLANK.search(line)
         if found:
-            return f" (a blank is missing after '{found[1]}:' in line {len(above) - back})"
+            return f" (a space is missing after '{found[1]}:' in line {len(above) - back})"
     if text[index : index + 1] == "*":
         return " (put quotation marks around a string that begins with *)"
     if _COLON_WITHIN.match(above[-1] if above else ""):
-        return " (put quotation marks around a string with a colon and a blank in it)"
-    return " (entries of one mapping begin in the same column)" if _is_indented_otherwise(above) else ""
+        return " (put quotation marks around a string with a colon and a space in it)"
+    return " (all entries of a mapping must begin in the same column)" if _is_indented_otherwise(above) else ""
 
 
 def _is_indented_otherwise(lines: list[str]) -> bool:
@@ -203,7 +206,7 @@ class _Reader:
             self.document.report(path, f"expected a shorter number, got {len(text)} digits")
             return None
         if _NO_TEXT.search(text):
-            self.document.report(path, "expected text without null or incomplete characters")
+            self.document.report(path, "expected text without null characters and damaged characters")
             return None
         if kind == "int":
             return _integer(text.replace("_", ""))

@@ -111,8 +111,11 @@ class _Expansion:
         for output in wanted:
             for dim in first.keys() & set(output.dims):
                 if any(not np.array_equal(first[dim].values, other[dim].values) for other in others):
-                    what = f"expected one value, because it sets the values of {dim} for {output.name}"
-                    self._complain(origin, f"{what} (give each value a series of its own)")
+                    what = (
+                        f"expected one value, because this parameter sets the values of {dim}, along which "
+                        f"{output.name} is stored"
+                    )
+                    self._complain(origin, f"{what} (write a series for each value)")
                     return
 
     def _variations(self) -> tuple[Variation, ...] | None:
@@ -122,12 +125,15 @@ class _Expansion:
         origin = Origin("sampling", self.document.place(("sampling",)))
         if isinstance(design, TableSpec):
             for one in found:
-                self._complain(one.origin, f"expected one value, because {design.table} has the parameters that vary")
+                self._complain(
+                    one.origin,
+                    f"expected one value, because with a table only its columns vary (add a column to {design.table})",
+                )
             return found or sampling.tabled(
                 design.table, self.directory, origin, self.parameters, self.data, self.document.problems, self.remarks
             )
         if drawn and not found:
-            self._complain(origin, "expected at least one range among the parameters, got none")
+            self._complain(origin, "expected at least one parameter with a range to draw from, got none")
         if isinstance(design, Drawn) and found and all(one.spread for one in found):
             return sampling.drawn(design, self.spec.seed, found)
         if design == "zip":
@@ -147,8 +153,14 @@ class _Expansion:
         sized = [one for one in found if one.items]
         for one in sized[1:]:
             if len(one.items) != len(sized[0].items):
-                what = f"expected {len(sized[0].items)} values as {'.'.join(sized[0].path)} has, got {len(one.items)}"
-                self._complain(one.origin, f"{what} (sampling: grid combines all with all)")
+                what = (
+                    f"expected {len(sized[0].items)} values, as many as {'.'.join(sized[0].path)} has, got "
+                    f"{len(one.items)}"
+                )
+                self._complain(
+                    one.origin,
+                    f"{what} (sampling: grid combines all values of one parameter with all values of the others)",
+                )
 
     def _grid_values(
         self, base: Parameters | None, variations: Sequence[Variation], index: int, broken: set[Path]

@@ -100,7 +100,7 @@ def read_measured(
     error = Column(ERROR, outputs[output], headings, needed=False, above=0.0, given_unit=unit)
     read = read_table(text, source, [*columns, error], allow_missing=True)
     known = np.isfinite(np.array([*read.values()])).all(axis=0)
-    missing = f"rows without a number, left out: {np.count_nonzero(~known)}" if not known.all() else ""
+    missing = f"rows without a number are left out: {np.count_nonzero(~known)}" if not known.all() else ""
     remark = "; ".join(filter(None, (read.remark, missing)))
     rows = {name: column[known] for name, column in read.items()}
     values, errors = rows.pop(output), rows.pop(ERROR, None)
@@ -165,7 +165,7 @@ def notes(campaign: Campaign) -> tuple[str, ...]:
         try:
             found = read_measured(table.read_text(), table.name, conditions, outputs, structures)
         except DataError:
-            notes_found.append(f"{before}: no table of this series")
+            notes_found.append(f"{before}: no measured points belong to this series")
             continue
         notes_found += [
             f"{before}: {sentence}"
@@ -193,8 +193,10 @@ def _sentences(found: Measured, model: str, series: Series, units: Mapping[str, 
         if not low - SAME * abs(low) <= value <= high + SAME * abs(high)
     ]
     more = f", ... ({len(outside)} in all)" if len(outside) > FEW else ""
-    refused = f"outside the study, and refused by the fit: {'; '.join(outside[:FEW])}{more}"
-    yield refused if outside else "every row lies inside the study"
+    refused = (
+        f"outside the ranges of the study, so that the fit will refuse the table: {'; '.join(outside[:FEW])}{more}"
+    )
+    yield refused if outside else "every row lies within the ranges of the study"
 
 
 def _reach(name: str, series: Series, conditions: Iterable[str]) -> dict[str, tuple[float, float]]:

@@ -246,7 +246,7 @@ def _unknown(path: Path, kind: type[BaseModel], data: Any) -> str:
     around = _structure_around(path, kind, data)
     instead = getattr(around, "renamed", {}).get(path[-1])
     if instead:
-        return f"there is no {path[-1]} any more: {instead}"
+        return f"{path[-1]} has been renamed or removed: {instead}"
     known = around.model_fields if around else {}
     holding = [name for name, info in known.items() for one in fields.structures(info) if path[-1] in one.model_fields]
     inside = f" (write {holding[0]}: {{{path[-1]}: ...}})" if holding else ""

@@ -136,7 +136,7 @@ def _outputs(document: Document, spec: CampaignSpec, model: Model[Any]) -> tuple
             what = f"this error is stored with its output: write {errors[name]!r}, without errors: false, got {name!r}"
             document.report(path, what)
         elif name in model.parameters.renamed:
-            document.report(path, f"there is no {name} any more: {model.parameters.renamed[name]}")
+            document.report(path, f"{name} has been renamed or removed: {model.parameters.renamed[name]}")
         elif name not in names:
             document.report(path, f"unknown output {name!r}{did_you_mean(name, names)}")
         elif name in wanted[:index]:

@@ -100,7 +100,7 @@ def tabled(
     path = Path(directory, name)
     try:
         if path.exists() and not path.is_file():
-            raise OSError(errno.EINVAL, "no regular file")
+            raise OSError(errno.EINVAL, "not a regular file")
         text = decoded(path.read_bytes(), str(path))
     except (OSError, DataError) as error:
         what = f"cannot read {path}: {error.strerror}" if isinstance(error, OSError) else str(error)
@@ -178,7 +178,9 @@ def _are_sound(
         if found is None:
             problems.add(column.origin.place, column.origin.name, _unknown(column, parameters))
         elif twice:
-            problems.add(column.origin.place, column.origin.name, "given twice (remove it from one of the two places)")
+            problems.add(
+                column.origin.place, column.origin.name, "this parameter is given twice (keep one of the two places)"
+            )
         sound = sound and found is not None and not twice
         seen.add(column.path)
     return sound

@@ -46,7 +46,7 @@ def tolerances(
     for name, written in given.items():
         at = (*path, name)
         if name not in known:
-            document.report(at, f"not among the outputs{did_you_mean(name, known)}", key=True)
+            document.report(at, f"this is none of the outputs of the campaign{did_you_mean(name, known)}", key=True)
             continue
         try:
             found[name] = tolerance(written, model.output(name).unit)
@@ -113,11 +113,18 @@ def refinement(
         until = tolerances(document, (*path, "until"), spec.until, model, outputs)
         numbers = {name: kept for name, kept in until.items() if not model.output(name).dims}
         for name in until.keys() - numbers.keys():
-            report(("until", name), "expected an output of one number a case, this one has more dimensions", key=True)
+            report(
+                ("until", name),
+                "expected an output with a single number for each case, got one with further dimensions",
+                key=True,
+            )
         return Refinement(spread, numbers, spec.at_most)
     single = [output.name for output in model.outputs if output.name in outputs and not output.dims]
     if not single:
-        report(("until",), "expected an output of one number a case to refine by, this study has none")
+        report(
+            ("until",),
+            "expected at least one output with a single number for each case, which the adaptive axis needs, got none",
+        )
         return None
     try:
         return Refinement(spread, {single[0]: tolerance(spec.until, "1")}, spec.at_most)

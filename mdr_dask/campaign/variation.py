@@ -155,7 +155,10 @@ class _Search:
             self._complain(at, f"expected a list of values, got {shown(values)}", name)
         if self.drawn:
             self._complain(
-                at, "expected one value, {linear: [a, b]} or {geometric: [a, b]} with this sampling, got a list", name
+                at,
+                "expected one value, {linear: [a, b]} or {geometric: [a, b]}, because this sampling draws "
+                "the values, got a list",
+                name,
             )
         if not values:
             self._complain(at, "expected at least one value, got []", name)
@@ -167,7 +170,7 @@ class _Search:
 
     def _range(self, path: tuple[str, ...], value: dict[str, Any], name: Path) -> Spread | list[Item]:
         if len(value) != 1:
-            self._complain(name, f"expected one of linear, geometric, values alone, got {', '.join(value)}", name)
+            self._complain(name, f"expected one of the keys linear, geometric and values, got {', '.join(value)}", name)
         [(kind, content)] = value.items()
         at = (*name, kind)
         if kind == "values":
@@ -178,7 +181,7 @@ class _Search:
     def _spread(self, path: tuple[str, ...], kind: str, content: Any, at: Path) -> Spread:
         size, wanted = (2, "[first, last]") if self.drawn else (3, "[first, last, count]")
         if not isinstance(content, list) or len(content) != size:
-            hint = " (the sampling says how many)" if self.drawn else ""
+            hint = " (sampling gives the number of values)" if self.drawn else ""
             self._complain(at, f"expected {wanted}, got {shown(content)}{hint}", at[:-1])
         low, high = (self._end(path, kind, content[index], (*at, index)) for index in range(2))
         if low == high:
@@ -198,7 +201,7 @@ class _Search:
             )
         numbers = spaced(spread, count)
         if len(numbers) < (2 if spread.whole else count):
-            self._complain(at, f"expected ends far enough apart for {count} values", name)
+            self._complain(at, f"expected ends between which {count} different values exist", name)
         first, last = (numbers[0], numbers[-1]) if spread.whole else content[:2]
         origin = self._origin(at, name)
         inner = [Item(number, origin, inner=True) for number in numbers[1:-1]]

@@ -80,7 +80,7 @@ def _question(value: float, unit: str, usual: tuple[str, ...]) -> str:
     meant = likely(value, unit, usual)
     if meant:
         return f"{value:g} is read as {read}: write {meant!r} if you mean that, {read!r} if not"
-    return f"{value:g} is read as {read}, far from a usual {usual[0]}: write {read!r} if you mean it"
+    return f"{value:g} is read as {read}, far from the usual {usual[0]}: write {read!r} if you mean that"
 
 
 def _scalars(value: Any, field: Path, at: Path) -> Iterator[tuple[Path, Path, Any]]:

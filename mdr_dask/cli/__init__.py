@@ -117,7 +117,7 @@ def main(arguments: list[str] | None = None) -> int:
         say(error.format_message().rstrip(".") + (f" (see {context.command_path} --help)" if context else ""), err=True)
         return error.exit_code
     except (click.Abort, KeyboardInterrupt):
-        say("interrupted; finished results are kept, and the same command goes on with the others", err=True)
+        say("interrupted; finished results are kept; the same command computes the others", err=True)
         return INTERRUPTED
     except MdrDaskError as error:
         logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # hides messages of cancelled Zarr tasks
@@ -163,7 +163,10 @@ def _reported(arguments: list[str]) -> str:
     with os.fdopen(descriptor, "w") as report:
         report.write("\n".join(lines))
     last = traceback.format_exc().strip().splitlines()[-1]
-    return f"a fault of mdr-dask itself; finished results are kept: {printable(last)}; please report it with {path}"
+    return (
+        f"a fault of mdr-dask itself: {printable(last)} (finished results are kept; please report the fault "
+        f"with {path})"
+    )
 
 
 def _interrupt(*_: object) -> None:

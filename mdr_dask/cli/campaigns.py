@@ -67,7 +67,12 @@ def _model(name: str) -> Model[Any]:
 
 @click.command()
 @click.argument("model")
-@click.option("--output", "-o", type=click.Path(path_type=Path), help="Write it to a new file instead of stdout.")
+@click.option(
+    "--output",
+    "-o",
+    type=click.Path(path_type=Path),
+    help="Write the campaign to a new file instead of standard output.",
+)
 def init(model: str, output: Path | None) -> None:
     """Write a first campaign of a model, with units, meanings and choices. It passes `check` without changes.
 
@@ -81,7 +86,7 @@ def init(model: str, output: Path | None) -> None:
         click.echo(text, nl=False)
         return
     if output.exists():
-        raise click.UsageError(f"{output}: exists already, expected the name of a new file")
+        raise click.UsageError(f"{output}: this file exists already, expected the name of a new file")
     with writing(output):
         output.write_text(text)
     click.echo(f"{output}: edit it, then run mdr-dask check {output}")
@@ -162,7 +167,9 @@ def ask(campaign: Campaign) -> None:
 
 
 @click.command()
-@click.option("--output", "-o", type=click.Path(path_type=Path), help="Write it to a file instead of stdout.")
+@click.option(
+    "--output", "-o", type=click.Path(path_type=Path), help="Write the schema to a file instead of standard output."
+)
 def schema(output: Path | None) -> None:
     """Print the JSON schema of campaign files, for completion and checks in an editor.
 

@@ -37,21 +37,25 @@ class Drawing(click.Command):
 
 @click.command(cls=Drawing)
 @click.argument("words", nargs=-1, required=True, metavar="STORE... [NAME...]")
-@click.option("--all", "everything", is_flag=True, help="Draw every named figure that the store has the data for.")
+@click.option("--all", "everything", is_flag=True, help="Draw every named figure for which the store has the data.")
 @click.option("--over", multiple=True, metavar="AXIS", help="Draw an output against this axis; twice for a map.")
-@click.option("--by", default="", metavar="AXIS", help="Axis, or sampled parameter, of the colours.")
+@click.option("--by", default="", metavar="AXIS", help="Axis or sampled parameter that the colours show.")
 @click.option("--panels", default="", metavar="AXIS", help="One panel for each value of this axis.")
-@click.option("--effects", is_flag=True, help="Draw the mean of an output against every parameter that varies.")
-@click.option("--series", multiple=True, help="Draw only this series; repeat.")
+@click.option("--effects", is_flag=True, help="Draw the mean of an output against each varied parameter.")
+@click.option("--series", multiple=True, help="Draw only this series; may be repeated.")
 @select_option
 @where_option
-@click.option("--log", metavar="[x][y][z]", help="Logarithmic axes (x, y, z = colours), or none.  [by the data]")
+@click.option(
+    "--log", metavar="[x][y][z]", help="Logarithmic axes: letters of xyz (z: colours), or none.  [chosen by the data]"
+)
 @units_option
-@click.option("--measured", metavar="FILE", help="Draw the points of this table with their error bars, too.")
-@click.option("--title", metavar="TEXT", help="Title; '' for none.  [a description; none with --size]")
-@click.option("--size", metavar="WIDTH[xHEIGHT]", help="Printed size: 85mm, 85x60mm.")
+@click.option("--measured", metavar="FILE", help="Also draw the measured points of this table, with error bars.")
+@click.option("--title", metavar="TEXT", help="Title; '' for none.  [a description, but none with --size]")
+@click.option("--size", metavar="WIDTH[xHEIGHT]", help="Size on paper: 85mm, 85x60mm.")
 @click.option("--style", metavar="FILE", help="Style file of matplotlib, or the name of one of its styles.")
-@click.option("--output", "-o", type=click.Path(path_type=Path), help="A file for one figure, else a folder.")
+@click.option(
+    "--output", "-o", type=click.Path(path_type=Path), help="File of a single figure, or folder of several figures."
+)
 @format_option
 @click.pass_context
 def plot(
@@ -144,7 +148,7 @@ def _warnings(urls: Sequence[str]) -> list[str]:
         messages = [message for name, data in studies.items() for message in progress.messages(url, name, data)]
         done = [message for message in messages if message["status"] == "done"]
         found += [
-            f"{group.results} result{'s' * (group.results > 1)} of the store: {group.reason}"
+            f"{group.results} result{'s' * (group.results > 1)} in the store: {group.reason}"
             for group in progress.grouped(done, studies)
         ]
     return found
@@ -204,7 +208,7 @@ def _requested(
         require_known(names, list(known), f"figure of {model}")
         if given:
             raise click.UsageError(
-                f"--{given[0]} is for an output with --over or --effects: the axes of a named figure are fixed"
+                f"--{given[0]} needs an output with --over or --effects; the axes of a named figure are fixed"
             )
         return dict(known) if everything else {name: known[name] for name in names}
     if everything:
@@ -219,7 +223,7 @@ def _of_output(name: str, look: Mapping[str, Any]) -> Plot:
 
     over = tuple(axis.replace(".", "_") for axis in look["over"])
     if len(over) > 2 or (over and look["effects"]):
-        raise click.UsageError("expected --over once, twice for a map, or --effects")
+        raise click.UsageError("expected --over once, --over twice (for a map), or --effects")
     log = look["log"]
     if log is not None and log != "none" and not set(log) <= set("xyz"):
         raise click.UsageError(f"expected --log with letters of xyz, or 'none', got {log!r}")

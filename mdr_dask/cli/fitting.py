@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 @click.option(
     "--measured",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
-    help="Table of measured points for `calibration`, in place of the campaign's.",
+    help="Table of measured points for `calibration`; replaces the table of the campaign.",
 )
 @click.option(
     "--figure", "-o", type=click.Path(path_type=Path), help="Draw `calibration`: FILE.png, FILE.pdf or FILE.svg."
@@ -69,7 +69,7 @@ def fit(
         return
     require_known(names, list(known), f"law for {model}")
     if (measured or figure) and names != ("calibration",):
-        raise click.UsageError("--measured and --figure are for `calibration` alone")
+        raise click.UsageError("--measured and --figure can be used only with `calibration`")
     groups = stores.datasets(store)
     if series is not None:
         groups = {series: selection.group(groups, series)}

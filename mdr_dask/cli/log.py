@@ -51,7 +51,7 @@ def telling(quiet: bool, log: Path | None, **about: Any) -> Iterator[Tell]:
         try:
             yield tell
         except BaseException as error:
-            write("run broken off", {"why": str(error) or type(error).__name__})
+            write("run interrupted", {"why": str(error) or type(error).__name__})
             raise
         write("run ended", {})
 

@@ -45,7 +45,7 @@ where_option = click.option(
     "--where",
     default="",
     metavar="CONDITION",
-    help="Only rows that meet a condition: 'friction_coefficient > 0.5 and velocity < 3 km/h'.",
+    help="Keep only rows that meet a condition: 'friction_coefficient > 0.5 and velocity < 3 km/h'.",
 )
 json_option = click.option("--json", "form", flag_value="json", help="Print one JSON document, with units.")
 csv_option = click.option("--csv", "form", flag_value="csv", help="Print comma-separated values.")
@@ -65,20 +65,20 @@ _QUESTION = (
         multiple=True,
         callback=_listed,
         metavar="AXIS,...",
-        help="A row for each value of these axes, averaged over all other cases.",
+        help="One row for each combination of values of these axes, averaged over all other axes.",
     ),
     click.option(
         "--sort",
         multiple=True,
         metavar="[-]COLUMN",
-        help="Order of the rows, with - the largest first; may be repeated.",
+        help="Sort the rows by this column, with - the largest first; may be repeated.",
     ),
     click.option(
         "--columns",
         multiple=True,
         callback=_listed,
         metavar="NAME,...",
-        help="Only these columns: axes, parameters, outputs, dimensionless numbers, realisations, status.",
+        help="Show only these columns: axes, parameters, outputs, dimensionless numbers, realisations, status.",
     ),
     units_option,
     limit_option,

@@ -72,9 +72,9 @@ def sensitivity(
 def _sentences(attributes: dict[str, object]) -> list[str]:
     left = attributes["left_out"]
     return [
-        *([f"{left} of {attributes['cases']} cases have no value and are left out"] if left else []),
+        *([f"{left} of {attributes['cases']} cases without a value are left out"] if left else []),
         *(
-            ["one realisation: the scatter of lines, where there is any, counts as an interaction"]
+            ["with one realisation, scatter between rough lines counts as an interaction"]
             if attributes["realisations"] == 1
             else []
         ),

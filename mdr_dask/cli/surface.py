@@ -33,7 +33,7 @@ KINDS = ("map", "scan", "spectrum")
 )
 @click.option("--direction", type=click.Choice(("x", "y")), help="Sliding direction over an anisotropic map.")
 @click.option("--longest-wavelength", help="Leave out longer wavelengths.")
-@click.option("--shortest-wavelength", help="Leave out shorter wavelengths.  [those that are noise]")
+@click.option("--shortest-wavelength", help="Leave out shorter wavelengths.  [those that contain only noise]")
 @click.option("--spectrum", "-o", type=click.Path(path_type=Path), help="Write C2D to FILE.csv, for a campaign.")
 @click.option(
     "--plot",

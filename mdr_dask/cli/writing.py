@@ -41,7 +41,7 @@ def require_outside(path: Path) -> None:
     """Raise UsageError for a file inside a store, because the store would then count as damaged."""
     for folder in path.absolute().parents:
         if (folder / "zarr.json").is_file() and _is_study(folder):
-            raise click.UsageError(f"expected a file outside of stores, got {str(path)!r} in the store {folder.name}")
+            raise click.UsageError(f"expected a file outside every store, got {str(path)!r} in the store {folder.name}")
 
 
 def _is_study(folder: Path) -> bool:

@@ -81,7 +81,7 @@ def _own(name: str, entry: EntryPoint, module: str) -> Model[Any]:
     except Exception as error:
         raise ModelError(f"cannot load model {name!r}: {type(error).__name__}: {error}") from None
     if not isinstance(found, Model):
-        raise ModelError(f"expected {name!r} to be a mdr_dask Model, got {type(found).__name__}")
+        raise ModelError(f"expected {name!r} to be an mdr_dask.models.base.Model, got {type(found).__name__}")
     others = ("seconds", "memory", "distinct", "coordinates", "units", "notes")
     guarded: dict[str, Any] = {
         each: _guarded(name, each, getattr(found, each)) for each in others if getattr(found, each) is not None
@@ -99,7 +99,7 @@ def _guarded(model: str, what: str, function: Callable[[Any], Any]) -> Callable[
         try:
             found = function(argument)
             if what in ("seconds", "memory") and not 0 <= float(found) < math.inf:
-                raise ValueError(f"expected a number from 0 on, got {found!r}")
+                raise ValueError(f"expected a number that is not negative, got {found!r}")
         except Exception as error:
             raise ModelError(f"the function {what!r} of model {model!r} failed: {reason(error)}") from None
         return found

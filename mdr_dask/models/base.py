@@ -149,7 +149,7 @@ def _conceivable(least: float, value: Any) -> Any:
     for number in value if isinstance(value, tuple) else (value,):
         if isinstance(number, float) and number != 0 and not least <= abs(number) <= MOST:
             got, low, high = distinguishable(number, least, MOST, digits=6)
-            raise ValueError(f"expected a size between {low} and {high} in SI units, got {got}")
+            raise ValueError(f"expected an absolute value between {low} and {high} in SI units, got {got}")
     return value
 
 

@@ -101,7 +101,7 @@ def reason(error: BaseException) -> str:
 def _output(name: str, outputs: Any) -> NDArray[np.float64]:
     if not isinstance(outputs, Mapping):
         got = "None (is the return statement missing?)" if outputs is None else type(outputs).__name__
-        raise TypeError(f"expected a dict of outputs by name, got {got}")
+        raise TypeError(f"expected a dictionary with a value for each output, got {got}")
     if name not in outputs:
         got = ", ".join(map(str, outputs)) or "none"
         raise ValueError(f"the output {name} is missing, got {got}")
@@ -141,7 +141,9 @@ def _gathered(
     arrays = {place: outputs[name] for place, outputs in found.items()}
     extra = {array.shape for array in arrays.values()} or {()}
     if len(extra) > 1:
-        raise ValueError(f"{name}: expected one shape for all cases, got {' and '.join(map(str, sorted(extra)))}")
+        raise ValueError(
+            f"{name}: expected an array of the same shape in all cases, got {' and '.join(map(str, sorted(extra)))}"
+        )
     gathered = np.full(shape + extra.pop(), np.nan)
     for place, array in arrays.items():
         gathered[place] = array

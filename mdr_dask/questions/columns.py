@@ -104,7 +104,7 @@ class Columns:
         if name in self._numbers:
             needed = parse(self._numbers[name].formula).names
             missing = ", ".join(sorted(each for each in needed if self.find(each) is None))
-            return DataError(f"{name} is {self._numbers[name].formula}: this study has no {missing}")
+            return DataError(f"{name} is {self._numbers[name].formula}: the study lacks {missing}")
         hint = did_you_mean(name, self.known) or f"; known: {', '.join(self.known)}"
         return DataError(f"no column {name!r}{hint}")
 

@@ -247,7 +247,10 @@ class _Evaluation:
             names = (_name(left), _name(right))
             first, second = (side or Value(name) for side, name in zip(sides, names, strict=True))
             if not (first.kind in "OUT" and second.kind in "OUT"):
-                raise DataError(f"{self.text!r}: expected words compared with words, or numbers with numbers")
+                raise DataError(
+                    f"{self.text!r}: expected a comparison of words with words or of numbers with numbers, "
+                    "got both kinds"
+                )
             return first.array == second.array
         first, second = self._number(left), self._number(right)
         self._require_alike(first, second)
@@ -260,7 +263,7 @@ class _Evaluation:
     def _require_alike(self, first: Value, second: Value) -> None:
         if None not in (first.dimension, second.dimension) and first.dimension != second.dimension:
             got = f"{_shown(first.dimension)} and {_shown(second.dimension)}"
-            raise DataError(f"{self.text!r}: expected quantities of one dimension, got {got}")
+            raise DataError(f"{self.text!r}: expected quantities of the same kind, got {got}")
 
     def _combined(self, node: ast.AST, left: Value, op: ast.operator, right: Value) -> Value:
         result = _OPERATORS[type(op)](left.array, right.array)

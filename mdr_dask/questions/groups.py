@@ -52,7 +52,7 @@ def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None =
     axes = [str(name) for name, axis in dataset.coords.items() if axis.ndim == 1 and axis.dims[0] in dims]
     for axis in by:
         if axis not in axes:
-            raise DataError(f"expected axes to group by, got {axis!r}{did_you_mean(axis, axes)}")
+            raise DataError(f"expected the name of an axis for --group-by, got {axis!r}{did_you_mean(axis, axes)}")
     rows = np.arange(prod(dataset.sizes[dim] for dim in dims))
     if kept is not None:
         like = dataset["status"].isel(realisation=0, drop=True)

@@ -113,7 +113,7 @@ def _cases(cases: Sequence[Mapping[str, Any]], study: xr.Dataset | None) -> str:
         first, *_, last = [_shown(value, unit, wanted.get(name, "")) for value in (values[0], values[-1])]
         more = f" to {last}, {len(values)} values" if len(values) > 1 else ""
         parts.append(f"{path} = {first}{more}")
-    return "; ".join(parts) or "the only case"
+    return "; ".join(parts) or "the single case"
 
 
 def _shown(value: Any, unit: str, wanted: str) -> str:

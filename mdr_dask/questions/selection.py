@@ -94,7 +94,7 @@ def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
             raise DataError(f"expected --series with one of {names}, because this study has series")
         return next(iter(datasets.values()))
     if series not in datasets:
-        raise DataError(f"no series {series!r}; known: {names or 'none, leave --series out'}")
+        raise DataError(f"no series {series!r}; known: {names or 'none (leave out --series)'}")
     return datasets[series]
 
 
@@ -200,7 +200,10 @@ def _nearest(values: NDArray[Any], wanted: float, name: str, unit: str, tell: Te
         return np.zeros(values.shape, dtype=bool)
     nearest = values[np.argmin(distance)]
     if distance.min() > SAME * max(abs(wanted), abs(nearest)):
-        tell(f"{name}: {written(wanted, unit)} is no value of this axis, the nearest is {written(nearest, unit)}")
+        tell(
+            f"{name}: {written(wanted, unit)} is not a value of this axis; the nearest value is used: "
+            f"{written(nearest, unit)}"
+        )
     return np.asarray(values == nearest)
 
 
@@ -212,7 +215,7 @@ def _intervals(wanted: str, name: str, unit: str) -> Iterator[tuple[float, float
     if not all(len(piece) <= 2 and any(piece) for piece in pieces):
         raise DataError(f"{name}: expected {FORM}, got {wanted!r}")
     if not all(bare) and any(alone and float(end) != 0 for end, alone in zip(numbers, bare, strict=True)):
-        raise DataError(f"{name}: expected a unit at every number or at none, got {wanted!r}")
+        raise DataError(f"{name}: expected a unit after every number or after none, got {wanted!r}")
     for piece in pieces:
         least, most = (_number(end, name, unit) if end else None for end in (piece[0], piece[-1]))
         yield (-np.inf if least is None else least, np.inf if most is None else most)
@@ -239,5 +242,5 @@ def _extent(values: NDArray[Any], unit: str) -> str:
     if values.size == 1:
         return f"it is {written(values[0], unit)} everywhere"
     if values.size <= 6:
-        return f"it has the values {', '.join(written(value, unit) for value in values)}"
-    return f"it goes from {written(values.min(), unit)} to {written(values.max(), unit)}"
+        return f"its values are {', '.join(written(value, unit) for value in values)}"
+    return f"its values go from {written(values.min(), unit)} to {written(values.max(), unit)}"

@@ -124,7 +124,10 @@ class _Maker:
     def __init__(self, dataset: xr.Dataset, question: Question, tell: Tell) -> None:
         raw = question.statistics is None
         if raw and question.group_by:
-            raise DataError("expected statistics with --group-by, got single realisations (leave out one of the two)")
+            raise DataError(
+                "expected statistics with --group-by, got single realisations (use only one of --group-by "
+                "and --realisations)"
+            )
         texts = [question.where, *question.sort, *question.columns]
         named = [name for text in texts if text for name in parse(text).names]
         shown = outputs(dataset, question.outputs) if question.outputs or not question.columns else dataset[[]]

@@ -140,28 +140,28 @@ def test_encodings_of_windows_are_read(tmp_path):
 @pytest.mark.parametrize(
     ("text", "units", "message"),
     [
-        (joined(ROWS), Units("um"), "does not say its spacing: give `spacing`"),
-        (joined(ROWS), Units("", "", STEP), "does not say the unit of its heights: give `unit`"),
-        (joined(xyz()), Units("um"), "does not say the unit of its positions: give `x_unit`"),
+        (joined(ROWS), Units("um"), "does not state its spacing: give `spacing`"),
+        (joined(ROWS), Units("", "", STEP), "does not state the unit of its heights: give `unit`"),
+        (joined(xyz()), Units("um"), "does not state the unit of its positions: give `x_unit`"),
         (joined(xyz()), Units("um", "um", 2 * STEP), "leave out `spacing`"),
         (joined(ROWS) + "1\t2\n", UNITS, "line 33 has 2, others 40"),
-        (joined(np.c_[Y, ROWS]), Units("um"), "does not say the unit of its positions: give `x_unit`"),
+        (joined(np.c_[Y, ROWS]), Units("um"), "does not state the unit of its positions: give `x_unit`"),
         (joined(np.c_[Y, ROWS]), Units("um", "", 1.5 * STEP), "which is not 3.75 um in any unit: give `x_unit`"),
         (joined(np.vstack([X, ROWS])), Units("um", "mm", STEP), "leave out `spacing` or correct the file"),
         (joined(np.c_[Y, 3 * Y, ROWS]), UNITS, "more than one column of positions, with steps of 2.5 and 7.5"),
         (joined(np.c_[Y**1.5, ROWS]), UNITS, "expected positions on a regular grid"),
-        ("Unit: nm\n" + joined(ROWS), UNITS, "the file says nm, got 'um': leave out `unit`"),
+        ("Unit: nm\n" + joined(ROWS), UNITS, "the file states nm, got 'um': leave out `unit`"),
         ("Unit: nm\nz in um\n" + joined(ROWS), Units("", "", STEP), "states more than one height"),
         (
             "pixel size,2 um\n" + joined(ROWS, ","),
             UNITS,
             "the spacing is 2 um in its heading and 2.5 um in `spacing`: leave out",
         ),
-        ("x [um] y [um] z [nm]\n" + joined(xyz(), " "), Units("um"), "the file says nm, got 'um': leave out `unit`"),
+        ("x [um] y [um] z [nm]\n" + joined(xyz(), " "), Units("um"), "the file states nm, got 'um': leave out `unit`"),
         (
             "x [um] y [um] z [nm]\n" + joined(xyz(), " "),
             Units("", "mm"),
-            "the file says um, got 'mm': leave out `x_unit`",
+            "the file states um, got 'mm': leave out `x_unit`",
         ),
         ("x [um] y [um] z [nm]\n" + joined(xyz(), " "), Units("", "", 1e-6), "leave out `spacing`"),
         (joined(np.c_[xyz(), xyz()]), XYZ, "expected a map, or columns x, y and z, got 6 columns: name them"),
@@ -200,7 +200,7 @@ def test_a_scan_is_read_as_it_stands_and_codes_are_no_heights(layout, code, tmp_
     x, z, remarks = read_scan(DataFile.of(path), units)
     np.testing.assert_allclose(x, 1e-3 * PLACE, atol=1e-11)
     np.testing.assert_allclose(z, 1e-6 * HEIGHT, atol=2e-8 if code else 1e-13)
-    assert ("taken as missing: 2 points" in " ".join(remarks)) == bool(code)
+    assert ("points counted as missing: 2 points" in " ".join(remarks)) == bool(code)
 
 
 def test_levels_of_a_grating_are_heights(tmp_path):

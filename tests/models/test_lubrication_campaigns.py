@@ -76,7 +76,12 @@ def profile(name: str, spacing: float, seed: int, size: int = 4000) -> None:
         (MIXED, "temperature: 60 degC", "temperature: 20 degC", "expected a temperature within the oil's data"),
         (MIXED, "temperature: 60 degC", "temperature: [60 degC, 20 degC]", "expected a temperature within the oil's"),
         (MIXED, "points: 20000", "points: some", "points"),
-        (MIXED, "normal_force: 100 N", "normal_force: 200 MN", "the contact is wider than the line"),
+        (
+            MIXED,
+            "normal_force: 100 N",
+            "normal_force: 200 MN",
+            "expected a contact width 2a of at most the length of the line",
+        ),
         (MIXED, "rotation_speed: 100 rpm", "rotation_speed: 0 rpm", "0 rpm"),
         (MIXED, "normal_force: 100 N", "normal_force: 0 N", "0 N"),
         (
@@ -108,7 +113,7 @@ def profile(name: str, spacing: float, seed: int, size: int = 4000) -> None:
             LINE,
             "  radius: 20 mm\n",
             "  radius: 20 mm\n  neighbours: true\n",
-            "there is no neighbours any more: every case",
+            "neighbours has been renamed or removed: every case",
         ),
         (
             MIXED,
@@ -116,8 +121,13 @@ def profile(name: str, spacing: float, seed: int, size: int = 4000) -> None:
             "  roller_radius: 1 mm\n  young_modulus: 1 GPa\n",
             "write contact_modulus, E*",
         ),
-        (MIXED, "asperity_load_share]", "load_share]", "there is no load_share any more: write asperity_load_share"),
-        (LINE, "outputs: [", "outputs: [discretisation_error, ", "any more: central_film and minimum_film come with"),
+        (
+            MIXED,
+            "asperity_load_share]",
+            "load_share]",
+            "load_share has been renamed or removed: write asperity_load_share",
+        ),
+        (LINE, "outputs: [", "outputs: [discretisation_error, ", "or removed: central_film and minimum_film come with"),
     ],
 )
 def test_bad_input_is_told_once_with_its_place(text, old, new, message, capsys):

@@ -91,7 +91,7 @@ def test_table_needs_a_temperature_or_a_reference():
     with pytest.raises(DataError, match="has several temperatures: name one by table_temperature, a reference"):
         solid_of(material(dma_table={"file": TABLE, "poisson_ratio": 0.5}))
     assert material(dma_table=TABLE) == material(dma_table={"file": TABLE})
-    with pytest.raises(DataError, match=r"got no rows at 226.9 degC; it was measured at -4"):
+    with pytest.raises(DataError, match=r"got no rows at 226.9 degC; the table was measured at -4"):
         solid_of(material(dma_table={"file": TABLE, "table_temperature": 500.0}))
 
 
@@ -140,7 +140,7 @@ def test_columns_of_a_table_go_by_their_names(tmp_path):
     ("text", "message"),
     [
         ("f [Hz],G' [MPa],tan delta [MPa]\n1,2,0.1\n", "column tan delta: expected a number"),
-        ("f [Hz],G' [MPa]\n1,2\n", "expected a column loss modulus or tan delta"),
+        ("f [Hz],G' [MPa]\n1,2\n", "expected a column loss modulus or a column tan delta"),
         ("1,2,3\n4,5,6\n", "column frequency: expected its unit"),
         ("f [Hz],G' [MPa],G'' [MPa],T [K]\n1,2,3,-10\n", "column temperature: expected a value above 0, got '-10 K'"),
         ("T [C],f [Hz],G' [MPa],G'' [MPa]\n20,1,2,\n", r"dma.csv:2:8: column loss modulus: expected a number"),
@@ -243,7 +243,9 @@ def test_shift_factors_that_are_none_are_refused(tmp_path, text, message):
 def test_shift_factors_end_where_they_were_measured(tmp_path):
     (tmp_path / "shifts.csv").write_text("T [K],a_T\n300,1\n310,0.1\n")
     kelvin = {"shear_modulus": 1e6, "relaxation_time": 1e-3}
-    with pytest.raises(ValueError, match=r"has shift factors for 26.85 degC to 36.85 degC, got 46.85 degC"):
+    with pytest.raises(
+        ValueError, match=r"expected a temperature within the shift factors, 26.85 degC to 36.85 degC, got 46.85 degC"
+    ):
         solid_of(material(kelvin=kelvin, temperature=320.0, shift_factors=str(tmp_path / "shifts.csv")))
 
 
@@ -256,7 +258,7 @@ def test_a_study_is_told_how_its_frequencies_meet_the_data(tmp_path):
         for v in (1e-6, 1e4)
     ]
     cold, warm = frequency_notes(sets)
-    assert cold.startswith("q v of 0.00063 to 3.1e+09 rad/s at 26.85 degC, data from")
+    assert cold.startswith("roughness excites 0.00063 to 3.1e+09 rad/s at 26.85 degC, data from")
     assert "extrapolated" in cold
     assert "decades above" in warm
     assert "at 56.85 degC" in warm
@@ -265,7 +267,10 @@ def test_a_study_is_told_how_its_frequencies_meet_the_data(tmp_path):
 def test_a_temperature_beyond_those_measured_is_told(tmp_path):
     file = shifted_table(tmp_path / "dma.csv", (280.0, 300.0, 330.0))
     at = {t: material(dma_table={"file": file}, temperature=t, wlf=LAW).notes() for t in (280.0, 330.0, 350.0)}
-    told = f"table {file}: measured at 6.85 degC to 56.85 degC; 76.85 degC is reached by shift factors alone"
+    told = (
+        f"table {file}: measured at 6.85 degC to 56.85 degC; 76.85 degC lies outside, and is "
+        "reached by shift factors only"
+    )
     assert [told in notes for notes in at.values()] == [False, False, True]
 
 

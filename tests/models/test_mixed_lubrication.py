@@ -323,7 +323,7 @@ def test_a_given_film_is_kept_and_too_thin_a_one_is_warned_of():
     assert result.values["film"][:, 0].tolist() == [1e-9, 4e-7]
     assert result.values["asperity_load_share"][0, 0] == 1.0
     assert np.all(result.values["asperity_load_share_error"] == 0.0)
-    assert "at the given film the asperities would carry more than the load" in result.messages[0, 0]
+    assert "at the given film thickness, asperities would carry more than the load" in result.messages[0, 0]
     assert (1, 0) not in result.messages
 
 
@@ -358,7 +358,7 @@ def test_a_table_of_viscosities_is_the_oil_that_it_was_made_of(kind, tmp_path):
     assert re.search(r"ASTM D341 through 5 kinematic viscosities, .*; \+4 % off at 60 degC", told[0])
     ends = re.search(r"viscosities, (\S+) to (\S+) mm\^2/s", told[0]).groups()
     assert [float(end) for end in ends] == pytest.approx([1e6 * given.kinematic(T) for T in (293.15, 373.15)], rel=0.05)
-    assert told[1:] == ("oil: its viscosity is extrapolated above 100 degC, to 126.9 degC",)
+    assert told[1:] == ("oil: the viscosity is extrapolated above 100 degC, to 126.9 degC",)
 
 
 @pytest.mark.parametrize(
@@ -391,7 +391,7 @@ def test_trace_under_slip_agrees_with_its_mean(slip):
     [
         ({"temperature": 293.15}, "expected a temperature within the oil's data, 313.15 to 373.15 K, got 293.15 K"),
         ({"rotation_speed": 0.0}, "Input should be greater than 0"),
-        ({"normal_force": 2e8}, "the contact is wider than the line: expected 2a of at most 0.006283 m, got 0.0"),
+        ({"normal_force": 2e8}, "expected a contact width 2a of at most the length of the line, 0.006283 m, got 0.0"),
         (
             {"longest_wavelength": 1e-6, "shortest_wavelength": 1e-5},
             "expected the longest wavelength above the shortest",

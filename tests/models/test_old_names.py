@@ -31,4 +31,6 @@ def test_old_names_are_refused_with_what_to_write(model):
     with pytest.raises(CampaignError) as refusal:
         campaign.loads(text, "old.yaml", ".")
     for name in [*parameters, *outputs]:
-        assert f"there is no {name} any more: {models.load(model).parameters.renamed[name]}" in str(refusal.value)
+        assert f"{name} has been renamed or removed: {models.load(model).parameters.renamed[name]}" in str(
+            refusal.value
+        )

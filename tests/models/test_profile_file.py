@@ -102,12 +102,12 @@ def test_files_of_instruments_are_read_by_surface_topography(tmp_path):
     assert line.length == pytest.approx(64e-6)
     np.testing.assert_allclose(line.height, 1e-6 * height, atol=1e-15)
     topography.UniformLineScan(height, 64.0).to_netcdf(str(tmp_path / "bare.nc"))
-    with pytest.raises(DataError, match="does not say its unit"):
+    with pytest.raises(DataError, match="does not state its unit"):
         line_of(ProfileFile.model_validate(str(tmp_path / "bare.nc")))
     bare = line_of(ProfileFile.model_validate({"file": str(tmp_path / "bare.nc"), "unit": "mm"}))
     assert bare.length == pytest.approx(64e-3)
     topography.Topography(np.outer(height, height), (64.0, 64.0), unit="um").to_netcdf(str(tmp_path / "map.nc"))
-    with pytest.raises(DataError, match="expected a line scan, got a map of 64 x 64 points: name it by `map`"):
+    with pytest.raises(DataError, match="expected a line scan, got a map of 64 x 64 points"):
         line_of(ProfileFile.model_validate(str(tmp_path / "map.nc")))
     (tmp_path / "noise.nc").write_bytes(b"nothing" * 10)
     with pytest.raises(DataError, match=r"noise.nc: SurfaceTopography cannot read it"):

@@ -87,7 +87,7 @@ def test_what_is_told_to_be_noise_begins_where_roughness_ends(tmp_path):
         (spectrum,) = spectra_of(one)
         assert spectrum.wavenumber[-1] * found.resolution == pytest.approx(2 * np.pi)
         assert 0.8 < LENGTH / found.resolution / ends < 1.2
-        assert f"wavelengths below {1e6 * found.resolution:.4g} um are noise" in " ".join(one.notes())
+        assert f"wavelengths below {1e6 * found.resolution:.4g} um contain only noise" in " ".join(one.notes())
 
 
 def test_noise_outliers_and_missing_points_are_told(tmp_path):
@@ -99,7 +99,7 @@ def test_noise_outliers_and_missing_points_are_told(tmp_path):
     options = {"files": ["map.npy"], "spacing": LENGTH / POINTS, "unit": "m"}
     filled = surface(tmp_path, map=options | {"outliers": "fill"})
     told = " ".join(filled.notes())
-    assert "are noise" in told
+    assert "contain only noise" in told
     assert "outliers replaced: 2" in told
     (spectrum,) = spectra_of(filled)
     assert spectrum.rms_gradient() == pytest.approx(SPECTRUM.rms_gradient(), rel=0.1)
@@ -107,7 +107,7 @@ def test_noise_outliers_and_missing_points_are_told(tmp_path):
         surface(tmp_path, map=options | {"outliers": "fill"}, shortest_wavelength=2 * LENGTH / 250)
     )
     assert everything.rms_gradient() > 1.2 * spectrum.rms_gradient()
-    assert "outliers, far from their neighbours: 2 (`outliers: fill`" in " ".join(
+    assert "outliers (far from their neighbours): 2 (`outliers: fill`" in " ".join(
         surface(tmp_path, map=options).notes()
     )
 
@@ -130,8 +130,8 @@ def test_an_anisotropic_map_needs_a_direction(tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "more", "message"),
     [
-        ("map.npy", HEIGHT, {"unit": ""}, "does not say the unit of its heights: give `unit`"),
-        ("map.npy", HEIGHT, {"spacing": None}, "does not say its spacing: give `spacing`"),
+        ("map.npy", HEIGHT, {"unit": ""}, "does not state the unit of its heights: give `unit`"),
+        ("map.npy", HEIGHT, {"spacing": None}, "does not state its spacing: give `spacing`"),
         ("map.npy", HEIGHT, {"unit": "s"}, "unit: "),
         ("map.npy", HEIGHT[:8], {}, "expected a map of 16 x 16 points or more"),
         ("map.npy", HEIGHT[0], {}, "expected rows and columns of heights, got 1 dimensions"),
@@ -140,7 +140,7 @@ def test_an_anisotropic_map_needs_a_direction(tmp_path):
         ("map.npy", np.where(HEIGHT > 0, HEIGHT, np.nan), {}, "expected at most 5 % of missing points"),
         ("map.npy", b"nothing", {}, "expected an array of numpy"),
         ("map.npy", b"", {}, "expected an array of numpy"),
-        ("map.txt", b"1 2 3\n4 5 6\n7 8\n", {}, "expected rows of heights of one length"),
+        ("map.txt", b"1 2 3\n4 5 6\n7 8\n", {}, "expected the same number of heights in every row"),
         ("map.txt", b"1 2 x\n4 5 6\n", {}, "expected a map of 16 x 16 points or more"),
         ("map.opd", b"nothing", {}, "SurfaceTopography cannot read it"),
     ],
@@ -159,7 +159,7 @@ def test_a_scan_is_no_map_and_a_map_no_scan(tmp_path):
     assert "expected a map, got a line scan" in refused(tmp_path, map="line.nc")
     np.save(tmp_path / "map.npy", HEIGHT)
     told = refused(tmp_path, scan="map.npy")
-    assert "map.npy: expected a table of x and z, got an array: name it by `map` instead of `scan`" in told
+    assert "map.npy: expected a table of x and z, got an array (write `map` instead of `scan`)" in told
     assert told.count("map.npy") == 1
 
 

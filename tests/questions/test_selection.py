@@ -76,7 +76,7 @@ def test_a_value_between_two_takes_the_nearest_and_says_so(study):
     told = []
     kept = select(study, ["velocity=0.2 m/s"], told.append)
     assert kept.velocity == 0.1
-    assert told == ["velocity: 0.2 m/s is no value of this axis, the nearest is 0.1 m/s"]
+    assert told == ["velocity: 0.2 m/s is not a value of this axis; the nearest value is used: 0.1 m/s"]
 
 
 @pytest.mark.parametrize(("factor", "kept"), [(1 + 5e-6, True), (1 + 2e-5, False)])
@@ -99,7 +99,7 @@ def test_cases_of_a_sampled_study_are_selected_by_number_and_by_column(sampled):
 REFUSED = [
     ("velocity=2 m/s", "no velocity 2 m/s: it has the values 0.001 m/s, 0.01 m/s, 0.1 m/s, 1 m/s"),
     ("velocity=2..3", "no velocity 2 m/s .. 3 m/s: it has"),
-    ("velocity=1..10 mm/s", "velocity: expected a unit at every number or at none, got '1..10 mm/s'"),
+    ("velocity=1..10 mm/s", "velocity: expected a unit after every number or after none, got '1..10 mm/s'"),
     ("velocity=1 N", "velocity: expected a velocity (such as '1 mm/s'), got '1 N'"),
     ("velocity=0.01:1", "velocity: expected a velocity (such as '1 mm/s'), got '0.01:1', and FROM..TO for a range"),
     ("velocity=1..2..3", "velocity: expected NAME=VALUE, NAME=VALUE,VALUE or NAME=FROM..TO, got '1..2..3'"),
@@ -143,4 +143,6 @@ def test_groups_and_outputs_are_named(study):
 def test_a_number_that_is_none_of_the_axis_is_told(study, wanted, silently):
     told = []
     assert select(study, [f"velocity={wanted}"], told.append)["velocity"].values.tolist() == [0.1]
-    assert told == ([] if silently else ["velocity: 0.1004 m/s is no value of this axis, the nearest is 0.1 m/s"])
+    assert told == (
+        [] if silently else ["velocity: 0.1004 m/s is not a value of this axis; the nearest value is used: 0.1 m/s"]
+    )

@@ -247,7 +247,10 @@ REFUSED = [
     ({"where": "velocity > 1 N"}, "expected quantities of one dimension"),
     ({"where": "velocity"}, "expected a comparison"),
     ({"sort": ("velocty",)}, "no column 'velocty' (did you mean 'velocity'?)"),
-    ({"group_by": ("velocty",)}, "expected axes to group by, got 'velocty' (did you mean 'velocity'?)"),
+    (
+        {"group_by": ("velocty",)},
+        "expected the name of an axis for --group-by, got 'velocty' (did you mean 'velocity'?)",
+    ),
     ({"group_by": ("velocity",), "statistics": None}, "expected statistics with --group-by"),
     ({"units": {"velocity": "N"}}, "velocity: expected a velocity"),
     ({"selections": ("velocity=9",)}, "no velocity 9 m/s"),
@@ -263,7 +266,7 @@ def test_a_wrong_question_is_one_sentence_before_any_row(study, parts, told):
 
 def test_a_number_without_its_ingredients_names_them(study):
     for part in ({"columns": ("load_number",)}, {"where": "load_number > 1"}):
-        with pytest.raises(DataError, match=r"load_number is .*: this study has no shear_modulus"):
+        with pytest.raises(DataError, match=r"load_number is .*: the study lacks shear_modulus"):
             table(study.drop_vars("shear_modulus"), Question(**part), 0, silent)
 
 

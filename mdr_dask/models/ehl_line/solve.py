@@ -165,7 +165,7 @@ def _warnings(block: Block[EhlLineParameters], index: int, parameters: list[floa
     if {"formula_central_film", "formula_minimum_film"} & set(block.outputs):
         notes.append(PAN_HAMROCK_CENTRAL.outside(*parameters))
     if {"central_film_thickness", "minimum_film_thickness"} & set(block.outputs) and block.case(index).radius is None:
-        notes.append("a film thickness in metres needs radius; without it only h/R is known")
+        notes.append("a film thickness in metres needs the parameter radius; without it only h/R is known")
     return notes
 
 

@@ -186,12 +186,12 @@ class MixedLubrication(Parameters):
             missing = self.rms_roughness is None or self.hurst is None
             return "expected rms_roughness, or surface_1 and surface_2, got neither" if missing else ""
         if one is None or two is None:
-            return "expected the surfaces of both rollers or of none, got one"
+            return "expected both surface_1 and surface_2 or neither, got one"
         if (one.profile is None) != (two.profile is None):
-            return "expected the profiles of both rollers or the spectra of both, got one of each"
+            return "expected profiles for both rollers or spectra for both, got one of each"
         if one.profile is None and self.rms_roughness is not None:
-            return "the surfaces take the place of rms_roughness: leave out one or the other"
-        return "" if self.hurst is None else "the surfaces take the place of hurst: leave out one or the other"
+            return "surface_1 and surface_2 replace rms_roughness: leave out one or the other"
+        return "" if self.hurst is None else "surface_1 and surface_2 replace hurst: leave out one or the other"
 
     def _problem_of_points(self) -> str:
         if self.points != "auto" or (self.surface_1 is not None and self.surface_1.profile is not None):
@@ -212,7 +212,7 @@ class MixedLubrication(Parameters):
         width = 2 * float(self.dry_contact(self.normal_force).half_width)
         if width > length:
             got, most = distinguishable(width, length, digits=4)
-            return f"the contact is wider than the line: expected 2a of at most {most} m, got {got} m"
+            return f"expected a contact width 2a of at most the length of the line, {most} m, got {got} m"
         return ""
 
     def oil_data(self) -> Oil:

@@ -41,7 +41,10 @@ class _Random:
             return f"expected the longest wavelength above the shortest, got {longest} m and {shortest} m"
         if 2 * self.modes > self.points:
             wave, least = distinguishable(perimeter / self.modes, 2 * perimeter / self.points, digits=4)
-            return f"expected a shortest wavelength of at least two spacings, {least} m, got {wave} m; raise points"
+            return (
+                f"expected a shortest wavelength of at least two point spacings, {least} m, got {wave} m "
+                "(increase points)"
+            )
         return ""
 
     def amplitudes(self, realisation: int) -> tuple[FloatArray, FloatArray]:
@@ -129,7 +132,7 @@ class OfSurfaces(_Random):
 
     def problem(self, perimeter: float) -> str:
         """Return the reason why these lines are impossible, or an empty string."""
-        flat = "expected waves of both surfaces between longest_wavelength and shortest_wavelength"
+        flat = "expected roughness of both surfaces between longest_wavelength and shortest_wavelength, got none"
         return super().problem(perimeter) or (
             "" if all(np.any(line) for both in self._both() for line in both) else flat
         )

@@ -100,7 +100,7 @@ class OilData(Parameters):
         for wanted, end, side in ends:
             if wanted is not None and (wanted < end if side == "below" else wanted > end):
                 reached, known = shown_apart("K", wanted, end)
-                notes.append(f"oil: its viscosity is extrapolated {side} {known}, to {reached}")
+                notes.append(f"oil: the viscosity is extrapolated {side} {known}, to {reached}")
         return tuple(notes)
 
 

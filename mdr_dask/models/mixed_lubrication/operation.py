@@ -160,13 +160,13 @@ def _shared_load(
 
     if case.film_thickness is not None:
         share = asperity_share(case.film_thickness)
-        warning = "" if share <= 1 else "at the given film the asperities would carry more than the load"
+        warning = "" if share <= 1 else "at the given film thickness, asperities would carry more than the load"
         return SharedLoad(case.film_thickness, max(0.0, 1 - share), min(share, 1.0)), 0.0, warning
     film_at, warning = film_of
     tolerance = accuracy / 10 if case.film_formula == "ehl" else accuracy / 1e6
     shared = share_load(lambda share: film_at(share).thickness, asperity_share, tolerance)
     if not shared.film > 0:
-        raise NoFilmError("the film is too thin for the EHL solution, even where the asperities carry all of the load")
+        raise NoFilmError("the film is too thin for the EHL solution, even if asperities carry the whole load")
     return shared, film_at(shared.film_share).error, warning
 
 

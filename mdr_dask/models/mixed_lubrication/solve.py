@@ -157,5 +157,8 @@ def _warn(result: Result, block: Block[MixedLubrication], index: int, operation:
     position = block.realisations.index(0)
     _note(result, index, position, operation.warning)
     if operation.film / operation.rms < LEAST_FILM_RATIO:
-        text = f"the film ratio is below {LEAST_FILM_RATIO}: overlaps merge into clusters that do not break, and the "
+        text = (
+            f"the film ratio is below {LEAST_FILM_RATIO}: asperities merge into large clusters that do not "
+            "break the layer, so the "
+        )
         _note(result, index, position, f"{text}probability is too low")

@@ -113,19 +113,21 @@ def read_scan(file: DataFile, units: Units) -> Scan:
     from mdr_dask.physics.surfaces.maps import require_few_missing
 
     if file.name.lower().endswith(".npy"):
-        raise DataError(f"{file.name}: expected a table of x and z, got an array: name it by `map` instead of `scan`")
+        raise DataError(f"{file.name}: expected a table of x and z, got an array (write `map` instead of `scan`)")
     channel = _channel(file)
     if channel is None:
         x, z = _line_of_text(file, units)
     elif channel.dim != 1:
         points = " x ".join(map(str, channel.nb_grid_pts))
-        raise DataError(f"{file.name}: expected a line scan, got a map of {points} points: name it by `map`")
+        raise DataError(
+            f"{file.name}: expected a line scan, got a map of {points} points (write `map` instead of `scan`)"
+        )
     else:
         line, unit = _topography(file, channel, units)
         metre = _metre(file, unit, "unit")
         x, z = (np.ma.filled(np.ma.asarray(a, dtype=np.float64), np.nan) * metre for a in line.positions_and_heights())
     placed = np.isfinite(x)
-    gaps = (f"rows without a position, left out: {np.count_nonzero(~placed)}",) if not placed.all() else ()
+    gaps = (f"rows without a position are left out: {np.count_nonzero(~placed)}",) if not placed.all() else ()
     x, (z, codes) = x[placed], positions.without_codes(z[placed])
     remarks = (*gaps, *codes)
     missing = ~np.isfinite(z)
@@ -182,7 +184,7 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
     if not height:
         unsaid.append("the unit of its heights: give `unit`, such as um")
     if unsaid:
-        raise DataError("\n".join(f"{file.name}: does not say {what}" for what in unsaid))
+        raise DataError("\n".join(f"{file.name}: does not state {what}" for what in unsaid))
     assert spacings[0] is not None
     return _metre(file, height, "unit"), (spacings[0], spacings[1] or spacings[0])
 
@@ -199,8 +201,8 @@ def _implied_unit(file: DataFile, steps: tuple[float | None, float | None], unit
             power = round(math.log10(spacing / step))
             if abs(spacing / step / 10.0**power - 1) > SAME:
                 raise DataError(
-                    f"{file.name}: its positions are {step:.4g} apart, which is not {shown(spacing, 'm')} in any unit: "
-                    "give `x_unit`, the unit of the positions"
+                    f"{file.name}: the step of its positions is {step:.4g}, which is not {shown(spacing, 'm')} in any "
+                    "unit: give `x_unit`, the unit of the positions"
                 )
             return 10.0**power
     return None
@@ -209,7 +211,9 @@ def _implied_unit(file: DataFile, steps: tuple[float | None, float | None], unit
 def _one_unit(file: DataFile, option: str, stated: str, given: str) -> str:
     """Return the unit stated by the file or by the user; raise DataError if both state units and these differ."""
     if stated and given and abs(_metre(file, stated, option) / _metre(file, given, option) - 1) > SAME:
-        raise DataError(f"{file.name}: the file says {stated}, got {given!r}: leave out `{option}` or correct the file")
+        raise DataError(
+            f"{file.name}: the file states {stated}, got {given!r}: leave out `{option}` or correct the file"
+        )
     return stated or given
 
 
@@ -249,11 +253,11 @@ def _topography(file: DataFile, channel: Any, units: Units) -> tuple[Any, str]:
     stated = channel.unit or ""
     unit = _one_unit(file, "unit", stated, units.height)
     if not unit:
-        raise DataError(f"{file.name}: does not say its unit: give `unit`, such as um")
+        raise DataError(f"{file.name}: does not state its unit: give `unit`, such as um")
     _one_unit(file, "x_unit", unit, units.position)
     if channel.physical_sizes is None:
         if units.spacing is None:
-            raise DataError(f"{file.name}: does not say its spacing: give `spacing`, such as 1 um")
+            raise DataError(f"{file.name}: does not state its spacing: give `spacing`, such as 1 um")
         steps = (units.spacing, units.spacing_y or units.spacing)
         metre = _metre(file, unit, "unit")
         sizes = tuple(n * step / metre for n, step in zip(channel.nb_grid_pts, steps, strict=False))
@@ -265,7 +269,7 @@ def _of_channel(file: DataFile, channel: Any, units: Units) -> _Grid:
     import numpy as np
 
     if channel.dim != 2:
-        raise DataError(f"{file.name}: expected a map, got a line scan: name it by `scan` instead of `map`")
+        raise DataError(f"{file.name}: expected a map, got a line scan (write `scan` instead of `map`)")
     surface, unit = _topography(file, channel, units)
     rows = np.ma.filled(np.ma.asarray(surface.heights(), dtype=np.float64), np.nan).T
     steps = tuple(size / points for size, points in zip(surface.physical_sizes, surface.nb_grid_pts, strict=True))
@@ -308,7 +312,7 @@ def _grid_of_text(file: DataFile) -> _Grid:
     remarks = [f"lines before the heights: {before}"] if before else []
     grid = _without_positions(file, cells.to_numpy(dtype="float64"), stated, tuple(remarks))
     if words := int(np.count_nonzero(np.isnan(grid.rows))):
-        remark = f"cells without a number, taken as missing points: {words}"
+        remark = f"cells without a number count as missing points: {words}"
         return grid._replace(remarks=(*grid.remarks, remark))
     return grid
 
@@ -347,7 +351,7 @@ def _stated(file: DataFile, head: list[str], first: str) -> Units:
     for key, values in found.items():
         if len({to_si(f"1 {v}" if key in ("height", "position") else v, "m") for v in values}) > 1:
             lines = " and ".join(repr(line.strip()) for line in values.values())
-            raise DataError(f"{file.name}: states more than one {key}: {lines}: remove the lines that are not about it")
+            raise DataError(f"{file.name}: states more than one {key}: {lines}: remove all lines but the correct one")
     only = {key: next(iter(values)) for key, values in found.items()}
     spacing, spacing_y = (to_si(only[key], "m") if key in only else None for key in ("spacing", "spacing_y"))
     return Units(only.get("height", ""), only.get("position", ""), spacing, spacing_y)
@@ -405,11 +409,11 @@ def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
             index_col=False,
         )
     except (ValueError, pd.errors.ParserError) as problem:
-        raise DataError(f"{file.name}: expected rows of heights of one length: {problem}") from None
+        raise DataError(f"{file.name}: expected the same number of heights in every row: {problem}") from None
     odd = [first + k for k, n in enumerate(width) if n != common]
     if table.empty or odd:
         line = f": line {lines.index(kept[odd[0]]) + 1} has {width[odd[0] - first]}, others {common}" if odd else ""
-        raise DataError(f"{file.name}: expected rows of heights of one length{line}")
+        raise DataError(f"{file.name}: expected the same number of heights in every row{line}")
     return table.apply(pd.to_numeric, errors="coerce"), lines.index(kept[first])
 
 
@@ -422,7 +426,7 @@ def _surfer(file: DataFile, lines: list[str]) -> _Grid:
         nx, ny = (int(n) for n in numbers[:2])
         rows = numbers[8:].reshape(ny, nx)
     except ValueError:
-        raise DataError(f"{file.name}: expected a grid of Surfer with as many heights as its heading states") from None
+        raise DataError(f"{file.name}: expected a Surfer grid with as many heights as stated in its heading") from None
     steps = (numbers[3] - numbers[2]) / (nx - 1), (numbers[5] - numbers[4]) / (ny - 1)
     return _Grid(rows, (float(steps[0]), float(steps[1])))
 
@@ -439,7 +443,9 @@ def _esri(file: DataFile, lines: list[str]) -> _Grid:
         rows = np.array(" ".join(lines[len(head) :]).split(), dtype=np.float64).reshape(shape)
         step = float(head["cellsize"])
     except (KeyError, ValueError):
-        raise DataError(f"{file.name}: expected an ESRI grid with ncols, nrows, cellsize and as many heights") from None
+        raise DataError(
+            f"{file.name}: expected an ESRI grid with ncols, nrows, cellsize and ncols x nrows heights"
+        ) from None
     rows[rows == float(head.get("nodata_value", "nan"))] = np.nan
     return _Grid(rows[::-1], (step, step))
 
@@ -498,7 +504,9 @@ def _spaced(file: DataFile, height: FloatArray, units: Units) -> FloatArray:
     import numpy as np
 
     if units.spacing is None:
-        raise DataError(f"{file.name}: expected a column x: name it, or give `spacing`, the distance of the heights")
+        raise DataError(
+            f"{file.name}: expected a column x: name the column, or give `spacing`, the distance between heights"
+        )
     return np.asarray(units.spacing * np.arange(height.size), dtype=np.float64)
 
 
@@ -516,12 +524,12 @@ def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]
         )
         table = read_table(text, file.name, columns, allow_missing=True)
         if "x" in table and units.spacing is not None:
-            raise DataError(f"{file.name}: has positions: leave out `spacing`")
+            raise DataError(f"{file.name}: the file has positions: leave out `spacing`")
         return table["x"] if "x" in table else _spaced(file, table["z"], units), table["z"]
     table_of = numbers(sheet)
     if table_of.shape[1] == 1:
         if not units.height:
-            raise DataError(f"{file.name}: does not say the unit of its heights: give `unit`, such as um")
+            raise DataError(f"{file.name}: does not state the unit of its heights: give `unit`, such as um")
         height = table_of[:, 0] * _metre(file, units.height, "unit")
         return _spaced(file, height, units), height
     rises = [k for k, one in enumerate(positions.rising(table_of.T)) if one]
@@ -534,7 +542,7 @@ def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]
             "them in the first line, such as x [mm], z [um]"
         )
     unsaid = [
-        f"{file.name}: does not say the unit of its {what}: give `{option}`, such as um"
+        f"{file.name}: does not state the unit of its {what}: give `{option}`, such as um"
         for what, option, unit in (("heights", "unit", units.height), ("positions", "x_unit", units.position))
         if not unit
     ]

@@ -98,7 +98,7 @@ def _check_rows(times: tuple[float, ...], velocities: tuple[float, ...], forces:
     if len(velocities) != len(times) or (forces is not None and len(forces) != len(times)):
         raise ValueError(f"expected a velocity and a force for each of {len(times)} times")
     if times[0] < 0 or any(b <= a for a, b in pairwise(times)):
-        raise ValueError(f"expected increasing times from 0 on, got {times!r}")
+        raise ValueError(f"expected increasing times that are not negative, got {times!r}")
     if forces is not None and min(forces) <= 0:
         raise ValueError(f"expected positive forces, got {forces!r}")
 
@@ -156,5 +156,5 @@ def _table_rows(file: NamedFile, force: float) -> list[tuple[float, float, float
     time, velocity = table["time"], table["velocity"]
     load = table.get("force", np.full(time.size, force))
     if time[0] != 0 or np.any(np.diff(time) < 0):
-        raise DataError(f"{file.name}: expected times that start at 0 and do not fall")
+        raise DataError(f"{file.name}: expected times that start at 0 and do not decrease")
     return [(float(t), float(v), float(f)) for t, v, f in zip(time, velocity, load, strict=True)]

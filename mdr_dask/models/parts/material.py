@@ -49,7 +49,9 @@ class PronySeries(Parameters):
     @model_validator(mode="after")
     def _a_time_for_every_modulus(self) -> PronySeries:
         if len(self.moduli) != len(self.times):
-            raise ValueError(f"expected a time for every modulus, got {len(self.times)} and {len(self.moduli)}")
+            raise ValueError(
+                f"expected as many times as moduli, got {len(self.times)} times and {len(self.moduli)} moduli"
+            )
         return self
 
 
@@ -114,7 +116,7 @@ class Material(Parameters):
             raise ValueError(f"expected one of {', '.join(LAWS)}, got {' and '.join(laws)}")
         superposing = self.dma_table is not None and self.dma_table.table_temperature is None
         if (self.temperature is not None and not laws) or (self.temperature is None and laws and not superposing):
-            raise ValueError(f"a temperature needs one of {', '.join(LAWS)}, and these need a temperature")
+            raise ValueError(f"expected a temperature together with one of {', '.join(LAWS)}, got only one of both")
         if info.context is not None:
             try:
                 solid_of(self)
@@ -240,7 +242,7 @@ def fit_notes(material: Material | None) -> tuple[str, ...]:
     errors = [f"{error:.1%} in {modulus}" for modulus, error in _errors(fit).items()]
     return (
         f"{what}: {how and how + '; '}{fit.solid.times.size} Prony terms for {lowest:.3g} to {highest:.3g} rad/s, "
-        f"rms error {', '.join(errors)}, largest {fit.largest_error:.1%} at {fit.worst_frequency:.3g} rad/s"
+        f"rms error {', '.join(errors)}, largest {fit.largest_error:.1%} at {fit.worst_frequency:.3g} rad/s",
     )
 
 
@@ -268,7 +270,10 @@ def _outside(material: Material) -> tuple[str, ...]:
     if low - SAME_TEMPERATURE <= temperature <= high + SAME_TEMPERATURE:
         return ()
     ends = shown(low, "K") if high - low < SAME_TEMPERATURE else f"{shown(low, 'K')} to {shown(high, 'K')}"
-    return f"table {table.file.name}: measured at {ends}; {shown(temperature, 'K')} is reached by shift factors alone"
+    return (
+        f"table {table.file.name}: measured at {ends}; {shown(temperature, 'K')} lies outside, and is reached "
+        "by shift factors only",
+    )
 
 
 def _unusual(material: Material) -> tuple[str, ...]:
@@ -281,7 +286,7 @@ def _unusual(material: Material) -> tuple[str, ...]:
     if high >= SOFTEST and low <= STIFFEST:
         return ()
     ends = f"{shown(low, 'Pa')} to {shown(high, 'Pa')}"
-    return (f"table {table.file.name}: shear moduli of {ends} are those of no solid: is the unit right?",)
+    return (f"table {table.file.name}: shear moduli of {ends} are not those of a solid (is the unit right?)",)
 
 
 def _errors(fit: SeriesFit) -> dict[str, float]:

@@ -151,13 +151,13 @@ def _by_law(
     """Return the moduli of all temperatures, shifted in frequency by the factors of a law."""
     if law is None:
         raise DataError(
-            f"{chosen.file.name}: has several temperatures: name one by table_temperature, a reference to superpose "
-            "them at, or the law that superposes them (wlf, arrhenius or shift_factors)"
+            f"{chosen.file.name}: has several temperatures: choose one by table_temperature, or superpose them by "
+            "giving a reference temperature or a law (wlf, arrhenius or shift_factors)"
         )
     omega, storage, loss = rows
     reference = law.reference
     rise = vertical_factor(chosen, levels, reference)[member]
-    text = f"superposed at {shown(reference, 'K')} by the shift factors given, moduli {_vertical(chosen)}"
+    text = f"superposed at {shown(reference, 'K')} by the given shift factors, moduli {_vertical(chosen)}"
     return Moduli(omega * law.factor(levels)[member], storage * rise, loss * rise, reference, ends, text)
 
 
@@ -232,10 +232,11 @@ def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, referenc
     try:
         apart = np.abs(decades - np.log10(law.factor(levels) / law.factor(reference)))
     except ValueError as error:
-        return f", whose shift factors cannot be compared with those given ({error})"
+        return f", whose shift factors cannot be compared with the given ones ({error})"
     worst = int(apart.argmax())
     return (
-        f", whose shift factors lie up to {apart[worst]:.2g} decades off those given (at {shown(levels[worst], 'K')})"
+        f", whose shift factors differ from the given ones by up to {apart[worst]:.2g} decades (at "
+        f"{shown(levels[worst], 'K')})"
     )
 
 
@@ -267,8 +268,8 @@ def _table(chosen: ModulusTable) -> Read:
         has = {name: any(is_called(each, name) for each in headings) for name in ("time", "frequency")}
         if has["time"] and not has["frequency"]:
             raise DataError(
-                f"{name}: moduli versus time are no material here: expected frequency, storage and loss modulus "
-                "(`mdr-dask master-curve` merges relaxation curves)"
+                f"{name}: moduli against time cannot be used as a material: expected frequency, storage and loss "
+                "modulus (`mdr-dask master-curve` merges relaxation curves)"
             ) from problem
         raise
 
@@ -283,12 +284,12 @@ def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray,
     if loss is None and "tan delta" in table:
         loss = storage * table["tan delta"]
     if loss is None:
-        raise DataError(f"{name}: expected a column loss modulus or tan delta")
+        raise DataError(f"{name}: expected a column loss modulus or a column tan delta")
     temperature, wanted = table.get("temperature"), chosen.table_temperature
     if temperature is not None and wanted is not None and np.count_nonzero(_near(temperature, wanted)) < 2:
         _, levels = _levels(temperature)
         known = ", ".join(shown(level, "K") for level in levels[:12])
-        raise DataError(f"{name}: got no rows at {shown(wanted, 'K')}; it was measured at {known}")
+        raise DataError(f"{name}: got no rows at {shown(wanted, 'K')}; the table was measured at {known}")
     heading = table.headings["storage modulus"]
     if chosen.poisson_ratio is None and _IN_TENSION.search(plain(heading)):
         raise DataError(

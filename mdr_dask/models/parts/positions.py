@@ -60,7 +60,7 @@ def without_positions(rows: FloatArray) -> Outer:
         places = [*range(first), *range(len(lines) - last, len(lines))]
         steps.append(_common_step([lines[place, along] for place in places], name))
         left_out += [f"{name} {place + 1}" for place in places]
-    remarks = (f"positions or numbers, left out: {', '.join(left_out)}",) if left_out else ()
+    remarks = (f"lines of positions or row numbers are left out: {', '.join(left_out)}",) if left_out else ()
     return Outer(rows[inner], (steps[0], steps[1]), remarks)
 
 
@@ -130,7 +130,7 @@ def scattered(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, 
     (column, step_x), (row, step_y) = regular(x), regular(y)
     shape = row.max() + 1, column.max() + 1
     if shape[0] * shape[1] > 4 * z.size or np.unique(row * shape[1] + column).size < z.size:
-        raise DataError("expected x, y and z of one point each on a regular grid")
+        raise DataError("expected columns x, y and z with one point of a regular grid in each row")
     rows = np.full(shape, np.nan)
     rows[row, column] = z
     return rows, (step_x, step_y)
@@ -157,7 +157,7 @@ def without_codes(height: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
             if distance > np.ptp(rest) * (1.0 if count > 1 else FAR_ALONE):
                 codes.append(code)
                 points = f"{count} points" if count > 1 else "1 point"
-                found.append(f"taken as missing: {points} at {shown(code, 'm')}, far from all others")
+                found.append(f"points counted as missing: {points} at {shown(code, 'm')}, far from all others")
         if not codes:
             return height, tuple(found)
         height[np.isin(height, codes)] = np.nan

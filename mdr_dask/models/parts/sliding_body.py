@@ -92,14 +92,14 @@ class SlidingBody(Parameters):
     def _problem_of_line(self) -> str:
         """Return a message about missing or contradictory parameters of the line, or an empty string."""
         if self.surface is None:
-            return "" if self.hurst is not None else "expected hurst with rms_roughness, got none"
+            return "" if self.hurst is not None else "expected hurst, which rms_roughness needs, got none"
         both = [name for name in GENERATED if getattr(self, name) is not None]
         if both:
             return f"surface replaces {', '.join(both)}: leave out one or the other"
         if self.surface.profile is not None and self.length is not None:
-            return "surface: {profile: ...} has its own length: leave out length"
+            return "the length of surface: {profile: ...} comes from its file: leave out length"
         if self.surface.profile is None and self.length is None:
-            return "expected length, of the line that stands for the surface"
+            return "expected length, the length of the rough line that represents the surface"
         return ""
 
     def largest_force(self) -> float:
@@ -131,7 +131,7 @@ def frequency_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
         if known is None:
             continue
         at = "" if material.temperature is None else f" at {shown(material.temperature, 'K')}"
-        ends = f"q v of {low:.2g} to {high:.2g} rad/s{at}, data from {known[0]:.2g} to {known[1]:.2g} rad/s"
+        ends = f"roughness excites {low:.2g} to {high:.2g} rad/s{at}, data from {known[0]:.2g} to {known[1]:.2g} rad/s"
         notes.append(f"{ends}: {_compared((low, high), known)}")
     return tuple(notes)
 
@@ -141,6 +141,6 @@ def _compared(asked: tuple[float, float], known: tuple[float, float]) -> str:
     (low, high), (first, last) = np.log10(asked), np.log10(known)
     beyond = {"below": max(first - low, 0.0), "above": max(high - last, 0.0)}
     if high <= first or low >= last:
-        return "outside the data, the solid is extrapolated at every velocity"
+        return "outside the data, so that the solid is extrapolated at every velocity"
     far = [f"{decades:.2g} decades {side}" for side, decades in beyond.items() if decades > 0.05]
     return f"extrapolated {' and '.join(far)}" if far else "inside"

@@ -51,10 +51,12 @@ class Surface(Parameters):
         self.require_one_alternative()
         ends = self.longest_wavelength, self.shortest_wavelength
         if self.profile is not None and (self.extrapolate or any(ends)):
-            raise ValueError("a profile is taken as it is: give its cut-offs with its file, profile: {file: ...}")
+            raise ValueError(
+                "a profile is used unchanged: give its shortest and longest wavelength in profile: {file: ...}"
+            )
         if self.extrapolate and not any(ends):
             raise ValueError(
-                "extrapolate needs longest_wavelength or shortest_wavelength, to which the spectrum goes on"
+                "extrapolate needs longest_wavelength or shortest_wavelength, up to which the spectrum is continued"
             )
         if info.context is not None and self.profile is None:
             try:
@@ -96,7 +98,7 @@ def _notes(surface: Surface, file: DataFile, found: Found, spectrum: Spectrum) -
         return (*(f"surface {file.name}: {remark}" for remark in found.remarks), f"surface {reason}")
     notes = [statistics, *found.remarks]
     if found.resolution:
-        noise = f"wavelengths below {shown(found.resolution, 'm')} are noise"
+        noise = f"wavelengths below {shown(found.resolution, 'm')} contain only noise"
         if surface.shortest_wavelength is None:
             whole = found.spectrum
             height = 1 - (spectrum.rms_height() / whole.rms_height()) ** 2
@@ -104,7 +106,7 @@ def _notes(surface: Surface, file: DataFile, found: Found, spectrum: Spectrum) -
             parts = (
                 f"{100 * height:.2g} % of the mean square height and {100 * gradient:.2g} % of the mean square gradient"
             )
-            notes.insert(1, f"{noise}: leaving them out removes {parts}")
+            notes.insert(1, f"{noise}; leaving them out removes {parts}")
         elif surface.shortest_wavelength < found.resolution:
             notes.insert(1, noise)
     return tuple(f"surface {file.name}: {note}" for note in notes)
@@ -151,8 +153,8 @@ def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
 def _beyond(name: str, wavelength: float, which: str, end: float) -> str:
     given, limit = distinguishable(wavelength, end, digits=4)
     return (
-        f"expected {name} of at {which} {limit} m, where the spectrum ends, got {given} m: "
-        "`extrapolate: true` goes on by a power law"
+        f"expected {name} of at {which} {limit} m, where the spectrum ends, got {given} m "
+        "(`extrapolate: true` continues it by a power law)"
     )
 
 

@@ -194,8 +194,8 @@ def _form(level: FloatArray, curved: FloatArray) -> tuple[str, ...]:
     if not rest < (1 - FORM) * square:
         return ()
     return (
-        f"a parabola explains {100 * (1 - rest / square):.3g} % of the mean square: form of the part, not "
-        "roughness? (`detrend: parabola` removes it)"
+        f"a parabola explains {100 * (1 - rest / square):.3g} % of the mean square height: this may be the form "
+        "of the part (`detrend: parabola` removes it)",
     )
 
 
@@ -203,7 +203,7 @@ def _steepness(slope: float) -> tuple[str, ...]:
     """Return a warning about units if the surface is steeper than 45 degrees."""
     if not slope > 1:
         return ()
-    return (f"rms slope {slope:.3g}, steeper than 45 degrees: are the units of heights and positions right?",)
+    return (f"rms slope {slope:.3g}, steeper than 45 degrees (are the units of heights and positions right?)",)
 
 
 @lru_cache(maxsize=64)
@@ -306,12 +306,12 @@ def levelled_map(maps: MapFiles, file: DataFile) -> LevelledMap:
         count = int(np.count_nonzero(far))
         if count > MOST_OUTLIERS * far.size:
             share = 100 * count / far.size
-            remarks = (*remarks, f"far from their neighbours: {share:.2g} % of the points, too many to be outliers")
+            remarks = (*remarks, f"{share:.2g} % of the points are far from their neighbours, too many to be outliers")
         elif count and maps.outliers == "fill":
             surface.height[far] = np.nan
             remarks = (*remarks, f"outliers replaced: {count}")
         elif count:
-            remarks = (*remarks, f"outliers, far from their neighbours: {count} (`outliers: fill` replaces them)")
+            remarks = (*remarks, f"outliers (far from their neighbours): {count} (`outliers: fill` replaces them)")
         surface = without_trend(surface, maps.detrend)
         height = surface.height - np.nanmean(surface.height)
         spectrum = spectrum_of_map(filled(surface), maps.window == "hann")
@@ -323,6 +323,9 @@ def levelled_map(maps: MapFiles, file: DataFile) -> LevelledMap:
     stripes = [name for name, power in zip("xy", spectrum.axes, strict=True) if power > STRIPES]
     if stripes:
         along = " and ".join(stripes)
-        remarks = (*remarks, f"waves along {along} have more than {STRIPES:.0f} times the usual power: scan lines?")
+        remarks = (
+            *remarks,
+            f"waves along {along} have more than {STRIPES:.0f} times the usual power (are these scan lines?)",
+        )
     rms, mean = np.sqrt(np.nanmean(height**2)), np.nanmean(np.abs(height))
     return LevelledMap(float(rms), float(mean), spectrum, remarks)

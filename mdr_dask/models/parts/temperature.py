@@ -33,7 +33,7 @@ class Wlf(Parameters):
         lowest, end = float(np.min(temperature)), self.reference - self.c2
         if lowest <= end:
             got, limit = shown_apart("K", lowest, end)
-            raise ValueError(f"wlf holds above reference - c2 = {limit}, got {got}")
+            raise ValueError(f"expected a temperature above reference - c2 = {limit} for wlf, got {got}")
         return wlf_factor(temperature, self.reference, self.c1, self.c2)
 
 
@@ -89,7 +89,9 @@ class ShiftFactors(Parameters):
         wanted = np.asarray(temperature, dtype=np.float64)
         for outside in wanted[(wanted < known[0]) | (wanted > known[-1])].ravel():
             got, first, last = shown_apart("K", outside, known[0], known[-1])
-            raise ValueError(f"{self.file.name}: has shift factors for {first} to {last}, got {got}")
+            raise ValueError(
+                f"{self.file.name}: expected a temperature within the shift factors, {first} to {last}, got {got}"
+            )
         return np.asarray(10 ** np.interp(wanted, known, decades), dtype=np.float64)
 
 
@@ -109,9 +111,13 @@ def _shifts(factors: ShiftFactors) -> tuple[FloatArray, FloatArray]:
     order = np.argsort(table["temperature"])
     temperature, decades = table["temperature"][order], decades[order]
     if order.size < 2 or np.any(np.diff(temperature) <= 0) or np.any(np.diff(decades) >= 0):
-        raise DataError(f"{name}: expected two or more temperatures, and an a_T that falls from each to the next")
+        raise DataError(
+            f"{name}: expected two or more temperatures, and values of a_T that decrease with the temperature"
+        )
     if not decades[-1] <= 0 <= decades[0]:
-        raise DataError(f"{name}: expected an a_T that passes 1, its value at the reference")
+        raise DataError(
+            f"{name}: expected values of a_T that include or enclose 1, the value at the reference temperature"
+        )
     return temperature, decades
 
 

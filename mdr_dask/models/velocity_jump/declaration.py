@@ -50,7 +50,7 @@ class VelocityJump(SlidingBody):
     @classmethod
     def _increasing(cls, times: tuple[float, ...]) -> tuple[float, ...]:
         if times[0] < 0 or np.any(np.diff(times) <= 0):
-            raise ValueError(f"expected increasing times from 0 on, got {times!r}")
+            raise ValueError(f"expected increasing times that are not negative, got {times!r}")
         return times
 
     @model_validator(mode="after")

@@ -77,7 +77,9 @@ def compute(block: Block[VelocityJump]) -> Result:
         after = np.abs(1 + np.asarray(block.column("velocity_change"), dtype=np.float64))
     refuse_immense({"v_2 / v_1": np.where(after == 0, 1, after)}, problems.faults)
     for j in np.flatnonzero(after == 1):
-        problems.faults.setdefault(int(j), "expected a velocity_change above rounding, the velocity stays the same")
+        problems.faults.setdefault(
+            int(j), "expected a larger velocity_change: the velocity stays the same because of rounding"
+        )
     groups = list(_groups(block, problems))
     for r, realisation in enumerate(block.realisations):  # all lines of a realisation have the same random phases
         for group in groups:
@@ -280,7 +282,7 @@ def _check_rough(roughness: Roughness) -> None:
     if isinstance(roughness, Measured):
         height = line_of(roughness.profile).height
         if not height.std() > FLAT * float(np.max(np.abs(height), initial=0.0)):
-            raise DataError(f"expected a rough line, got {roughness.profile.file.name}, which is flat")
+            raise DataError(f"expected a rough line, got the flat profile {roughness.profile.file.name}")
 
 
 def distinct(block: Block[VelocityJump]) -> int:
