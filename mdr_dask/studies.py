@@ -271,7 +271,9 @@ def fit(study: Study, law: str, measured: str | Path | pd.DataFrame | None = Non
         groups = with_table(groups, measured)
     model = _model(groups)
     found: dict[str, xr.Dataset] = _named(fits.available(model), law, f"law for {model}").results(groups)
-    return next(iter(found.values())) if len(found) == 1 else _tree(found)
+    if len(found) == 1:
+        return next(iter(found.values()))
+    return xr.DataTree.from_dict({f"/{name}": data for name, data in found.items()})
 
 
 def plot(study: Study, figure: str, select: Words = (), **view: Any) -> Figure:
@@ -405,10 +407,6 @@ def _temporary_folder() -> Path:
     folder = tempfile.mkdtemp(prefix="mdr-dask-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return Path(folder)
-
-
-def _tree(groups: Mapping[str, xr.Dataset]) -> xr.DataTree:
-    return xr.DataTree.from_dict({f"/{name}": data for name, data in groups.items()})
 
 
 def _groups(study: Study) -> dict[str, xr.Dataset]:

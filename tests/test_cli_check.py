@@ -91,7 +91,7 @@ REFUSED = {
     "no law and no reference": (
         lambda _: None,
         ("    temperature: [0 degC, 20 degC, 50 degC]\n    wlf: {c1: 10, c2: 100 K, reference: 20 degC}\n", ""),
-        "rubber.csv: has several temperatures: name one by table_temperature, a reference to superpose them at",
+        "rubber.csv: has several temperatures: choose one by table_temperature, or superpose them by",
     ),
     "reference outside the data": (
         lambda _: None,
@@ -154,7 +154,7 @@ def test_moduli_of_no_solid_are_asked_about(files, capsys, unit):
     """Softer than a gel, stiffer than diamond."""
     (files / "rubber.csv").write_text(rubber((0, 20, 50)).replace("MPa", unit))
     assert main(["check", "tyre.yaml"]) == 0
-    told = r"rubber.csv: shear moduli of [\d.]+ \w+ to [\d.]+ \w+ are those of no solid: is the unit right\?"
+    told = r"rubber.csv: shear moduli of [\d.]+ \w+ to [\d.]+ \w+ are not those of a solid \(is the unit right\?\)"
     assert re.search(told, capsys.readouterr().out)
 
 

@@ -28,16 +28,11 @@ VELOCITY = "{geometric: [1 mm/s, 1 m/s, 4]}"
 #: What is changed into what, and the parts of the sentence: line and column, key, value, remedy.
 MISTAKES = [
     # words
-    ("normal_force", "normal_forse", "12:3: parameters.normal_forse: ", "did you mean 'normal_force'?"),
     ("velocity", "speed", "13:3: parameters.speed: ", "did you mean 'velocity'?"),
-    ("realisations", "repeats", "4:1: repeats: ", "did you mean 'realisations'?"),
-    ("sliding_friction", "friction", "2:8: model: ", "did you mean 'sliding_friction'?"),
     ("sliding_friction", "json:MODEL", "2:8: model: ", "expected module:NAME"),
     ("accuracy: 1 %", "outputs: [mu]", "14:11: outputs[0]: ", "did you mean 'friction_coefficient'?"),
     ("accuracy: 1 %", "outputs: film", "14:10: outputs: ", "got 'film'", "write [film]"),
-    ("accuracy: 1 %", "store: a.zarr", "14:8: store: ", "write {path: a.zarr}"),
     ("accuracy: 1 %", "sampling: sobol", "14:11: sampling: ", "write {sobol: ...}"),
-    ("name: study", "name: my study", "1:7: name: ", "got 'my study'"),
     ("name: study", f"name: {'a' * 101}", "1:7: name: ", "at most 100"),
     (
         "realisations: 2",
@@ -46,38 +41,24 @@ MISTAKES = [
         "little",
     ),
     # numbers
-    ("hurst: 0.7", "hurst: 0,7", "8:10: parameters.hurst: ", "'0.7'"),
-    ("0.5 um", "0,5 um", "9:18: parameters.rms_roughness: ", "'0.5 um'"),
     ("points: 500", "points: 1,000", "7:11: ", "'1000'", "'1.000'"),
-    ("points: 500", "points: 5e2", "7:11: ", "write 500"),
-    ("hurst: 0.7", "hurst: .nan", "8:10: ", "finite"),
     ("hurst: 0.7", "hurst: 70", "8:10: ", "at most 1", "'70 %'"),
-    ("[0.1 N, 1 N]", "[0.1 N, -1 N]", "12:25: ", "above 0", "'-1 N'"),
     # units
     ("20 mm", "20 milimeters", "6:11: ", "did you mean 'millimeter'?"),
     ("10 MPa", "10 N/mm2", "10:18: ", "write mm^2"),
     ("20 mm", "20 kg", "6:11: parameters.length: ", "a length (such as '20 mm')"),
-    ("hurst: 0.7", "hurst: 0.7 mm", "8:10: ", "expected a number"),
-    ("10 MPa", "10 grad", "10:18: ", "'10 MPa'"),
     ("[0.1 N, 1 N]", "10 kg", "12:17: ", "1 kg weighs 9.81 N"),
     # ranges
     (VELOCITY, "1 mm/s to 1 m/s", "13:13: ", "{geometric: [a, b, n]}"),
-    (VELOCITY, "{logspace: [1 mm/s, 1 m/s, 4]}", "13:13: ", "{geometric: [a, b, n]}"),
-    (VELOCITY, "{linear: [1 mm/s, 1 m/s]}", "[first, last, count]"),
-    (VELOCITY, "{geometric: [0, 1 m/s, 4]}", "above 0", "got 0"),
     # YAML
-    ("hurst: 0.7", "hurst:0.7", "a blank is missing after 'hurst:' in line 8"),
-    ("  points", "\tpoints", "not with tabs"),
+    ("hurst: 0.7", "hurst:0.7", "a space is missing after 'hurst:' in line 8"),
     ("  length", "   length", "same column"),
-    ("hurst: 0.7", "hurst: 0.7\n  hurst: 0.8", "9:3: parameters.hurst: ", "line 8"),
     ("name: study", "name: my: study", "1:9: ", "put quotation marks"),
     # files
     ("hurst: 0.7", "material: rubber.csv", "8:13: ", "write {dma_table: rubber.csv}"),
     ("hurst: 0.7", "surface: {profile: no.csv}", "no.csv", "folder of the campaign file"),
     ("hurst: 0.7", "surface: {profile: README.ms}", "did you mean 'README.md'?"),
     # bodies
-    ("hurst: 0.7", "indenter: {shape: sphere}", "8:21: parameters.indenter.shape: ", "'plane', 'cone'"),
-    ("hurst: 0.7", "indenter: cone", "write {shape: cone, angle: ...}"),
     ("hurst: 0.7", "indenter: {shape: cone, angle: 30}", "'30 deg'"),
     ("hurst: 0.7", "material: {kelvin: {}}", "parameters.material.kelvin.shear_modulus: missing"),
 ]
@@ -106,23 +87,6 @@ def test_numbers_in_quotes_are_numbers_everywhere():
     quoted, plain = (loads(each, "study.yaml", ".") for each in (text, CAMPAIGN))
     assert quoted.series == plain.series
     assert (quoted.seed, quoted.replication) == (plain.seed, plain.replication)
-
-
-FILES = {
-    "empty": (b"", "study.yaml:1:1: expected a mapping with the keys name, model and parameters, got nothing"),
-    "UTF-16": (CAMPAIGN.encode("utf-16"), "study.yaml:1:1: expected UTF-8 text, got byte 0xff"),
-    "Latin-1": (CAMPAIGN.replace("0.5 um", "0.5 µm").encode("latin-1"), "expected UTF-8 text, got byte 0xb5"),
-}
-
-
-@pytest.mark.parametrize("kind", FILES)
-def test_a_file_that_is_no_campaign_is_named(kind, tmp_path, monkeypatch):
-    content, told = FILES[kind]
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "study.yaml").write_bytes(content)
-    with pytest.raises(CampaignError) as caught:
-        load("study.yaml")
-    assert told in str(caught.value)
 
 
 @pytest.mark.parametrize("text", ["\ufeff" + CAMPAIGN, CAMPAIGN.replace("\n", "\r\n")], ids=["mark", "line ends"])

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from mdr_dask import models
 from mdr_dask.campaign.reference import output_rows, parameter_rows
-from mdr_dask.units import expected, seconds, to_si
+from mdr_dask.errors import did_you_mean
+from mdr_dask.units import expected, is_doubtful, likely, seconds, to_si
 
 
 @pytest.mark.parametrize(
@@ -133,3 +134,35 @@ def test_units_that_would_keep_the_parser_busy_are_refused_at_once(value):
 )
 def test_durations_for_a_reader(duration, text):
     assert seconds(duration) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "usual", "meant"),
+    [
+        (1500, "rad/s", ["100 rpm"], "1500 rpm"),
+        (10.5, "rad/s", ["100 rpm"], None),
+        (200, "Pa", ["2 GPa", "200 HV"], "200 HV"),
+        (2, "Pa", ["2 GPa", "200 HV"], "2 GPa"),
+        (60, "K", ["20 degC"], "60 degC"),
+        (300, "K", ["20 degC"], None),
+        (20, "m", ["10 mm"], "20 mm"),
+        (0.02, "m", ["10 mm"], None),
+    ],
+)
+def test_a_number_without_a_unit_is_doubtful_where_another_unit_is_likelier(value, unit, usual, meant):
+    assert is_doubtful(value, unit, usual) == (meant is not None)
+    if meant:
+        assert likely(value, unit, usual) == meant
+
+
+@pytest.mark.parametrize(
+    ("word", "known", "hint"),
+    [
+        ("roller_diameter", ["roller_radius", "roller_width"], "'roller_radius', half the diameter?"),
+        ("pressure", ["normal_force", "velocity"], "'normal_force', a load instead of a pressure?"),
+        ("sliding_speed", ["normal_force", "velocity"], "'velocity'?"),
+        ("normal_forse", ["normal_force", "velocity"], "'normal_force'?"),
+    ],
+)
+def test_hints_name_related_quantities(word, known, hint):
+    assert did_you_mean(word, known) == f" (did you mean {hint})"

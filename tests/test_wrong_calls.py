@@ -19,7 +19,6 @@ WRONG = [
     ("run small.yaml --threads 0", "0", "1"),
     ("run small.yaml --threads 2 --workers 2", "--threads, --workers"),
     ("run small.yaml --part 4/3", "K/N", "'4/3'"),
-    ("run small.yaml --part 3", "K/N", "'3'"),
     ("status STORE --watch --json", "--watch", "--json"),
     ("show STORE -o x.csv --json", "--json and --output"),
     ("show STORE -o x.nc --sort velocity", ".csv", "--sort"),
@@ -31,22 +30,16 @@ WRONG = [
     # names
     ("models nobody", "'nobody'", "known: sliding_friction"),
     ("show STORE friction", "'friction'", "did you mean 'friction_coefficient'?"),
-    ("show STORE --series x", "'x'", "leave --series out"),
+    ("show STORE --series x", "'x'", "leave out --series"),
     ("show STORE --statistic median", "'median'", "'mean'"),
     ("show STORE --select speed=1", "'speed'", "did you mean 'velocity'?"),
-    ("show STORE --columns wear", "'wear'", "known: "),
     ("fit STORE nothing", "'nothing'", "known: calibration, zone_one"),
     ("plot STORE nothing -o new/x.png", "'nothing'", "known: velocity, force"),
     ("plot STORE velocity --units velocty=km/h", "'velocty'", "did you mean 'velocity'?"),
     ("plot STORE friction_coefficient --over velocity --style graysale", "'graysale'", "did you mean 'grayscale'?"),
-    ("law STORE nothing -o new/x.nc", "'nothing'"),
     # values
     ("show STORE --select velocity=1kg", "velocity: ", "'1 mm/s'", "'1kg'"),
-    ("show STORE --select velocity=2..1", "2 m/s .. 1 m/s", "0.001 m/s"),
-    ("show STORE --units velocity=N", "velocity: ", "'N'"),
     ("show STORE --where velocity>1kg -o new/x.zarr", "'velocity>1kg'"),
-    ("show STORE --where velocity=1", "'velocity > 1 mm/s", "'velocity=1'"),
-    ("aggregate STORE --select hurst=0.1 -o new/x.nc", "hurst 0.1"),
     ("sensitivity STORE friction_coefficient -o new/x.png", "sampled"),
     # files that are read
     ("check nowhere.yaml", "nowhere.yaml"),
@@ -54,29 +47,24 @@ WRONG = [
     ("run small.yaml --cluster small.yaml", "small.yaml:1:1: name", "known: class"),
     ("run small.yaml --cluster class.yaml", "class.yaml:1:8: class", "dask_jobqueue"),
     ("run small.yaml --cluster number.yaml", "number.yaml:2:12: arguments", "3"),
-    ("run small.yaml --cluster latin.yaml", "latin.yaml:1:1: ", "UTF-8"),
     ("run small.yaml --cluster system.yaml", "'os.system'", "class of Dask clusters"),
     ("surface nowhere.csv -o new/x.csv --plot new/x.png", "nowhere.csv"),
     ("master-curve nowhere.csv", "nowhere.csv: "),
     # stores
     ("status nowhere.zarr", "nowhere.zarr: no store here", "mdr-dask run"),
     ("status FOREIGN", "FOREIGN: ", "not a study of mdr_dask"),
-    ("run small.yaml --store FOREIGN", "FOREIGN: ", "not a study of mdr_dask"),
     ("run small.yaml --store nobody://x", "nobody://x: ", "fsspec"),
     ("run other.yaml --store STORE", "STORE: ", "--store"),
-    ("run other.yaml --store STORE --dry-run", "hurst: 0.7 in the store, 0.6 in the campaign"),
     ("run small.yaml --scheduler nowhere --store new/deep/x.zarr", "'nowhere'"),
-    ("run small.yaml --part 1/2 --scheduler nowhere --store new/x.zarr", "'nowhere'"),
     ("run small.yaml --cluster broken.yaml --store new/x.zarr", "'distributed.LocalCluster'"),
     # files that are written
     ("aggregate STORE -o means.xls", ".csv, .json", "means.xls"),
     ("plot STORE velocity -o velocity.bmp", ".png, .pdf or .svg", "'velocity.bmp'"),
     ("plot STORE velocity force -o both.png", "folder", "'both.png'"),
     ("aggregate STORE -o STORE", "new file", "'STORE'"),
-    ("publish STORE -o STORE/x.zip", "outside of stores", "'STORE/x.zip'"),
-    ("run small.yaml --store STORE --log STORE/x.jsonl", "outside of stores"),
+    ("publish STORE -o STORE/x.zip", "outside every store", "'STORE/x.zip'"),
+    ("run small.yaml --store STORE --log STORE/x.jsonl", "outside every store"),
     ("init sliding_friction -o small.yaml", "small.yaml", "exists already"),
-    ("schema -o small.yaml/x.json", "small.yaml/x.json: Not a directory"),
     ("run small.yaml --log small.yaml/x.jsonl", "small.yaml/x.jsonl: Not a directory"),
 ]
 
@@ -96,7 +84,6 @@ def folder(tmp_path_factory):
         "notes.txt": "what we did\n",
     }.items():
         (folder / name).write_text(text)
-    (folder / "latin.yaml").write_bytes("µ: 1\n".encode("latin-1"))
     (folder / "FOREIGN").mkdir()
     (folder / "FOREIGN/zarr.json").write_text(json.dumps({"zarr_format": 3, "node_type": "array"}))
     with pytest.MonkeyPatch.context() as here:
@@ -148,8 +135,9 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize("file", FILES)
-@pytest.mark.parametrize("line", COMMANDS)
+@pytest.mark.parametrize(
+    ("line", "file"), [*((line, "small.yaml") for line in COMMANDS), *(("status FILE", file) for file in FILES)]
+)
 def test_every_command_says_that_a_file_is_no_store(folder, monkeypatch, capsys, line, file):
     monkeypatch.chdir(folder)
     before = contents(folder)
@@ -161,13 +149,12 @@ def test_every_command_says_that_a_file_is_no_store(folder, monkeypatch, capsys,
     assert contents(folder) == before
 
 
-@pytest.mark.parametrize("file", FILES)
 @pytest.mark.parametrize("name", CALLS)
-def test_every_function_says_that_a_file_is_no_store(folder, monkeypatch, name, file):
+def test_every_function_says_that_a_file_is_no_store(folder, monkeypatch, name):
     monkeypatch.chdir(folder)
     before = contents(folder)
-    with pytest.raises(MdrDaskError, match=re.escape(FILES[file])):
-        CALLS[name](file)
+    with pytest.raises(MdrDaskError, match=re.escape(FILES["notes.txt"])):
+        CALLS[name]("notes.txt")
     assert contents(folder) == before
 
 

@@ -157,7 +157,7 @@ def _is_indented_otherwise(lines: list[str]) -> bool:
 
 
 class _EndlessError(Exception):
-    """The reading of a document ends, because the document is too large or refers to itself; this was reported."""
+    """Ends the reading of a document that is too large or contains itself, after this problem was reported."""
 
 
 class _Reader:
@@ -208,23 +208,14 @@ class _Reader:
         if _NO_TEXT.search(text):
             self.document.report(path, "expected text without null characters and damaged characters")
             return None
+        digits = text.replace("_", "").casefold()
         if kind == "int":
-            return _integer(text.replace("_", ""))
+            return int(digits, 0 if digits.lstrip("+-")[:2] in ("0x", "0o", "0b") else 10)
         if kind == "float":
-            return _real(text.replace("_", "").casefold())
+            return float(digits.replace(".inf", "inf").replace(".nan", "nan"))
         if kind not in _KEPT_AS_TEXT:
             self.document.report(path, f"unknown tag {str(node.tag)!r}")
         return text
-
-
-def _integer(text: str) -> int:
-    digits = text.lstrip("+-")
-    base = {"0x": 16, "0o": 8, "0b": 2}.get(digits[:2].casefold(), 10)
-    return int(text, base)
-
-
-def _real(text: str) -> float:
-    return float(text.replace(".inf", "inf").replace(".nan", "nan"))
 
 
 def _flow(node: Node) -> str:

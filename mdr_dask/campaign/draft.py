@@ -90,13 +90,9 @@ def _entry(parameters: type[BaseModel], name: str, needed: set[str]) -> Iterator
     mark = "" if name in needed or inner else "# "
     first, *others = _values(parameters, name, inner)
     start = f"  {mark}{name}: {first}"
-    yield f"{start:{_COMMENTS - 2}s}  # {_comment(info, first)}".rstrip()
+    choices = ", ".join(choice for choice in _choices(info) if choice != first)
+    yield f"{start:{_COMMENTS - 2}s}  # {'; or '.join(filter(None, [info.description, choices]))}".rstrip()
     yield from (f"  # or {name}: {other}" for other in others)
-
-
-def _comment(info: FieldInfo, value: str) -> str:
-    others = [choice for choice in _choices(info) if choice != value]
-    return "; or ".join(filter(None, [info.description or "", ", ".join(others)]))
 
 
 def _choices(info: FieldInfo) -> list[str]:

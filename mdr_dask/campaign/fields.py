@@ -64,12 +64,6 @@ def holds_list(info: FieldInfo) -> bool:
     return any(isinstance(kind, type) and issubclass(kind, Sequence) and kind is not str for kind in kinds)
 
 
-def holds_whole_numbers(info: FieldInfo) -> bool:
-    """Return whether the numbers of this field are whole."""
-    kinds = members(info.annotation)
-    return int in kinds and float not in kinds
-
-
 def usual(info: FieldInfo) -> tuple[str, ...]:
     """Return the usual values that a field declares, with their units; ``mdr-dask init`` writes the first one."""
     return tuple(map(str, info.examples or ()))

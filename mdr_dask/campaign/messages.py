@@ -73,7 +73,7 @@ def path_into(data: Any, details: ErrorDetails) -> Path:
         elif details["type"] == "missing" and depth == len(location) - 1:
             path = (*path, part)
     if details["type"] == "union_tag_invalid":
-        path = (*path, *_tag_key(data, details["ctx"]["tag"]))
+        path = (*path, *[key for key, value in data.items() if str(value) == details["ctx"]["tag"]][:1])
     return path
 
 
@@ -97,10 +97,6 @@ def _is_of_another_branch(details: ErrorDetails, kind: type[BaseModel], data: An
 def _field(kind: type[BaseModel], path: Path, data: Any) -> FieldInfo | None:
     found = fields.owner(kind, path, data)
     return found[0].model_fields[found[1]] if found else None
-
-
-def _tag_key(data: Mapping[str, Any], tag: str) -> list[str]:
-    return [key for key, value in data.items() if str(value) == tag][:1]
 
 
 def value_at(data: Any, path: Path) -> Any:

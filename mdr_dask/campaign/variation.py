@@ -27,7 +27,7 @@ DECADE = 10.0
 
 @dataclass(frozen=True)
 class Origin:
-    """The origin of a value, for messages: file name and position, and the path if the value is in the document."""
+    """The place where a value is written, for messages: the name of its key, its position, and its path if any."""
 
     name: str
     place: Place
@@ -96,7 +96,7 @@ def find(
 
 
 class _MalformedError(Exception):
-    """The reading of a range ends, because the range is wrong; this was reported."""
+    """Ends the reading of a range after a problem of the range was reported."""
 
 
 @dataclass(frozen=True)
@@ -187,7 +187,8 @@ class _Search:
         if low == high:
             self._complain(at, f"expected two different ends, got {shown(content[0])} and {shown(content[1])}", at[:-1])
         info = self._field(path)
-        return Spread(low, high, kind == "geometric", info is not None and fields.holds_whole_numbers(info))
+        kinds = fields.members(info.annotation) if info else ()
+        return Spread(low, high, kind == "geometric", whole=int in kinds and float not in kinds)
 
     def _items(self, spread: Spread, content: list[Any], at: Path) -> list[Item]:
         name, count = at[:-1], content[2]

@@ -66,15 +66,15 @@ def cli() -> None:
     """Parameter studies for tribology with the method of dimensionality reduction.
 
     \b
-    mdr-dask init sliding_friction -o mine.yaml    write a first campaign to edit
-    mdr-dask check mine.yaml                       is the file right, what will it cost?
-    mdr-dask run mine.yaml                         compute it, or what is missing of it
-    mdr-dask show results/sliding_friction.zarr    a table of results, also during a run
-    mdr-dask plot results/sliding_friction.zarr    figures
-    mdr-dask report results/sliding_friction.zarr  all results on one page
+    mdr-dask init sliding_friction -o mine.yaml    write a first campaign file to edit
+    mdr-dask check mine.yaml                       check the file, and estimate the cost
+    mdr-dask run mine.yaml                         compute all results that are missing
+    mdr-dask show results/sliding_friction.zarr    print results as a table, also during a run
+    mdr-dask plot results/sliding_friction.zarr    draw figures
+    mdr-dask report results/sliding_friction.zarr  write all results to one page
 
-    Exit codes: 0 all done, 1 some cases failed, 2 refused, 3 a fault of the program, 130 interrupted. Options can also
-    be set in the environment: MDR_DASK_RUN_THREADS=4 for `run --threads 4`.
+    Exit codes: 0 all results are computed, 1 some cases failed, 2 wrong input, 3 a fault of the program,
+    130 interrupted. An environment variable can set an option: MDR_DASK_RUN_THREADS=4 means `run --threads 4`.
     """
 
 

@@ -1,4 +1,4 @@
-"""Print the answer to a question, or write it to a file; rows are written as they are computed."""
+"""Print the table that answers a question, or write it to a file; rows are written as soon as they are computed."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
 
     from mdr_dask.questions.table import Table
 
-#: Largest number of rows of a printed table; longer answers are printed as several tables.
+#: Largest number of rows of a printed table; longer tables are printed in parts.
 AT_ONCE = 2**16
 FILES = (".csv", ".json", ".jsonl", ".parquet", ".nc", ".zarr")
 
 
 def print_answer(answer: Table, form: str, limit: int, join: bool) -> None:
-    """Print a table: aligned and at most `limit` rows, or all rows as CSV, JSON or lines of JSON.
+    """Print a table: at most `limit` rows in aligned columns, or all rows as CSV, as JSON or as one JSON object a line.
 
-    `join` combines means and their errors in one column.
+    If `join` is true, each mean and its errors are printed in one column.
     """
     if form == "table":
         _print_aligned(answer, limit, join)

@@ -23,7 +23,7 @@ CAMPAIGN = click.Path(exists=True, dir_okay=False, path_type=Path)
 @click.argument("name", required=False)
 @click.option("--json", "form", flag_value="json", help="Print one JSON document.")
 def models(name: str | None, form: str | None) -> None:
-    """List the models, or the parameters and outputs of one.
+    """List the models, or the parameters and outputs of one model.
 
     \b
     mdr-dask models
@@ -74,7 +74,7 @@ def _model(name: str) -> Model[Any]:
     help="Write the campaign to a new file instead of standard output.",
 )
 def init(model: str, output: Path | None) -> None:
-    """Write a first campaign of a model, with units, meanings and choices. It passes `check` without changes.
+    """Write a first campaign file for a model: every parameter with a value, its unit and its meaning.
 
     \b
     mdr-dask init sliding_friction -o rubber.yaml
@@ -126,9 +126,9 @@ def _brief(cell: str) -> str:
 @click.argument("campaigns", nargs=-1, required=True, type=CAMPAIGN)
 @click.option("--json", "form", flag_value="json", help="Print one JSON document.")
 def check(campaigns: tuple[Path, ...], form: str | None) -> None:
-    """Check campaign files; print their axes, data, sizes and times.
+    """Check campaign files, and print the axes, the number of results, the size and the computing time of each study.
 
-    All problems are reported at once, with exit code 2.
+    All problems of a file are reported at once, with exit code 2.
 
     \b
     mdr-dask check campaigns/*.yaml

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     from mdr_dask.plots.base import Plot
     from mdr_dask.plots.figure import Figure
-    from mdr_dask.plots.page import Page
 
 #: Options that apply only to figures of outputs; the axes of a named figure are fixed.
 OF_OUTPUTS = ("over", "by", "panels", "effects", "log")
@@ -73,8 +72,9 @@ def plot(
 ) -> None:
     """Draw figures by name, or any output against any axis; without a name, list the figures.
 
-    The data of every figure is written beside it, as FIGURE.csv. Axes that a figure cannot show are fixed at one value,
-    which is printed; --select chooses another one. Several stores can be drawn in one figure.
+    The data of every figure are written to a table beside it, FIGURE.csv. If a study has more axes than a figure can
+    show, the other axes are fixed at one value, which is printed; --select chooses another value. Several stores can
+    be drawn in one figure.
 
     \b
     mdr-dask plot results/quickstart.zarr velocity -o quickstart.png
@@ -95,7 +95,8 @@ def plot(
         return
     figures = _requested(names, everything, known, urls, look)
     places = _places(output, list(figures), urls, suffix, alone=len(names) == 1 and not everything)
-    asked = _page(look)
+    width, height = page.size(look["size"]) if look["size"] else (None, None)
+    asked = page.Page(width, height, look["title"], look["units"] or {})
     with page.drawing_for(asked, look["style"]), readable(", ".join(urls)):
         groups = {key: data for url in urls for key, data in _groups(url, urls, series).items()}
         _require_quantities(asked.units, groups)
@@ -229,13 +230,6 @@ def _of_output(name: str, look: Mapping[str, Any]) -> Plot:
         raise click.UsageError(f"expected --log with letters of xyz, or 'none', got {log!r}")
     by, panels = (look[key].replace(".", "_") for key in ("by", "panels"))
     return figure_of(View(name, over, by, panels, "" if log == "none" else log))
-
-
-def _page(look: Mapping[str, Any]) -> Page:
-    from mdr_dask.plots import page
-
-    width, height = page.size(look["size"]) if look["size"] else (None, None)
-    return page.Page(width, height, look["title"], look["units"] or {})
 
 
 def _groups(url: str, urls: Sequence[str], series: Sequence[str]) -> dict[str, xr.Dataset]:

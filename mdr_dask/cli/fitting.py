@@ -1,4 +1,4 @@
-"""The command that fits laws to a store, and calibrates parameters of a study with measured points."""
+"""The command that fits laws to the results of a study, and finds unknown parameters from measured points."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def fit(
     limit: int,
     form: str | None,
 ) -> None:
-    """Fit laws to a store: constants with 95 % intervals, and whether the law holds. Without a name, list the laws.
+    """Fit laws to results: constants with 95 % intervals, and whether the law holds. Without a name, list the laws.
 
     `calibration` finds unknown parameters of a study from a table of measured points.
 

@@ -20,7 +20,7 @@ from mdr_dask.cli.writing import require_suffix, writing
     "--output", "-o", "path", type=click.Path(path_type=Path), required=True, help="Write to FILE.nc or FILE.zarr."
 )
 def law(store: str, output: str, series: str | None, selections: tuple[str, ...], path: Path) -> None:
-    """Write an output as a dense table over the axes of its study, with its error, for other programs.
+    """Write an output and its error as a dense table over the axes of the study, for other programs.
 
     Interpolate the table linearly: with xarray, with mdr_dask.Law, or in your own program.
 

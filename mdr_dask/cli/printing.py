@@ -1,4 +1,4 @@
-"""Print results and messages for a terminal, a pipe, JSON or CSV."""
+"""Print results and messages: as aligned tables, CSV or JSON."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def print_rows(rows: Sequence[Row], units: dict[str, str], form: str, limit: int
     form : str
         ``table``, ``csv`` or ``json``.
     limit : int, optional
-        Largest number of rows of a table; the number of rows left out is printed on stderr.
+        Largest number of rows of an aligned table; the number of further rows is printed on stderr.
     """
     if form == "json":
         print_json({"units": units, "rows": [{key: _finite(value) for key, value in row.items()} for row in rows]})

@@ -37,10 +37,11 @@ def sensitivity(
     figure: Path | None,
     form: str | None,
 ) -> None:
-    """Say which input matters: Sobol indices of an output of a sampled study, with 95 % intervals.
+    """Compute which parameters matter for an output: Sobol indices of a sampled study, with 95 % intervals.
 
-    First order: the share of the variance that an input explains alone; total: with all its interactions. Total
-    indices need the design of a campaign with `sampling: {saltelli: n}`; first-order ones take any sampled design.
+    The first-order index of a parameter is the fraction of the variance that this parameter explains alone. The total
+    index includes its interactions with other parameters. Total indices need a campaign with
+    `sampling: {saltelli: n}`; first-order indices can be computed for every sampled study.
 
     \b
     mdr-dask sensitivity results/rolling.zarr breakthrough_probability

@@ -39,15 +39,11 @@ def writing(path: Path) -> Iterator[None]:
 
 def require_outside(path: Path) -> None:
     """Raise UsageError for a file inside a store, because the store would then count as damaged."""
-    for folder in path.absolute().parents:
-        if (folder / "zarr.json").is_file() and _is_study(folder):
-            raise click.UsageError(f"expected a file outside every store, got {str(path)!r} in the store {folder.name}")
-
-
-def _is_study(folder: Path) -> bool:
     from mdr_dask.store import is_study
 
-    return is_study(str(folder))
+    for folder in path.absolute().parents:
+        if (folder / "zarr.json").is_file() and is_study(str(folder)):
+            raise click.UsageError(f"expected a file outside every store, got {str(path)!r} in the store {folder.name}")
 
 
 def require_suffix(path: Path | None, known: tuple[str, ...]) -> None:

@@ -5,18 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from mdr_dask import models
 from mdr_dask.aggregation import mean
-from mdr_dask.errors import DataError, ModelError
+from mdr_dask.errors import DataError, ModelError, did_you_mean
 from mdr_dask.models.base import Number, Status
-from mdr_dask.questions.expression import Column, Value, evaluate, parse
-
-if TYPE_CHECKING:
-    import xarray as xr
+from mdr_dask.questions.expression import Value, evaluate, parse
 
 #: Names of the columns with the state of the results of a row, and with the number of its finished results.
 STATUS, REALISATIONS = "status", "realisations"
@@ -62,7 +59,7 @@ class Columns:
     def __init__(self, dataset: xr.Dataset) -> None:
         self.dataset = dataset
         self._numbers, self._words = numbers(dataset), fixed_words(dataset)
-        self._found: dict[str, Column | None] = {}
+        self._found: dict[str, xr.DataArray | None] = {}
 
     @property
     def known(self) -> list[str]:
@@ -70,8 +67,8 @@ class Columns:
         data = self.dataset
         return [*map(str, data.data_vars), *map(str, data.coords), *self._numbers, REALISATIONS]
 
-    def find(self, name: str) -> Column | None:
-        """Return the values of a column (for an output, its mean over realisations); None if the name is unknown."""
+    def find(self, name: str) -> xr.DataArray | None:
+        """Return a column with its unit (for an output, its mean over realisations); None if the name is unknown."""
         if name not in self._found:
             self._found[name] = None  # ends the recursion of a formula that refers to itself
             self._found[name] = self._make(name)
@@ -85,22 +82,13 @@ class Columns:
         DataError
             If there is no such column, or the study lacks a quantity in the formula of the column.
         """
-        from xarray import DataArray
-
         found = self.find(name)
         if found is None:
             raise self.unknown(name)
-        array = found.array if isinstance(found.array, DataArray) else DataArray(found.array)
-        if name in self._numbers and name not in self.dataset:
-            return array.assign_attrs(units="1", long_name=self._numbers[name].meaning)
-        if name in self.dataset and name != STATUS:
-            return array.assign_attrs(self.dataset[name].attrs)
-        return array
+        return found
 
     def unknown(self, name: str) -> DataError:
         """Return the error for an unknown column, or for a number whose formula needs a missing quantity."""
-        from mdr_dask.errors import did_you_mean
-
         if name in self._numbers:
             needed = parse(self._numbers[name].formula).names
             missing = ", ".join(sorted(each for each in needed if self.find(each) is None))
@@ -118,36 +106,29 @@ class Columns:
 
     def truth(self, condition: str) -> xr.DataArray:
         """Return the truth values of a condition."""
-        from xarray import DataArray
-
-        array = self.evaluate(condition).array
-        found = array if isinstance(array, DataArray) else DataArray(array)
+        found = xr.DataArray(self.evaluate(condition).array)
         if found.dtype != bool:
             raise DataError(f"{condition!r}: expected a comparison such as 'hurst < 0.7'")
         return found
 
-    def _make(self, name: str) -> Column | None:
+    def _make(self, name: str) -> xr.DataArray | None:
         data = self.dataset
         if name == STATUS:
-            return Column(states(data), None)
+            return states(data)
         if name == REALISATIONS:
-            return Column(counts(data).isel(state=Status.DONE), "1")
-        if name in data.data_vars:
+            return counts(data).isel(state=Status.DONE)
+        if name in data and name != COUNTS:
             array = data[name]
-            return Column(mean(array) if "realisation" in array.dims else array, _unit(array))
-        if name in data.coords and name != COUNTS:
-            return Column(data[name], _unit(data[name]))
+            has_realisations = name in data.data_vars and "realisation" in array.dims
+            return mean(array).assign_attrs(array.attrs) if has_realisations else array
         if name in self._words:
-            return Column(self._words[name], None)
+            return xr.DataArray(self._words[name])
         if name in self._numbers:
             expression = parse(self._numbers[name].formula)
             if all(self.find(each) is not None for each in expression.names):
-                return Column(evaluate(expression, self.find).array, "1")
+                value = xr.DataArray(evaluate(expression, self.find).array)
+                return value.assign_attrs(units="1", long_name=self._numbers[name].meaning)
         return None
-
-
-def _unit(array: xr.DataArray) -> str | None:
-    return str(array.attrs.get("units", "1")) if array.dtype.kind in "fiu" else None
 
 
 def needed(dataset: xr.Dataset, names: Iterable[str]) -> list[str]:
@@ -163,8 +144,6 @@ def needed(dataset: xr.Dataset, names: Iterable[str]) -> list[str]:
 
 def counts(dataset: xr.Dataset) -> xr.DataArray:
     """Return for every row the number of results in each state, along the dimension ``state``."""
-    import xarray as xr
-
     if COUNTS in dataset:
         return dataset[COUNTS]
     status = dataset[STATUS]
@@ -174,8 +153,6 @@ def counts(dataset: xr.Dataset) -> xr.DataArray:
 
 def states(dataset: xr.Dataset) -> xr.DataArray:
     """Return the state of every row as text: ``failed`` for one result, ``2 failed, 1 missing`` for several."""
-    from xarray import DataArray
-
     if STATUS in dataset and "realisation" not in dataset[STATUS].dims:
         status = dataset[STATUS]
         return status.copy(data=WORDS[status.to_numpy()]).drop_attrs()
@@ -185,7 +162,7 @@ def states(dataset: xr.Dataset) -> xr.DataArray:
     )
     words = np.array([_described(kind) for kind in kinds], dtype=object)[of.ravel()]
     like = number.isel(state=0, drop=True)
-    return DataArray(words.reshape(like.shape), like.coords, like.dims)
+    return xr.DataArray(words.reshape(like.shape), like.coords, like.dims)
 
 
 def _described(kind: np.ndarray) -> str:

@@ -16,6 +16,7 @@ from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.units import conversion, dimension_of, is_unit
@@ -46,11 +47,7 @@ _OPERATORS: Mapping[type[ast.AST], Callable[[Any, Any], Any]] = {
 }
 
 
-class Column(NamedTuple):
-    """The values that a name stands for, with their coherent SI unit; the unit is None for words and truth values."""
-
-    array: Any
-    unit: str | None
+Find = Callable[[str], xr.DataArray | None]
 
 
 class Value(NamedTuple):
@@ -103,15 +100,15 @@ def parse(text: str) -> Expression:
     return Expression(text, tree, quantities)
 
 
-def evaluate(expression: Expression, find: Callable[[str], Column | None], known: Sequence[str] = ()) -> Value:
+def evaluate(expression: Expression, find: Find, known: Sequence[str] = ()) -> Value:
     """Return the value of an expression.
 
     Parameters
     ----------
     expression : Expression
         The return value of `parse`.
-    find : callable, str -> Column or None
-        Returns the values of a name; None if there is no such name.
+    find : callable, str -> DataArray or None
+        Returns the values of a name, in the SI unit ``attrs["units"]``; None if there is no such name.
     known : sequence of str
         All names, for the hint in the message about an unknown name.
 
@@ -169,7 +166,7 @@ def _name(node: ast.expr) -> str:
 class _Evaluation:
     """The evaluation of the nodes of one expression."""
 
-    def __init__(self, expression: Expression, find: Callable[[str], Column | None], known: Sequence[str]) -> None:
+    def __init__(self, expression: Expression, find: Find, known: Sequence[str]) -> None:
         self.text, self.quantities, self.find, self.known = expression.text, expression.quantities, find, known
 
     def value(self, node: ast.expr) -> Value:
@@ -211,9 +208,9 @@ class _Evaluation:
         if found is None:
             raise DataError(f"{self.text!r}: no column {name!r}{did_you_mean(name, self.known)}")
         try:
-            return Value(found.array, None if found.unit is None else dimension_of(found.unit)[0])
+            return Value(found, dimension_of(found.attrs.get("units", "1"))[0] if found.dtype.kind in "fiu" else None)
         except ValueError:  # a model from outside this package may declare a unit that `mdr_dask.units` does not define
-            return Value(found.array)
+            return Value(found)
 
     def _truth(self, node: ast.expr) -> Any:
         value = self.value(node)

@@ -49,7 +49,7 @@ def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn
             "--realisations)"
         )
     columns = [name for name in question.columns if name not in dataset.coords]
-    shown = outputs(dataset, [*question.outputs, *(name for name in columns if name in dataset.data_vars)])
+    shown = outputs(dataset, [*question.outputs, *(name for name in columns if name in dataset.data_vars)], tell)
     used = needed(dataset, [*columns, *(parse(question.where).names if question.where else ())])
     data = select(dataset[list(dict.fromkeys([*shown.data_vars, *used, STATUS]))], question.selections, tell)
     data = _in_pieces(data)

@@ -98,8 +98,11 @@ def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
     return datasets[series]
 
 
-def outputs(dataset: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
-    """Keep the named outputs with their errors; without names, all outputs with one number for each result."""
+def outputs(dataset: xr.Dataset, names: Sequence[str], tell: Tell | None = None) -> xr.Dataset:
+    """Keep the named outputs with their errors; without names, all outputs with one number for each result.
+
+    `tell` receives a sentence about the outputs that are left out because they have further dimensions.
+    """
     known = [str(name) for name in dataset.data_vars if name != "status"]
     for name in names:
         if name not in known:
@@ -108,6 +111,9 @@ def outputs(dataset: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
     of_cases = set(dataset["status"].dims)
     kept = list(names) or [name for name in known if set(dataset[name].dims) <= of_cases]
     errors = [dataset[name].attrs.get("ancillary_variables") for name in kept]
+    all_errors = {array.attrs.get("ancillary_variables") for array in dataset.data_vars.values()}
+    if tell and not names and (others := [name for name in known if name not in {*kept, *all_errors}]):
+        tell(f"left out, because they have further dimensions: {', '.join(others)} (name an output to include it)")
     return dataset[list(dict.fromkeys([*kept, *(error for error in errors if error in known)]))]
 
 

@@ -130,7 +130,7 @@ class _Maker:
             )
         texts = [question.where, *question.sort, *question.columns]
         named = [name for text in texts if text for name in parse(text).names]
-        shown = outputs(dataset, question.outputs) if question.outputs or not question.columns else dataset[[]]
+        shown = outputs(dataset, question.outputs, tell) if question.outputs or not question.columns else dataset[[]]
         errors = {shown[name].attrs.get("ancillary_variables") for name in shown.data_vars}
         self._question, self._raw = question, raw
         self._written = as_written(dataset) if question.written else {}
@@ -161,12 +161,15 @@ class _Maker:
 
     def order(self) -> NDArray[np.intp]:
         """Return the positions of the rows in sorted order."""
+        import pandas as pd
+
         question = self._question
         named = {name for text in (question.where, *question.sort) if text for name in parse(text).names}
         needs = self._data[[*needed(self._data, named), *({STATUS, COUNTS, CASES} & self._data.data_vars.keys())]]
         found = [(places, *self._keys(rows)) for places, rows in self._boxes(needs, ROWS, whole=True)]
         places, *keys = (np.concatenate(part) for part in zip(*found, strict=True))
-        ordered: NDArray[np.intp] = places[np.lexsort([_ranks(key) for key in reversed(keys)])]
+        words_by_rank = [pd.factorize(key, sort=True)[0] if key.dtype.kind == "O" else key for key in keys]
+        ordered: NDArray[np.intp] = places[np.lexsort(words_by_rank[::-1])]
         return ordered
 
     def picked(self, places: NDArray[np.intp]) -> Iterator[pd.DataFrame]:
@@ -242,13 +245,6 @@ class _Maker:
         units = {key: str(value.attrs.get("units", "1")) for key, value in flat.items()}
         size = rows.sizes["row"]
         return pd.DataFrame({key: np.broadcast_to(value.to_numpy(), size) for key, value in flat.items()}), units
-
-
-def _ranks(key: NDArray[Any]) -> NDArray[Any]:
-    """Return numbers that sort like the values of a key; words are sorted alphabetically."""
-    import pandas as pd
-
-    return pd.factorize(key, sort=True)[0] if key.dtype.kind == "O" else key
 
 
 def _numbered(dataset: xr.Dataset) -> xr.Dataset:
