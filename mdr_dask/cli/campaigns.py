@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mdr_dask.bars import at_work
-from mdr_dask.cli.printing import print_json, say, terminal_width
+from mdr_dask.cli.printing import hanging, print_json, say, terminal_width
 from mdr_dask.cli.writing import writing
 
 if TYPE_CHECKING:
@@ -34,23 +34,59 @@ def models(name: str | None, form: str | None) -> None:
 
     if name is None:
         rows = [{"model": known, "summary": models.load(known).summary} for known in models.names()]
-        _print_left(rows, form)
+        if form == "json":
+            print_json(rows)
+        else:
+            _print_named([(row["model"], row["summary"]) for row in rows])
         return
     model = _model(name)
+    parameters, outputs, numbers = parameter_rows(model), output_rows(model), number_rows(model)
+    together = alternatives_of(model)
     if form == "json":
-        parts = {"parameters": parameter_rows(model), "together": alternatives_of(model), "outputs": output_rows(model)}
-        print_json({"model": name, **parts, "numbers": number_rows(model)})
+        rest = {"parameters": parameters, "together": together, "outputs": outputs, "numbers": numbers}
+        print_json({"model": name, **rest})
         return
     say(f"{name}: {model.summary}\n\nparameters")
-    _print_left([row | {"parameter": _indented(row["parameter"])} for row in parameter_rows(model)], None)
-    if alternatives_of(model):
-        lines = (click.wrap_text(line, terminal_width(), subsequent_indent="    ") for line in alternatives_of(model))
+    _print_named([(_indented(row["parameter"]), _parameter(row)) for row in parameters])
+    if together:
+        lines = (click.wrap_text(line, terminal_width(), subsequent_indent="    ") for line in together)
         click.echo("\n".join(["", "exactly one of these is required", *lines]))
     click.echo("\noutputs")
-    _print_left([row | {"error": "yes" if row["error"] else ""} for row in output_rows(model)], None)
-    if model.numbers:
+    _print_named([(row["output"], _output(row)) for row in outputs])
+    if numbers:
         click.echo("\ndimensionless numbers")
-        _print_left(number_rows(model), None)
+        _print_named([(row["number"], f"{row['meaning']}; {row['formula']}") for row in numbers])
+
+
+def _print_named(entries: list[tuple[str, str]]) -> None:
+    """Print names in one column, each followed by its description."""
+    width = max(len(name) for name, _ in entries)
+    for name, text in entries:
+        click.echo(hanging(f"{name.ljust(width)}  ", text))
+
+
+def _indented(path: str) -> str:
+    """Return the last part of a dotted name, indented by two blanks for each earlier part."""
+    return "  " * path.count(".") + path.rpartition(".")[2]
+
+
+def _parameter(row: dict[str, str]) -> str:
+    """Return the meaning, unit, default and allowed values of a parameter; nested entries have lines of their own."""
+    words = [word for word in row["allowed"].split(" or ") if not word.startswith("{")]
+    default = f"default {row['default']}" if row["default"] not in ("", "required") else row["default"]
+    short = re.sub(r"\[([^\]]{9})[^\]]{30,}, ([^,\]]*)\]", r"[\1..., \2]", default)
+    return "; ".join(filter(None, [_with_unit(row), short, " or ".join(words)]))
+
+
+def _output(row: dict[str, str]) -> str:
+    """Return the meaning, unit and dimensions of an output, and whether it is computed by default and has an error."""
+    along = row["dimensions"] and f"along {row['dimensions']}"
+    missing = "" if row["default"] == "yes" else "only if requested"
+    return "; ".join(filter(None, [_with_unit(row), along, missing, row["error"] and "with error"]))
+
+
+def _with_unit(row: dict[str, str]) -> str:
+    return f"{row['meaning']} [{row['unit']}]" if row["unit"] not in ("", "1") else row["meaning"]
 
 
 def _model(name: str) -> Model[Any]:
@@ -90,36 +126,6 @@ def init(model: str, output: Path | None) -> None:
     with writing(output):
         output.write_text(text)
     click.echo(f"{output}: edit it, then run mdr-dask check {output}")
-
-
-def _print_left(rows: list[dict[str, str]], form: str | None) -> None:
-    if form == "json":
-        print_json(rows)
-        return
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for place, key in enumerate(rows[0]):
-        table.add_column(key, no_wrap=place == 0, overflow="fold")
-    for row in rows:
-        table.add_row(*(Text(_brief(cell)) for cell in row.values()))
-    console = Console(width=terminal_width(), color_system=None)
-    with console.capture() as written:
-        console.print(table)
-    click.echo("\n".join(line.rstrip() for line in written.get().splitlines()))
-
-
-def _indented(path: str) -> str:
-    """Return the last part of a dotted name, indented by two blanks for each earlier part."""
-    return "  " * path.count(".") + path.rpartition(".")[2]
-
-
-def _brief(cell: str) -> str:
-    """Shorten a cell: leave out the entries of structures, which have their own rows, and the middle of lists."""
-    words = re.sub(r"\{[^{}]*\}", "{...}", cell).split(" or ")
-    return re.sub(r"\[([^\]]{9})[^\]]{30,}, ([^,\]]*)\]", r"[\1..., \2]", " or ".join(dict.fromkeys(words)))
 
 
 @click.command()
