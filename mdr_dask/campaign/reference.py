@@ -48,31 +48,31 @@ _VARIATION = """\
 
 | written | means |
 |---|---|
-| `[1 N, 3 N, 10 N]` | these values, inside structured parameters too |
-| `[[1 ms], [1 ms, 1 s]]` | values of a parameter that is itself a list; the store names them as they are written |
-| `{values: [...]}` | the same |
+| `[1 N, 3 N, 10 N]` | these values; also inside a structure |
+| `[[1 ms], [1 ms, 1 s]]` | two values of a parameter that is itself a list; the store names them as they are written |
+| `{values: [...]}` | the same as a list |
 | `{linear: [a, b, n]}` | `n` values at equal distances from `a` to `b`, both included |
 | `{geometric: [a, b, n]}` | `n` values at equal ratios; both ends above 0 |
-| `{adaptive: [a, b], until: 1 %, at_most: 60}` | the study [chooses the values itself](adaptive.md) |
-| `[{shape: cone, angle: 10 deg}, {shape: plane}]` | structures; the store names them as they are written |
-| `{shape: cone, angle: {linear: [5 deg, 75 deg, 20]}}` | an entry of a structure; its axis is called `indenter_angle` |
+| `{adaptive: [a, b], until: 1 %, at_most: 60}` | the study [chooses the values](adaptive.md) between `a` and `b` |
+| `[{shape: cone, angle: 10 deg}, {shape: plane}]` | two structures; the store names them as they are written |
+| `{shape: cone, angle: {linear: [5 deg, 75 deg, 20]}}` | an entry of `indenter`; its axis is called `indenter_angle` |
 
-The ends of a range are exact, the values between are rounded to 14 digits. Values that agree to 12 digits are the same
-value. Ranges of whole numbers are rounded to whole numbers, each once.
+The ends of a range are exact, the values between them are rounded to 14 digits. Values that agree to 12 digits count as
+the same value. In a range of whole numbers, values are rounded, and each value appears once.
 
-Each of the `series` replaces some of the `parameters`; a campaign without `series` is one series without a name.
+Each of the `series` replaces some of the `parameters`. A campaign without `series` has one series without a name.
 
 | `sampling` | means |
 |---|---|
-| `grid` | all values of each with all values of the others: one dimension for each varied parameter |
-| `zip` | the first values together, the second values together, ...: one dimension `case` |
+| `grid` | all combinations of the values of the varied parameters: one dimension for each of them |
+| `zip` | the first values of all varied parameters together, then the second values, ...: one dimension `case` |
 | `{sobol: n}` | `n` points of a scrambled Sobol sequence in the ranges |
-| `{latin_hypercube: n}` | `n` points, one in each of `n` strips of every range |
-| `{saltelli: n}` | `n` (inputs + 2) points for [Sobol indices](sensitivity.md) |
+| `{latin_hypercube: n}` | `n` points, one in each of `n` intervals of every range |
+| `{saltelli: n}` | `n` (d + 2) points for [Sobol indices](sensitivity.md) of `d` varied parameters |
 | `{table: cases.csv}` | a case for each line of a CSV file |
 
 All except `grid` have the single dimension `case`. Ranges to draw from have no number of values: `{linear: [a, b]}` is
-uniform, `{geometric: [a, b]}` uniform in the logarithm. Drawn points depend on `seed` only; a larger `sobol` keeps
+uniform, `{geometric: [a, b]}` is uniform in the logarithm. Drawn points depend only on `seed`; a larger `sobol` keeps
 the points of a smaller one. The headings of a table are names of parameters, with units if needed:
 `velocity [mm/s],indenter.angle [deg]`.
 """
@@ -145,8 +145,8 @@ def _units() -> str:
             "## Units",
             "",
             "A number without a unit is in SI units. With a unit it is a string: `20 mm`, `10 mPa s`, `870 kg/m^3`. An",
-            "angle is not a pure number: `5 deg`, not `5 %`. `check` asks you to confirm a bare number more than three",
-            "decades from the usual value, such as `length: 20`.",
+            "angle is not a pure number: `5 deg`, not `5 %`. `check` asks about a number without a unit that is more",
+            "than three decades from the usual value (`length: 20`), or nearer to it in rpm, degrees or Celsius.",
             "",
             f"Prefixes: {', '.join(f'`{prefix}`' for prefix in prefixes)}, and their names.",
             "",
