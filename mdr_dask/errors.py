@@ -90,7 +90,7 @@ _DIFFERENCES = {"diameter": ", half the diameter", "pressure": ", a load instead
 
 
 def did_you_mean(word: Any, known: Sequence[str]) -> str:
-    """Return a hint in parentheses, after a blank: the nearest known word, or all known words if they are few."""
+    """Return a hint in parentheses, after a space: the nearest known word, or all known words if they are few."""
     from difflib import get_close_matches
 
     folded = {name.casefold(): name for name in known}

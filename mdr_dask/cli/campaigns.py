@@ -66,7 +66,7 @@ def _print_named(entries: list[tuple[str, str]]) -> None:
 
 
 def _indented(path: str) -> str:
-    """Return the last part of a dotted name, indented by two blanks for each earlier part."""
+    """Return the last part of a dotted name, indented by two spaces for each earlier part."""
     return "  " * path.count(".") + path.rpartition(".")[2]
 
 

@@ -103,9 +103,8 @@ def plot(
         groups = selection.select_all(groups, selections, tell)
         if where:
             groups = selection.where_all(groups, where)
-            figures = {name: _without(figure, where) for name, figure in figures.items()}
         warnings = _warnings(urls)
-        figures = {name: _warned(figure, warnings) for name, figure in figures.items()}
+        figures = {name: _with_notes(figure, where, warnings) for name, figure in figures.items()}
         if measured is not None:
             from mdr_dask.plots.measured import with_points
 
@@ -127,12 +126,12 @@ def _require_quantities(units: Mapping[str, str], groups: Mapping[str, xr.Datase
             raise DataError(f"no quantity {name!r} to give a unit{did_you_mean(name, known)}")
 
 
-def _without(figure: Plot, where: str) -> Plot:
-    """Return a figure with a note on the cases that it leaves out."""
+def _with_notes(figure: Plot, where: str, warnings: list[str]) -> Plot:
+    """Return a figure that names the condition of its cases, and shows the warnings of its results."""
 
     def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
-        drawn = figure.draw(groups)
-        drawn.leave_out([f"cases other than {where}"])
+        drawn = replace(figure.draw(groups), warnings=warnings)
+        drawn.leave_out([f"cases other than {where}"] * bool(where))
         return drawn
 
     return replace(figure, draw=draw)
@@ -153,11 +152,6 @@ def _warnings(urls: Sequence[str]) -> list[str]:
             for group in progress.grouped(done, studies)
         ]
     return found
-
-
-def _warned(figure: Plot, warnings: list[str]) -> Plot:
-    """Return a figure that shows the warnings of its results."""
-    return replace(figure, draw=lambda groups: replace(figure.draw(groups), warnings=warnings))
 
 
 def _split(words: Sequence[str]) -> tuple[list[str], list[str]]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Row = dict[str, Any]
 #: An error below this fraction of its mean counts as a rounding error.
 ROUNDING = 1e-13
-#: `GAP`: blanks between two columns of a table. `NARROWEST`: smallest width in characters for which tables are
+#: `GAP`: spaces between two columns of a table. `NARROWEST`: smallest width in characters for which tables are
 #: formatted.
 GAP, NARROWEST = 2, 40
 #: Smallest width in characters to which a long text in the last column is wrapped.
@@ -30,7 +30,7 @@ WRAPPED = 30
 #: Numbers below `_SMALL` or above `_LARGE` are printed with a power of ten.
 _SMALL, _LARGE = 1e-4, 1e6
 UNKNOWN = "-"
-#: A blank at which lines are not broken.
+#: A space at which lines are not broken.
 _BLANK = "\N{NO-BREAK SPACE}"
 
 
@@ -186,7 +186,7 @@ def hanging(before: str, text: str) -> str:
 
 
 def _heading(title: str, width: int) -> list[str]:
-    """Return the lines of a heading: the name, broken after ``_`` or blanks to fit the column, and the unit."""
+    """Return the lines of a heading: the name, broken after ``_`` or spaces to fit the column, and the unit."""
     name, unit = _name(title), _unit(title).strip()
     pieces = re.findall(r"[^_ ]+[_ ]*", name) or [name]
     lines = [""]

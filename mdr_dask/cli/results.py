@@ -182,7 +182,11 @@ def list_names(model: str, summaries: dict[str, str]) -> None:
 
 
 def require_known(names: Sequence[str], known: Sequence[str], what: str) -> None:
-    """Raise UsageError for an unknown name."""
+    """Raise UsageError for an unknown name, with the nearest known name."""
+    from mdr_dask.errors import did_you_mean
+
     for name in names:
         if name not in known:
-            raise click.UsageError(f"no {what} is called {name!r}; known: {', '.join(known) or 'none'}")
+            hint = did_you_mean(name, known)
+            rest = hint if "mean" in hint else f"; known: {', '.join(known) or 'none'}"
+            raise click.UsageError(f"no {what} is called {name!r}{rest}")

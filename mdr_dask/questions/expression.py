@@ -28,7 +28,7 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
     "log": np.log,
     "log10": np.log10,
 }
-#: Relative difference up to which numbers count as equal, also in selections; screens show six digits.
+#: Relative difference up to which numbers count as equal, also in selections, because tables show six digits.
 SAME = 1e-5
 _LONGEST = 500
 _NUMBER = re.compile(r"(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.])|(?<![\w.])\d+\.?\d*(?=[^\W\d_])")

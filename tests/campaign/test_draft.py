@@ -88,7 +88,7 @@ def test_a_model_of_ones_own_has_a_draft_too(tmp_path, monkeypatch, capsys):
     assert "shift: 1 K " in (tmp_path / "pin.yaml").read_text()  # without any bound
     capsys.readouterr()
     assert main(["init", "drafted:MODEL", "-o", "pin.yaml"]) == 2
-    assert "pin.yaml: exists already" in capsys.readouterr().err
+    assert "pin.yaml: this file exists already" in capsys.readouterr().err
     assert main(["init", "sliding_frition"]) == 2
     assert "(did you mean 'sliding_friction'?)" in capsys.readouterr().err
 
