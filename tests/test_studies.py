@@ -186,7 +186,7 @@ REFUSED = [
     (lambda: mdr_dask.check({**SMALL, "realisation": 3}), CampaignError, "realisation: unknown key (did"),
     (lambda: mdr_dask.run({"model": "slidin_friction"}), CampaignError, "did you mean 'sliding_friction'"),
     (lambda: mdr_dask.open("nowhere.zarr"), StoreError, "nowhere.zarr: no store here"),
-    (lambda: mdr_dask.plot(xr.Dataset(), "velocity"), DataError, "expected a study as run or open returns it"),
+    (lambda: mdr_dask.plot(xr.Dataset(), "velocity"), DataError, "expected a study as returned by run or open_study"),
 ]
 
 
@@ -210,10 +210,10 @@ UNFIT = [
         lambda study: mdr_dask.aggregate(study, "medan"),
         "no statistic is called 'medan' (did you mean 'mean'?)",
     ),
-    (lambda study: mdr_dask.aggregate(xr.Dataset()), "expected a study as run or open returns it"),
+    (lambda study: mdr_dask.aggregate(xr.Dataset()), "expected a study as returned by run or open_study"),
     (lambda study: mdr_dask.plot(study.isel(realisation=0), "velocity"), "isel(realisation=[0]) keeps one"),
     (lambda study: mdr_dask.fit(study.mean("realisation"), "plateau"), "with its status and realisations"),
-    (lambda study: mdr_dask.plot(study, "friction_coefficient"), "is an output: name the axis to draw it over"),
+    (lambda study: mdr_dask.plot(study, "friction_coefficient"), "is an output: name an axis to draw it against"),
 ]
 
 

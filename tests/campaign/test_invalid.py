@@ -1,4 +1,4 @@
-"""Every file in ``invalid`` is refused with the messages that stand beside it."""
+"""Every campaign in `mistakes` is refused with its messages."""
 
 from __future__ import annotations
 
@@ -6,27 +6,26 @@ import pickle
 from pathlib import Path
 
 import pytest
+from mistakes import MISTAKES, campaign, messages
 
-from mdr_dask.campaign import load
+from mdr_dask.campaign import load, loads
 from mdr_dask.errors import CampaignError
 
-FOLDER = Path(__file__).parent / "invalid"
-FILES = sorted(FOLDER.glob("*.yaml"))
+TABLES = Path(__file__).parent / "tables"
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
-def test_invalid_campaign_is_refused_with_all_its_problems(path, monkeypatch):
-    monkeypatch.chdir(FOLDER)
-    with pytest.raises(CampaignError, match=r"^[a-z_]+\.(yaml|csv):\d+:\d+: ") as caught:
-        load(path.name)
-    messages = str(caught.value).replace(f"{FOLDER}/", "")
-    assert messages.splitlines() == path.with_suffix(".txt").read_text().splitlines()
+@pytest.mark.parametrize("name", MISTAKES)
+def test_an_invalid_campaign_is_refused_with_all_its_problems(name, monkeypatch):
+    monkeypatch.chdir(TABLES)
+    with pytest.raises(CampaignError) as caught:
+        loads(campaign(name), "bad.yaml", ".")
+    found = [str(problem).replace(f"{TABLES}/", "").removeprefix("bad.yaml:") for problem in caught.value.args]
+    assert found == messages(name)
 
 
-def test_problems_are_sorted_and_survive_pickling(monkeypatch):
-    monkeypatch.chdir(FOLDER)
-    with pytest.raises(CampaignError, match=r"many\.yaml") as caught:
-        load("many.yaml")
+def test_problems_are_sorted_and_survive_pickling():
+    with pytest.raises(CampaignError, match=r"bad\.yaml") as caught:
+        loads(campaign("many"), "bad.yaml", ".")
     lines = [int(problem.split(":")[1]) for problem in caught.value.args]
     assert lines == sorted(lines)
     assert len(lines) > 10

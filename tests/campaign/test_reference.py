@@ -8,6 +8,7 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+from mistakes import campaign
 from ruamel.yaml import YAML
 
 from mdr_dask import models
@@ -15,7 +16,6 @@ from mdr_dask.campaign import json_schema, reference
 from mdr_dask.campaign.spec import CampaignSpec
 
 VALID = Path(__file__).parent / "valid"
-INVALID = Path(__file__).parent / "invalid"
 
 
 @pytest.fixture(name="validator")
@@ -54,7 +54,7 @@ def test_schema_accepts_valid_files(validator, path):
     ],
 )
 def test_schema_refuses_what_needs_no_units(validator, name):
-    assert list(validator.iter_errors(plain((INVALID / f"{name}.yaml").read_text())))
+    assert list(validator.iter_errors(plain(campaign(name))))
 
 
 def test_reference_names_every_key_parameter_and_output(rubbing, monkeypatch):

@@ -94,7 +94,7 @@ def profile(name: str, spacing: float, seed: int, size: int = 4000) -> None:
             MIXED,
             "  roller_radius: 1 mm\n",
             "  roller_radius: 1 mm\n  shortest_wavelength: 0.1 um\n",
-            "expected a shortest wavelength of at least two spacings",
+            "expected a shortest wavelength of at least two point spacings",
         ),
         (
             MIXED,
@@ -102,7 +102,7 @@ def profile(name: str, spacing: float, seed: int, size: int = 4000) -> None:
             PROFILES,
             "expected profiles of the same spacing, got 1e-06 m and 2e-06 m",
         ),
-        (MIXED, "  rms_roughness: 0.2 um\n", PROFILES.splitlines(True)[0], "the surfaces of both rollers or of none"),
+        (MIXED, "  rms_roughness: 0.2 um\n", PROFILES.splitlines(True)[0], "expected both surface_1 and surface_2 or neither"),
         (MIXED, "  rms_roughness: 0.2 um\n", "", "expected rms_roughness, or surface_1 and surface_2"),
         (MIXED, "  rms_roughness: 0.2 um\n", PROFILES.replace("two.csv", "no.csv"), "no.csv"),
         (LINE, "mean_velocity: 1 m/s", "mean_velocity: 0 m/s", "0 m/s"),

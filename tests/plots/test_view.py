@@ -1,6 +1,7 @@
 """Any output against its parameters: the data given are the data drawn."""
 
 import io
+import json
 
 import numpy as np
 import pandas as pd
@@ -14,7 +15,7 @@ from mdr_dask import aggregation, execute
 from mdr_dask.campaign import loads
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Status
-from mdr_dask.plots import page
+from mdr_dask.plots import curves, page
 from mdr_dask.plots.render import render
 from mdr_dask.plots.view import View, draw, figure_of
 from mdr_dask.store import datasets
@@ -231,3 +232,11 @@ def test_warnings_of_results_are_in_figure_and_table(groups):
     figure.warnings = ["3 results of the store: outside the range tested"]
     assert "warning: 3 results" in render(figure).get_suptitle()
     assert "warning: 3 results of the store: outside the range tested" in figure.head({})
+
+
+@pytest.mark.parametrize(("rule", "named"), [("exact", False), ("fast", True)])
+def test_a_title_leaves_out_a_parameter_without_effect(rule, named):
+    attrs = {"model": "fretting_wear", "parameters": json.dumps({"wear_rule": rule})}
+    assert ("xi" in curves.scalars(xr.Dataset(coords={"xi": 0.8, "stick_radius": 0.5}, attrs=attrs))) == named
+    varied = {"wear_rule": ("wear_rule", ["exact", "fast"]), "xi": 0.8}
+    assert "xi" in curves.scalars(xr.Dataset(coords=varied, attrs=attrs))
