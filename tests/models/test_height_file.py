@@ -122,7 +122,7 @@ def test_a_text_map_is_read_as_it_stands(layout, tmp_path):
     np.testing.assert_allclose(surface.height[~holes], expected[~holes], atol=1e-13)
     assert surface.size == pytest.approx((LENGTH, LENGTH * NY / NX), rel=1e-3)
     left_out = any(word in layout for word in ("axes", "pandas", "numbers", "position", "corner"))
-    assert ("positions or numbers, left out" in " ".join(remarks)) == (
+    assert ("lines of positions or row numbers are left out" in " ".join(remarks)) == (
         left_out and "xyz" not in layout and "preamble" not in layout
     )
     if "preamble" in layout:
@@ -165,8 +165,8 @@ def test_encodings_of_windows_are_read(tmp_path):
         ),
         ("x [um] y [um] z [nm]\n" + joined(xyz(), " "), Units("", "", 1e-6), "leave out `spacing`"),
         (joined(np.c_[xyz(), xyz()]), XYZ, "expected a map, or columns x, y and z, got 6 columns: name them"),
-        ("no numbers at all\n", UNITS, "expected rows of heights"),
-        ("", UNITS, "expected rows of heights"),
+        ("no numbers at all\n", UNITS, "expected the same number of heights in every row"),
+        ("", UNITS, "expected the same number of heights in every row"),
     ],
 )
 def test_what_cannot_be_read_says_what_to_give(text, units, message, tmp_path):

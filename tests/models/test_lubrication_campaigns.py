@@ -102,7 +102,12 @@ def profile(name: str, spacing: float, seed: int, size: int = 4000) -> None:
             PROFILES,
             "expected profiles of the same spacing, got 1e-06 m and 2e-06 m",
         ),
-        (MIXED, "  rms_roughness: 0.2 um\n", PROFILES.splitlines(True)[0], "expected both surface_1 and surface_2 or neither"),
+        (
+            MIXED,
+            "  rms_roughness: 0.2 um\n",
+            PROFILES.splitlines(True)[0],
+            "expected both surface_1 and surface_2 or neither",
+        ),
         (MIXED, "  rms_roughness: 0.2 um\n", "", "expected rms_roughness, or surface_1 and surface_2"),
         (MIXED, "  rms_roughness: 0.2 um\n", PROFILES.replace("two.csv", "no.csv"), "no.csv"),
         (LINE, "mean_velocity: 1 m/s", "mean_velocity: 0 m/s", "0 m/s"),

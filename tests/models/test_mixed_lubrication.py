@@ -396,7 +396,7 @@ def test_trace_under_slip_agrees_with_its_mean(slip):
             {"longest_wavelength": 1e-6, "shortest_wavelength": 1e-5},
             "expected the longest wavelength above the shortest",
         ),
-        ({"shortest_wavelength": 1e-7}, "expected a shortest wavelength of at least two spacings"),
+        ({"shortest_wavelength": 1e-7}, "expected a shortest wavelength of at least two point spacings"),
         ({"points": "auto", "shortest_wavelength": 1e-9}, "expected a shortest_wavelength of at least 1.571e-09 m"),
         ({"rms_roughness": None}, "expected rms_roughness, or surface_1 and surface_2"),
         ({"slide_roll_ratio": 3.0}, "Input should be less than or equal to 2"),
@@ -462,12 +462,12 @@ def test_creep_on_measured_profiles_has_the_mean_of_pure_rolling_and_of_swapped_
 def test_bad_profiles_give_one_error(tmp_path):
     assert "expected profiles of the same spacing, got 1e-06 m and 2e-06 m" in refused(**profiles(tmp_path, 2e-6))
     files = profiles(tmp_path)
-    assert "expected the surfaces of both rollers or of none" in refused(surface_1=files["surface_1"])
+    assert "expected both surface_1 and surface_2 or neither" in refused(surface_1=files["surface_1"])
     (tmp_path / "bad.csv").write_text("x [m], z [m]\n1, 2\n3, many\n")
     assert "bad.csv:3:4: column z: expected a number, got 'many'" in refused(
         **files | {"surface_2": {"profile": str(tmp_path / "bad.csv")}}
     )
-    assert "wider than the line" in refused(**files | {"normal_force": 1e7})
+    assert "expected a contact width 2a of at most" in refused(**files | {"normal_force": 1e7})
 
 
 @pytest.mark.slow

@@ -208,7 +208,7 @@ def test_two_rollers_have_spectra_of_their_own(tmp_path):
         np.testing.assert_allclose(same.values[name], wanted.values[name], rtol=1e-9)
     rougher, _ = values(surface_1=files[0], surface_2=files[1])
     np.testing.assert_allclose(rougher.values["film_ratio"], wanted.values["film_ratio"] / np.sqrt(5), rtol=1e-9)
-    with pytest.raises(ValidationError, match="the surfaces take the place of rms_roughness"):
+    with pytest.raises(ValidationError, match="surface_1 and surface_2 replace rms_roughness"):
         values(surface_1=files[0], surface_2=files[0], rms_roughness=2e-7)
 
 
