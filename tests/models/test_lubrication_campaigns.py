@@ -224,7 +224,7 @@ def test_ranges_that_are_left_stand_beside_the_results(capsys):
         told[name] = capsys.readouterr().out
     assert "film formula Pan-Hamrock (central) is extrapolated: W lies outside" in told["mixed"]
     assert "film ratio" in told["loaded"]
-    assert "at the given film the asperities would carry" in told["loaded"]
+    assert "at the given film thickness, asperities would carry" in told["loaded"]
     assert "film formula Pan-Hamrock (central) is extrapolated: W lies outside" in told["line"]
 
 

@@ -493,7 +493,7 @@ def test_error_within_a_revolution_is_the_scatter_between_revolutions():
     [
         ({"film_thickness": 1e-4}, "the film is thicker than 0.1 of the radius"),
         ({"film_thickness": None, "normal_force": 1.0}, "film formula Pan-Hamrock (central) is extrapolated: W lies"),
-        ({"film_thickness": 1e-8, "rms_roughness": 2e-5}, "overlaps merge into clusters"),
+        ({"film_thickness": 1e-8, "rms_roughness": 2e-5}, "asperities merge into large clusters"),
     ],
 )
 def test_what_lies_beyond_the_tested_range_is_warned_of(changes, message):
