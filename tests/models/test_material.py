@@ -90,7 +90,7 @@ def test_table_of_many_temperatures_is_superposed():
 
 
 def test_table_needs_a_temperature_or_a_reference():
-    with pytest.raises(DataError, match="has several temperatures: name one by table_temperature, a reference"):
+    with pytest.raises(DataError, match="has several temperatures: choose one by table_temperature, or superpose"):
         solid_of(material(dma_table={"file": TABLE, "poisson_ratio": 0.5}))
     assert material(dma_table=TABLE) == material(dma_table={"file": TABLE})
     with pytest.raises(DataError, match=r"got no rows at 226.9 degC; the table was measured at -4"):
@@ -229,8 +229,8 @@ def test_curves_with_a_gap_are_refused_before_any_is_shifted(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("T [K],a_T\n300,1\n310,2\n", "an a_T that falls from each to the next"),
-        ("T [K],a_T\n300,0.5\n310,0.1\n", "expected an a_T that passes 1"),
+        ("T [K],a_T\n300,1\n310,2\n", "values of a_T that decrease with the temperature"),
+        ("T [K],a_T\n300,0.5\n310,0.1\n", "expected values of a_T that include or enclose 1"),
         ("T [K],a_T\n300,1\n", "expected two or more temperatures"),
         ("T [K],a_T,log aT\n300,1,0\n310,0.1,-1\n", "one of the columns a_T and log10 a_T"),
     ],
