@@ -307,7 +307,10 @@ def test_what_may_come_is_said_before(study, tmp_path, monkeypatch, capsys):
     assert study  # registers the model
     assert main(["check", "c.yaml"]) == 0
     told = capsys.readouterr().out
-    assert "1 mm to 1 km, 5 to 60 values, geometric, until y is interpolated within 1 % of its largest value" in told
+    assert (
+        "1 mm to 1 km, 5 to 60 values, geometric, until y is interpolated with an error below 1 % of its largest value"
+        in told
+    )
     assert "10 to 120 cases x 1 realisation = 10 to 120 results" in told
     assert main(["run", "c.yaml", "--dry-run", "--json"]) == 0
     plan = json.loads(capsys.readouterr().out)
@@ -393,7 +396,7 @@ def test_a_figure_has_the_values_that_each_curve_needed(study, url):
         (
             "{film: 1 %}",
             "film, minimum_film",
-            "speed_parameter.until.film: expected an output of one number a case, this",
+            "speed_parameter.until.film: expected an output with a single number for each case, got one",
         ),
         (
             "1 %",
