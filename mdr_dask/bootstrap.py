@@ -79,6 +79,11 @@ def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
     return rows
 
 
+def with_errors(stack: FloatArray, errors: FloatArray) -> FloatArray:
+    """Return a stack with additional rows in which the mean is shifted by its errors (see `moved`)."""
+    return np.concatenate([stack, moved(stack[0], errors)]) if np.any(errors > 0) else stack
+
+
 def difference(one: FloatArray, other: FloatArray) -> FloatArray:
     """Return the stack of the difference of two stacks with the same resamples.
 
@@ -114,7 +119,7 @@ def regrouped(stack: FloatArray) -> FloatArray:
     """
     shifts = stack[1 + RESAMPLES :] - stack[0]
     own = np.maximum(_reach(shifts), _reach(-shifts))
-    return np.concatenate([stack[: 1 + RESAMPLES], moved(stack[0], own)]) if np.any(own > 0) else stack[: 1 + RESAMPLES]
+    return with_errors(stack[: 1 + RESAMPLES], own)
 
 
 def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tuple[FloatArray, FloatArray]:

@@ -23,7 +23,6 @@ def fit(campaign: str, law: str) -> str:
 MIDDLE = {"hurst": slice(0.15, 0.85)}
 THREE = {"hurst": [0.2, 0.5, 0.8]}
 FEW = {"hurst": "[0, 0.2, 0.5, 0.8, 1]"}
-ALL = {"hurst": "all"}
 #: Reduced axes of campaigns: few speeds and Hurst exponents of the kinetics, and loads on the plateau.
 SPEEDS = {"series_velocity": "{velocity: {geometric: [10 um/s, 10 m/s, 15]}, hurst: [0, 0.3, 0.7, 1]}"}
 LOADS = {
@@ -381,20 +380,20 @@ KINETICS = (
         "(4.9)",
         "In region I zeta = 1",
         fit("kinetics2014", "jump_law"),
-        kinetics("jump_law", sentence="zeta_holds", constants=("zeta",), within=ALL),
+        kinetics("jump_law", sentence="zeta_holds", constants=("zeta",)),
     ),
     Claim(
         "(4.10)",
         "On the plateau the jump is 0.4 of the slope, times dv / v_1",
         fit("kinetics2014", "jump_law"),
-        kinetics("jump_law", sentence="plateau_holds", constants=("plateau_jump",), within=ALL),
+        kinetics("jump_law", sentence="plateau_holds", constants=("plateau_jump",)),
         "Printed without dv / v_1 and with mu_1 in place of 1: a misprint, since (4.11) has this limit.",
     ),
     Claim(
         "(4.11), fig. 4.5",
         "The jump follows one law with the constant 0.4",
         fit("kinetics2014", "jump_law"),
-        kinetics("jump_law", constants=("constant",), within=ALL),
+        kinetics("jump_law", constants=("constant",)),
         "With 0.4 the knee is 20 to 29 % too low at mu_1 = 0.5 to 0.8 of the slope.",
     ),
     Claim(

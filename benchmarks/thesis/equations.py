@@ -35,8 +35,8 @@ EQUATIONS = (
     ("(4.5)-(4.7)", "fits/relaxation.py", "planted exponentials"),
     ("(4.8), (4.9)", "fits/jumps.py", "fits `jump_linearity`, `jump_law`"),
     ("(4.10), (4.11)", "fits/jumps.py: jump_law", "(4.10) is misprinted: limit of (4.11) is 0.4 dv / v_1"),
-    ("(4.12)", "fits/kinetic_cases.py: law_rate", "factor 1 by (4.13) and (4.15); fit `rate_power`"),
-    ("(4.13)-(4.15)", "fits/kinetics.py: relaxation_law", "fit `relaxation`; (4.14) is lost in print"),
+    ("(4.12)", "fits/relaxation.py: law_rate", "factor 1 by (4.13) and (4.15); fit `rate_power`"),
+    ("(4.13)-(4.15)", "fits/relaxation.py: relaxation_law", "fit `relaxation`; (4.14) is lost in print"),
     ("(5.1)", "models/mixed_lubrication", "Holm's constriction: 1/R = L_cont / rho"),
     ("(5.2)", "physics/lubrication/film_formulas.py: hertz_line", "Hertz"),
     (

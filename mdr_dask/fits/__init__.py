@@ -14,8 +14,8 @@ SUBJECTS: tuple[str, ...] = (
     "friction",
     "indenter",
     "jumps",
-    "kinetics",
     "master_curve",
+    "relaxation",
     "scaling",
 )
 

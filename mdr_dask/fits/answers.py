@@ -160,7 +160,7 @@ def cases_behind(
     """
     data = groups[name]
     sizes = {str(dim): size for dim, size in data["status"].sizes.items() if dim != "realisation"}
-    own = [dim for dim in sizes if dim in wide.dims and _is_own(data, wide, dim)]
+    own = [dim for dim in sizes if dim in wide.dims]
     place = {dim: xr.DataArray(np.arange(size), dims=dim) for dim, size in sizes.items()}
     chosen = xr.ones_like(sum(place.values(), xr.DataArray(0)), dtype=bool) & _over(own, wide)
     step = _steps(data, [dim for dim in sizes if dim not in own])
@@ -188,16 +188,6 @@ def cases_behind(
             follows = follows | here
         chosen = chosen & follows
     return chosen.transpose(*sizes)
-
-
-def _is_own(data: xr.Dataset, wide: xr.DataArray, dim: str) -> bool:
-    """Return whether a dimension of a result has the same values as in the study.
-
-    It does not if the result has an additional element for all values together.
-    """
-    if dim in data.coords and dim in wide.coords:
-        return data[dim].equals(wide[dim])
-    return data.sizes[dim] == wide.sizes[dim]
 
 
 def _over(dims: list[str], flags: xr.DataArray) -> xr.DataArray:

@@ -82,6 +82,13 @@ class Calibration:
         """Products of powers of the undetermined unknowns that the data determine."""
         return identifiability.products(self.posterior, self.values, self.free)
 
+    def name_and_unit(self, product: identifiability.Product) -> tuple[str, str]:
+        """Return a product as text, and its unit."""
+        units = [self.units[name] for name in self.unknowns]
+        return identifiability.written(self.unknowns, product.exponents), identifiability.unit_of(
+            units, product.exponents
+        )
+
     @cached_property
     def residuals(self) -> Residuals:
         """Residuals of the best prediction."""
@@ -268,8 +275,7 @@ def summary(found: Calibration) -> xr.Dataset:
             ends = dict.fromkeys(ends, np.nan) | _bound(found, k)
         variables |= {name + end: ((), value, attributes) for end, value in ends.items()}
     for product in found.products:
-        name = identifiability.written(found.unknowns, product.exponents)
-        unit = identifiability.unit_of([found.units[each] for each in found.unknowns], product.exponents)
+        name, unit = found.name_and_unit(product)
         ends = _intervals(product.values, found.posterior.weights)
         variables |= {name + end: ((), value, {"units": unit, "long_name": name}) for end, value in ends.items()}
     pure = {"units": "1"}
@@ -335,8 +341,7 @@ def _known(found: Calibration) -> str:
         return "every unknown is determined"
     known = [name for name in found.unknowns if name not in free]
     for product in found.products:
-        name = identifiability.written(found.unknowns, product.exponents)
-        unit = identifiability.unit_of([found.units[each] for each in found.unknowns], product.exponents)
+        name, unit = found.name_and_unit(product)
         ends = _intervals(product.values, found.posterior.weights)
         half = (ends["_high"] - ends["_low"]) / 2 / ends[""]
         known.append(f"{name} ({ends['']:.3g}{'' if unit == '1' else ' ' + unit} +- {half:.2g} of it)")

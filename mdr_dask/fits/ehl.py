@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-
 import numpy as np
 import xarray as xr
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import FITTED_LAW_HOLDS, WITHIN, Fit, law_holds, undetermined
+from mdr_dask.fits.base import WITHIN, Fit, law_holds, undetermined
+from mdr_dask.fits.cases import Series, Variables, each, holds, measure, rms
 from mdr_dask.models.ehl_line import groups as groups_of
 from mdr_dask.physics.lubrication.film_formulas import PAN_HAMROCK_CENTRAL, PAN_HAMROCK_MINIMUM
 
@@ -27,23 +26,6 @@ def _logarithms(dataset: xr.Dataset, output: str) -> FloatArray:
         np.float64
     )
     return np.asarray(np.log(table[:, np.isfinite(table).all(axis=0) & (table > 0).all(axis=0)]))
-
-
-def _maps(groups: Mapping[str, xr.Dataset]) -> Iterator[tuple[str, xr.Dataset]]:
-    """Yield the films of each series, separately for each value of other varied parameters (viscosity law, inlet)."""
-    for name, dataset in groups.items():
-        outputs = [output for output in _FILMS if output in dataset]
-        if not outputs:
-            continue
-        varied = {str(dim) for group in groups_of(dataset.coords.get) for dim in getattr(group, "dims", ())}
-        others = [str(dim) for dim in dataset[outputs[0]].dims if dim not in varied | {"realisation"}]
-        for index in np.ndindex(*(dataset.sizes[other] for other in others)):
-            part = dataset[outputs].isel(dict(zip(others, index, strict=True)))
-            values = [
-                f"{other}={part[other].item() if other in part.coords else i}"
-                for other, i in zip(others, index, strict=True)
-            ]
-            yield " ".join([name, *values]).strip(), part
 
 
 def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -68,75 +50,42 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     return constants, width, residuals
 
 
-def film_exponents(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    """Fit ``h/R = factor W^load U^speed G^material`` to the films of every series that varies W, U or G.
+def _films(data: xr.Dataset) -> Variables:
+    """Fit ``h/R = factor W^load U^speed G^material`` to the central and the minimum film.
 
-    If another parameter varies in a series, such as the viscosity law, each of its values gets its own fit.
-
-    Parameters
-    ----------
-    groups : mapping of str to Dataset
-        Groups of a store of ``ehl_line``.
-
-    Returns
-    -------
-    Dataset, dims (series,)
-        ``<film>_factor``, ``<film>_load``, ``<film>_speed``, ``<film>_material`` for the central and the minimum film,
-        and the ends of their intervals, ``_low`` and ``_high``. An exponent is NaN if its parameter (W, U or G) does
-        not vary, or varies only together with the other two. ``<film>_rms`` and ``<film>_worst`` are the rms and the
-        largest residual of ``ln h``.
-        Films have no scatter, so the intervals measure the misfit of the formula. ``law_holds`` refers to the formula
-        of Pan and Hamrock with its published constants, ``fitted_law_holds`` to the formula with the fitted constants.
-
-    Raises
-    ------
-    FitError
-        If no series has enough points.
+    An exponent is NaN if its parameter (W, U or G) does not vary, or varies only together with the other two. Films
+    have no scatter, so the intervals measure the misfit of the formula. ``law_holds`` refers to the formula of Pan and
+    Hamrock with its published constants.
     """
-    results: dict[str, dict[str, float]] = {}
-    stated_sentences, sentences = [], []
-    problem = "expected a series with central_film or minimum_film at several W, U or G, got none"
-    for name, dataset in _maps(groups):
-        constants: dict[str, float] = {}
-        departures, of_stated = [], []
-        try:
-            for output in sorted(_FILMS.keys() & set(dataset.data_vars)):
-                film, formula = _FILMS[str(output)]
-                table = _logarithms(dataset, str(output))
-                found = _regression(table)
-                constants |= _named(film, *found)
-                departures.append(found[-1])
-                of_stated.append(table[3] - np.log(formula(*np.exp(table[:3]))))
-        except FitError as error:
-            problem = str(error)
+    found: Variables = {}
+    departures, of_stated = [], []
+    for output, (film, formula) in _FILMS.items():
+        if output not in data:
             continue
-        results[name] = constants
-        stated_sentences.append(law_holds(np.concatenate(of_stated), None))
-        sentences.append(law_holds(np.concatenate(departures), None))
-    if not results:
-        raise FitError(problem)
-    variables = sorted({key for constants in results.values() for key in constants})
-    found_constants = {
-        key: ("series", [constants.get(key, np.nan) for constants in results.values()], {"units": "1"})
-        for key in variables
-    }
-    verdicts = {"fitted_law_holds": ("series", sentences, FITTED_LAW_HOLDS), "law_holds": ("series", stated_sentences)}
-    return xr.Dataset(found_constants | verdicts, coords={"series": list(results)})
+        table = _logarithms(data, output)
+        constants, width, residuals = _regression(table)
+        ends = {"": constants, "_low": constants - width, "_high": constants + width}
+        for k, name in enumerate(("factor", "load", "speed", "material")):
+            for end, value in ends.items():
+                about = f"exponent of {_GROUPS[name]}" if k else "factor of the power law"
+                found |= measure(f"{film}_{name}{end}", float(value[k] if k else np.exp(value[k])), about)
+        found |= measure(f"{film}_rms", rms(residuals), "rms residual of ln h")
+        found |= measure(f"{film}_worst", float(np.abs(residuals).max()), "largest residual of ln h")
+        departures.append(residuals)
+        of_stated.append(table[3] - np.log(formula(*np.exp(table[:3]))))
+    sentences = (law_holds(np.concatenate(each), None) for each in (of_stated, departures))
+    return found | holds(*sentences)
 
 
-def _named(film: str, constants: FloatArray, width: FloatArray, residuals: FloatArray) -> dict[str, float]:
-    named = {
-        f"{film}_factor": np.exp(constants[0]),
-        f"{film}_factor_low": np.exp(constants[0] - width[0]),
-        f"{film}_factor_high": np.exp(constants[0] + width[0]),
-        f"{film}_rms": np.sqrt(np.mean(residuals**2)),
-        f"{film}_worst": np.max(np.abs(residuals)),
-    }
-    for index, name in enumerate(_GROUPS, start=1):
-        named[f"{film}_{name}"] = constants[index]
-        named[f"{film}_{name}_low"] = constants[index] - width[index]
-        named[f"{film}_{name}_high"] = constants[index] + width[index]
-    return {key: float(value) for key, value in named.items()}
+def _film_exponents(series: Series) -> xr.Dataset:
+    (data,) = series.values()
+    present = [output for output in _FILMS if output in data]
+    return each(series, _axes_of_groups, _films, *(present or _FILMS))
+
+
+def _axes_of_groups(data: xr.Dataset) -> list[str]:
+    """Return the dimensions along which W, U or G varies."""
+    return [str(dim) for group in groups_of(data.coords.get) for dim in getattr(group, "dims", ())]
 
 
 FITS: tuple[Fit, ...] = (
@@ -144,6 +93,7 @@ FITS: tuple[Fit, ...] = (
         "film_exponents",
         ("ehl_line",),
         "h/R = factor W^load U^speed G^material through a map of films, beside Pan and Hamrock (eq. 5.3)",
-        film_exponents,
+        _film_exponents,
+        apart=True,
     ),
 )

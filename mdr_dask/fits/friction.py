@@ -6,26 +6,36 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Callable
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from mdr_dask import bootstrap
-from mdr_dask.aggregation import companion
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
 from mdr_dask.fits import top
-from mdr_dask.fits.base import FITTED_LAW_HOLDS, LAW_HOLDS, Fit, Fitted, excludes, fitted, require, short, verdict
+from mdr_dask.fits.base import Fit, require, short, verdict
+from mdr_dask.fits.cases import (
+    Variables,
+    constant,
+    dimensions,
+    each,
+    holds,
+    measure,
+    nonlinear,
+    one_value,
+    power_law,
+    stated_power,
+    table_of,
+    text,
+)
 from mdr_dask.physics.sliding import laws
 from mdr_dask.physics.surfaces import roughness
 
-Series = Mapping[str, xr.Dataset]
-Variables = dict[str, xr.Variable]
-
 MODELS = ("sliding_friction",)
+FRICTION = "friction_coefficient"
 ZONE_ONE = (0.01, 0.3)  # range of F_N / (G h L) in zone 1; other limits change alpha by up to 0.02, beta by up to 0.14
 LINEAR = 0.05  # region I: mu / v changes by less than this fraction between neighbouring velocities
 NEEDS_SLOPE = "not tested: the study has no output contact_slope"
@@ -64,171 +74,13 @@ def loads_and_velocities(data: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
     return xr.DataArray(force), xr.DataArray(velocity)
 
 
-def numbers(data: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
-    """Return mu / slope, F_N / (G h L) and v tau slope / (sqrt 2 h) of all cases."""
-    return data["friction_coefficient"] / spectral_slope(data), *loads_and_velocities(data)
-
-
-def one_value(data: xr.Dataset, name: str) -> float:
-    """Return the only value of a parameter; raise FitError if the study lacks it, or if it differs between cases."""
-    require(data, name)
-    values = data[name]
-    if values.size != 1:
-        raise FitError(
-            f"expected one {name}, or an axis for it, got {values.size} values of a sampled study: each has its own law"
-        )
-    return float(values.item())
-
-
-def constant(name: str, stack: FloatArray, count: int, long_name: str, positive: bool = False) -> Variables:
-    """Return a constant and the ends of its interval as variables."""
-    low, high = bootstrap.interval(stack, count, positive)
-    values = {name: stack[0], f"{name}_low": low, f"{name}_high": high}
-    return {key: xr.Variable((), value, {"units": "1", "long_name": long_name}) for key, value in values.items()}
-
-
-def measure(name: str, value: float, long_name: str) -> Variables:
-    """Return a number without an interval as a variable."""
-    return {name: xr.Variable((), value, {"units": "1", "long_name": long_name})}
-
-
-def text(name: str, sentence: str, long_name: str) -> Variables:
-    """Return a sentence as a variable."""
-    return {name: xr.Variable((), sentence, {"units": "1", "long_name": long_name})}
-
-
-def holds(stated: str, with_fitted: str = "") -> Variables:
-    """Return ``law_holds`` and, if given, ``fitted_law_holds`` as variables."""
-    found = {"fitted_law_holds": xr.Variable((), with_fitted, FITTED_LAW_HOLDS)} if with_fitted else {}
-    return found | {"law_holds": xr.Variable((), stated, LAW_HOLDS)}
-
-
-def each(
-    series: Series,
-    inner: Callable[[xr.Dataset], list[str]],
-    fit: Callable[[xr.Dataset], Variables],
-    *outputs: str,
-) -> xr.Dataset:
-    """Fit a law separately at every point of the dimensions that the law itself does not contain.
-
-    Parameters
-    ----------
-    series : mapping of str to Dataset
-        One series.
-    inner : callable
-        Returns the dimensions that one fit needs, such as load and velocity.
-    fit : callable
-        Returns the results of the fit at one point of the other dimensions.
-    *outputs : str
-        Outputs that the fit needs; by default the coefficient of friction.
-    """
-    data = next(iter(series.values()))
-    needed = outputs or ("friction_coefficient",)
-    missing = [name for name in needed if name not in data]
-    if missing:
-        raise FitError(f"expected the outputs {', '.join(needed)} in the store, got none of {', '.join(missing)}")
-    data = data.load()
-    used = ["realisation", *inner(data)]
-    outer = [str(dim) for dim in data[needed[0]].dims if dim not in used]
-    sizes = [data.sizes[dim] for dim in outer]
-    points = [fit(data.isel(dict(zip(outer, index, strict=True)))) for index in np.ndindex(*sizes)]
-    found = {}
-    for name in dict.fromkeys(name for point in points for name in point):
-        known = next(point[name] for point in points if name in point)
-        blank = "" if known.dtype.kind == "U" else np.nan
-        values = np.stack([point[name].values if name in point else np.full(known.shape, blank) for point in points])
-        found[name] = xr.Variable((*outer, *known.dims), values.reshape((*sizes, *known.shape)), known.attrs)
-    return xr.Dataset(found, {dim: data[dim] for dim in outer if dim in data.coords})
-
-
-def _varying(data: xr.Dataset, *names: str) -> list[str]:
-    """Return the dimensions along which any of these parameters varies."""
-    return sorted({str(dim) for name in names if name in data.coords for dim in data[name].dims})
-
-
 def _velocity_axes(data: xr.Dataset) -> list[str]:
-    return _varying(data, "velocity", "relaxation_time")
+    return dimensions(data, "velocity", "relaxation_time")
 
 
 def load_and_velocity_axes(data: xr.Dataset) -> list[str]:
     """Return the dimensions along which loads and velocities vary."""
-    return [*_varying(data, "normal_force", "shear_modulus", "rms_roughness"), *_velocity_axes(data)]
-
-
-class Table(NamedTuple):
-    """An output of all cases, divided by a scale.
-
-    Attributes
-    ----------
-    values, error : array, shape (cases, realisations)
-        The output and its discretisation error, both divided by the scale.
-    columns : tuple of array, shape (cases,)
-        Other numbers of the cases, such as load and velocity.
-    """
-
-    values: FloatArray
-    error: FloatArray
-    columns: tuple[FloatArray, ...]
-
-    def stack(self, used: Any = slice(None)) -> FloatArray:
-        """Return the stack of the means of some cases, shape (1 + RESAMPLES + 2 groups, cases)."""
-        return self._moved(bootstrap.means(self.values[used].T), self._errors(used))
-
-    def logarithms(self, used: Any = slice(None)) -> FloatArray:
-        """Return the stack of the logarithms of the means; an infinite error counts as 100 % of the mean."""
-        means = bootstrap.means(self.values[used].T)
-        relative = self._errors(used) / means[0]
-        return self._moved(bootstrap.logarithms(means), np.where(np.isinf(relative), 1.0, relative))
-
-    def _errors(self, used: Any) -> FloatArray:
-        known = ~np.isnan(self.error[used])
-        total = np.where(known, np.abs(self.error[used]), 0.0).sum(axis=1)
-        mean: FloatArray = total / np.maximum(known.sum(axis=1), 1)
-        return mean
-
-    @staticmethod
-    def _moved(stack: FloatArray, error: FloatArray) -> FloatArray:
-        return np.concatenate([stack, bootstrap.moved(stack[0], error)]) if np.any(error > 0) else stack
-
-    def count(self, used: Any = slice(None)) -> int:
-        """Return the smallest number of successful realisations among some cases."""
-        return int(np.isfinite(self.values[used]).sum(axis=1).min())
-
-    def mean(self) -> FloatArray:
-        """Return the mean of every case; NaN without any successful realisation."""
-        mean: FloatArray = bootstrap.means(self.values.T)[0]
-        return mean
-
-
-def table_of(data: xr.Dataset, scale: Any, *columns: xr.DataArray, output: str = "friction_coefficient") -> Table:
-    """Return an output of all cases divided by a scale, with other numbers of the cases as columns."""
-    values = data[output]
-    error = companion(data, output)
-    arrays = xr.broadcast(values / scale, (0 * values if error is None else error) / scale, *columns)
-    cases = [dim for dim in arrays[0].dims if dim != "realisation"]
-    count = arrays[0].sizes["realisation"]
-    flat = [
-        np.asarray(array.transpose(*cases, "realisation").values, dtype=np.float64).reshape(-1, count)
-        for array in arrays
-    ]
-    return Table(flat[0], flat[1], tuple(column[:, 0] for column in flat[2:]))
-
-
-def power_law(x: FloatArray, logs: FloatArray, count: int) -> Fitted:
-    """Fit a straight line to a stack of logarithms against x; the constants are its slope and its value at x = 0."""
-    design = np.vstack([x, np.ones(x.size)])
-    solve = np.linalg.pinv(design)
-    return fitted(lambda rows: rows @ solve, lambda rows, constants: rows - constants @ design, logs, count)
-
-
-def stated_power(x: FloatArray, logs: FloatArray, power: float, count: int, where: Callable[[int], str]) -> str:
-    """Return a sentence on whether a stack of logarithms follows a power law with a stated power and any factor."""
-    rest = logs - power * x
-    free = power_law(x, logs, count).constants[:, 0]
-    if np.isnan(free[0]):
-        return "not tested: the cases differ too little to determine the exponent"
-    excluded = excludes(free, count, power)
-    return verdict(rest - rest.mean(axis=1, keepdims=True), count, 1, where, excluded=excluded)
+    return [*dimensions(data, "normal_force", "shear_modulus", "rms_roughness"), *_velocity_axes(data)]
 
 
 def at_load(force: FloatArray) -> Callable[[int], str]:
@@ -289,22 +141,10 @@ def _zone_one(data: xr.Dataset) -> Variables:
     }
 
 
-def _velocity_of(place: FloatArray, x: FloatArray, count: int, meaning: str, unit: str) -> Variables:
-    """Return the velocity of the largest friction, from a stack of the logarithms of this velocity.
-
-    It is NaN if the maximum may lie outside the range of velocities.
-    """
-    outside = np.isinf(place[~np.isnan(place)])
-    if outside[0] or outside.mean() > bootstrap.TAILS[0]:
-        place = np.full_like(place, np.nan)
-    found = constant("plateau_velocity", np.exp(np.clip(place, x[0], x[-1])), count, meaning, positive=True)
-    return {name: xr.Variable((), each.values, {"units": unit, "long_name": meaning}) for name, each in found.items()}
-
-
 def _plateau(data: xr.Dataset) -> Variables:
-    """Return the largest friction over all velocities, and the velocity at which it occurs."""
+    """Return the largest friction over all velocities, and compare it with the slope of the line and in contact."""
     require(data, "shear_modulus", "relaxation_time")
-    velocities, name, unit = _velocities(data)
+    velocities, form = _velocities(data)
     table = table_of(data, spectral_slope(data), velocities)
     known = np.flatnonzero(np.isfinite(table.mean()))
     velocity = table.columns[0][known]
@@ -314,7 +154,7 @@ def _plateau(data: xr.Dataset) -> Variables:
     x, count, stack = np.log(table.columns[0][known]), table.count(known), table.stack(known)
     found = top.highest(x, stack, count)
     ends = bootstrap.interval(found.rise, count)
-    reached = _reached(x, found, (float(ends[0]), float(ends[1])), f"{name} = {{:.2g}}{unit}")
+    reached = _reached(x, found, (float(ends[0]), float(ends[1])), form)
     flat = stack[0] > (1 - top.FLAT) * stack[0].max()
     height = constant("plateau", found.height, count, "largest friction coefficient over rms slope of the line")
     if reached.startswith("no:"):
@@ -322,7 +162,6 @@ def _plateau(data: xr.Dataset) -> Variables:
     return {
         **height,
         **measure("plateau_stated", math.sqrt(2), "sqrt 2 (eq. 3.15)"),
-        **_velocity_of(top.place(x, stack), x, count, f"{name} of the largest friction", unit.strip() or "1"),
         **measure("decades", float(np.ptp(x[flat]) / np.log(10)), f"decades of velocity within {top.FLAT:.0%} of it"),
         **text("reached", reached, "whether friction reaches its largest value within the velocities"),
         **_root_two(data, found.height, known[flat], count, reached),
@@ -344,19 +183,16 @@ def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], coun
         of_contact = verdict(ratio[:, None] / math.sqrt(2) - 1, count) if "contact_slope" in data else NEEDS_SLOPE
     return {
         **constant("plateau_of_contact", ratio, count, meaning, positive=True),
-        **text("line_slope_holds", of_line, LINE_SLOPE),
+        **text("line_slope_holds", of_line, "whether mu = sqrt 2 times the rms slope of the whole line"),
         **holds(of_contact),
     }
 
 
-LINE_SLOPE = "whether mu = sqrt 2 times the rms slope of the whole line"
-
-
-def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str, str]:
-    """Return velocities, their name and unit: the velocity number, or v tau for a measured surface (no rms height)."""
+def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str]:
+    """Return velocities and a format for one of them: the velocity number, or v tau if the study has no rms height."""
     if "rms_roughness" in data:
-        return loads_and_velocities(data)[1], "v tau slope / (sqrt 2 h)", ""
-    return data["velocity"] * data["relaxation_time"], "v tau", " m"
+        return loads_and_velocities(data)[1], "v tau slope / (sqrt 2 h) = {:.2g}"
+    return data["velocity"] * data["relaxation_time"], "v tau = {:.2g} m"
 
 
 def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: str) -> str:
@@ -375,43 +211,6 @@ def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: st
     if x[0] < at < x[-1] and abs(rise) < 1e-9:
         return f"yes: friction is largest at {place.format(np.exp(at))}"
     return f"yes: friction is level at the end of the velocities, {change}"
-
-
-def least_squares(
-    model: Callable[[FloatArray], FloatArray], start: FloatArray, data: FloatArray, steps: int = 40
-) -> FloatArray:
-    """Fit every row of the data, shape (rows, cases), by Levenberg-Marquardt steps; return (rows, constants).
-
-    Each call of the model evaluates all rows; this is a hundred times faster than one scipy fit for each row.
-    """
-    size = np.eye(start.size)
-    constants = np.tile(start, (data.shape[0], 1))
-    damping = np.full(data.shape[0], 1e-6)
-    value = model(constants)
-    cost = np.sum((data - value) ** 2, axis=1)
-    for _ in range(steps):
-        jacobian = np.stack([(model(constants + shift) - value) / 1e-6 for shift in 1e-6 * size], axis=-1)
-        normal = np.swapaxes(jacobian, 1, 2) @ jacobian
-        normal = normal + (damping * np.einsum("sii->s", normal) + 1e-12)[:, None, None] * size
-        gradient = np.swapaxes(jacobian, 1, 2) @ (data - value)[..., None]
-        step = np.clip(np.linalg.solve(normal, gradient)[..., 0], -0.3, 0.3)
-        trial = model(constants + step)
-        cost_there = np.sum((data - trial) ** 2, axis=1)
-        better = cost_there <= cost
-        constants = np.where(better[:, None], constants + step, constants)
-        value, cost = np.where(better[:, None], trial, value), np.where(better, cost_there, cost)
-        damping = np.clip(np.where(better, damping / 10, damping * 10), 1e-9, 1e9)
-        if np.abs(step).max() < 1e-9:
-            break
-    return constants
-
-
-def law_error(departures: FloatArray, suffix: str, which: str) -> Variables:
-    """Return the rms and the largest relative departure of the data from a law."""
-    return {
-        **measure(f"rms_error{suffix}", float(np.sqrt(np.mean(departures**2))), f"rms relative departure, {which}"),
-        **measure(f"largest_error{suffix}", float(np.max(np.abs(departures))), f"largest relative departure, {which}"),
-    }
 
 
 def rising(force: FloatArray, velocity: FloatArray, mean: FloatArray, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -441,26 +240,17 @@ def _interpolation(data: xr.Dataset) -> Variables:
         law: FloatArray = np.log(laws.interpolation(force, velocity, constants[:, :1], np.exp(constants[:, 1:])))
         return law
 
-    stated = laws.alpha(one_value(data, "hurst"))
-    start = np.array([stated, np.log(laws.BETA)])
-    stack = table.logarithms(used)
-    found = fitted(
-        lambda rows: least_squares(model, start, rows), lambda rows, best: rows - model(best), stack, count, start
-    )
-    of_stated = stack - model(start[None])
-    excluded = excludes(found.constants[:, 0], count, stated)
-
     def where(k: int) -> str:
         return f"{at_load(force)(k)}, v tau slope / (sqrt 2 h) = {short(velocity[k])}"
 
+    stated = laws.alpha(one_value(data, "hurst"))
+    found, verdicts = nonlinear(model, np.array([stated, np.log(laws.BETA)]), table.logarithms(used), count, where)
     return {
         **constant("alpha", found.constants[:, 0], count, "exponent of the force in the interpolation law"),
         **measure("alpha_stated", stated, "H / (1 + H) (eq. 3.13)"),
         **constant("beta", np.exp(found.constants[:, 1]), count, "factor of the interpolation law", positive=True),
-        **law_error(found.residuals[0], "", "constants fitted"),
-        **law_error(of_stated[0], "_stated", f"with H / (1 + H) and {laws.BETA}"),
         **measure("cases", int(used.sum()), "number of cases fitted"),
-        **holds(verdict(of_stated, count, 0, where, excluded=excluded), found.holds(where)),
+        **verdicts,
     }
 
 
@@ -469,7 +259,7 @@ FITS: tuple[Fit, ...] = (
         "zone_one",
         MODELS,
         "alpha and beta of mu / slope = beta (v tau slope / h) (G h L / F_N)^alpha (eq. 3.11)",
-        lambda series: each(series, load_and_velocity_axes, _zone_one),
+        lambda series: each(series, load_and_velocity_axes, _zone_one, FRICTION),
         apart=True,
         constants=("alpha", "beta"),
     ),
@@ -477,15 +267,15 @@ FITS: tuple[Fit, ...] = (
         "plateau",
         MODELS,
         "largest mu / slope over the velocities, beside sqrt 2 (eq. 3.15)",
-        lambda series: each(series, _velocity_axes, _plateau),
+        lambda series: each(series, _velocity_axes, _plateau, FRICTION),
         apart=True,
-        constants=("plateau", "plateau_of_contact", "plateau_velocity"),
+        constants=("plateau", "plateau_of_contact"),
     ),
     Fit(
         "interpolation",
         MODELS,
         "alpha and beta of the law of regions I to III and both zones (eq. 3.17)",
-        lambda series: each(series, load_and_velocity_axes, _interpolation),
+        lambda series: each(series, load_and_velocity_axes, _interpolation, FRICTION),
         apart=True,
         constants=("alpha", "beta"),
     ),

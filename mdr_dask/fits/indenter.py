@@ -9,21 +9,9 @@ import xarray as xr
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import Fit, excludes, fitted, require, short, verdict
-from mdr_dask.fits.friction import (
-    KELVIN,
-    MODELS,
-    Variables,
-    constant,
-    each,
-    holds,
-    law_error,
-    least_squares,
-    measure,
-    one_value,
-    spectral_slope,
-    table_of,
-)
+from mdr_dask.fits.base import Fit, require, short
+from mdr_dask.fits.cases import Variables, constant, each, holds, measure, nonlinear, one_value, table_of
+from mdr_dask.fits.friction import FRICTION, KELVIN, MODELS, spectral_slope
 from mdr_dask.physics.sliding import laws
 from mdr_dask.physics.surfaces import shapes as indenter
 
@@ -74,8 +62,8 @@ def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
     flat = coefficient * exponent * width ** (exponent - 1) / np.sqrt(2 * exponent - 1) <= BODY * slope
     deep = coefficient * width**exponent >= data["rms_roughness"]
     within = flat & deep
-    if "velocity" in data["friction_coefficient"].dims:
-        mean = data["friction_coefficient"].mean("realisation").fillna(0.0)
+    if "velocity" in data[FRICTION].dims:
+        mean = data[FRICTION].mean("realisation").fillna(0.0)
         within = within & (data["velocity"] <= mean.idxmax("velocity"))
     return xr.DataArray(within)
 
@@ -108,23 +96,16 @@ def _indenter(data: xr.Dataset) -> Variables:
     def where(k: int) -> str:
         return f"xi = {short(xi[k])}"
 
-    start = np.log([laws.INDENTER_EXPONENT])
-    found = fitted(
-        lambda rows: least_squares(model, start, rows), lambda rows, best: rows - model(best), logs, count, start
-    )
-    stated = logs - model(start[None])
-    excluded = excludes(found.constants[:, 0], count, start[0])
+    found, verdicts = nonlinear(model, np.log([laws.INDENTER_EXPONENT]), logs, count, where)
     return {
         **constant("exponent", np.exp(found.constants[:, 0]), count, "exponent of the law of rough indenters", True),
-        **law_error(found.residuals[0], "", "exponent fitted"),
-        **law_error(stated[0], "_stated", "exponent 1.5"),
         **measured,
-        **holds(verdict(stated, count, 0, where, excluded=excluded), found.holds(where)),
+        **verdicts,
     }
 
 
 def _indenter_axes(data: xr.Dataset) -> list[str]:
-    return [str(dim) for dim in data["friction_coefficient"].dims if dim not in ("realisation", "hurst")]
+    return [str(dim) for dim in data[FRICTION].dims if dim not in ("realisation", "hurst")]
 
 
 FITS: tuple[Fit, ...] = (
@@ -132,7 +113,7 @@ FITS: tuple[Fit, ...] = (
         "indenter",
         MODELS,
         "exponent of mu / (sqrt 2 slope) = (1 + xi^-alpha)^(-1/alpha) for rough indenters (eq. 3.40)",
-        lambda series: each(series, _indenter_axes, _indenter),
+        lambda series: each(series, _indenter_axes, _indenter, FRICTION),
         apart=True,
         constants=("exponent",),
     ),

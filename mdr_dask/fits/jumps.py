@@ -1,12 +1,14 @@
-"""The jump of friction at a jump of the velocity: its law, its limits, and its linearity (thesis eqs. 4.8 to 4.11).
+"""Friction just after a jump of the velocity: its size, its law and the limits of the law (thesis eqs. 4.8 to 4.11).
 
-`mdr_dask.fits.kinetic_cases` defines the symbols.
+The velocity jumps at time t_0 from v_1 to v_2 = v_1 + dv. Friction is mu_1 before the jump and mu_2 long after the
+jump, and d_mu_0 is its jump at t_0. The symbol s means the rms slope.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+import json
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -15,132 +17,205 @@ from numpy.typing import NDArray
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import FITTED_LAW_HOLDS, LAW_HOLDS, Fit, excludes, fitted, verdict
-from mdr_dask.fits.kinetic_cases import LEVELS, Cases, jump_numbers, rows_of
+from mdr_dask.fits.base import Fit, fitted, verdict
+from mdr_dask.fits.cases import (
+    Series,
+    Variables,
+    constant,
+    dimensions,
+    each,
+    holds,
+    measure,
+    nonlinear,
+    table_of,
+    text,
+)
 
-Series = Mapping[str, xr.Dataset]
+MODELS = ("velocity_jump",)
+LEVELS = ("friction_coefficient_before", "friction_coefficient_jump", "friction_coefficient_after")
+LEAST = 2  # smallest number of successful realisations of a case
 
 LAW = 0.4  # constant of eqs. 4.10 and 4.11 in the thesis
-REGION_ONE = 0.1  # mu_1 / rms slope up to which eqs. 4.9 and 4.11 differ by less than 3 %
-PLATEAU = 1.1  # mu_1 / rms slope above which friction counts as on its plateau; the plateau is at 1.26 to 1.44
+REGION_ONE = 0.1  # mu_1 / s up to which eqs. 4.9 and 4.11 differ by less than 3 %
+PLATEAU = 1.1  # mu_1 / s above which friction counts as on its plateau; the plateau is at 1.26 to 1.44
 
-JUMP_FIELDS = {
-    "constant": "constant c of eq. 4.11",
-    "constant_of_thesis": "0.4",
-    "deviation": "rms relative departure from the law with the fitted constant",
-    "deviation_of_thesis": "rms relative departure from the law with 0.4",
-    "cases": "cases in regions I to III",
-    "zeta": "mean zeta of the cases in region I; 1 by eq. 4.9",
-    "zeta_holds": "whether zeta = 1 in region I (eq. 4.9)",
-    "plateau_jump": "mean d_mu_0 v_1 / (dv rms_slope) of the cases on the plateau; 0.4 by eq. 4.10",
-    "plateau_holds": "whether it is 0.4 on the plateau (eq. 4.10)",
-    "fitted_law_holds": FITTED_LAW_HOLDS["long_name"],
-    "law_holds": LAW_HOLDS["long_name"],
+NUMBERS = {
+    "before_over_slope": "mu_1 / rms_slope",
+    "jump_over_slope": "d_mu_0 v_1 / (dv rms_slope)",
+    "zeta": "zeta = (d_mu_0 / mu_1) / (dv / v_1), eq. 4.8",
+    "xi": "xi = ((mu_2 - mu_1) / mu_1) / (dv / v_1), eq. 4.8",
+    "relaxing_over_slope": "relaxing part mu(t_0+) - mu_2 over rms_slope",
+    "direct_effect": "a = d_mu_0 / ln(v_2 / v_1)",
+    "evolution_effect": "b = (mu(t_0+) - mu_2) / ln(v_2 / v_1)",
+    "velocity_dependence": "a - b = (mu_2 - mu_1) / ln(v_2 / v_1): above 0 friction grows with the velocity",
+}
+
+
+def is_jump(data: xr.Dataset) -> bool:
+    """Return whether the loading history of all cases of a series is a sudden jump of the velocity."""
+    varied = any(axis["path"].split(".")[0] == "protocol" for axis in data.attrs.get("axes", []))
+    history = json.loads(data.attrs.get("parameters", "{}")).get("protocol") or {}
+    return not varied and history.get("shape", "jump") == "jump"
+
+
+def each_jump(
+    series: Series, inner: Callable[[xr.Dataset], list[str]], fit: Callable[[xr.Dataset], Variables], *outputs: str
+) -> xr.Dataset:
+    """Fit a law of jumps as `mdr_dask.fits.cases.each` does; the levels of friction and the slope are always needed.
+
+    Raises
+    ------
+    FitError
+        If an output is missing, if the loading history is not a jump, or if there is only one realisation.
+    """
+    (data,) = series.values()
+    if "realisation" in data.sizes and data.sizes["realisation"] < LEAST:
+        raise FitError(f"expected at least {LEAST} realisations, got {data.sizes['realisation']}")
+    if not is_jump(data):
+        raise FitError("expected a jump of the velocity, got another loading history")
+    return each(series, inner, fit, *LEVELS, "rms_slope", *outputs)
+
+
+def single(data: xr.Dataset) -> list[str]:
+    """Return no dimension: every case is fitted for itself."""
+    return []
+
+
+class Jumps(NamedTuple):
+    """The levels of friction in some cases.
+
+    Attributes
+    ----------
+    before, jump, after : array, shape (1 + RESAMPLES + 2 groups, cases)
+        Stacks of mu_1, d_mu_0 and mu_2.
+    change, slope : array, shape (cases,)
+        dv / v_1, and the rms slope; NaN for smooth lines.
+    counts : int array, shape (cases,)
+        Number of successful realisations.
+    """
+
+    before: FloatArray
+    jump: FloatArray
+    after: FloatArray
+    change: FloatArray
+    slope: FloatArray
+    counts: NDArray[np.intp]
+
+    def count(self, used: NDArray[np.bool_]) -> int:
+        """Return the smallest number of successful realisations among some cases."""
+        return int(self.counts[used].min(initial=np.iinfo(np.intp).max))
+
+    def numbers(self) -> dict[str, FloatArray]:
+        """Return stacks of all `NUMBERS`; zeta and xi are infinite or NaN where mu_1 is 0."""
+        before, jump, after, change, slope, _ = self
+        logarithm = np.log1p(change)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            of_before = jump / before / change, (after / before - 1) / change
+        found = (
+            before / slope,
+            jump / change / slope,
+            *of_before,
+            (before + jump - after) / slope,
+            jump / logarithm,
+            (before + jump - after) / logarithm,
+            (after - before) / logarithm,
+        )
+        return dict(zip(NUMBERS, found, strict=True))
+
+
+def jumps_of(data: xr.Dataset) -> Jumps:
+    """Return the levels of friction in all cases."""
+    tables = [table_of(data, 1.0, data["velocity_change"], output=name) for name in LEVELS]
+    values = np.stack([table.values.T for table in tables], axis=1)
+    values = values + 0 * values.sum(axis=1, keepdims=True)  # a NaN in one level makes all three NaN
+    errors = np.stack([table.mean_error() for table in tables])
+    slopes = table_of(data, 1.0, output="rms_slope").values
+    known = np.isfinite(slopes) & (slopes > 0)
+    slope = np.where(known, slopes, 0.0).sum(axis=1) / np.where(known.any(axis=1), known.sum(axis=1), np.nan)
+    before, jump, after = np.moveaxis(bootstrap.with_errors(bootstrap.means(values), errors), 1, 0)
+    (change,) = tables[0].columns
+    return Jumps(before, jump, after, change, slope, np.isfinite(values[:, 0]).sum(axis=0))
+
+
+def _kinetics(case: xr.Dataset) -> Variables:
+    """Return the dimensionless numbers of the jump of a case, and the effects a and b of rate and state."""
+    jumps = jumps_of(case)
+    found: Variables = {}
+    for name, stack in jumps.numbers().items():
+        found |= constant(name, stack[:, 0], int(jumps.counts[0]), NUMBERS[name])
+    return found
+
+
+#: Limits of eq. 4.11: value, name of the verdict, meaning of the constant, and of the verdict.
+LIMITS = {
+    "zeta": (1.0, "zeta_holds", "mean zeta in region I; 1 by eq. 4.9", "whether zeta = 1 in region I (eq. 4.9)"),
+    "plateau_jump": (
+        LAW,
+        "plateau_holds",
+        "mean d_mu_0 v_1 / (dv rms_slope) on the plateau; 0.4 by eq. 4.10",
+        "whether it is 0.4 on the plateau (eq. 4.10)",
+    ),
 }
 
 
 def jump_law(before: FloatArray, constant: float | FloatArray) -> FloatArray:
-    """Return d_mu_0 v_1 / (dv rms_slope) from mu_1 / rms_slope (eq. 4.11)."""
+    """Return d_mu_0 v_1 / (dv s) from mu_1 / s (eq. 4.11)."""
     law: FloatArray = before / np.hypot(1.0, before / np.asarray(constant))
     return law
 
 
-def _jump_law(series: Series) -> xr.Dataset:
-    """Fit the constant of eq. 4.11 for every Hurst exponent and for all cases, and test the limits 4.9 and 4.10."""
-    cases = Cases.of(series, *LEVELS, "rms_slope")
-    numbers = jump_numbers(cases)
+def _jump_law(data: xr.Dataset) -> Variables:
+    """Fit the constant of eq. 4.11 to all cases in regions I to III, and test the limits 4.9 and 4.10."""
+    jumps = jumps_of(data)
+    numbers = jumps.numbers()
     before, jump, zeta = numbers["before_over_slope"], numbers["jump_over_slope"], numbers["zeta"]
-    highest = bootstrap.interval(numbers["xi"], cases.counts)[1]
-    rising = np.isfinite(highest) & (highest >= 0)  # regions I to III: friction does not fall with the velocity
+    highest = bootstrap.interval(numbers["xi"], jumps.counts)[1]
+    rising = np.isfinite(highest) & (highest >= 0)  # friction does not fall with the velocity
     known = rising & ~np.any(before <= 0, axis=0) & ~np.any(jump <= 0, axis=0)
-    limits = {
-        "zeta": (zeta, 1.0, (before[0] < REGION_ONE) & np.isfinite(zeta[0])),
-        "plateau": (jump, LAW, (before[0] > PLATEAU) & rising),
-    }
-    if np.count_nonzero(known) < 2 and not any(np.any(region) for _, _, region in limits.values()):
+    slow, fast = (before[0] < REGION_ONE) & np.isfinite(zeta[0]), (before[0] > PLATEAU) & rising
+    if np.count_nonzero(known) < 2 and not slow.any() and not fast.any():
         raise FitError(f"expected two or more cases in regions I to III whose friction jumps, got {int(known.sum())}")
-    rows = rows_of(cases)
-    table: dict[str, list[float | str]] = {}
-    for _, chosen in rows:
-        row = _constant(before[:, chosen & known], jump[:, chosen & known], cases.count(chosen & known))
-        row |= _limit("zeta", "zeta_holds", *limits["zeta"], chosen, cases)
-        row |= _limit("plateau_jump", "plateau_holds", *limits["plateau"], chosen, cases)
-        for name, value in row.items():
-            table.setdefault(name, []).append(value)
-    result = xr.Dataset({name: ("hurst", column, {"units": "1"}) for name, column in table.items()})
-    for name, meaning in JUMP_FIELDS.items():
-        result[name].attrs["long_name"] = meaning
-    result.attrs["law"] = f"d_mu_0 v_1 / (dv s) = [(s / mu_1)^2 + 1 / c^2]^(-1/2), s = rms_slope; thesis: c = {LAW}"
-    result.attrs["window"] = "regions I to III, where friction does not fall; equal weights of the relative departures"
-    return result.assign_coords(hurst=[label for label, _ in rows])
+    return {
+        **_constant(before[:, known], jump[:, known], jumps.count(known)),
+        **_limit("zeta", zeta[:, slow], jumps.count(slow)),
+        **_limit("plateau_jump", jump[:, fast], jumps.count(fast)),
+    }
 
 
-def _constant(before: FloatArray, jump: FloatArray, count: int) -> dict[str, float | str]:
-    """Return the constant of eq. 4.11 for some cases, from stacks of mu_1 / slope and of the jump / slope."""
-    row: dict[str, float | str] = {"cases": jump.shape[1], "constant_of_thesis": LAW}
+def _constant(before: FloatArray, jump: FloatArray, count: int) -> Variables:
+    """Return the constant of eq. 4.11 for some cases, from stacks of mu_1 / s and of d_mu_0 v_1 / (dv s)."""
+    measured = measure("constant_stated", LAW, "0.4") | measure("cases", jump.shape[1], "cases in regions I to III")
     if jump.shape[1] < 2:
         reason = "not tested: the constant needs two cases"
-        names = ("constant", "constant_low", "constant_high", "deviation", "deviation_of_thesis")
-        return dict.fromkeys(names, np.nan) | row | {"fitted_law_holds": reason, "law_holds": reason}
-    logs = np.log(jump)
+        return measured | holds(reason, reason)
 
-    def before_of(rows: FloatArray) -> FloatArray:
-        return before if len(rows) == len(before) else before[:1]  # rows shifted by departures use mu_1 of row 0
-
-    def left(rows: FloatArray, constant: FloatArray) -> FloatArray:
-        return rows - np.log(jump_law(before_of(rows), np.exp(constant)))
-
-    def fit(rows: FloatArray) -> FloatArray:
-        constant = np.full((len(rows), 1), np.log(LAW))
-        for _ in range(30):  # Gauss-Newton steps in ln c
-            slope = (jump_law(before_of(rows), np.exp(constant)) / np.exp(constant)) ** 2
-            step = np.sum(slope * left(rows, constant), axis=1, keepdims=True) / np.sum(slope**2, axis=1, keepdims=True)
-            constant = constant + np.clip(step, -1, 1)
-        return constant
+    def model(constants: FloatArray) -> FloatArray:
+        # data shifted by the departures from the law are compared with mu_1 of the data
+        law: FloatArray = np.log(jump_law(before if len(constants) == len(before) else before[:1], np.exp(constants)))
+        return law
 
     def where(k: int) -> str:
         return f"mu_1 / rms_slope = {before[0, k]:.2g}"
 
-    found = fitted(fit, left, logs, count, np.log([LAW]))
-    stated = left(logs, np.full((len(logs), 1), np.log(LAW)))
-    constant = np.exp(found.constants[:, 0])
-    low, high = bootstrap.interval(constant, count, positive=True)
-    holds = verdict(stated, count, 0, where, excluded=excludes(found.constants[:, 0], count, np.log(LAW)))
-    if np.isnan(constant[0]):
-        holds = f"not tested: mu_1 / rms_slope is at most {before[0].max():.2g}, where the constant plays no part"
-    return row | {
-        "constant": float(constant[0]),
-        "constant_low": float(low),
-        "constant_high": float(high),
-        "deviation": found.rms,
-        "deviation_of_thesis": float(np.sqrt(np.mean(stated[0] ** 2))),
-        "fitted_law_holds": found.holds(where),
-        "law_holds": holds,
-    }
+    found, verdicts = nonlinear(model, np.log([LAW]), np.log(jump), count, where)
+    if np.isnan(found.constants[0, 0]):
+        reason = f"not tested: mu_1 / rms_slope is at most {before[0].max():.2g}, where the constant plays no part"
+        verdicts = verdicts | holds(reason)
+    stack = np.exp(found.constants[:, 0])
+    return constant("constant", stack, count, "constant c of eq. 4.11", positive=True) | measured | verdicts
 
 
-def _limit(
-    name: str,
-    holds: str,
-    stack: FloatArray,
-    limit: float,
-    region: NDArray[np.bool_],
-    chosen: NDArray[np.bool_],
-    cases: Cases,
-) -> dict[str, float | str]:
+def _limit(name: str, stack: FloatArray, count: int) -> Variables:
     """Return the mean of a number over the cases of a region, and a sentence on whether it equals its limit there."""
-    inside = region & chosen
-    if not np.any(inside):
-        return dict.fromkeys((name, f"{name}_low", f"{name}_high"), np.nan) | {
-            holds: "not tested: no case in this region"
-        }
-    count, mean = cases.count(inside), stack[:, inside].mean(axis=1)
-    low, high = bootstrap.interval(mean, count)
-    sentence = verdict(stack[:, inside] / limit - 1, count)
-    return {name: float(mean[0]), f"{name}_low": float(low), f"{name}_high": float(high), holds: sentence}
+    limit, verdict_name, meaning, question = LIMITS[name]
+    if not stack.shape[1]:
+        nothing = constant(name, np.full(1 + bootstrap.RESAMPLES, np.nan), count, meaning)
+        return nothing | text(verdict_name, "not tested: no case in this region", question)
+    mean = constant(name, stack.mean(axis=1), count, meaning)
+    return mean | text(verdict_name, verdict(stack / limit - 1, count), question)
 
 
-LINEAR_FIELDS = {
+TRENDS = {
     "zeta": "zeta of eq. 4.8 in the limit of a small jump",
     "zeta_trend": "relative change of zeta with dv / v_1",
     "xi": "xi of eq. 4.8 in the limit of a small jump",
@@ -148,90 +223,66 @@ LINEAR_FIELDS = {
 }
 
 
-def _jump_linearity(series: Series) -> xr.Dataset:
+def _jump_linearity(data: xr.Dataset) -> Variables:
     """Fit straight lines to zeta and xi against dv / v_1; by eq. 4.8 both are constant."""
-    cases = Cases.of(series, *LEVELS, "rms_slope")
-    outer = [dim for dim in cases.template.dims if dim not in cases.data["velocity_change"].dims]
-    change, place, numbers = cases.column("velocity_change"), cases.places(outer), jump_numbers(cases)
+    if np.unique(data["velocity_change"]).size < 3:
+        raise FitError("expected a series with jumps dv / v_1 of three sizes or more")
+    jumps = jumps_of(data)
+    numbers = jumps.numbers()
     both = np.stack([numbers["zeta"], numbers["xi"]], axis=1)
     both[~np.isfinite(both)] = np.nan
-    rows = []
-    for i in range(int(place.max()) + 1):
-        used = np.flatnonzero((place == i) & np.all(np.isfinite(both[0]), axis=0))
-        rows.append(_lines(both[:, :, used], change[used], cases.count(used)))
-    if all(np.isnan(row["rms_error"]) for row in rows):
-        raise FitError("expected a series with jumps dv / v_1 of three sizes or more")
-    shape = [cases.template.sizes[dim] for dim in outer]
-    axes = {dim: cases.template[dim] for dim in outer if dim in cases.template.coords}
-    columns = {name: np.reshape([row[name] for row in rows], shape) for name in rows[0]}
-    meanings = LINEAR_FIELDS | {"law_holds": LAW_HOLDS["long_name"]}
-    result = xr.Dataset(
-        {
-            name: (outer, column, {"units": "1", "long_name": meanings.get(name, name)})
-            for name, column in columns.items()
-        },
-        axes,
-    )
-    result.attrs["law"] = "eq. 4.8: d_mu_0 / mu_1 = zeta dv / v_1, (mu_2 - mu_1) / mu_1 = xi dv / v_1"
-    return result
-
-
-def _lines(numbers: FloatArray, change: FloatArray, count: int) -> dict[str, Any]:
-    """Return zeta and xi with their trends and intervals, and a sentence on whether both are constant.
-
-    Parameters
-    ----------
-    numbers : array, shape (rows, 2, jumps)
-        Stack of zeta and xi.
-    change : array, shape (jumps,)
-        dv / v_1.
-    count : int
-        Realisations.
-    """
-    names = [f"{name}{end}" for name in LINEAR_FIELDS for end in ("", "_low", "_high")]
+    used = np.all(np.isfinite(both[0]), axis=0)
+    both, change, count = both[:, :, used], jumps.change[used], jumps.count(used)
     if change.size < 3:
-        empty: dict[str, Any] = dict.fromkeys([*names, "rms_error"], np.nan)
-        return empty | {"law_holds": f"not tested: {change.size} jumps, three are needed"}
-    scale, both = numbers[0, 0].mean(), np.concatenate([numbers[:, 0], numbers[:, 1]], axis=1)
-
-    def levels(rows: FloatArray) -> FloatArray:
-        means: FloatArray = rows.reshape(len(rows), 2, -1).mean(axis=2)
-        return means
-
-    def left(rows: FloatArray, constants: FloatArray) -> FloatArray:
-        return rows - np.repeat(constants, change.size, axis=1)
-
-    flat = fitted(levels, left, both / scale, count)
-    line = numbers @ np.linalg.pinv(np.vstack([np.ones(change.size), change]))
-    moved = scale * (flat.constants[len(numbers) :] - flat.constants[0])  # departures from the mean count as errors
+        return holds(f"not tested: {change.size} jumps, three are needed")
+    scale = both[0, 0].mean()
+    flat = fitted(
+        lambda rows: rows.reshape(len(rows), 2, -1).mean(axis=2),
+        lambda rows, constants: rows - np.repeat(constants, change.size, axis=1),
+        both.reshape(len(both), -1) / scale,
+        count,
+    )
+    line = both @ np.linalg.pinv(np.vstack([np.ones(change.size), change]))
+    moved = scale * (flat.constants[len(both) :] - flat.constants[0])  # departures from the mean count as errors
     level = np.concatenate([line[:, :, 0], line[0, :, 0] + moved])
     with np.errstate(divide="ignore", invalid="ignore"):  # zeta may be zero within its error
         trend = line[:, :, 1] / line[:, :1, 0]
-    found: dict[str, Any] = {}
-    stacks = (level[:, 0], trend[:, 0], level[:, 1], trend[:, 1])
-    for name, stack in zip(LINEAR_FIELDS, stacks, strict=True):
-        low, high = bootstrap.interval(stack, count)
-        found |= {name: float(stack[0]), f"{name}_low": float(low), f"{name}_high": float(high)}
+    found: Variables = {}
+    for (name, meaning), stack in zip(
+        TRENDS.items(), (level[:, 0], trend[:, 0], level[:, 1], trend[:, 1]), strict=True
+    ):
+        found |= constant(name, stack, count, meaning)
     sentence = flat.holds(lambda k: f"dv / v_1 = {change[k % change.size]:.2g}, relative to zeta")
-    return found | {"rms_error": flat.rms, "law_holds": sentence}
+    return (
+        found
+        | measure("rms_error", flat.rms, "rms departure from the means of zeta and xi, over zeta")
+        | holds(sentence)
+    )
 
 
-_MODELS = ("velocity_jump",)
 FITS: tuple[Fit, ...] = (
     Fit(
+        "kinetics",
+        MODELS,
+        "jump of every case: d_mu_0 v_1 / (dv s), zeta, xi, relaxing part, and a and b of rate and state",
+        lambda series: each_jump(series, single, _kinetics),
+        apart=True,
+        constants=tuple(NUMBERS),
+    ),
+    Fit(
         "jump_law",
-        _MODELS,
-        "d_mu_0 v_1 / (dv s) = [(s / mu_1)^2 + 1 / c^2]^(-1/2) for every H (eq. 4.11), and its limits 4.9 and 4.10",
-        _jump_law,
+        MODELS,
+        "d_mu_0 v_1 / (dv s) = [(s / mu_1)^2 + 1 / c^2]^(-1/2) for all cases (eq. 4.11), and its limits 4.9 and 4.10",
+        lambda series: each_jump(series, lambda data: [str(dim) for dim in data.dims], _jump_law),
         apart=True,
         constants=("constant", "zeta", "plateau_jump"),
     ),
     Fit(
         "jump_linearity",
-        _MODELS,
+        MODELS,
         "zeta and xi against dv / v_1: constant if the jump is proportional to the change of velocity (eq. 4.8)",
-        _jump_linearity,
+        lambda series: each_jump(series, lambda data: dimensions(data, "velocity_change"), _jump_linearity),
         apart=True,
-        constants=tuple(LINEAR_FIELDS),
+        constants=tuple(TRENDS),
     ),
 )

@@ -1,23 +1,53 @@
-"""One exponential fitted to the mean of traces that relax to zero."""
+"""How friction relaxes after a jump of the velocity: one exponential, and the laws of its rate (eqs. 4.5 to 4.15).
+
+`mdr_dask.fits.jumps` defines the symbols; t' = (t - t_0) / tau.
+"""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
-from mdr_dask.fits.base import DOUBTFUL, law_holds
+from mdr_dask.errors import FitError
+from mdr_dask.fits.base import DOUBTFUL, Fit, excludes, fitted, law_holds, short, verdict
+from mdr_dask.fits.cases import (
+    Series,
+    Variables,
+    constant,
+    dimensions,
+    holds,
+    measure,
+    one_value,
+    rms,
+    table_of,
+    text,
+)
+from mdr_dask.fits.jumps import LAW, LEAST, LEVELS, MODELS, each_jump, jump_law, jumps_of, single
 
 WINDOW = 8.0  # length of the fitted part of a trace, in units of 1 / (rate by eq. 4.12)
 FLOOR = 0.01  # assumed grid error at every moment, as a fraction of the largest value of the trace (docs/kinetics.md)
 GRID = 400  # rates that are tried, evenly spaced on a logarithmic scale
 
-RATE_FIELDS = {
+TRUSTED = 0.5  # a rate is used to fit the power law if the half width of the interval of ln(rate) is below this
+SURE = 0.1  # added in quadrature to the error of ln(rate) in the weights, so that no single rate dominates the fit
+INSTANT = 1e-9  # no relaxation is fitted if the relaxing part of friction is below this times the rms slope
+
+TRACE = "friction_coefficient"
+#: Constants of the relaxation of a case, with units and meanings.
+FIELDS = {
     "rate": ("1", "rate b of one exponential in t' = (t - t_0) / tau, eq. 4.5; weights 1 / variance of the mean"),
     "integral_rate": ("1", "relaxing part at t_0+ over its integral in t': a rate without a model"),
+    "relaxation_duration": ("s", "tau / b"),
+    "relaxation_length": ("m", "v_2 tau / b: slip length D_c of rate and state"),
+    "length_times_wavenumber": ("1", "q_max v_2 tau / b: 1 if the length is that of the smallest asperities"),
 }
+
+
+# one exponential
 
 
 class Relaxation(NamedTuple):
@@ -132,3 +162,245 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
 def window(time: FloatArray, expected: float) -> float:
     """Return the last moment of the fit, which includes at least eight moments after the first."""
     return float(time[time <= max(WINDOW / expected, time[min(8, time.size - 1)])][-1])
+
+
+# the relaxation of a case, and its laws
+
+
+def law_rate(number: float, hurst: float) -> float:
+    """Return the rate of eq. 4.12 from v_1 tau q_max: its power is 1 below v_1 tau q_max = 1, and 1 - H above."""
+    return number if number < 1 else number ** (1 - hurst)
+
+
+def _wavenumber(case: xr.Dataset) -> float:
+    """Return q_max = pi points / length."""
+    return np.pi * one_value(case, "points") / one_value(case, "length")
+
+
+def _passing_number(case: xr.Dataset) -> float:
+    """Return v_1 tau q_max: the relaxation time over the time in which v_1 covers 1 / q_max."""
+    return one_value(case, "velocity") * one_value(case, "relaxation_time") * _wavenumber(case)
+
+
+def _outputs(case: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the transient of a case.
+
+    Returns
+    -------
+    time : array, shape (m,)
+        t', beginning with 0.
+    values : array, shape (realisations, 2 + m)
+        mu_1, d_mu_0, mu_2, and mu at all times but the first.
+    error : array, shape (2 + m,)
+        Grid errors of the means of these values.
+    """
+    tables = [table_of(case, 1.0, output=name) for name in (*LEVELS, TRACE)]
+    values = np.concatenate([table.values for table in tables]).T
+    error = np.concatenate([table.mean_error() for table in tables])
+    return np.concatenate([[0.0], case["relaxation_times"].values]), values, error
+
+
+def _fit_case(case: xr.Dataset) -> Relaxation | None:
+    """Fit one exponential to a case; None for a case with too few realisations or without relaxation.
+
+    The error of mu includes the error of mu_2, which is therefore subtracted to obtain the error of mu - mu_2.
+    """
+    time, values, error = _outputs(case)
+    before, jump, after = values[:, :3].T
+    relaxing = np.column_stack([before + jump - after, values[:, 3:] - after[:, None]])
+    whole, of_after = error[3:], error[2]
+    trace_error = np.where(
+        np.isinf(whole), np.inf, np.maximum(whole - np.where(np.isinf(of_after), 0.0, of_after), 0.0)
+    )
+    good = relaxing[np.all(np.isfinite(relaxing), axis=1)]
+    if len(good) < LEAST or not np.abs(good.mean(axis=0)).max() > INSTANT * jumps_of(case).slope[0]:
+        return None
+    means = bootstrap.means(bootstrap.complete(relaxing))
+    traces = np.concatenate([means, bootstrap.moved(means[0], np.append(error[1], trace_error))])
+    expected = law_rate(_passing_number(case), one_value(case, "hurst"))
+    return relaxation_of(time, traces, good.std(axis=0, ddof=1) / np.sqrt(len(good)), len(good), expected)
+
+
+def relaxation_law(
+    before: FloatArray, after: FloatArray, slope: float, change: float, rate: float, time: FloatArray
+) -> FloatArray:
+    """Return mu(t) after a jump by eqs. 4.13 and 4.14, shape (rows, times).
+
+    Parameters
+    ----------
+    before, after : array, shape (rows,)
+        mu_1 and mu_2.
+    slope, change, rate : float
+        Rms slope, dv / v_1, and rate b of eq. 4.12.
+    time : array
+        (t - t_0) / tau.
+    """
+    start = before + slope * change * jump_law(before / slope, LAW)
+    transient: FloatArray = after[:, None] + (start - after)[:, None] * np.exp(-rate * time)
+    return transient
+
+
+def _closed_law(case: xr.Dataset, rate: float) -> Variables:
+    """Compare the transient of a case with the closed law of eqs. 4.13 to 4.15.
+
+    ``rms_error`` is the rms difference between law and transient over all times, divided by d_mu_0. For
+    ``rms_error_of_rate``, the law has the computed jump in place of eq. 4.11, so that only the rate is tested.
+    """
+    time, values, error = _outputs(case)
+    means = bootstrap.means(bootstrap.complete(values))
+    whole = of_rate = np.nan
+    sentence = "not tested: fewer than two realisations succeeded, or their friction does not jump"
+    if np.all(np.isfinite(values), axis=1).sum() >= LEAST and means[0, 1] != 0:
+        jumps = jumps_of(case)
+        stack = np.concatenate([means, bootstrap.moved(means[0], error)])
+        before, jump, after = stack[:, :3].T
+        transient = np.column_stack([before + jump, stack[:, 3:]])
+        law = relaxation_law(before, after, float(jumps.slope[0]), float(jumps.change[0]), rate, time)
+        decay = after[:, None] + (before + jump - after)[:, None] * np.exp(-rate * time)
+        departures = (law - transient) / abs(jump[0])
+        whole, of_rate = rms(departures[0]), rms((decay - transient)[0]) / abs(jump[0])
+        sentence = verdict(departures, int(jumps.counts[0]), 0, lambda j: f"t' = {time[j]:.2g}, relative to the jump")
+    return {
+        **measure("rms_error", whole, "rms over the times of transient less closed law, over d_mu_0"),
+        **measure("rms_error_of_rate", of_rate, "the same with the computed jump: error of the rate alone"),
+        **holds(sentence),
+    }
+
+
+def _relaxation(case: xr.Dataset) -> Variables:
+    """Return rate, time and length of the relaxation of a case, and compare with the law of eqs. 4.13 to 4.15."""
+    found, count = _fit_case(case), int(jumps_of(case).counts[0])
+    nothing = np.full(1 + bootstrap.RESAMPLES, np.nan)
+    rate, integral = (found.rate, found.integral_rate) if found else (nothing, nothing)
+    with np.errstate(divide="ignore"):  # the rate of a trace that does not relax is zero
+        duration = one_value(case, "relaxation_time") / rate
+    length = one_value(case, "velocity") * (1 + one_value(case, "velocity_change")) * duration
+    stacks = (rate, integral, duration, length, length * _wavenumber(case))
+    constants: Variables = {}
+    for (name, (unit, meaning)), stack in zip(FIELDS.items(), stacks, strict=True):
+        constants |= constant(name, stack, count, meaning, name != "integral_rate", unit)
+    passing = _passing_number(case)
+    expected = law_rate(passing, one_value(case, "hurst"))
+    last = window(_outputs(case)[0], expected) if found else np.nan
+    return {
+        **measure("passing_number", passing, "v_1 tau q_max"),
+        **constants,
+        **measure("law_rate", expected, "(v_1 tau q_max)^a with a = 1 below and 1 - H above 1, eq. 4.12"),
+        **measure("window", last, "last t' of the fit"),
+        **_closed_law(case, expected),
+        **text(
+            "fitted_law_holds", found.holds if found else "not tested: nothing relaxes", "whether one exponential fits"
+        ),
+    }
+
+
+# the power of the rate
+
+
+def _rate_power(data: xr.Dataset) -> Variables:
+    """Fit rate ~ (v_1 tau q_max)^power below and above v_1 tau q_max = 1."""
+    axes = [str(dim) for dim in data[LEVELS[0]].dims if dim != "realisation"]
+    cells = np.ndindex(*(data.sizes[dim] for dim in axes))
+    cases = [data.isel(dict(zip(axes, cell, strict=True))) for cell in cells]
+    x = np.log([_passing_number(case) for case in cases])
+    counts, rates = jumps_of(data).counts, _side_by_side([_fit_case(case) for case in cases])
+    low, high = bootstrap.interval(rates, counts, positive=True)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        error = 0.25 * np.log(high / low)
+    known = error < TRUSTED / 2
+    rows = []
+    for side, stated in ((x < 0, 1.0), (x > 0, 1 - one_value(data, "hurst"))):
+        used = side & known
+        count = int(counts[used].min(initial=data.sizes["realisation"]))
+        rows.append(_power(x[used], rates[:, used], error[used], stated, count))
+    return {
+        name: xr.Variable("regime", [row[name].values.item() for row in rows], value.attrs)
+        for name, value in rows[0].items()
+    }
+
+
+def _side_by_side(found: list[Relaxation | None]) -> FloatArray:
+    """Return the stacks of the rates of all cases as columns; missing rows of a column repeat its first row."""
+    most = 1 + bootstrap.RESAMPLES + 2 * bootstrap.GROUPS
+    stacks = [one.rate[:most] if one else np.full(1, np.nan) for one in found]
+    columns = np.empty((max(1 + bootstrap.RESAMPLES, *(stack.size for stack in stacks)), len(stacks)))
+    for k, stack in enumerate(stacks):
+        columns[:, k] = stack[0]
+        columns[: stack.size, k] = stack
+    return columns
+
+
+def _power(x: FloatArray, rates: FloatArray, error: FloatArray, stated: float, count: int) -> Variables:
+    """Fit the power of the rates in one regime.
+
+    Parameters
+    ----------
+    x : array, shape (cases,)
+        ln(v_1 tau q_max).
+    rates : array, shape (rows, cases)
+        Stack of the rates.
+    error : array, shape (cases,)
+        Standard errors of the logarithms of the rates.
+    stated : float
+        Power by eq. 4.12.
+    count : int
+        Realisations.
+    """
+    power, factor, error_of_fit = np.full(1 + bootstrap.RESAMPLES, np.nan), np.nan, np.nan
+    of_fitted = of_stated = f"not tested: {x.size} rates are known to a factor of 1.6, three are needed"
+    if x.size >= 3:
+        weights = 1 / (error**2 + SURE**2)
+        weights /= weights.sum()
+        centre = weights @ x
+        design = np.stack([x - centre, np.ones(x.size)])
+        solve = np.stack([weights * (x - centre) / (weights @ (x - centre) ** 2), weights], axis=1)
+        logs = bootstrap.regrouped(bootstrap.logarithms(rates))
+        found = fitted(lambda rows: rows @ solve, lambda rows, constants: rows - constants @ design, logs, count)
+        power, factor, error_of_fit = found.constants[:, 0], np.exp(found.constants[0] @ [-centre, 1]), found.rms
+        rest = logs - stated * x
+        rest = rest - (rest @ weights)[:, None]
+        excluded = excludes(power, count, stated)
+
+        def where(k: int) -> str:
+            return f"v_1 tau q_max = {short(np.exp(x[k]))}"
+
+        of_fitted, of_stated = found.holds(where), verdict(rest, count, 1, where, excluded=excluded)
+    return {
+        **constant("power", power, count, "power a of b against v_1 tau q_max"),
+        **measure("power_stated", stated, "1 below and 1 - H above v_1 tau q_max = 1"),
+        **measure("factor", float(factor), "b at v_1 tau q_max = 1 by the power law"),
+        **measure("rms_error", error_of_fit, "rms relative departure from the law with the fitted power"),
+        **measure("cases", x.size, "rates known well enough"),
+        **holds(of_stated, of_fitted),
+    }
+
+
+def _fit_power(series: Series) -> xr.Dataset:
+    result = each_jump(series, _axes_of_passing_number, _rate_power, TRACE).assign_coords(regime=["below", "above"])
+    if result["power"].isnull().all():
+        raise FitError("expected three or more rates, known to a factor of 1.6, at different v_1 tau q_max")
+    return result
+
+
+def _axes_of_passing_number(data: xr.Dataset) -> list[str]:
+    return dimensions(data, "velocity", "relaxation_time", "points", "length")
+
+
+FITS: tuple[Fit, ...] = (
+    Fit(
+        "relaxation",
+        MODELS,
+        "mu = mu_2 + mu* exp(-b t') of every case: rate b, time, slip length; closed law of eqs. 4.13 to 4.15",
+        lambda series: each_jump(series, single, _relaxation, TRACE),
+        apart=True,
+        constants=tuple(FIELDS),
+    ),
+    Fit(
+        "rate_power",
+        MODELS,
+        "b = factor (v_1 tau q_max)^a for every H, below and above v_1 tau q_max = 1 (eq. 4.12)",
+        _fit_power,
+        apart=True,
+        constants=("power",),
+    ),
+)

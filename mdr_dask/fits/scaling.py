@@ -11,28 +11,32 @@ from numpy.typing import NDArray
 from mdr_dask import bootstrap
 from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import DOUBTFUL, WITHIN, Fit, fitted, undetermined, verdict
+from mdr_dask.fits.base import DOUBTFUL, WITHIN, Fit, undetermined, verdict
+from mdr_dask.fits.cases import (
+    Variables,
+    constant,
+    each,
+    holds,
+    linear,
+    measure,
+    one_value,
+    power_law,
+    stated_power,
+    table_of,
+    text,
+)
 from mdr_dask.fits.friction import (
+    FRICTION,
     KELVIN,
     MODELS,
     NEEDS_SLOPE,
     ZONE_ONE,
-    Variables,
     at_load,
-    constant,
-    each,
-    holds,
     load_and_velocity_axes,
     loads_and_velocities,
     loads_of_zone_one,
-    measure,
-    one_value,
-    power_law,
     rising,
     spectral_slope,
-    stated_power,
-    table_of,
-    text,
 )
 from mdr_dask.physics.sliding import laws
 
@@ -115,12 +119,7 @@ def _contact_slope(data: xr.Dataset) -> Variables:
         raise FitError(f"expected three cases whose contact is longer than the shortest wave, got {used.size}")
     count = min(slopes.count(used), fractions.count(used))
     law = np.log(contact_slope_law(np.exp(fractions.logarithms(used)), hurst, points))
-    found = fitted(
-        lambda rows: rows.mean(axis=1, keepdims=True),
-        lambda rows, level: rows - level,
-        bootstrap.difference(slopes.logarithms(used), law),
-        count,
-    )
+    found = linear(np.ones((1, used.size)), bootstrap.difference(slopes.logarithms(used), law), count)
     fraction = fractions.mean()[used]
     holding = found.holds(lambda k: f"L_cont / L = {fraction[k]:.2g}")
     if np.ptp(np.log(fraction)) < WITHIN:  # because the factor is fitted, equal lengths cannot contradict the law
@@ -148,12 +147,8 @@ def _friction_of_slope(data: xr.Dataset) -> Variables:
     if not beyond.size:
         return text("friction_follows", "not tested: no velocity beyond the largest friction", SLOPE_FOLLOWED)
     count = table.count(beyond)
-    found = fitted(
-        lambda rows: rows.mean(axis=1, keepdims=True),
-        lambda rows, level: rows - level,
-        bootstrap.difference(table.logarithms(beyond), slopes.logarithms(beyond)),
-        count,
-    )
+    ratios = bootstrap.difference(table.logarithms(beyond), slopes.logarithms(beyond))
+    found = linear(np.ones((1, beyond.size)), ratios, count)
     ratio = np.exp(found.constants[:, 0])
     where = at_load(force[beyond])
     meaning = "friction coefficient over slope in contact beyond the largest friction; 2 / sqrt 3 for one parabolic tip"
@@ -334,7 +329,7 @@ FITS: tuple[Fit, ...] = (
         "collapse",
         MODELS,
         "mu = slope_cont(F_N) g(v f(F_N)): the curves of all loads shifted onto one (eqs. 3.22, 3.23)",
-        lambda series: each(series, load_and_velocity_axes, _collapse),
+        lambda series: each(series, load_and_velocity_axes, _collapse, FRICTION),
         apart=True,
         constants=("horizontal", "vertical"),
     ),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -16,21 +16,13 @@ from mdr_dask.fits import identifiability
 from mdr_dask.plots import colours, labels
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
+from mdr_dask.plots.measured import HALF, conditions
 
 #: `SAMPLES`: number of posterior samples for the band of predictions. `BINS`: number of bins of a density.
 SAMPLES, BINS = 400, 60
-#: Half width of the 95 % interval of a normal distribution, in standard deviations.
-HALF = 1.96
 #: Weights of neighbouring bins with which a density is smoothed.
 SMOOTH = np.array([0.1, 0.2, 0.4, 0.2, 0.1])
-
-
-class _Curve(NamedTuple):
-    """Measured points that differ only in the condition on the horizontal axis."""
-
-    label: str
-    colour: str
-    points: NDArray[np.intp]
+Points = NDArray[np.intp]
 
 
 def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
@@ -40,18 +32,18 @@ def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
     grey if the data do not determine the unknown. Further panels show the products of unknowns that are determined.
     """
     found, series, data = _first(groups)
-    main = max(found.measured.conditions, key=lambda name: np.unique(found.measured.conditions[name]).size, default="")
+    varied = found.measured.conditions
+    main = max(varied, key=lambda name: np.unique(varied[name]).size, default="")
     curves = _curves(found, main, data)
-    panels = [_data(found, main, curves, data), _residuals(found, main, curves, data)]
+    x = Axis("measured point")
+    if main:
+        x = Axis(labels.label(main, data[main]), labels.is_geometric(varied[main]), quantity=main)
+    panels = [_data(found, x, curves, data), _residuals(found, x, curves, data)]
     for k, name in enumerate(found.unknowns):
-        panels.append(_density(found, name, found.values[:, k], found.units[name], k in found.free, data))
+        panels.append(_density(found, name, found.values[:, k], labels.quantity(name, data[name]), k in found.free))
     for product in found.products:
-        units = [found.units[name] for name in found.unknowns]
-        name, unit = (
-            identifiability.written(found.unknowns, product.exponents),
-            identifiability.unit_of(units, product.exponents),
-        )
-        panels.append(_density(found, name, product.values, unit, False, data))
+        name, unit = found.name_and_unit(product)
+        panels.append(_density(found, name, product.values, labels.Quantity(name, unit), False))
     points = f"{found.measured.source}, {found.measured.values.size} points{f', series {series}' if series else ''}"
     subject = f"calibration: {fit.sentence(found)}"
     return Figure(panels, subject, points, f"{found.law_holds}; bars, bands and shades: 95 % (dark: 68 %)", ratio=0.8)
@@ -68,98 +60,76 @@ def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.D
     raise FitError("; ".join(dict.fromkeys(reasons)))
 
 
-def _quantity(found: fit.Calibration, name: str, data: xr.Dataset) -> labels.Quantity:
-    values = data[name] if name in data.variables else xr.DataArray(0.0, attrs={"units": found.units.get(name, "1")})
-    return labels.quantity(name, values)
-
-
-def _curves(found: fit.Calibration, main: str, data: xr.Dataset) -> list[_Curve]:
-    """Return groups of points that differ only in the condition `main`; too many groups are merged into one."""
+def _curves(found: fit.Calibration, main: str, data: xr.Dataset) -> dict[str, Points]:
+    """Return groups of points that differ only in the condition `main`, by label; many groups are merged into one."""
     others = {name: each for name, each in found.measured.conditions.items() if name != main}
     rows = np.stack(list(others.values()), axis=1) if others else np.zeros((found.measured.values.size, 1))
     places, which = np.unique(np.round(rows, 12), axis=0, return_inverse=True)
     if not 1 < len(places) <= colours.most():
-        return [_Curve("measured", colours.colour(0), np.arange(len(rows)))]
-    found_curves = []
+        return {"measured": np.arange(len(rows))}
+    curves = {}
     for k, row in enumerate(places):
-        texts = []
-        for name, value in zip(others, np.atleast_1d(row), strict=True):
-            how = _quantity(found, name, data)
-            symbol = how.symbol[how.symbol.index("$") :] if "$" in how.symbol else how.symbol
-            texts.append(f"{symbol} = {how.of(value):.4g} {labels.printed_unit(how.unit)}".strip())
-        found_curves.append(_Curve(", ".join(texts), colours.colour(k), np.flatnonzero(which.ravel() == k)))
-    return found_curves
+        here = {
+            name: xr.DataArray(value, {name: value}, attrs=data[name].attrs)
+            for name, value in zip(others, row, strict=True)
+        }
+        label = ", ".join(labels.named(name, value) for name, value in here.items())
+        curves[label] = np.flatnonzero(which.ravel() == k)
+    return curves
 
 
-def _axis(found: fit.Calibration, main: str, data: xr.Dataset) -> Axis:
-    if not main:
-        return Axis("measured point")
-    how = _quantity(found, main, data)
-    log = labels.is_geometric(found.measured.conditions[main])
-    return Axis(labels.with_unit(how.symbol, how.unit), log, quantity=main)
-
-
-def _along(found: fit.Calibration, main: str, points: NDArray[np.intp], data: xr.Dataset) -> FloatArray:
-    if not main:
+def _along(found: fit.Calibration, x: Axis, points: Points, data: xr.Dataset) -> FloatArray:
+    """Return the positions of points on the horizontal axis."""
+    if not x.quantity:
         return np.asarray(points, dtype=np.float64) + 1
-    along: FloatArray = _quantity(found, main, data).of(found.measured.conditions[main][points])
+    along: FloatArray = labels.quantity(x.quantity, data[x.quantity]).of(found.measured.conditions[x.quantity][points])
     return along
 
 
-def _conditions(found: fit.Calibration, points: NDArray[np.intp]) -> xr.Dataset:
-    """Return the conditions of some points as coordinates."""
-    of = found.measured.conditions
-    return xr.Dataset(
-        coords={name: ("point", each[points], {"units": found.units.get(name, "1")}) for name, each in of.items()}
-    )
-
-
-def _data(found: fit.Calibration, main: str, curves: list[_Curve], data: xr.Dataset) -> Panel:
+def _data(found: fit.Calibration, x: Axis, curves: Mapping[str, Points], data: xr.Dataset) -> Panel:
     output, values = found.measured.output, found.measured.values
-    how = _quantity(found, output, data)
     log = labels.is_geometric(values) and found.prediction.logarithmic
-    panel = Panel(_axis(found, main, data), Axis(labels.with_unit(how.symbol, how.unit), log))
-    half = HALF * found.noise[0]
+    panel = Panel(x, Axis(labels.label(output, data[output]), log))
+    how, half = labels.quantity(output, data[output]), HALF * found.noise[0]
     steps = (np.arange(SAMPLES) + 0.5) / SAMPLES
     cells = np.searchsorted(np.cumsum(found.posterior.weights), steps).clip(0, len(found.posterior.weights) - 1)
     predicted = found.prediction(found.posterior.places[cells]).mean
     low, best, high = np.quantile(predicted, [0.025, 0.5, 0.975], axis=0)
-    for curve in curves:
-        at = curve.points[np.argsort(_along(found, main, curve.points, data))]
-        x, of = _along(found, main, at, data), _conditions(found, at)
-        measured = Mean(*(how.of(each[at]) for each in (values, values - half, values + half)))
-        study = f"study, {curve.label}"
-        look: dict[str, Any] = {"colour": curve.colour}
+    for k, (label, points) in enumerate(curves.items()):
+        at = points[np.argsort(_along(found, x, points, data))]
+        of, place = conditions(found.measured, data, at), _along(found, x, at, data)
+        measured, band = (
+            Mean(*(how.of(each[at]) for each in ends))
+            for ends in ((values, values - half, values + half), (best, low, high))
+        )
+        study = f"study, {label}"
+        look: dict[str, Any] = {"colour": colours.colour(k)}
         panel.traces += [
-            Trace("band", columns(of, x=x, y=Mean(*(how.of(each[at]) for each in (best, low, high)))), study, **look),
-            Trace("law", columns(of, x=x, y=how.of(best[at])), study, study, line="-", **look),
-            Trace("curve", columns(of, x=x, y=measured), "data", curve.label, marker="o", **look),
+            Trace("band", columns(of, x=place, y=band), study, **look),
+            Trace("law", columns(of, x=place, y=band.value), study, study, line="-", **look),
+            Trace("curve", columns(of, x=place, y=measured), "data", label, marker="o", **look),
         ]
-        panel.keys.append(Key(curve.label, curve.colour, "", "o"))
+        panel.keys.append(Key(label, look["colour"], "", "o"))
     panel.keys.append(Key("median of the calibrated study", "#808080", "-"))
     return panel
 
 
-def _residuals(found: fit.Calibration, main: str, curves: list[_Curve], data: xr.Dataset) -> Panel:
-    panel = Panel(_axis(found, main, data), Axis("residual over its error"), keys=[])
-    every = np.concatenate([_along(found, main, curve.points, data) for curve in curves])
+def _residuals(found: fit.Calibration, x: Axis, curves: Mapping[str, Points], data: xr.Dataset) -> Panel:
+    panel = Panel(x, Axis("residual over its error"))
+    every = _along(found, x, np.concatenate(list(curves.values())), data)
     ends = np.array([every.min(), every.max()])
     strip = columns(x=ends, y=Mean(np.zeros(2), np.full(2, -HALF), np.full(2, HALF)))
     panel.traces.append(Trace("band", strip, "95 % of normal residuals", colour="#b0b0b0"))
     panel.traces.append(Trace("law", columns(x=ends, y=np.zeros(2)), "zero", "", "#000000", "-"))
-    for curve in curves:
-        of, x = _conditions(found, curve.points), _along(found, main, curve.points, data)
-        residuals = columns(of, x=x, y=found.residuals.scaled[curve.points])
-        panel.traces.append(Trace("curve", residuals, "data", curve.label, curve.colour, "", "o"))
-    panel.keys = [Key(curve.label, curve.colour, "", "o") for curve in curves]
+    for k, (label, points) in enumerate(curves.items()):
+        of, place = conditions(found.measured, data, points), _along(found, x, points, data)
+        residuals = columns(of, x=place, y=found.residuals.scaled[points])
+        panel.traces.append(Trace("curve", residuals, "data", label, colours.colour(k), "", "o"))
     return panel
 
 
-def _density(
-    found: fit.Calibration, name: str, values: FloatArray, unit: str, is_free: bool, data: xr.Dataset
-) -> Panel:
+def _density(found: fit.Calibration, name: str, values: FloatArray, how: labels.Quantity, is_free: bool) -> Panel:
     """Return the density of an unknown, or of a product of unknowns, with its 68 % and 95 % intervals."""
-    how = _quantity(found, name, data) if name in found.unknowns else labels.Quantity(name, unit)
     shown, weights = how.of(values), found.posterior.weights
     known = name in found.unknowns
     log = bool(np.all(shown > 0)) and (not known or found.prediction.scales[found.unknowns.index(name)].logarithmic)
@@ -183,7 +153,7 @@ def _density(
     if is_free:
         panel.title = "not determined"
         return panel
-    for level in (0.95, 0.6827):
+    for level in identifiability.LEVELS.values():
         low, high = identifiability.quantiles(across, weights, [0.5 - level / 2, 0.5 + level / 2])
         inside = np.concatenate([[low], centres[(centres > low) & (centres < high)], [high]])
         below = np.interp(inside, centres, height)

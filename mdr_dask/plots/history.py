@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,14 +22,14 @@ from mdr_dask.plots.view import MOST_PANELS
 BEFORE, JUMP, AFTER = (f"friction_coefficient_{name}" for name in ("before", "jump", "after"))
 FRICTION = "friction_coefficient"
 TIME = "relaxation_times"
-DRIVEN = ("velocity", "normal_force")
+DRIVEN = {"velocity": "m/s", "normal_force": "N"}
 #: Duration that is shown before the history begins, as a fraction of the duration shown.
 LEAD = 0.08
 STEADY = "steady state at the end"
 
 
 def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
-    """Return friction, velocity and normal force against time; each series has a column of panels."""
+    """Return friction against time, with velocity and normal force if they change; each series has a column."""
     needed = (BEFORE, JUMP, FRICTION)
     found = {name: data for name, data in groups.items() if all(output in data for output in needed)}
     if not found:
@@ -36,8 +37,10 @@ def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
     families = {name: curves.family(data, FRICTION, TIME) for name, data in found.items()}
     kept, left_out = curves.with_one_legend(families)
     rest, kept = kept[MOST_PANELS:], kept[:MOST_PANELS]
-    panels = [panel for name in kept for panel in _column(name, found[name], families[name])]
-    figure = Figure(panels, "friction along histories of velocity and load", stack=3, ratio=0.45)
+    columns_of = {name: _column(name, found[name], families[name]) for name in kept}
+    shown = [0, *(k for k in (1, 2) if any(_changes(column[k]) for column in columns_of.values()))]
+    panels = [column[k] for column in columns_of.values() for k in shown]
+    figure = Figure(panels, "friction along histories of velocity and load", stack=len(shown), ratio=0.45)
     held = curves.fixed_by_all([families[name].held for name in kept])
     figure.fixed = curves.fixed_text(held, found[kept[0]])
     figure.bars = curves.meaning_of_bars(found.values(), [FRICTION])
@@ -46,13 +49,19 @@ def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
     return figure
 
 
+def _changes(panel: Panel) -> bool:
+    return any(np.ptp(trace.column("y")) > 0 for trace in panel.traces)
+
+
 def _column(name: str, data: xr.Dataset, one: curves.Family) -> list[Panel]:
+    """Return the panels of a series: friction, velocity and normal force."""
     last = float(data[TIME].values[-1])
     time = Axis(labels.SYMBOLS[TIME], low=-LEAD * last, high=last)
-    friction = Axis("coefficient of friction", quantity=FRICTION)
-    driven = [_driven(key, data) for key in DRIVEN]
-    panels = [Panel(time, friction, title=f"series {name}" if name else "", bar=one.bar)]
-    panels += [Panel(time, axis) for axis, _ in driven]
+    panels = [Panel(time, Axis("coefficient of friction", quantity=FRICTION), bar=one.bar)]
+    panels[0].title = f"series {name}" if name else ""
+    for key, unit in DRIVEN.items():
+        values = data[key] if key in data.coords else xr.DataArray(np.nan, attrs={"units": unit})
+        panels.append(Panel(time, Axis(labels.label(key, values), quantity=key), keys=one.keys))
     for curve in one.curves:
         case = curve.data
         look: dict[str, Any] = {"label": curve.label, "colour": curve.colour, "line": curve.line or "-"}
@@ -61,24 +70,15 @@ def _column(name: str, data: xr.Dataset, one: curves.Family) -> list[Panel]:
         if np.isfinite(after):
             level = columns(case, x=np.array([0.0, last]), y=np.full(2, after))
             panels[0].traces.append(Trace("law", level, STEADY, STEADY, curve.colour, ":"))
-        at, *values = loading_history(VelocityJump.model_validate(curves.parameters_at(case)), last)
-        for panel, (_, how), value in zip(panels[1:], driven, values, strict=True):
-            panel.traces.append(Trace("curve", columns(case, x=at, y=how.of(value)), **look))
+        at, *driven = loading_history(VelocityJump.model_validate(curves.parameters_at(case)), last)
+        for panel, (key, unit), value in zip(panels[1:], DRIVEN.items(), driven, strict=True):
+            shown = labels.shown(key, xr.DataArray(value, attrs={"units": unit}))
+            panel.traces.append(Trace("curve", columns(case, x=at, y=shown), **look))
     panels[0].keys = [*one.keys, Key(STEADY, "#808080", ":")] if len(panels[0].traces) > 1 else one.keys
-    for panel, row in zip(panels[1:], driven, strict=True):
-        highest = max(float(trace.column("y").max()) for trace in panel.traces)
-        lowest = min(float(trace.column("y").min()) for trace in panel.traces)
-        panel.y = Axis(row[0].label, low=min(0.0, 1.1 * lowest), high=1.15 * highest)
-        panel.keys = one.keys
+    for panel in panels[1:]:
+        every = np.concatenate([trace.column("y") for trace in panel.traces])
+        panel.y = replace(panel.y, low=min(0.0, 1.1 * every.min()), high=1.15 * every.max())
     return panels
-
-
-def _driven(name: str, data: xr.Dataset) -> tuple[Axis, labels.Quantity]:
-    """Return axis and unit of a prescribed quantity, which is a parameter or only part of the loading history."""
-    unit = {"velocity": "m/s", "normal_force": "N"}[name]
-    values = data[name] if name in data.coords else xr.DataArray(np.nan, attrs={"units": unit})
-    how = labels.quantity(name, values)
-    return Axis(labels.with_unit(how.symbol, how.unit)), how
 
 
 def _trace(case: xr.Dataset, last: float) -> xr.Dataset:
@@ -112,5 +112,5 @@ def loading_history(case: VelocityJump, last: float) -> tuple[FloatArray, FloatA
 
 
 PLOTS: tuple[Plot, ...] = (
-    Plot("history", ("velocity_jump",), "friction, velocity and normal force against time", draw),
+    Plot("history", ("velocity_jump",), "friction against time, with velocity and normal force if they change", draw),
 )

@@ -11,43 +11,41 @@ import xarray as xr
 from mdr_dask import aggregation
 from mdr_dask.fits.friction import loads_and_velocities, spectral_slope
 from mdr_dask.fits.indenter import indenter_xi
-from mdr_dask.fits.kinetic_cases import is_jump
+from mdr_dask.fits.jumps import LAW, LEVELS, is_jump, jump_law
 from mdr_dask.models.ehl_line import groups
-from mdr_dask.physics.lubrication.film_formulas import PAN_HAMROCK_CENTRAL, PAN_HAMROCK_MINIMUM, FilmFormula
+from mdr_dask.physics.lubrication.film_formulas import PAN_HAMROCK_CENTRAL, PAN_HAMROCK_MINIMUM
 from mdr_dask.physics.sliding import laws
+
+#: Outputs that some laws need as input.
+NEEDED = ("rms_slope", LEVELS[0])
+FILMS = {"central_film": PAN_HAMROCK_CENTRAL, "minimum_film": PAN_HAMROCK_MINIMUM}
+#: Output of the steady coefficient of friction, by model.
+STEADY = {"sliding_friction": "friction_coefficient", "velocity_jump": LEVELS[0]}
+#: Parameters of a Kelvin body on a generated line.
+LINE = {"shear_modulus", "relaxation_time", "rms_roughness", "length", "hurst", "points"}
 
 
 class Law(NamedTuple):
-    """A law of one output.
-
-    Attributes
-    ----------
-    name : str
-        Name in the legend.
-    models, output
-        Models and output to which the law applies.
-    holds_for : callable, Dataset -> bool
-        Returns whether the law applies to a series.
-    value : callable, Dataset -> DataArray
-        Returns the value of the law in SI, from the parameters and the outputs in `NEEDED`.
-    """
+    """A law: its name in the legend, and a function that returns its values in SI from parameters and `NEEDED`."""
 
     name: str
-    models: tuple[str, ...]
-    output: str
-    holds_for: Callable[[xr.Dataset], bool]
     value: Callable[[xr.Dataset], xr.DataArray]
-
-
-#: Outputs that some laws need as input.
-NEEDED = ("rms_slope", "friction_coefficient_before")
 
 
 def law_of(data: xr.Dataset, output: str) -> Law | None:
     """Return the law of an output that applies to a series, or None."""
     model = data.attrs.get("model")
-    known = (law for law in LAWS if model in law.models and law.output == output)
-    return next((law for law in known if law.holds_for(data)), None)
+    if model == "ehl_line" and output in FILMS and "inlet" not in data.coords:
+        return Law("Pan and Hamrock", lambda part: xr.DataArray(FILMS[output](*groups(part.coords.get))))
+    if not LINE.issubset(data.coords) or not bool((data["rms_roughness"] > 0).all()):
+        return None
+    if model == "velocity_jump" and output == LEVELS[1] and is_jump(data) and LEVELS[0] in data:
+        return Law("law (eq. 4.11)", _jump)
+    if output != STEADY.get(str(model)):
+        return None
+    if not any(str(name).startswith("indenter_") for name in data.coords):
+        return Law("law (eq. 3.18)", _plane)
+    return Law("law (eq. 3.40)", _rough_indenter) if model == "sliding_friction" else None
 
 
 def along(data: xr.Dataset, name: str, count: int = 200) -> xr.Dataset:
@@ -77,17 +75,6 @@ def along(data: xr.Dataset, name: str, count: int = 200) -> xr.Dataset:
     return fine
 
 
-def on_generated_line(data: xr.Dataset) -> bool:
-    """Return whether a series has a Kelvin body on a generated line."""
-    needed = {"shear_modulus", "relaxation_time", "rms_roughness", "length", "hurst", "points"}
-    return needed <= set(data.coords) and bool((data["rms_roughness"] > 0).all())
-
-
-def is_plane(data: xr.Dataset) -> bool:
-    """Return whether a series has a plane Kelvin body on a generated line."""
-    return on_generated_line(data) and not any(str(name).startswith("indenter_") for name in data.coords)
-
-
 def _plane(data: xr.Dataset) -> xr.DataArray:
     force, velocity = loads_and_velocities(data)
     law = laws.interpolation(force, velocity, laws.alpha(data["hurst"]), laws.BETA)
@@ -99,40 +86,9 @@ def _rough_indenter(data: xr.Dataset) -> xr.DataArray:
     return xr.DataArray(np.sqrt(2) * slope * laws.indenter(indenter_xi(data, slope)))
 
 
-def _is_rough_indenter(data: xr.Dataset) -> bool:
-    return on_generated_line(data) and not is_plane(data)
-
-
 def _jump(data: xr.Dataset) -> xr.DataArray:
     """Return the jump of friction by eq. 4.11, from the stored friction before the jump."""
-    from mdr_dask.fits.jumps import LAW, jump_law
-
     slope = spectral_slope(data)
-    before = aggregation.mean(data["friction_coefficient_before"]) / slope
+    before = aggregation.mean(data[LEVELS[0]]) / slope
     law = xr.apply_ufunc(jump_law, before, kwargs={"constant": LAW})
     return xr.DataArray(law * slope * data["velocity_change"])
-
-
-def _is_known_jump(data: xr.Dataset) -> bool:
-    return is_jump(data) and on_generated_line(data) and "friction_coefficient_before" in data
-
-
-def _film(formula: FilmFormula) -> Callable[[xr.Dataset], xr.DataArray]:
-    def value(data: xr.Dataset) -> xr.DataArray:
-        return xr.DataArray(formula(*groups(data.coords.get)))
-
-    return value
-
-
-def _is_flooded(data: xr.Dataset) -> bool:
-    return "inlet" not in data.coords
-
-
-LAWS: tuple[Law, ...] = (
-    Law("law (eq. 3.18)", ("sliding_friction",), "friction_coefficient", is_plane, _plane),
-    Law("law (eq. 3.40)", ("sliding_friction",), "friction_coefficient", _is_rough_indenter, _rough_indenter),
-    Law("law (eq. 3.18)", ("velocity_jump",), "friction_coefficient_before", is_plane, _plane),
-    Law("law (eq. 4.11)", ("velocity_jump",), "friction_coefficient_jump", _is_known_jump, _jump),
-    Law("Pan and Hamrock", ("ehl_line",), "central_film", _is_flooded, _film(PAN_HAMROCK_CENTRAL)),
-    Law("Pan and Hamrock", ("ehl_line",), "minimum_film", _is_flooded, _film(PAN_HAMROCK_MINIMUM)),
-)

@@ -133,10 +133,14 @@ def _points(panel: Panel, measured: Measured, data: xr.Dataset, here: np.ndarray
     x = labels.quantity(panel.x.quantity, data[panel.x.quantity]).of(measured.conditions[panel.x.quantity][here])
     how, values = labels.quantity(measured.output, data[measured.output]), measured.values[here]
     half = np.full(values.size, np.nan) if measured.errors is None else HALF * measured.errors[here]
-    coords = {
-        name: ("point", each[here], {"units": str(data[name].attrs.get("units", "1"))})
-        for name, each in measured.conditions.items()
-    }
-    points = columns(xr.Dataset(coords=coords), x=x, y=Mean(*map(how.of, (values, values - half, values + half))))
+    points = columns(
+        conditions(measured, data, here), x=x, y=Mean(*map(how.of, (values, values - half, values + half)))
+    )
     name = ", ".join(part for part in (NAME, label) if part)
     return Trace("curve", points, NAME, name, colour, "", "D", bars=True)
+
+
+def conditions(measured: Measured, data: xr.Dataset, here: np.ndarray) -> xr.Dataset:
+    """Return the conditions of some measured points as coordinates."""
+    units = {name: {"units": str(data[name].attrs.get("units", "1"))} for name in measured.conditions}
+    return xr.Dataset(coords={name: ("point", each[here], units[name]) for name, each in measured.conditions.items()})

@@ -75,8 +75,8 @@ PLOTS: tuple[Plot, ...] = (
         View(("upper_profile", "lower_profile"), "position", single=True),
     ),
     described(
-        *("trace", MIXED, "contact length during one revolution"),
-        View("contact_length_trace", "angle", log="", single=True),
+        *("trace", MIXED, "contact length during one revolution, one panel for each case"),
+        View("contact_length_trace", "angle", log="", single=True, apart=True),
     ),
     described(
         *("film_profile", EHL, "pressure and film thickness against position"),

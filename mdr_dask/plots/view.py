@@ -55,6 +55,8 @@ class View:
         positive and span more than a factor of ten.
     single : bool
         Whether the first realisation is drawn instead of the mean over realisations.
+    apart : bool
+        Whether every curve has its own panel, for curves that would hide each other.
     guides : mapping of str to mapping of float to str
         Horizontal lines in the panels of an output, with their names.
     """
@@ -65,6 +67,7 @@ class View:
     panels: str = ""
     log: str | None = None
     single: bool = False
+    apart: bool = False
     guides: Mapping[str, Mapping[float, str]] = field(default_factory=dict)
 
     @property
@@ -228,7 +231,7 @@ def _lines(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
         panel.y = y
         panel.traces += _guides(view.guides.get(output, {}), panel)
     every = [one for part in families for one in part.values()]
-    figure = Figure(panels, "", share_y=len(panels) > 1)
+    figure = Figure(panels, "", share_y=len(panels) > 1, ratio=0.3 if view.apart else 0.7)
     figure.fixed = curves.fixed_text(curves.fixed_by_all([one.held for one in every]), first)
     figure.bars = curves.meaning_of_bars(found.values(), [output])
     figure.leave_out([*left_out, *(sentence for one in every for sentence in one.left_out)])
@@ -262,6 +265,13 @@ def _parts(found: Mapping[str, xr.Dataset], view: View, output: str) -> tuple[li
     if view.panels:
         return _by_value(found, view)
     families = {name: curves.family(data, output, view.along[0], view.by) for name, data in found.items()}
+    if view.apart:
+        every = [(name, curve) for name, one in families.items() for curve in one.curves]
+        rest = [f"{len(every) - MOST_PANELS} of {len(every)} curves"] if len(every) > MOST_PANELS else []
+        left_out = [sentence for one in families.values() for sentence in one.left_out]
+        titles = [", ".join(part for part in (name, curve.label) if part) for name, curve in every]
+        parts = [_Part(title, {name: curve.data}) for title, (name, curve) in zip(titles, every, strict=True)]
+        return parts[:MOST_PANELS], [*left_out, *rest]
     if len(found) == 1 or sum(len(one.curves) for one in families.values()) <= colours.most():
         return [_Part("", dict(found))], []
     kept, left_out = curves.with_one_legend(families)

@@ -1,4 +1,4 @@
-"""Every fit of every model on every kind of study: constants, or one sentence why there are none, never a traceback."""
+"""Every fit of every model on every kind of study gives constants, or one sentence with the reason."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ OF_LINE = {"collapse", "contact_slope", "interpolation"}
 OF_JUMPS = {"kinetics", "jump_law"}
 OF_RATES = {"relaxation", "rate_power"}
 
-#: Campaign, what is special of its store, and the fits that it can hold.
+#: Campaign, options of its planted store, and the fits that succeed.
 STUDIES: dict[str, tuple[str, dict[str, object], set[str]]] = {
     "spectrum": (SLIDING + SPECTRUM + KELVIN + SPEEDS, {}, OF_SLOPE),
     "map": (SLIDING + MAP + KELVIN + SPEEDS, {}, OF_SLOPE),
@@ -98,14 +98,19 @@ STUDIES: dict[str, tuple[str, dict[str, object], set[str]]] = {
 }
 
 
-def test_all_but_curves_that_are_merged_are_fitted_to_each_series_for_itself():
+def test_all_fits_but_the_master_curve_treat_series_separately():
     models = ("sliding_friction", "velocity_jump", "mixed_lubrication", "ehl_line", "fretting_wear")
     joined = {name for model in models for name, fit in fits.available(model).items() if not fit.apart}
-    assert joined == {"master_curve", "film_exponents"}
+    assert joined == {"master_curve"}
 
 
-@pytest.mark.parametrize("study", STUDIES)
-def test_every_fit_finds_constants_or_says_why_not(study, tmp_path):
+#: Studies of the default run: at least one of every model, and of every kind of surface, material and history.
+QUICK = {"spectrum", "moduli of a table", "smooth and rough cone", "calibration on a surface", "jumps on a spectrum"}
+QUICK |= {"jumps of three sizes on a scan", "jumps", "ramps", "film", "one film", "rollers", "wear"}
+
+
+@pytest.mark.parametrize("study", [pytest.param(s, marks=[pytest.mark.slow] * (s not in QUICK)) for s in STUDIES])
+def test_every_fit_gives_constants_or_the_reason(study, tmp_path):
     text, special, holds = STUDIES[study]
     planted.make_tables(tmp_path)
     groups = planted.make(tmp_path, text, **{"realisations": 3, **special})
@@ -121,7 +126,7 @@ def test_every_fit_finds_constants_or_says_why_not(study, tmp_path):
         assert callable(law.constants) or name == "film_exponents" or ends <= set(law.constants)
         found.add(name)
     assert found == holds
-    assert all(sentence.__cause__ is None for sentence in refused), "a fault of a fit, not a sentence about the store"
+    assert all(sentence.__cause__ is None for sentence in refused), "an internal error of a fit"
     assert all(re.fullmatch(r"[^\n]{20,400}", str(sentence)) for sentence in refused)
 
 
@@ -140,8 +145,8 @@ ODD = {
 @pytest.mark.slow
 @pytest.mark.parametrize("odd", ODD)
 @pytest.mark.parametrize("study", ["jumps", "jumps of three sizes on a scan", "lengths and points"])
-def test_fits_take_odd_numbers_without_a_warning(study, odd, tmp_path):
-    """No numpy warning, no traceback: constants with wide intervals or none, or one sentence."""
+def test_fits_accept_unusual_numbers_without_a_warning(study, odd, tmp_path):
+    """They give constants with wide intervals, constants without intervals, or one sentence."""
     text, special, _ = STUDIES[study]
     planted.make_tables(tmp_path)
     groups = {
@@ -162,8 +167,4 @@ def test_the_plateau_of_a_measured_surface_is_the_one_of_its_numbers(tmp_path):
     generated = {"": groups[""].assign_coords(planted.USUAL)}
     other = fits.available("sliding_friction")["plateau"].results(generated)[""]
     np.testing.assert_allclose(measured["plateau"], other["plateau"], rtol=1e-12)
-    slope = groups[""]["rms_slope"].mean()
-    number = measured["plateau_velocity"] * slope / (np.sqrt(2) * planted.USUAL["rms_roughness"])
-    np.testing.assert_allclose(number, other["plateau_velocity"], rtol=1e-9)
-    assert measured["plateau_velocity"].attrs["units"] == "m"
     assert "v tau" in str(measured["reached"].values.flat[0])

@@ -1,4 +1,4 @@
-"""What data determine of unknowns that they do not determine: products, beside posteriors made for them."""
+"""Products of powers that the data determine, for planted posteriors."""
 
 import numpy as np
 import pytest
@@ -17,11 +17,11 @@ def posterior(likely, unknowns):
 
 
 def test_of_three_unknowns_two_products_are_determined():
-    """The data know x y and y z alone: any two that span the same are right, each without one of the unknowns."""
+    """The data determine x y and y z alone: any two products that span the same space are right."""
     found = posterior([lambda p: p[:, 0] + p[:, 1] - 1, lambda p: p[:, 1] + p[:, 2] - 1], 3)
-    told = products(found, np.exp(found.places), [0, 1, 2])
-    assert len(told) == 2
-    for each in told:
+    found_products = products(found, np.exp(found.places), [0, 1, 2])
+    assert len(found_products) == 2
+    for each in found_products:
         assert np.sum(each.exponents != 0) == 2
         assert np.abs(each.exponents).max() == 1
         np.testing.assert_allclose(each.values, np.exp(found.places @ each.exponents))
@@ -29,11 +29,11 @@ def test_of_three_unknowns_two_products_are_determined():
         mean = found.weights @ logarithm
         assert np.sqrt(found.weights @ (logarithm - mean) ** 2) < 0.03
     known = np.array([[1, 1, 0], [0, 1, 1]])
-    assert np.linalg.matrix_rank(np.concatenate([known, [each.exponents for each in told]])) == 2
+    assert np.linalg.matrix_rank(np.concatenate([known, [each.exponents for each in found_products]])) == 2
 
 
 @pytest.mark.parametrize("least", [0.0, -0.5])
-def test_what_is_not_positive_has_no_product(least):
+def test_unknowns_that_are_not_positive_have_no_product(least):
     found = posterior([lambda p: p[:, 0] + p[:, 1] - 1], 2)
     assert len(products(found, np.exp(found.places), [0, 1])) == 1
     assert products(found, found.places + least, [0, 1]) == []

@@ -3,10 +3,8 @@ import pytest
 import xarray as xr
 
 from mdr_dask.errors import FitError
-from mdr_dask.fits import available, kinetics
+from mdr_dask.fits import available
 from mdr_dask.fits.jumps import jump_law
-from mdr_dask.fits.kinetics import relaxation_curves
-from mdr_dask.fits.relaxation import exponential, widths
 
 FIT = available("velocity_jump")
 TIMES = np.geomspace(1e-4, 20, 60)
@@ -69,10 +67,9 @@ def test_rate_of_an_exponential_is_found() -> None:
     assert np.allclose(found["relaxation_duration"], TAU / found["rate"])
     assert np.allclose(found["relaxation_length"], 1.2 * found["velocity"] * found["relaxation_duration"])
     assert np.allclose(found["length_times_wavenumber"], 1.2 * found["passing_number"] / found["rate"])
-    assert found.attrs["window"].startswith("one exponential over")
 
 
-def test_a_stretched_decay_is_no_exponential_and_its_rate_is_not_narrow() -> None:
+def test_a_stretched_decay_is_no_exponential_and_its_rate_has_a_wide_interval() -> None:
     found = FIT["relaxation"].compute({"": store(ABOVE[3:4], 0.7, 0.3, shape=0.5)}).squeeze()
     assert not found["fitted_law_holds"].item().startswith("yes")
     assert found["rate_low"] <= found["integral_rate"] <= found["rate_high"]
@@ -102,10 +99,8 @@ def test_constant_of_the_jump_law_is_found() -> None:
     # the mean over realisations of a curved law differs from the law of the mean by the square of the scatter
     assert found["constant"].item() == pytest.approx(0.42, rel=0.02)
     assert found["constant_low"].item() < found["constant"].item() < found["constant_high"].item()
-    both = axes(store(ABOVE, 0.7, 0.3), "hurst", [0.7, 0.8])
-    found = FIT["jump_law"].compute({"": both})
-    assert found["hurst"].values.tolist() == ["0.7", "0.8", "all"]
-    assert found["constant"].values[2] == pytest.approx(found["constant"].values[0], rel=1e-12)
+    both = FIT["jump_law"].compute({"": axes(store(ABOVE, 0.7, 0.3), "hurst", [0.7, 0.8])})
+    assert both["constant"].item() == pytest.approx(found["constant"].item(), rel=1e-12)
 
 
 def test_two_cases_are_enough_for_the_jump_law_and_one_is_not() -> None:
@@ -157,7 +152,7 @@ def test_power_of_the_rate_in_both_regimes() -> None:
     assert powers["slow"]["power"].sel(regime="below").item() == pytest.approx(1.0, abs=0.05)
     assert np.isnan(powers["slow"]["power"].sel(regime="above").item())
     assert powers["fast"]["power"].sel(regime="above").item() == pytest.approx(0.7, abs=1e-3)
-    assert powers["fast"]["law_power"].sel(regime="above").item() == pytest.approx(0.7)
+    assert powers["fast"]["power_stated"].sel(regime="above").item() == pytest.approx(0.7)
     rows = FIT["rate_power"].compute({"": axes(store(ABOVE, 0.8, 0.2), "normal_force", [1.0, 2.0])})
     assert rows["power"].dims == ("normal_force", "regime")
     assert np.allclose(rows["power"].sel(regime="above"), 0.2, atol=1e-3)
@@ -185,39 +180,12 @@ def test_failed_realisations_are_left_out() -> None:
     assert np.allclose(found["rate"], whole["rate"])
 
 
-def test_missing_outputs_are_named() -> None:
+def test_a_missing_output_is_named() -> None:
     with pytest.raises(FitError, match="rms_slope"):
         FIT["jump_law"].compute({"": store(ABOVE, 0.7, 0.3).drop_vars("rms_slope")})
 
 
-def test_weights_integrate() -> None:
-    assert widths(TIMES) @ TIMES == pytest.approx((TIMES[-1] ** 2 - TIMES[0] ** 2) / 2, rel=1e-12)
-
-
-def test_exponential_outside_its_first_grid() -> None:
-    time = np.linspace(0, 1, 200)
-    rate, amplitude = exponential(time, 3 * np.exp(-5 * time)[None], widths(time))
-    assert (rate[0], amplitude[0]) == (pytest.approx(5, rel=1e-3), pytest.approx(3, rel=1e-3))
-
-
-def test_curves_of_a_relaxation_are_those_of_its_constants():
-    found = relaxation_curves(store(np.array([0.05]), 0.7, 0.3, shape=0.5))
-    rate = -np.polyfit(found["t"], np.log(found["one"]), 1)[0]
-    assert rate == pytest.approx(found["rate"].item())
-    assert np.all((found["one_low"] <= found["one"]) & (found["one"] <= found["one_high"]))
-
-
-def test_rates_count_in_a_power_as_well_as_their_logarithms_are_known():
-    x, error = np.log([2.0, 5.0, 10.0, 20.0]), np.array([0.02, 0.05, 0.1, 0.19])
-    random = np.random.default_rng(3)
-    logs = 0.4 * x + np.append([[0.0, 0.02, -0.05, 0.05]], error * random.standard_normal((400, 4)), axis=0)
-    (power, _, _, _, factor, *_), _ = kinetics._power(x, np.exp(logs), error, 0.4, 8)
-    slope, level = np.polyfit(x, logs[0], 1, w=1 / np.sqrt(error**2 + 0.1**2))
-    assert power == pytest.approx(slope, rel=1e-9)
-    assert factor == pytest.approx(np.exp(level), rel=1e-9)
-
-
-def test_a_limit_is_not_tested_where_one_line_is_left() -> None:
+def test_a_limit_is_not_tested_with_one_realisation() -> None:
     data = store(np.array([1e-6, 2e-6]), 0.7, 0.3, realisations=5)
     levels = [name for name in data.data_vars if name.startswith("friction_coefficient")]
     for name in levels:

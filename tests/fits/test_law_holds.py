@@ -1,4 +1,4 @@
-"""Every fit says in words whether its law holds, from the function to the command line."""
+"""Verdicts of fits: sentences, undetermined constants, and the command line."""
 
 import json
 from importlib import import_module
@@ -54,7 +54,7 @@ RANKS = {"not tested": 0, "no": 0, "approximately": 1, "yes": 2}
 @pytest.mark.parametrize(("off", "best"), [(0.0, "yes"), (0.1, "approximately"), (0.6, "no")])
 @pytest.mark.parametrize("cases", [1, 12])
 def test_fewer_realisations_give_no_better_verdict(off, best, cases):
-    """Scatter of each realisation is as large as the mean; with two of them nothing can be said."""
+    """Scatter of each realisation is as large as the mean; two of them give no verdict."""
     for seed in range(5):
         values = 1 + off + np.random.default_rng(seed).normal(size=(40_000, cases))
         found = {}
@@ -87,7 +87,7 @@ LOG_LOADS = np.repeat(np.linspace(0.0, 1.0, 4), 3)
     ],
 )
 @pytest.mark.parametrize("misfit", [0.0, 0.2])
-def test_constants_that_play_no_part_are_not_determined(columns, known, misfit):
+def test_constants_without_effect_are_not_determined(columns, known, misfit):
     design = np.stack(columns)
     bent = design.sum(axis=0) + misfit * np.cos(9 * LOG_LOADS)
     rows = bent + 0.01 * np.random.default_rng(0).normal(size=(401, bent.size))
@@ -98,7 +98,7 @@ def test_constants_that_play_no_part_are_not_determined(columns, known, misfit):
     assert np.isfinite(found.rms)
 
 
-def test_a_fit_without_a_law_says_so():
+def test_a_fit_without_a_verdict_is_not_tested():
     plain = Fit("plain", ("toy",), "none", lambda groups: xr.Dataset({"a": 1.0}))
     assert plain.results({})[""]["law_holds"].item().startswith("not tested: ")
     apart = Fit("plain", ("toy",), "none", lambda groups: xr.Dataset({"a": 1.0}), apart=True)
@@ -122,7 +122,7 @@ def friction(tmp_path_factory):
 @pytest.mark.parametrize(
     "name", ["zone_one", "plateau", "interpolation", "contact_growth", "contact_slope", "collapse"]
 )
-def test_the_command_line_says_it_in_table_and_json(friction, name, capsys):
+def test_the_command_line_prints_the_verdict_as_table_and_json(friction, name, capsys):
     capsys.readouterr()
     assert main(["fit", friction, name]) == 0
     printed = " ".join(capsys.readouterr().out.split())

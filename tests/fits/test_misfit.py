@@ -1,4 +1,4 @@
-"""Whether residuals follow a trend: what chance does alone, and what it does not."""
+"""Trends of residuals, and verdicts on models."""
 
 import numpy as np
 import pytest
@@ -10,14 +10,14 @@ DRAWS, POINTS = 600, 30
 
 
 def noise(seed: int) -> np.ndarray:
-    """Residuals of fits with a constant of their own: their mean is gone."""
+    """Return residuals of a fit with a free constant: their mean is zero."""
     drawn = np.random.default_rng(seed).standard_normal((DRAWS, POINTS))
     return drawn - drawn.mean(axis=1, keepdims=True)
 
 
 @pytest.mark.parametrize("count", [1, 3])
-def test_of_noise_a_trend_is_doubted_no_more_often_than_its_probability_says(count):
-    """Of one condition just as often; of several, the worst of which is told, no more often: and never above 1."""
+def test_noise_has_a_trend_as_often_as_its_probability(count):
+    """For one condition exactly as often; for several conditions, of which the worst counts, not more often."""
     random = np.random.default_rng(2)
     conditions = {f"condition {k}": random.permutation(POINTS).astype(float) for k in range(count)}
     found = np.array([trend(residuals, conditions)[0] for residuals in noise(1)])
@@ -38,19 +38,19 @@ def test_the_condition_that_residuals_follow_is_named():
     assert trend(residuals, {"few": np.arange(POINTS) % 3}) == (1.0, "")
 
 
-def test_residuals_without_errors_of_their_own_are_judged_by_their_trend_alone():
+def test_residuals_without_known_errors_are_judged_by_their_trend():
     velocity = np.geomspace(0.01, 1, 12)
     bent = np.log(velocity) ** 2 - 8 + 0.1 * np.random.default_rng(0).normal(size=12)
     even = np.random.default_rng(1).normal(size=12)
 
-    def said(scaled, relative=0.1, freedom=10, errors=0.1, squares=np.nan):
+    def judged(scaled, relative=0.1, freedom=10, errors=0.1, squares=np.nan):
         return law_holds(Residuals(scaled, relative, squares, freedom, errors), {"velocity": velocity})
 
-    assert said(even, freedom=0).startswith("not tested: there are no more points")
-    assert said(even[:5]).startswith("not tested: 5 points")
-    assert said(even).startswith("yes: ")
-    assert said(bent).startswith("no: the residuals have a trend along velocity")
-    assert said(bent, relative=0.9 * WITHIN).startswith("yes: ")
+    assert judged(even, freedom=0).startswith("not tested: there are no more points")
+    assert judged(even[:5]).startswith("not tested: 5 points")
+    assert judged(even).startswith("yes: ")
+    assert judged(bent).startswith("no: the residuals have a trend along velocity")
+    assert judged(bent, relative=0.9 * WITHIN).startswith("yes: ")
     for squares in (np.nan, 5.0):
-        assert said(even, squares=squares).startswith("yes: ")
-        assert said(even, errors=0.5, squares=squares).startswith("not tested: errors of 50 %")
+        assert judged(even, squares=squares).startswith("yes: ")
+        assert judged(even, errors=0.5, squares=squares).startswith("not tested: errors of 50 %")

@@ -76,13 +76,13 @@ def test_scatter_of_realisations_does_not_count():
     assert means == pytest.approx(FIRST, abs=0.035)
 
 
-def test_one_failed_realisation_loses_no_case():
+def test_a_failed_realisation_does_not_remove_its_case():
     data = study("saltelli", 64, 1, realisations=3, noise=0.1)
     data["y"][::4, 1] = np.nan
     assert sobol_indices(data, "y").attrs["left_out"] == 0
 
 
-def test_few_points_are_said_with_how_many_more():
+def test_too_few_points_are_reported_with_the_number_needed():
     found = sobol_indices(study("saltelli", 32, 0), "y")
     widest = max(float((found[f"{kind}_high"] - found[f"{kind}_low"]).max()) / 2 for kind in ("first", "total"))
     assert widest > 0.1
@@ -100,7 +100,7 @@ def test_few_points_are_said_with_how_many_more():
         (lambda d: d.assign_coords(x1=("case", np.full(d.sizes["case"], "a"))), "this input has words"),
     ],
 )
-def test_what_cannot_be_is_one_sentence(change, what):
+def test_bad_studies_are_refused_with_the_reason(change, what):
     with pytest.raises(FitError, match=what):
         sobol_indices(change(study("latin hypercube", 64, 0)), "y")
 
@@ -149,7 +149,7 @@ def test_the_command_prints_rows_draws_and_refuses(toy, tmp_path, monkeypatch, c
     assert "dimension" in capsys.readouterr().err
 
 
-def test_an_output_without_realisations_is_one_of_each_case():
+def test_an_output_without_realisations_counts_as_one_realisation():
     data = study("sobol", 128, 3)
     found, single = sobol_indices(data, "y"), sobol_indices(data.isel(realisation=0), "y")
     for name in found:

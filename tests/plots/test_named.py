@@ -1,13 +1,16 @@
 """Named figures: each is drawn from a store that holds its data, and the numbers drawn are those of the store."""
 
+import functools
+
 import numpy as np
 import planted
 import pytest
 from matplotlib.figure import Figure
+from overlaps import problems
 
 from mdr_dask import aggregation
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.plots import available, history
+from mdr_dask.plots import available, history, page
 from mdr_dask.units import conversion
 
 V = "  velocity: {geometric: [0.01 mm/s, 10 m/s, 8]}\n"
@@ -42,7 +45,7 @@ FIGURES = {
     ),
     "temperature": (ROLLERS, ["breakthrough_probability"] * 4),
     "profiles": (PROFILES, ["upper_profile", "lower_profile"]),
-    "trace": (PROFILES, ["contact_length_trace"]),
+    "trace": (PROFILES, ["contact_length_trace"] * 6),
     "film_profile": (FILM + "  inlet: [-4, -2]\n", ["pressure", "film"]),
     "starvation": (FILM + "  inlet: [-4, -2, -1.5]\n", ["central_film", "minimum_film"]),
     "traction": (FILM + "  slide_roll_ratio: [0.01, 0.1, 0.2]\n", ["traction_coefficient"]),
@@ -51,10 +54,16 @@ FIGURES = {
 }
 
 
+@pytest.fixture(scope="module")
+def stores(tmp_path_factory):
+    """Return a function that makes the store of a campaign once."""
+    return functools.cache(lambda text: planted.make(tmp_path_factory.mktemp("named"), text))
+
+
 @pytest.mark.parametrize("name", FIGURES)
-def test_what_is_drawn_is_what_the_store_holds(name, tmp_path):
+def test_what_is_drawn_is_what_the_store_holds(name, stores):
     text, outputs = FIGURES[name]
-    groups = planted.make(tmp_path, text)
+    groups = stores(text)
     (data,) = groups.values()
     figure = available(data.attrs["model"])[name].describe(groups)
     assert [panel.y.quantity for panel in figure.panels] == outputs
@@ -72,6 +81,18 @@ def test_what_is_drawn_is_what_the_store_holds(name, tmp_path):
             np.minimum(abs(drawn.y - nearest), abs(drawn.y - below)), 0, atol=1e-9 * abs(known).max()
         )
         assert len(drawn) >= data[panel.x.quantity].size if panel.x.quantity in data.coords else len(drawn)
+
+
+@pytest.mark.parametrize("size", ["85mm", "170mm"])
+@pytest.mark.parametrize("name", [*FIGURES, "history"])
+def test_nothing_overlaps_and_no_panel_is_empty(name, size, stores):
+    text, _ = FIGURES.get(name, (JUMP, []))
+    groups = stores(text)
+    (data,) = groups.values()
+    with page.drawing_for(page.Page(*page.size(size))):
+        figure = available(data.attrs["model"])[name].figure(groups)
+        assert not list(problems(figure))
+    assert all(axes.has_data() for axes in figure.axes)
 
 
 def _unit(label: str) -> str:
@@ -122,8 +143,8 @@ def test_a_history_shows_friction_velocity_and_force_as_prescribed(tmp_path):
                 assert np.interp(at, x, y) == pytest.approx(value)
 
 
-def test_a_jump_is_a_history_of_one_step(tmp_path):
-    groups = planted.make(tmp_path, JUMP)
+def test_a_jump_is_a_history_of_one_step(stores):
+    groups = stores(JUMP)
     figure = available("velocity_jump")["history"].describe(groups)
     data = groups[""]
     assert len(figure.panels[0].traces) == 8  # four curves and their steady states

@@ -1,0 +1,261 @@
+"""What fits share: the cases of a series as arrays, laws fitted to them, and results as variables.
+
+`mdr_dask.bootstrap` defines the stacks from which intervals are computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from mdr_dask import bootstrap
+from mdr_dask.aggregation import companion
+from mdr_dask.arrays import FloatArray
+from mdr_dask.errors import FitError
+from mdr_dask.fits.base import FITTED_LAW_HOLDS, LAW_HOLDS, Fitted, excludes, fitted, require, verdict
+
+Series = Mapping[str, xr.Dataset]
+Variables = dict[str, xr.Variable]
+
+
+def each(
+    series: Series,
+    inner: Callable[[xr.Dataset], list[str]],
+    fit: Callable[[xr.Dataset], Variables],
+    *outputs: str,
+) -> xr.Dataset:
+    """Fit a law separately at every point of the dimensions that the law itself does not contain.
+
+    Parameters
+    ----------
+    series : mapping of str to Dataset
+        One series.
+    inner : callable
+        Returns the dimensions that one fit needs, such as those of load and velocity.
+    fit : callable
+        Returns the results of the fit at one point of the other dimensions.
+    *outputs : str
+        Outputs that the fit needs. The first one has no other dimensions than the axes of the study.
+
+    Raises
+    ------
+    FitError
+        If the store lacks an output.
+    """
+    data = next(iter(series.values()))
+    missing = [name for name in outputs if name not in data]
+    if missing:
+        raise FitError(f"expected the outputs {', '.join(outputs)} in the store, got none of {', '.join(missing)}")
+    data = data.load()
+    used = ["realisation", *inner(data)]
+    outer = [str(dim) for dim in data[outputs[0]].dims if dim not in used]
+    sizes = [data.sizes[dim] for dim in outer]
+    points = [fit(data.isel(dict(zip(outer, index, strict=True)))) for index in np.ndindex(*sizes)]
+    found = {}
+    for name in dict.fromkeys(name for point in points for name in point):
+        known = next(point[name] for point in points if name in point)
+        blank = "" if known.dtype.kind == "U" else np.nan
+        values = np.stack([point[name].values if name in point else np.full(known.shape, blank) for point in points])
+        found[name] = xr.Variable((*outer, *known.dims), values.reshape((*sizes, *known.shape)), known.attrs)
+    return xr.Dataset(found, {dim: data[dim] for dim in outer if dim in data.coords})
+
+
+def dimensions(data: xr.Dataset, *names: str) -> list[str]:
+    """Return the dimensions along which any of these parameters varies."""
+    return sorted({str(dim) for name in names if name in data.coords for dim in data[name].dims})
+
+
+def one_value(data: xr.Dataset, name: str) -> float:
+    """Return the only value of a parameter; raise FitError if the study lacks it, or if it differs between cases."""
+    require(data, name)
+    values = data[name]
+    if values.size != 1:
+        raise FitError(
+            f"expected one {name}, or an axis for it, got {values.size} values of a sampled study: each has its own law"
+        )
+    return float(values.item())
+
+
+class Table(NamedTuple):
+    """An output of all cases, divided by a scale.
+
+    Attributes
+    ----------
+    values, error : array, shape (cases, realisations)
+        The output and its discretisation error, both divided by the scale.
+    columns : tuple of array, shape (cases,)
+        Other numbers of the cases, such as load and velocity.
+    """
+
+    values: FloatArray
+    error: FloatArray
+    columns: tuple[FloatArray, ...]
+
+    def stack(self, used: Any = slice(None)) -> FloatArray:
+        """Return the stack of the means of some cases, shape (1 + RESAMPLES + 2 groups, cases)."""
+        return bootstrap.with_errors(bootstrap.means(self.values[used].T), self.mean_error(used))
+
+    def logarithms(self, used: Any = slice(None)) -> FloatArray:
+        """Return the stack of the logarithms of the means; an infinite error counts as 100 % of the mean."""
+        means = bootstrap.means(self.values[used].T)
+        relative = self.mean_error(used) / means[0]
+        return bootstrap.with_errors(bootstrap.logarithms(means), np.where(np.isinf(relative), 1.0, relative))
+
+    def mean_error(self, used: Any = slice(None)) -> FloatArray:
+        """Return the discretisation error of the mean of some cases; 0 if it is unknown."""
+        known = ~np.isnan(self.error[used])
+        total = np.where(known, np.abs(self.error[used]), 0.0).sum(axis=1)
+        mean: FloatArray = total / np.maximum(known.sum(axis=1), 1)
+        return mean
+
+    def count(self, used: Any = slice(None)) -> int:
+        """Return the smallest number of successful realisations among some cases."""
+        return int(np.isfinite(self.values[used]).sum(axis=1).min())
+
+    def mean(self) -> FloatArray:
+        """Return the mean of every case; NaN without any successful realisation."""
+        mean: FloatArray = bootstrap.means(self.values.T)[0]
+        return mean
+
+
+def table_of(data: xr.Dataset, scale: Any, *columns: xr.DataArray, output: str = "friction_coefficient") -> Table:
+    """Return an output of all cases divided by a scale, with other numbers of the cases as columns."""
+    values = data[output]
+    error = companion(data, output)
+    arrays = xr.broadcast(values / scale, (0 * values if error is None else error) / scale, *columns)
+    cases = [dim for dim in arrays[0].dims if dim != "realisation"]
+    count = arrays[0].sizes["realisation"]
+    flat = [
+        np.asarray(array.transpose(*cases, "realisation").values, dtype=np.float64).reshape(-1, count)
+        for array in arrays
+    ]
+    return Table(flat[0], flat[1], tuple(column[:, 0] for column in flat[2:]))
+
+
+# laws
+
+
+def linear(design: FloatArray, logs: FloatArray, count: int) -> Fitted:
+    """Fit a law that is linear in its constants to a stack of logarithms; design has the shape (constants, cases)."""
+    solve = np.linalg.pinv(design)
+    return fitted(lambda rows: rows @ solve, lambda rows, constants: rows - constants @ design, logs, count)
+
+
+def power_law(x: FloatArray, logs: FloatArray, count: int) -> Fitted:
+    """Fit a straight line to a stack of logarithms against x; the constants are its slope and its value at x = 0."""
+    return linear(np.vstack([x, np.ones(x.size)]), logs, count)
+
+
+def stated_power(x: FloatArray, logs: FloatArray, power: float, count: int, where: Callable[[int], str]) -> str:
+    """Return a sentence on whether a stack of logarithms follows a power law with a stated power and any factor."""
+    rest = logs - power * x
+    free = power_law(x, logs, count).constants[:, 0]
+    if np.isnan(free[0]):
+        return "not tested: the cases differ too little to determine the exponent"
+    excluded = excludes(free, count, power)
+    return verdict(rest - rest.mean(axis=1, keepdims=True), count, 1, where, excluded=excluded)
+
+
+def nonlinear(
+    model: Callable[[FloatArray], FloatArray],
+    stated: FloatArray,
+    logs: FloatArray,
+    count: int,
+    where: Callable[[int], str],
+) -> tuple[Fitted, Variables]:
+    """Fit a law to a stack of logarithms, and compare the data with its stated and with its fitted constants.
+
+    Parameters
+    ----------
+    model : callable
+        Takes constants, shape (rows, p), and returns the logarithm of the law, shape (rows or 1, cases).
+    stated : array, shape (p,)
+        Constants that the source of the law states: exponents, or logarithms of factors.
+    logs : array, shape (1 + RESAMPLES + 2 groups, cases)
+        Stack of the data.
+    count : int
+        Realisations that were resampled.
+    where : callable, int -> str
+        Returns a description of a case.
+
+    Returns
+    -------
+    Fitted, Variables
+        The fit, and variables with the rms and the largest departures and with both verdicts.
+    """
+    found = fitted(
+        lambda rows: _least_squares(model, stated, rows), lambda rows, best: rows - model(best), logs, count, stated
+    )
+    rest = logs - model(np.broadcast_to(stated, (len(logs), stated.size)))
+    excluded = excludes(found.constants[:, 0], count, stated[0])
+    sentence = verdict(rest, count, 0, where, excluded=excluded)
+    errors: Variables = {}
+    for end, which, left in (("", "fitted", found.residuals[0]), ("_stated", "stated", rest[0])):
+        errors |= measure(f"rms_error{end}", rms(left), f"rms relative departure with the {which} constants")
+        errors |= measure(
+            f"largest_error{end}", float(np.abs(left).max()), f"largest relative departure with the {which} constants"
+        )
+    return found, errors | holds(sentence, found.holds(where))
+
+
+def rms(left: FloatArray) -> float:
+    """Return the root mean square of residuals."""
+    return float(np.sqrt(np.mean(left**2)))
+
+
+def _least_squares(model: Callable[[FloatArray], FloatArray], start: FloatArray, data: FloatArray) -> FloatArray:
+    """Fit every row of the data, shape (rows, cases), by Levenberg-Marquardt steps; return (rows, constants).
+
+    Each call of the model evaluates all rows; this is a hundred times faster than one scipy fit for each row.
+    """
+    size = np.eye(start.size)
+    constants = np.tile(start, (data.shape[0], 1))
+    damping = np.full(data.shape[0], 1e-6)
+    value = model(constants)
+    cost = np.sum((data - value) ** 2, axis=1)
+    for _ in range(40):
+        jacobian = np.stack([(model(constants + shift) - value) / 1e-6 for shift in 1e-6 * size], axis=-1)
+        normal = np.swapaxes(jacobian, 1, 2) @ jacobian
+        normal = normal + (damping * np.einsum("sii->s", normal) + 1e-12)[:, None, None] * size
+        gradient = np.swapaxes(jacobian, 1, 2) @ (data - value)[..., None]
+        step = np.clip(np.linalg.solve(normal, gradient)[..., 0], -0.3, 0.3)
+        trial = model(constants + step)
+        cost_there = np.sum((data - trial) ** 2, axis=1)
+        better = cost_there <= cost
+        constants = np.where(better[:, None], constants + step, constants)
+        value, cost = np.where(better[:, None], trial, value), np.where(better, cost_there, cost)
+        damping = np.clip(np.where(better, damping / 10, damping * 10), 1e-9, 1e9)
+        if np.abs(step).max() < 1e-9:
+            break
+    return constants
+
+
+# results
+
+
+def constant(
+    name: str, stack: FloatArray, count: int, long_name: str, positive: bool = False, unit: str = "1"
+) -> Variables:
+    """Return a constant and the ends of its interval as variables."""
+    low, high = bootstrap.interval(stack, count, positive)
+    values = {name: stack[0], f"{name}_low": low, f"{name}_high": high}
+    return {key: xr.Variable((), value, {"units": unit, "long_name": long_name}) for key, value in values.items()}
+
+
+def measure(name: str, value: float, long_name: str) -> Variables:
+    """Return a number without an interval as a variable."""
+    return {name: xr.Variable((), value, {"units": "1", "long_name": long_name})}
+
+
+def text(name: str, sentence: str, long_name: str) -> Variables:
+    """Return a sentence as a variable."""
+    return {name: xr.Variable((), sentence, {"units": "1", "long_name": long_name})}
+
+
+def holds(stated: str, with_fitted: str = "") -> Variables:
+    """Return ``law_holds`` and, if given, ``fitted_law_holds`` as variables."""
+    found = {"fitted_law_holds": xr.Variable((), with_fitted, FITTED_LAW_HOLDS)} if with_fitted else {}
+    return found | {"law_holds": xr.Variable((), stated, LAW_HOLDS)}
