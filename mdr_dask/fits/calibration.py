@@ -20,7 +20,7 @@ from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits import identifiability
 from mdr_dask.fits.base import DOUBTFUL, Fit
 from mdr_dask.fits.misfit import Residuals, law_holds
-from mdr_dask.fits.posterior import DEVIATIONS, Likelihood, Noise, Posterior, distance, posterior
+from mdr_dask.fits.posterior import DEVIATIONS, Noise, Posterior, distance, likelihood, posterior
 from mdr_dask.fits.prediction import Prediction, prediction
 from mdr_dask.tables import decoded
 
@@ -92,7 +92,17 @@ class Calibration:
     @cached_property
     def residuals(self) -> Residuals:
         """Residuals of the best prediction."""
-        return self.contradicted or _residuals(self)
+        if self.contradicted is not None:
+            return self.contradicted
+        measured, predicted = self.measured, self.prediction(self.posterior.places[[self.posterior.best]])
+        noise, _ = self.noise
+        left = measured.values - predicted.mean[0]
+        variance = noise**2 + predicted.alone[0] + (predicted.together[0] ** 2).sum(axis=-1)
+        squares, _ = distance(measured.values, predicted, noise[None] ** 2)
+        freedom = left.size - (len(self.unknowns) - len(self.free) + len(self.products))
+        relative, errors = np.sqrt(np.array([np.mean(left**2), np.mean(variance)]) / np.mean(measured.values**2))
+        chi_squared = float(squares[0]) if measured.errors is not None else np.nan
+        return Residuals(left / np.sqrt(variance), float(relative), chi_squared, freedom, float(errors))
 
     @property
     def law_holds(self) -> str:
@@ -158,7 +168,7 @@ def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
 
 
 def _posterior(predicted: Prediction, measured: Measured, noises: list[Noise]) -> Posterior:
-    return posterior(Likelihood(predicted, measured.values, noises), len(predicted.unknowns))
+    return posterior(likelihood(predicted, measured.values, noises), len(predicted.unknowns))
 
 
 def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
@@ -200,21 +210,6 @@ def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
     spare = max(1, count - unknowns)
     most = min(100.0, float(np.sqrt(count / chi2.ppf(0.001, spare))))
     return np.asarray(residual * np.geomspace(LEAST, most, DEVIATIONS))
-
-
-def _residuals(found: Calibration) -> Residuals:
-    """Return the residuals of the best prediction."""
-    place = found.posterior.places[found.posterior.best]
-    predicted = found.prediction(place[None])
-    noise, _ = found.noise
-    left = found.measured.values - predicted.mean[0]
-    variance = noise**2 + predicted.alone[0] + (predicted.together[0] ** 2).sum(axis=-1)
-    squares = distance(found.measured.values, predicted, noise[None] ** 2)[0]
-    known = found.measured.errors is not None
-    freedom = left.size - (len(found.unknowns) - len(found.free) + len(found.products))
-    relative, errors = np.sqrt(np.array([np.mean(left**2), np.mean(variance)]) / np.mean(found.measured.values**2))
-    chi_squared = float(squares[0]) if known else np.nan
-    return Residuals(left / np.sqrt(variance), float(relative), chi_squared, freedom, float(errors))
 
 
 def measured_of(dataset: xr.Dataset) -> Measured:

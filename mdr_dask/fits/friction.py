@@ -42,7 +42,7 @@ NEEDS_SLOPE = "not tested: the study has no output contact_slope"
 
 
 def spectral_slope(data: xr.Dataset) -> xr.DataArray:
-    """Return the spectral rms slope, from the store or from the parameters of a line without roll-off.
+    """Return the spectral rms slope, from the store or from the parameters of a generated line.
 
     It is NaN for a smooth line, for which friction over slope has no meaning.
     """
@@ -52,12 +52,14 @@ def spectral_slope(data: xr.Dataset) -> xr.DataArray:
     if "hurst" not in data:
         raise FitError("expected the output rms_slope in the store of a measured surface, got none")
     require(data, "hurst", "points", "rms_roughness", "length")
-    unit = xr.apply_ufunc(
-        lambda hurst, points: roughness.spectral_slope(roughness.amplitudes(int(points) // 2, float(hurst))),
-        data["hurst"],
-        data["points"],
-        vectorize=True,
-    )
+    cutoffs = [data.coords.get(name, xr.DataArray(np.nan)) for name in ("rolloff_wavelength", "longest_wavelength")]
+
+    def of_unit_line(hurst: float, points: float, *harmonics: float) -> float:
+        known = (harmonic if np.isfinite(harmonic) else 0.0 for harmonic in harmonics)
+        return roughness.spectral_slope(roughness.amplitudes(int(points) // 2, hurst, *known))
+
+    harmonics = (data["length"] / cutoff for cutoff in cutoffs)
+    unit = xr.apply_ufunc(of_unit_line, data["hurst"], data["points"], *harmonics, vectorize=True)
     slope: xr.DataArray = unit * data["rms_roughness"] / data["length"]
     return slope.where(slope > 0)
 

@@ -49,41 +49,36 @@ class Noise(NamedTuple):
         return square
 
 
-class Likelihood:
-    """The likelihood of measured values for a prediction, including the errors of the prediction.
+def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) -> Callable[[FloatArray], FloatArray]:
+    """Return the likelihood of measured values for a prediction, including the errors of the prediction.
 
     Parameters
     ----------
     prediction : Prediction
     values : array, shape (points,)
         Measured values.
-    noises : sequence of Noise
+    noises : list of Noise
         Possible errors of measurement. All have the same prior probability, and so have all sizes of one element.
+
+    Returns
+    -------
+    callable
+        Takes places in the unit cube, shape (sets, unknowns), and returns log-likelihoods, shape (sets, sizes of all
+        noises).
     """
 
-    def __init__(self, prediction: Prediction, values: FloatArray, noises: list[Noise]) -> None:
-        self.prediction, self.values, self.noises = prediction, values, noises
-
-    def __call__(self, places: FloatArray) -> FloatArray:
-        """Return log-likelihoods at places in the unit cube, shape (sets, sizes of all noises)."""
-        modes = 4 + self.prediction.realisations // 8
-        step = max(1, _STEP // (self.values.size * modes))
-        parts = [self._of(places[start : start + step]) for start in range(0, len(places), step)]
-        return np.concatenate(parts)
-
-    def _of(self, places: FloatArray) -> FloatArray:
-        predicted = self.prediction(places)
+    def of(places: FloatArray) -> FloatArray:
+        predicted = prediction(places)
         found = []
-        for noise in self.noises:
-            prior = -np.log(len(self.noises) * noise.sizes.size)
-            found += [prior + of_errors(self.values, predicted, each) for each in noise.variances(predicted.mean)]
+        for noise in noises:
+            prior = -np.log(len(noises) * noise.sizes.size)
+            for variance in noise.variances(predicted.mean):
+                square, determinant = distance(values, predicted, variance)
+                found.append(prior - 0.5 * (square + determinant))
         return np.stack(found, axis=1)
 
-
-def of_errors(values: FloatArray, predicted: Predicted, noise: FloatArray) -> FloatArray:
-    """Return the logarithm of the normal density of the measured values, up to a constant, shape (sets,)."""
-    square, determinant = distance(values, predicted, noise)
-    return -0.5 * (square + determinant)
+    step = max(1, _STEP // (values.size * (4 + prediction.realisations // 8)))
+    return lambda places: np.concatenate([of(places[k : k + step]) for k in range(0, len(places), step)])
 
 
 def distance(values: FloatArray, predicted: Predicted, noise: FloatArray) -> tuple[FloatArray, FloatArray]:

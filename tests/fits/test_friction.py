@@ -7,7 +7,6 @@ from mdr_dask.errors import FitError
 from mdr_dask.fits import available, friction, top
 from mdr_dask.fits.indenter import within_indenter_law
 from mdr_dask.physics.sliding import laws
-from mdr_dask.physics.surfaces import roughness
 
 FIT = {name: fit.compute for name, fit in available("sliding_friction").items()}
 ZONE_ONE = available("sliding_friction")["zone_one"]
@@ -180,15 +179,11 @@ def test_zone_one_has_the_known_constants():
             assert abs(float(here[name]) - value) < 4 * sigma * np.sqrt(1 + 60 / 200) + 0.02
 
 
-def test_a_slope_that_is_not_stored_follows_from_every_line(forces):
-    """Of each exponent and number of points, as an axis of the study or one number of it."""
-    data = forces.drop_vars("rms_slope").assign_coords(points=("points", [200, 400]))
-    found = friction.spectral_slope(data)
-    for hurst in (0.3, 0.7):
-        for points in (200, 400):
-            unit = roughness.spectral_slope(roughness.amplitudes(points // 2, hurst))
-            here = float(found.sel(hurst=hurst, points=points))
-            assert here == pytest.approx(unit * float(data["rms_roughness"] / data["length"]), rel=1e-12)
+@pytest.mark.parametrize("ends", [{}, {"rolloff_wavelength": 1e-3}, {"longest_wavelength": 2e-3}])
+def test_a_slope_that_is_not_stored_follows_from_the_parameters_of_the_line(ends):
+    data = store({"hurst": [0.3, 0.7], "points": [200, 400]}, realisations=1, **ends)
+    found = friction.spectral_slope(data.drop_vars("rms_slope"))
+    np.testing.assert_allclose(found.transpose("hurst", "points"), data["rms_slope"].mean("realisation"), rtol=1e-12)
 
 
 @pytest.mark.parametrize("misfit", [0.0, 0.1])

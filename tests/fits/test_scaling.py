@@ -3,66 +3,18 @@
 import numpy as np
 import pytest
 import xarray as xr
+from fit_studies import SLOPE, coverage, judged, not_contradicted, planted
 from friction_store import store
 
 from mdr_dask.errors import FitError
 from mdr_dask.fits import available, scaling
 from mdr_dask.fits.scaling import FITS, contact_slope_law
-from mdr_dask.physics.sliding import laws
 from mdr_dask.physics.surfaces import roughness
 
 FIT = {fit.name: fit for fit in FITS}
 LEAST = 0.9  # 95 % less 2.3 standard deviations of a share of 100 studies
-G, RMS, LENGTH, TAU, SLOPE, POINTS = 1e7, 5e-7, 0.02, 1e-3, 0.1, 400
 LINES = pytest.mark.parametrize("lines", [3, 30])
-
-
-def planted(axes, lines, studies, hurst=0.5, **outputs):
-    """Return studies whose outputs are functions of force number and velocity number, that lines scatter about."""
-    rng = np.random.default_rng(12)
-    base = {"shear_modulus": G, "rms_roughness": RMS, "length": LENGTH, "relaxation_time": TAU, "points": POINTS}
-    coords = base | {"hurst": hurst, "normal_force": 1.0, "velocity": 1e-6} | axes
-    data = xr.Dataset(coords={name: (name, value) if np.ndim(value) else value for name, value in coords.items()})
-    force = laws.force_number(data.normal_force, G, RMS, LENGTH)
-    velocity = laws.velocity_number(data.velocity, TAU, SLOPE, RMS)
-    force, velocity = xr.broadcast(force, velocity)
-    shape = (studies, *force.shape, lines)
-    for name, law in outputs.items():
-        shared = 0.05 * rng.standard_normal((studies, *(1 for _ in force.shape), lines))
-        scatter = 1 + shared + 0.03 * rng.standard_normal(shape)
-        data[name] = (("study", *force.dims, "realisation"), np.asarray(law(force, velocity))[..., None] * scatter)
-    data["rms_slope"] = xr.full_like(data[next(iter(outputs))], SLOPE)
-    return data
-
-
-def coverage(found, name, truth):
-    return float(((found[f"{name}_low"] <= truth) & (truth <= found[f"{name}_high"])).mean())
-
-
-def judged(found, verdict, which="fitted_law_holds"):
-    return float(found[which].str.startswith(verdict).mean())
-
-
-def not_contradicted(found, lines, which="fitted_law_holds"):
-    """Return the share of studies whose law holds; with few realisations, all that are not contradicted."""
-    return judged(found, "yes", which) if lines >= 30 else 1 - judged(found, "no:", which)
-
-
 LOADS = {"normal_force": np.geomspace(1e-3, 3e-2, 8)}
-
-
-@pytest.mark.slow
-@LINES
-def test_growth_of_the_contact(lines):
-    data = planted(LOADS, lines, 100, contact_fraction=lambda force, _: 0.3 * force**0.6)
-    found = FIT["contact_growth"].compute({"": data})
-    assert coverage(found, "exponent", 0.6) >= LEAST
-    assert coverage(found, "factor", 0.3) >= LEAST
-    assert not_contradicted(found, lines) >= LEAST
-    data = planted(LOADS, lines, 10, contact_fraction=lambda force, _: 0.3 * force**0.6 * (1 + 3 * (force > 0.05)))
-    found = FIT["contact_growth"].compute({"": data})
-    assert judged(found, "no: departs") == 1
-    assert np.all(found["exponent_high"] - found["exponent_low"] > 0.1)
 
 
 @pytest.mark.parametrize("hurst", [0.0, 0.5, 0.9, 1.0])
@@ -76,25 +28,6 @@ def test_slope_in_contact_by_its_integral(hurst):
         expected = roughness.spectral_slope(part) / slope
         assert contact_slope_law(np.array(fraction), hurst, 4000) == pytest.approx(expected, abs=0.05)
     assert np.isnan(contact_slope_law(np.array(1e-4), hurst, 4000))
-
-
-@pytest.mark.slow
-@LINES
-def test_slope_in_contact(lines):
-    def fraction(force, _):
-        return 0.5 * force**0.6
-
-    def slope(force, _):
-        return 0.9 * SLOPE * contact_slope_law(fraction(force, _), 0.9, POINTS)
-
-    data = planted(LOADS, lines, 100, 0.9, contact_fraction=fraction, contact_slope=slope)
-    found = FIT["contact_slope"].compute({"": data})
-    assert coverage(found, "factor", 0.9) >= LEAST
-    assert not_contradicted(found, lines, "law_holds") >= LEAST
-    data = planted(LOADS, lines, 10, 0.9, contact_fraction=fraction, contact_slope=lambda force, _: SLOPE * force**0.4)
-    found = FIT["contact_slope"].compute({"": data})
-    assert judged(found, "no: departs", "law_holds") == 1
-    assert np.all(found["factor_high"] - found["factor_low"] > 0.1)
 
 
 CURVES = {"normal_force": np.geomspace(0.01, 10, 4), "velocity": np.geomspace(1e-7, 1e-1, 19)}
@@ -239,7 +172,7 @@ def test_a_rising_curve_with_scatter_has_no_plateau(lines):
 def test_too_few_points_do_not_test_a_collapse():
     """More constants than points always fit; a load without a curve has NaN."""
     axes = {"hurst": [0.3, 0.7], "normal_force": np.geomspace(1e-2, 10, 4), "velocity": np.geomspace(1e-6, 1, 5)}
-    data = planted(axes, 3, 1, hurst=[0.3, 0.7], friction_coefficient=scaled).isel(study=0)
+    data = planted(axes, 3, 1, friction_coefficient=scaled).isel(study=0)
     falling = (data.hurst == 0.7) & (data.normal_force > 5) & (data.velocity > 1e-5)
     data["friction_coefficient"] = data.friction_coefficient.where(~falling, 1e-9)
     found = FIT["collapse"].compute({"": data})
