@@ -342,7 +342,7 @@ WRONG = {
     "one end": ("shift: 1", "{adaptive: [1 m], until: 1 %}", "", r"x: expected \[first, last\], got"),
     "same ends": ("shift: 1", "{adaptive: [1 m, 1 m], until: 1 %}", "", "expected two different ends"),
     "a length": ("shift: 1", "{adaptive: [1 N, 1 m], until: 1 %}", "", "expected a length"),
-    "output": ("shift: 1", "{adaptive: [1 m, 2 m], until: {yy: 1 %}}", "", r"until\.yy: not among the outputs"),
+    "output": ("shift: 1", "{adaptive: [1 m, 2 m], until: {yy: 1 %}}", "", r"until\.yy: this is none of the outputs"),
     "key": ("shift: 1", "{adaptive: [1 m, 2 m], until: 1 %, most: 9}", "", r"x\.most: unknown"),
 }
 

@@ -49,7 +49,7 @@ def test_errors_false_leaves_them_and_their_work_out(toy):
     [
         (
             "",
-            "a.yaml:5:11: outputs[0]: this error comes with its output: expected 'width', and not errors: false, "
+            "a.yaml:5:11: outputs[0]: expected the output 'width', whose error is stored unless errors: false, "
             "got 'width_error'",
         ),
         ("errors: maybe\n", "a.yaml:6:9: errors: expected true or false, got 'maybe'"),
@@ -64,7 +64,7 @@ def test_an_error_is_not_asked_for_by_name(toy, more, sentence):
 
 def test_rounds_go_by_outputs_and_not_by_their_errors(toy):
     text = STUDY.replace("6", "{at_most: 20, until: {width_error: 1 %}}")
-    with pytest.raises(CampaignError, match="not among the outputs"):
+    with pytest.raises(CampaignError, match="this is none of the outputs of the campaign"):
         loads(text, "a.yaml", ".")
 
 

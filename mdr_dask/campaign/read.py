@@ -133,8 +133,8 @@ def _outputs(document: Document, spec: CampaignSpec, model: Model[Any]) -> tuple
     for index, name in enumerate(spec.outputs or ()):
         path = ("outputs", index)
         if name in errors:
-            what = f"this error is stored with its output: write {errors[name]!r}, without errors: false, got {name!r}"
-            document.report(path, what)
+            what = f"expected the output {errors[name]!r}, whose error is stored unless errors: false"
+            document.report(path, f"{what}, got {name!r}")
         elif name in model.parameters.renamed:
             document.report(path, f"{name} has been renamed or removed: {model.parameters.renamed[name]}")
         elif name not in names:

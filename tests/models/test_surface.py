@@ -118,7 +118,7 @@ parameters:
         ("surface: {spectrum: road.csv}", "profile: road.csv", "write surface: {profile: ...}"),
         ("spectrum: road.csv", "spectrum: no.csv", "no such file"),
         ("spectrum: road.csv", "longest_wavelength: 1 mm", "expected spectrum, or "),
-        ("road.csv}", "road.csv, shortest_wavelength: 1 um}", "`extrapolate: true` goes on by a power law"),
+        ("road.csv}", "road.csv, shortest_wavelength: 1 um}", "`extrapolate: true` continues it by a power law"),
         ("road.csv}", "road.csv, extrapolate: true}", "extrapolate needs longest_wavelength or shortest_wavelength"),
         ("road.csv}", "road.csv, longest_wavelength: 1 mm, shortest_wavelength: 2 mm}", "cut-offs that leave some"),
         ("spectrum: road.csv", "spectrum: two.csv", "expected one column of C2D, C1D and C cut, got C2D and C1D"),
