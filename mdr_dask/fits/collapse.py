@@ -38,7 +38,11 @@ def laws_of(
     """
     size, anchor = result.groups.size, result.groups.size // 2
     groups, factors = result.groups, result.horizontal - result.horizontal[anchor]
-    covariance = np.cov(result.draws[:, :size] - result.draws[:, [anchor]], rowvar=False)
+    drawn = result.draws[:, :size] - result.draws[:, [anchor]]
+    covariance = np.cov(drawn, rowvar=False)
+    free = np.diag(covariance) > 0
+    away = drawn[:, free] - drawn[:, free].mean(axis=0)
+    scatter = LOG * float(np.quantile(np.sqrt(np.mean(away**2, axis=1)), 0.95))
     fits: list[ShiftLaw] = []
     try:
         if is_temperature:
@@ -52,9 +56,8 @@ def laws_of(
         return [], {"law of the shifts": f"not tested: {problem}"}
     verdicts = {}
     for law in fits:
-        worst, free = int(np.argmax(np.abs(law.departures))), np.diag(covariance) > 0
-        where = f"{result.groups[worst]:.4g}"
-        verdicts[law.name] = law_holds(LOG * law.departures[free], law.chance, len(law.constants), where)
+        where = f"{result.groups[np.argmax(np.abs(law.departures))]:.4g}"
+        verdicts[law.name] = law_holds(LOG * law.departures[free], law.chance, len(law.constants), where, scatter)
     return fits, verdicts
 
 

@@ -193,8 +193,7 @@ def _with_laws(
     unit = units.get(by, "")
     warm = is_temperature(by, unit)
     laws, verdicts = laws_of(found, over, unit, zero, is_temperature=warm)
-    holding = [law for law in laws if verdicts[law.name].startswith("yes")]
-    best = min(holding, key=lambda law: law.residual, default=None)
+    best = min(laws, key=lambda law: law.residual, default=None)
     if best is None:
         logarithmic = bool(np.all(found.groups > 0)) and not warm
         moved = superposition.rereference(found, zero, logarithmic=logarithmic)

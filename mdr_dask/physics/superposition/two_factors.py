@@ -98,32 +98,27 @@ def _split(
     curves, both = free.groups.size, design.shape[1]
     rows, moved = (design - design[0])[1:, columns], np.arange(1, curves)
     whiten = np.linalg.inv(np.linalg.cholesky(free.covariance[np.ix_(moved, moved)]))
-    solve = np.zeros((2 * both, 2 * curves))
+    solve = np.zeros((both, curves))
     solve[np.ix_(columns, moved)] = np.linalg.pinv(whiten @ rows) @ whiten
-    target = np.append(free.horizontal, free.vertical)
+    target = free.horizontal
     sums = solve @ target
     freedom = moved.size - columns.size
     misfit = float(np.sum((whiten @ (target[moved] - rows @ sums[columns])) ** 2))
     reduced = misfit / freedom if freedom else 0.0
-    drawn = sums + np.sqrt(max(reduced, 1.0)) * (free.draws - target) @ solve.T
+    drawn = sums + np.sqrt(max(reduced, 1.0)) * (free.draws[:, :curves] - target) @ solve.T
 
-    across, along = sums.reshape(2, -1) @ design.T
-    slope = np.gradient(free.curve_y, free.curve_x, axis=1)
-    first = np.zeros((2, 2 * both))
-    first[0, :both], first[1, both:] = design[0], design[0]
-    moves = first[1] - slope[..., None] * first[0]
-    cross = free.curve_cross @ solve.T
+    across = design @ sums
+    moves = -np.gradient(free.curve_y, free.curve_x, axis=1)[..., None] * design[0]
+    cross = free.curve_cross[..., :curves] @ solve.T
     spread = moves @ np.cov(drawn, rowvar=False)
     variance = free.curve_error**2 + np.sum(moves * (2 * cross + spread), axis=2)
-    x = free.x + (across - free.horizontal)[free.member]
+    x = free.x + (across - target)[free.member]
     own = x[np.isin(free.member, np.flatnonzero((places[0] == zeros[0]) & (places[1] == zeros[1])))]
     own = own if own.size else x[places[0][free.member] == zeros[0]]
     merged = replace(
         free,
         x=x,
-        y=free.y + (along - free.vertical)[free.member],
         curve_x=free.curve_x + across[0],
-        curve_y=free.curve_y + along[0],
         curve_error=np.sqrt(np.maximum(variance, 0)),
         measured=(float(own.min()), float(own.max())),
         undetermined=(),
@@ -131,14 +126,14 @@ def _split(
     parts = []
     for which, begin in enumerate((0, groups[0].size)):
         own_columns = begin + np.arange(groups[which].size)
-        of_both = np.append(own_columns, both + own_columns)
+        none = np.zeros((drawn.shape[0], own_columns.size))
         part = replace(
             merged,
             groups=groups[which],
             horizontal=sums[own_columns],
-            vertical=sums[both + own_columns],
-            draws=drawn[:, of_both],
-            curve_cross=(cross + spread)[..., of_both],
+            vertical=none[0],
+            draws=np.hstack([drawn[:, own_columns], none]),
+            curve_cross=np.pad((cross + spread)[..., own_columns], ((0, 0), (0, 0), (0, own_columns.size))),
             reference=float(groups[which][zeros[which]]),
             member=places[which][free.member],
         )
