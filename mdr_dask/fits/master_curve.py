@@ -56,7 +56,7 @@ def master_curve(
         quantities against time or frequency at different temperatures, otherwise ``none``.
     reference : float, optional
         Value of the group at which the factors are zero; by default the middle group. Between two groups, the factor
-        follows from the law that holds, otherwise from interpolation, whose error is included in the intervals. With
+        follows from interpolation about the best law, whose error is included in the intervals. With
         two kinds of groups, the reference is the nearest value of the first kind.
 
     Returns
