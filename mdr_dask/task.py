@@ -27,6 +27,9 @@ from mdr_dask.version import __version__
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
 MAPPED, TRIMMED = 32 * 2**20, 128 * 2**20  # bytes: larger arrays are not on the heap; free heap that glibc keeps
 
+#: Environment variable with the text of `kind` in the child processes of this machine.
+KIND = "MDR_DASK_KIND_OF_MACHINE"
+
 
 @dataclass(frozen=True)
 class Work:
@@ -351,7 +354,12 @@ def _describe(block: Block[Any], case: int) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def kind() -> str:
-    """Return processor and numerical libraries as text, because the last digits of results may depend on them."""
+    """Return processor and numerical libraries as text, because the last digits of results may depend on them.
+
+    Child processes read the text from the variable `KIND` of their environment, so that they need not import SciPy.
+    """
+    if KIND in os.environ:
+        return os.environ[KIND]
     from importlib.metadata import version
 
     import scipy.linalg  # noqa: F401  (brings its own BLAS)

@@ -84,7 +84,8 @@ def plot(
     mdr-dask plot results/quickstart.zarr friction_coefficient --over velocity --over normal_force -o map.png
     mdr-dask plot results/rubber.zarr velocity --measured rig.csv -o rig.pdf
     """
-    from mdr_dask.plots import page, render
+    from mdr_dask.plots import page
+    from mdr_dask.plots.base import provenance
     from mdr_dask.questions import selection
     from mdr_dask.store import readable
 
@@ -110,7 +111,7 @@ def plot(
 
             groups, figures = with_points(groups, figures, measured)
         for (name, figure), path in zip(figures.items(), places, strict=True):
-            origin = render.provenance(name, urls, str(context.meta.get(COMMAND, "")))
+            origin = provenance(name, urls, str(context.meta.get(COMMAND, "")))
             _draw(figure, groups, path, origin, everything)
     if unused := look["units"].keys() - asked.used:
         tell(f"--units {', '.join(sorted(unused))}: not shown in any figure that was drawn")

@@ -84,7 +84,7 @@ def fit(
             _print(result, group, form, limit)
     if figure is not None:
         from mdr_dask.plots import available
-        from mdr_dask.plots.render import provenance
+        from mdr_dask.plots.base import provenance
 
         drawn = available(model)["calibration"].describe(groups)
         save(drawn, figure, provenance("calibration", [store], str(context.meta[COMMAND])))

@@ -63,7 +63,7 @@ def sensitivity(
     for sentence in _sentences(found.attrs):
         tell(sentence)
     if figure is not None:
-        from mdr_dask.plots.render import provenance
+        from mdr_dask.plots.base import provenance
         from mdr_dask.plots.sensitivity import sensitivity as drawn
 
         save(drawn(found), figure, provenance("sensitivity", [store], str(context.meta[COMMAND])))

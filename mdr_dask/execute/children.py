@@ -26,10 +26,12 @@ import numpy as np
 
 from mdr_dask import models
 from mdr_dask.errors import MachineError
-from mdr_dask.task import Outcome, Work, kind, one_blas_thread, run_block, write_off
+from mdr_dask.task import KIND, Outcome, Work, kind, run_block, write_off
 
 #: Code of the server process.
 COMMAND = "import sys; from mdr_dask.execute.children import serve; serve(sys.argv[1], [int(x) for x in sys.argv[2:]])"
+#: Environment variables that limit the libraries for linear algebra to one thread, without importing these libraries.
+BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 #: A process is killed this number of seconds after the time limit of its case. A case in plain Python raises
 #: TimeoutError at the limit, before the process is killed.
 GRACE = 1.0
@@ -83,7 +85,8 @@ def children(count: int, model: str) -> Iterator[list[Child]]:
     """Start child processes for a model; at the end of the context, wait until each has finished its block."""
     pipes = [Pipe() for _ in range(count)]
     numbers = [theirs.fileno() for _, theirs in pipes]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    path = os.pathsep.join(filter(None, sys.path))
+    environment = {**os.environ, **dict.fromkeys(BLAS_THREADS, "1"), "PYTHONPATH": path, KIND: kind()}
     command = [sys.executable, "-c", COMMAND, model, *map(str, numbers)]
     with subprocess.Popen(command, pass_fds=numbers, env=environment):
         try:
@@ -127,8 +130,6 @@ def compute_apart(child: Child, work: Work, limit: float | None = None) -> Itera
 def serve(model: str, numbers: list[int]) -> None:
     """Import the modules that blocks need, fork a keeper for each pipe, and return when all keepers have ended."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal sends Ctrl-C to all processes; only the driver reacts
-    one_blas_thread()
-    kind()
     with suppress(Exception):  # the first block reports this error
         models.load(model)
     pipes = [Connection(number) for number in numbers]

@@ -7,17 +7,18 @@ from importlib.metadata import entry_points
 
 from mdr_dask.fits.base import Fit
 
-#: Modules of this package with a tuple ``FITS``.
-SUBJECTS: tuple[str, ...] = (
-    "calibration",
-    "ehl",
-    "friction",
-    "indenter",
-    "jumps",
-    "master_curve",
-    "relaxation",
-    "scaling",
-)
+#: Modules of this package with a tuple ``FITS``, and the models whose stores they fit; a module is imported for these
+#: models only. Without models, its fits are for all models.
+SUBJECTS: dict[str, tuple[str, ...]] = {
+    "calibration": (),
+    "ehl": ("ehl_line",),
+    "friction": ("sliding_friction",),
+    "indenter": ("sliding_friction",),
+    "jumps": ("velocity_jump",),
+    "master_curve": ("sliding_friction",),
+    "relaxation": ("velocity_jump",),
+    "scaling": ("sliding_friction",),
+}
 
 #: Entry point group in which other packages offer tuples of `Fit`.
 GROUP = "mdr_dask.fits"
@@ -25,6 +26,7 @@ GROUP = "mdr_dask.fits"
 
 def available(model: str) -> dict[str, Fit]:
     """Return the fits for stores of a model, by name; other packages offer tuples of them in `GROUP`."""
-    own = (import_module(f"mdr_dask.fits.{subject}").FITS for subject in SUBJECTS)
+    subjects = [subject for subject, models in SUBJECTS.items() if model in models or not models]
+    own = (import_module(f"mdr_dask.fits.{subject}").FITS for subject in subjects)
     others = (entry.load() for entry in entry_points(group=GROUP))
     return {fit.name: fit for fits in (*own, *others) for fit in fits if model in fit.models or not fit.models}

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.campaign.measured import Measured, read_measured, unknowns
@@ -208,7 +208,7 @@ def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
     of the error that follows from the residuals.
     """
     spare = max(1, count - unknowns)
-    most = min(100.0, float(np.sqrt(count / chi2.ppf(0.001, spare))))
+    most = min(100.0, float(np.sqrt(count / (2 * gammaincinv(spare / 2, 0.001)))))
     return np.asarray(residual * np.geomspace(LEAST, most, DEVIATIONS))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -12,9 +13,11 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.physics.superposition.master_curve import Vertical
 from mdr_dask.tables import JOINED, SYNONYMS, decoded, is_called, numbers, read_sheet
 from mdr_dask.units import conversion, is_unit
+
+if TYPE_CHECKING:
+    from mdr_dask.physics.superposition.master_curve import Vertical
 
 ALIASES = {"normal_force": "normal force", "friction_coefficient": "friction coefficient"} | {
     f"{kind}_modulus": f"{kind} modulus" for kind in ("storage", "loss")

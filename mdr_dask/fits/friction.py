@@ -32,7 +32,6 @@ from mdr_dask.fits.cases import (
     text,
 )
 from mdr_dask.physics.sliding import laws
-from mdr_dask.physics.surfaces import roughness
 
 MODELS = ("sliding_friction",)
 FRICTION = "friction_coefficient"
@@ -52,6 +51,8 @@ def spectral_slope(data: xr.Dataset) -> xr.DataArray:
     if "hurst" not in data:
         raise FitError("expected the output rms_slope in the store of a measured surface, got none")
     require(data, "hurst", "points", "rms_roughness", "length")
+    from mdr_dask.physics.surfaces import roughness  # it imports numba
+
     cutoffs = [data.coords.get(name, xr.DataArray(np.nan)) for name in ("rolloff_wavelength", "longest_wavelength")]
 
     def of_unit_line(hurst: float, points: float, *harmonics: float) -> float:

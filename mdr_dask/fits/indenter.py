@@ -13,13 +13,14 @@ from mdr_dask.fits.base import Fit, require, short
 from mdr_dask.fits.cases import Variables, constant, each, holds, measure, nonlinear, one_value, table_of
 from mdr_dask.fits.friction import FRICTION, KELVIN, MODELS, spectral_slope
 from mdr_dask.physics.sliding import laws
-from mdr_dask.physics.surfaces import shapes as indenter
 
 BODY = 0.3  # the law applies to bodies whose rms slope in contact is at most this fraction of that of the roughness
 
 
 def _body(data: xr.Dataset) -> tuple[Any, float]:
     """Return coefficient c and exponent n of the line c |x|^n that replaces the indenter."""
+    from mdr_dask.physics.surfaces import shapes as indenter  # it imports numba
+
     if "indenter_angle" in data.coords:
         return indenter.mapped(1.0) * np.tan(data["indenter_angle"]), 1.0
     if "indenter_radius" in data.coords:

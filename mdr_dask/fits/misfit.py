@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2
-from scipy.stats import f as fisher
+from scipy.special import chdtrc, fdtrc
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import APPROXIMATE, DOUBTFUL, WITHIN
@@ -44,7 +43,7 @@ class Residuals(NamedTuple):
     @property
     def chance(self) -> float:
         """Probability that errors alone cause residuals of this size; NaN if the errors are unknown."""
-        return float(chi2.sf(self.chi_squared, self.freedom)) if self.freedom > 0 else np.nan
+        return float(chdtrc(self.freedom, self.chi_squared)) if self.freedom > 0 else np.nan
 
 
 def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str:
@@ -86,7 +85,7 @@ def trend(scaled: FloatArray, conditions: Mapping[str, FloatArray]) -> tuple[flo
         left = scaled - terms @ np.linalg.lstsq(terms, scaled)[0]
         spare = scaled.size - 3
         share = (np.sum(scaled**2) - np.sum(left**2)) / 2 / max(np.sum(left**2) / spare, 1e-30)
-        probability = float(fisher.sf(share, 2, spare))
+        probability = float(fdtrc(2, spare, max(share, 0.0)))
         if probability < worst:
             worst, along = probability, name
     return min(1.0, worst * max(1, len(conditions))), along

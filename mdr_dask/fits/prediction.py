@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.interpolate import RegularGridInterpolator
 
 from mdr_dask import aggregation, bootstrap
 from mdr_dask.arrays import FloatArray
@@ -17,6 +16,9 @@ from mdr_dask.campaign.measured import Measured
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.interpolation import FEWEST, Scale, cubic, dense, left_out_error, linear
 from mdr_dask.questions.selection import written_apart
+
+if TYPE_CHECKING:
+    from scipy.interpolate import RegularGridInterpolator
 
 #: `MOST`: largest number of unknowns. `LARGEST`: largest number of values of the dense table that is interpolated
 #: linearly.
@@ -284,6 +286,8 @@ def _interpolators(
     at_points: FloatArray, unknowns: Mapping[str, FloatArray], count: int, logarithmic: bool
 ) -> Prediction:
     """Return a prediction that interpolates linearly: means on a dense table, errors on the grid of the study."""
+    from scipy.interpolate import RegularGridInterpolator
+
     scales = [Scale.of(values) for values in unknowns.values()]
     places = [scale.of_values(values) for scale, values in zip(scales, unknowns.values(), strict=True)]
     unit = [(place - place[0]) / (place[-1] - place[0]) for place in places]

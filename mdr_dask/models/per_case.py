@@ -47,11 +47,14 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
         status = np.full(shape, Status.DONE, dtype=np.int8)
         found: dict[tuple[int, int], dict[str, NDArray[np.float64]]] = {}
         messages: dict[tuple[int, int], str] = {}
+        streams = [_stream(block.seed, realisation) for realisation in block.realisations]
+        starts = [stream.bit_generator.state for stream in streams]
         for case in range(block.cases):
             parameters = block.case(case)
-            for number, realisation in enumerate(block.realisations):
+            for number, (stream, start) in enumerate(zip(streams, starts, strict=True)):
+                stream.bit_generator.state = start  # setting the state is much faster than making a generator
                 try:
-                    outputs = _limited(solve, parameters, _stream(block.seed, realisation))
+                    outputs = _limited(solve, parameters, stream)
                     found[case, number] = {name: _output(name, outputs) for name in block.outputs}
                 except BaseException as error:
                     if is_interrupt(error):

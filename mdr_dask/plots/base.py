@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
+from mdr_dask import store
 from mdr_dask.errors import DataError, MdrDaskError
 from mdr_dask.models.base import Status
 from mdr_dask.plots import labels, page
 from mdr_dask.plots.figure import Figure
-from mdr_dask.store import is_damage
+from mdr_dask.version import __version__
 
 if TYPE_CHECKING:
     from mdr_dask.plots.render import Drawn
@@ -59,7 +61,7 @@ class Plot:
         except MdrDaskError:
             raise
         except Exception as error:
-            if is_damage(error):
+            if store.is_damage(error):
                 raise
             problem = f"{type(error).__name__}: {error}"
             raise DataError(f"internal error in this figure; please report it with the campaign: {problem}") from error
@@ -68,7 +70,7 @@ class Plot:
 
     def figure(self, groups: Mapping[str, xr.Dataset]) -> Drawn:
         """Draw the figure with matplotlib; raises the errors of `describe`."""
-        from mdr_dask.plots.render import origin_of, render
+        from mdr_dask.plots.render import render
 
         drawn = render(self.describe(groups))
         drawn.origin = origin_of(self.name, groups)
@@ -89,3 +91,21 @@ def _without_value(groups: Mapping[str, xr.Dataset]) -> list[str]:
     reasons = {Status.FAILED: "failed", Status.NOT_CONVERGED: "did not converge", Status.MISSING: "are missing"}
     counts = {words: sum(int((state == status.value).sum()) for state in states) for status, words in reasons.items()}
     return [f"{count} of {total} results of the store, which {words}" for words, count in counts.items() if count]
+
+
+def provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:
+    """Return the origin of a figure that a command drew, for its table."""
+    origin = {"mdr_dask": f"{__version__}, figure {name}", "command": command}
+    return origin | {f"store {url}": _campaign_of(store.attributes(url)) for url in urls}
+
+
+def origin_of(name: str, groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
+    """Return the origin of a figure that was drawn from Python, for its table."""
+    campaigns = dict.fromkeys(_campaign_of(data.attrs) for data in groups.values())
+    return {"mdr_dask": f"{__version__}, figure {name}", "study": "; ".join(campaigns)}
+
+
+def _campaign_of(held: Mapping[Any, Any]) -> str:
+    title, text, model, version = (str(held.get(key)) for key in ("title", "campaign", "model", "model_version"))
+    digest, computed = hashlib.sha256(text.encode()).hexdigest(), held.get("versions", {}).get("mdr_dask")
+    return f"campaign {title}, sha256 {digest}, model {model} version {version}, computed by mdr_dask {computed}"

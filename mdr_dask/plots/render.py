@@ -6,7 +6,6 @@ beside the panels. Labels that would overlap are broken into lines, and ticks th
 
 from __future__ import annotations
 
-import hashlib
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -20,11 +19,9 @@ import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as MplFigure
 
-from mdr_dask import store as stores
 from mdr_dask.errors import DataError
 from mdr_dask.plots import colours, page
 from mdr_dask.plots.figure import Axis, Bar, Figure, Key, Panel, Trace, edges
-from mdr_dask.version import __version__
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -87,24 +84,6 @@ def table_beside(path: str | Path) -> Path:
     if beside.exists() and not beside.read_bytes().startswith(b"# mdr_dask"):
         raise DataError(f"{beside} exists and was not written beside a figure; choose another name for the figure")
     return beside
-
-
-def provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:
-    """Return the origin of a figure that a command drew, for its table."""
-    origin = {"mdr_dask": f"{__version__}, figure {name}", "command": command}
-    return origin | {f"store {url}": _campaign_of(stores.attributes(url)) for url in urls}
-
-
-def origin_of(name: str, groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
-    """Return the origin of a figure that was drawn from Python, for its table."""
-    campaigns = dict.fromkeys(_campaign_of(data.attrs) for data in groups.values())
-    return {"mdr_dask": f"{__version__}, figure {name}", "study": "; ".join(campaigns)}
-
-
-def _campaign_of(held: Mapping[Any, Any]) -> str:
-    title, text, model, version = (str(held.get(key)) for key in ("title", "campaign", "model", "model_version"))
-    digest, computed = hashlib.sha256(text.encode()).hexdigest(), held.get("versions", {}).get("mdr_dask")
-    return f"campaign {title}, sha256 {digest}, model {model} version {version}, computed by mdr_dask {computed}"
 
 
 def render(description: Figure) -> Drawn:

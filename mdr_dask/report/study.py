@@ -20,7 +20,7 @@ import xarray as xr
 from mdr_dask import aggregation, fits, plots, store
 from mdr_dask.errors import DataError, FitError, StoreError
 from mdr_dask.plots import curves, labels, page
-from mdr_dask.plots.render import provenance
+from mdr_dask.plots.base import provenance
 from mdr_dask.questions import progress
 from mdr_dask.questions.columns import fixed_words
 from mdr_dask.report.cases import cases_of, main_outputs
@@ -139,8 +139,10 @@ def _study(url: str, held: Mapping[str, Any], whole: Mapping[str, xr.Dataset], g
             lambda name: provenance(name, [url], f"mdr-dask plot {shlex.quote(url)} {name}"),
         )
     )
-    laws, not_fitted = _laws(url, model, {} if reduced else groups)
-    if reduced:
+    if not reduced:
+        laws, not_fitted = _laws(url, model, groups)
+    else:
+        laws = []
         first = next(iter(groups.values()))
         not_fitted = [("all laws", f"the study is large; use mdr-dask fit {shlex.quote(url)} NAME")]
         note = f"figures and errors are made from evenly spread values of the axes, such as {dict(first.sizes)}"
