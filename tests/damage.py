@@ -33,7 +33,7 @@ KINDS = {
     "ledger": "**/status/c/*/*",
     "record": "**/status/records/*.jsonl",
     "loose record": "**/status/records/*.json",
-    "copy of the layout": "**/status/layout.json",
+    "record of the layout": "layout.json",
 }
 
 
@@ -203,8 +203,9 @@ def try_harm(toy, sound: Path, study, work: Path, kind: str, harm: str, draw: ra
         "show": named(lambda: [found.load() for found in store.datasets(url).values()]),
         "run": named(lambda: execute.run(study, url, Resources(threads=1), lambda _: None)),
     }
-    if not result["run"] and harm == "delete" and kind == "ledger":
-        result["status"] = result["show"] = result["run"] = True  # it is computed again, and was shown as missing
+    result["run"] = result["run"] or not store.verify(url).findings  # a run writes what is missing again
+    if harm == "delete" and kind == "ledger":
+        result["status"] = result["show"] = True  # it was shown as missing
     store.repair(url)
     execute.run(study, url, Resources(threads=1), lambda _: None)
     return Trial(

@@ -180,7 +180,7 @@ METADATA = (
     "height/zarr.json",
     "status/zarr.json",
     "position/zarr.json",
-    "status/layout.json",
+    "layout.json",
 )
 
 
@@ -321,13 +321,13 @@ def _cluster_file(case: Case, _: Path) -> None:
 
 
 def _metadata(case: Case, whole: Path) -> None:
-    """Change a document of a store; of kind "store" without the copies that would give it away."""
+    """Change a document of a store; of kind "store" without the record that would give it away."""
     shutil.copytree(whole, "s.zarr")
     Path("a.yaml").write_text(TOY)
     name = Path("s.zarr", case.base)
     tree = edited(json.loads(name.read_bytes()), case.content)
     if case.kind == "store":
-        Path("s.zarr/status/layout.json").unlink()
+        Path("s.zarr/layout.json").unlink()
         if isinstance(tree, dict) and isinstance(tree.get("attributes"), dict):
             tree["attributes"]["mdr_dask_layout"] = 1
     try:

@@ -13,7 +13,8 @@ from mdr_dask import store
 from mdr_dask.cli import main
 from mdr_dask.execute import Resources, run
 from mdr_dask.store import ledgers
-from mdr_dask.store.records import decoded, encoded
+from mdr_dask.store.files import sealed
+from mdr_dask.store.records import decoded
 
 
 @pytest.fixture
@@ -73,7 +74,7 @@ def test_a_run_with_nothing_to_do_does_not_count_attempts(url, monkeypatch):
 
 @pytest.mark.parametrize(("old", "new"), [(b'"attempt": 1', b'"attempt": 2'), (b'"digest": "', b'"digest": "0')])
 def test_a_record_that_was_changed_is_none(old, new):
-    line = encoded({"attempt": 1, "block": [0, 3], "chunks": {"status": "ab"}, "messages": []})
+    line = sealed({"attempt": 1, "block": [0, 3], "chunks": {"status": "ab"}, "messages": []})
     assert decoded(line)["block"] == [0, 3]
     assert decoded(json.dumps(json.loads(line), indent=1).encode()) is not None
     assert old in line

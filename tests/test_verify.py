@@ -18,8 +18,8 @@ from mdr_dask.cli import main
 from mdr_dask.errors import StoreError
 from mdr_dask.execute import Resources
 from mdr_dask.store import locks
-from mdr_dask.store.files import digest
-from mdr_dask.store.records import encoded, name_of
+from mdr_dask.store.files import digest, sealed
+from mdr_dask.store.records import name_of
 from mdr_dask.task import run_block
 
 
@@ -38,7 +38,7 @@ def whole(tmp_path_factory):
 HARMS = [(kind, list(damage.HARMS)[number % len(damage.HARMS)]) for number, kind in enumerate(damage.KINDS)]
 
 
-OF_SERIES = [("copy of the layout", "truncate"), ("root metadata", "empty")]
+OF_SERIES = [("record of the layout", "truncate"), ("root metadata", "empty")]
 
 
 @pytest.mark.parametrize(
@@ -153,8 +153,8 @@ def test_a_store_of_an_earlier_version_is_verified_as_far_as_it_can_be(toy, url,
 
 
 def older(url: str) -> None:
-    """Make a store as version 0.2.0.dev0 left it: no copy of the layout, no digests, records apart."""
-    Path(url, "status/layout.json").unlink()
+    """Make a store as version 0.2.0.dev0 left it: no record of the layout, no digests, records apart."""
+    Path(url, "layout.json").unlink()
     for record in list(store.records(url, "")):
         name = f"{'.'.join(map(str, record['block']))}-{record['attempt']}.json"
         del record["chunks"]
@@ -250,7 +250,7 @@ def retitled(path):
 
 def of_another_block(path):
     (path.parent / Path(name_of("", (0, 0), 1)).name).write_bytes(
-        encoded({"attempt": 1, "block": [1, 0], "chunks": {"status": "ab"}, "messages": []})
+        sealed({"attempt": 1, "block": [1, 0], "chunks": {"status": "ab"}, "messages": []})
     )
 
 
@@ -262,7 +262,7 @@ def of_no_block(path):
     path.write_bytes(
         path.read_bytes().rstrip()
         + b"\n"
-        + encoded({"attempt": 1, "block": [9, 9], "chunks": {"status": "ab"}, "messages": []})
+        + sealed({"attempt": 1, "block": [9, 9], "chunks": {"status": "ab"}, "messages": []})
         + b"\n"
     )
 

@@ -133,7 +133,7 @@ def run(
         with store.exclusive(url) if part is None else store.shared(url, part) as lock:
             execute.hold(lock)
             if store.exists(url):
-                store.require_sound(url, store.series_names(url))
+                store.require_sound(url, store.series_names(url), to_run=True)
             job = _Job(stage, url, lock, execute, part, retry_failed, report, tell)
             progress = _run_stages(job)
             if progress.blocks:

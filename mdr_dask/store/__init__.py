@@ -10,14 +10,14 @@ write.
 from mdr_dask.store.blocks import Place, is_written, layout_mark, read_block, values, write_block
 from mdr_dask.store.files import absolute
 from mdr_dask.store.identity import Stored, reconcile
-from mdr_dask.store.layout import is_laid_out, lay_out
+from mdr_dask.store.layout import Finding, is_laid_out, lay_out
 from mdr_dask.store.ledgers import ledger, require_sound
 from mdr_dask.store.locks import Lock, Part, at_work, exclusive, gate, note_begun, shared, while_locked
 from mdr_dask.store.packing import contents, verify_packed
 from mdr_dask.store.reading import datasets, is_damage, readable, save
 from mdr_dask.store.records import attempts, kinds, merge_records, record, records
 from mdr_dask.store.study import attributes, exists, is_study, series_names
-from mdr_dask.store.verification import CHECKSUMS, PUBLISHED, Finding, Inspection, repair, verify
+from mdr_dask.store.verification import CHECKSUMS, PUBLISHED, Inspection, repair, verify
 
 __all__ = [
     "CHECKSUMS",

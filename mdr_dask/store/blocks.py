@@ -19,9 +19,8 @@ from zarr.core.sync import sync
 
 from mdr_dask.errors import StoreError
 from mdr_dask.plan import BlockIndex
-from mdr_dask.store.files import bytes_of, chunk_name, digest, group_name, guarded, read_bytes, write_stages
+from mdr_dask.store.files import bytes_of, chunk_name, digest, group_name, guarded, read_bytes, sealed, write_stages
 from mdr_dask.store.locks import Lock, while_locked
-from mdr_dask.store.records import encoded as encode_record
 from mdr_dask.store.records import name_of
 from mdr_dask.store.study import array_of, document
 
@@ -87,7 +86,7 @@ def write_block(
         sync(encode())
     keys = {name: _chunk(place, arrays[name], name) for name in given}
     chunks = {name: (key, encoded.pop(key).to_bytes()) for name, key in keys.items()}
-    line = encode_record({**record, "chunks": {name: digest(content) for name, (_, content) in chunks.items()}})
+    line = sealed({**record, "chunks": {name: digest(content) for name, (_, content) in chunks.items()}})
     ledger = dict([chunks.pop("status")])
     with while_locked(place.url, place.lock):
         write_stages(place.url, [{name_of(place.series, place.index, attempt): line}, dict(chunks.values()), ledger])

@@ -30,8 +30,8 @@ ROOT = "-"
 CLAIMS = ".claims/"
 #: Suffix of files that were set aside: they are kept but no longer read.
 ASIDE = ".aside"
-#: Files that remain when an unfinished layout is cleared: the metadata file of the root, and the claims of the run.
-KEPT = ("zarr.json", CLAIMS.rstrip("/"))
+#: Files in the folder of a study whose first run was stopped before laying it out.
+KEPT = ("zarr.json", "layout.json", CLAIMS.rstrip("/"))
 #: Number of simultaneous requests to a server.
 AT_ONCE = 64
 #: Seconds after which a request to a server fails if there is no answer.
@@ -320,17 +320,6 @@ def set_aside(url: str, files: Iterable[str]) -> None:
             remove(url, [name])
 
 
-def clear(url: str) -> None:
-    """Remove the files of a run that was stopped before it had laid the study out."""
-
-    async def remove() -> None:
-        for name in [name async for name in bytes_of(url).list_dir("") if name not in KEPT]:
-            await bytes_of(url).delete_dir(name)
-
-    with guarded(url, "clearing it"):
-        sync(remove())
-
-
 def sweep(url: str) -> None:
     """Remove the temporary files of killed processes; call this only while holding the lock."""
     path = local(url)
@@ -380,3 +369,21 @@ def digest(content: bytes) -> str:
     is the same constant.
     """
     return hashlib.blake2b(content, digest_size=8).hexdigest()
+
+
+def sealed(document: Mapping[str, Any]) -> bytes:
+    """Return a document as one line of JSON that includes the digest of the document."""
+    text = json.dumps(document, sort_keys=True)
+    return json.dumps({**document, "digest": digest(text.encode())}, sort_keys=True).encode()
+
+
+def unsealed(line: bytes) -> dict[str, Any] | None:
+    """Return a document without its digest, or None if it is damaged. A document without a digest is not checked."""
+    try:
+        document: dict[str, Any] = parsed(line)
+        stated = document.pop("digest", None)
+    except (ValueError, TypeError, AttributeError):
+        return None
+    if stated is None or stated == digest(line.replace(f'"digest": "{stated}", '.encode(), b"", 1)):
+        return document
+    return document if stated == digest(json.dumps(document, sort_keys=True).encode()) else None

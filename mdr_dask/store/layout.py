@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import platform
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
@@ -17,18 +16,34 @@ import numpy as np
 import zarr
 from numpy.typing import NDArray
 from pydantic import BaseModel
+from zarr.abc.store import Store
 from zarr.codecs import Crc32cCodec, ZstdCodec
 
 from mdr_dask import models
 from mdr_dask.campaign import Campaign
-from mdr_dask.errors import StoreError
 from mdr_dask.models.base import Status
 from mdr_dask.models.numbers import numbers_of
 from mdr_dask.plan import Template
-from mdr_dask.store.files import LAYOUT, clear, digest, group_name, read_bytes, read_many, write_bytes, write_stages
-from mdr_dask.store.study import document, only_claimed
+from mdr_dask.store.files import (
+    CLAIMS,
+    LAYOUT,
+    digest,
+    group_name,
+    listed,
+    read_bytes,
+    read_many,
+    remove,
+    sealed,
+    unsealed,
+    write_bytes,
+    write_stages,
+)
+from mdr_dask.store.study import document, members_of, only_claimed
 from mdr_dask.version import __version__
 
+#: File with the record of the layout: the digests of all other files of the layout.
+RECORD = "layout.json"
+#: Length of the chunks of a coordinate.
 _COORDINATE_CHUNK = 4096
 #: Attributes that `_series_attributes` writes. If series are added to a store without series, these attributes stay at
 #: the root.
@@ -39,8 +54,9 @@ _Coordinate = tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]
 def lay_out(url: str, layout: Sequence[Template]) -> None:
     """Create the arrays of every template, or extend existing ones. Readers see either the old shape or the new one.
 
-    Files are written in this order: a copy of the layout of each group, arrays and coordinates, the metadata of groups,
-    and finally the metadata of the study. This last write makes the new shape visible.
+    Files are written in this order: the record of the layout, which holds the digests of all following files; metadata
+    and coordinates of arrays; the metadata of groups; and finally ``zarr.json``, the metadata of the study. This last
+    write makes the new shape visible. Coordinates and metadata that are missing are written again.
 
     Parameters
     ----------
@@ -60,40 +76,45 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
     if held is None:
         write_bytes(url, "zarr.json", group_document({}, {"mdr_dask_layout": LAYOUT}))
     elif only_claimed(held["attributes"]):
-        clear(url)
-    members = dict(held["consolidated_metadata"]["metadata"]) if held else {}
-    study = _study_attributes(layout[0].campaign, held["attributes"] if held else {})
-    root = {name: held["attributes"][name] for name in OF_SERIES if name in held["attributes"]} if held else {}
-    files: dict[str, dict[str, bytes]] = {}
-    groups = {}
+        remove(url, [name for name in listed(url) if name != "zarr.json" and not name.startswith(CLAIMS)])
+    root = json.loads(json.dumps(held)) if held else {"attributes": {}, "consolidated_metadata": {"metadata": {}}}
+    members, earlier = root["consolidated_metadata"]["metadata"], root["attributes"]
+    coordinates: dict[str, bytes] = {}
+    attributes = {name: earlier[name] for name in OF_SERIES if name in earlier}
+    is_new = held is None or not all(_has_shape(url, held, template) for template in layout)
+    study = _study_attributes(layout[0].campaign, earlier)
     for template in layout:
         series, own = template.series.name, _series_attributes(template)
-        found = _laid_out_files(template)
-        arrays = {name.removesuffix("/zarr.json"): json.loads(found[name]) for name in found if "zarr.json" in name}
-        files[series] = {group_name(series, name): content for name, content in found.items()}
+        arrays, chunks = _arrays_and_coordinates(template)
         members |= {group_name(series, name): array for name, array in arrays.items()}
+        coordinates |= {group_name(series, name): content for name, content in chunks.items()}
         if series:
-            attributes = {**study, **own}
-            members[series] = {"zarr_format": 3, "node_type": "group", "attributes": attributes}
-            groups[group_name(series, "zarr.json")] = group_document(arrays, attributes)
+            members[series] = {"zarr_format": 3, "node_type": "group", "attributes": {**study, **own}}
         else:
-            root = own
-    document_of_root = {"zarr.json": group_document(members, study | root | _signpost(members))}
-    copies: dict[str, bytes] = {}
-    changed: dict[str, bytes] = {}
-    for series, own_files in files.items():
-        group = {name: groups[name] for name in [group_name(series, "zarr.json")] if name in groups}
-        laid_out = {**own_files, **group, **document_of_root}
-        before = {name: digest(content) for name, content in read_many(url, laid_out) if content is not None}
-        copies |= copy_of(series, laid_out, before)
-        changed |= {name: content for name, content in own_files.items() if before.get(name) != digest(content)}
-    write_stages(url, [copies, changed, groups, document_of_root])
+            attributes = own
+    content = read_bytes(url, "zarr.json") or b""
+    if is_new:
+        content = group_document(members, study | attributes | _signpost(members))
+    root = json.loads(content)
+    metadata = metadata_files(root)
+    groups = {name: metadata.pop(name) for name in [f"{group}/zarr.json" for group in group_names(members)]}
+    files = {**coordinates, **metadata, **groups, "zarr.json": content}
+    record, recorded = read_record(url), list(files)
+    if record is None:
+        recorded = list({*files, *coordinate_files(root, listed(url))})
+    before = dict(read_many(url, recorded))
+    known = record.files if record else {name: [digest(old)] for name, old in before.items() if old is not None}
+    digests = {name: [*dict.fromkeys([*known.get(name, ()), digest(new)])] for name, new in files.items()}
+    changed = {name: new for name, new in (coordinates | metadata).items() if new != before[name]}
+    held_record = sealed({"files": {**known, **digests}, "root": content.decode()})
+    write_stages(url, [{RECORD: held_record}, changed, groups, {"zarr.json": content}])
 
 
 def is_laid_out(url: str, layout: Sequence[Template]) -> bool:
-    """Return whether a store already has the shape and the attributes of all templates."""
+    """Return whether a store already has the shape and the attributes of all templates, and no file is missing."""
     root = document(url)
-    return root is not None and all(_has_shape(url, root, template) for template in layout)
+    is_whole = root is not None and all(_has_shape(url, root, template) for template in layout)
+    return is_whole and not any(layout_faults(url))
 
 
 def _has_shape(url: str, root: Mapping[str, Any], template: Template) -> bool:
@@ -107,117 +128,129 @@ def _has_shape(url: str, root: Mapping[str, Any], template: Template) -> bool:
     return bool(shown["shape"] == list(template.shape) and wanted.items() <= held["attributes"].items())
 
 
-@dataclass(frozen=True)
-class Copy:
-    """A copy of the layout of a group: metadata and coordinates.
+def group_names(members: Mapping[str, Any]) -> list[str]:
+    """Return the names of the groups among the members of a study."""
+    return [name for name, member in members.items() if member["node_type"] == "group"]
 
-    The copy is written before the files of the layout. A run may be killed between these writes, so a file is intact if
-    it equals its copy or if it is still the previous version.
+
+def metadata_files(root: Mapping[str, Any]) -> dict[str, bytes]:
+    """Return the metadata files of all groups and arrays, which follow from the metadata of the study."""
+    members = root["consolidated_metadata"]["metadata"]
+    names = group_names(members)
+    groups = {name: group_document(members_of(members, name), members[name]["attributes"]) for name in names}
+    arrays = {name: json.dumps(member).encode() for name, member in members.items() if name not in groups}
+    return {f"{name}/zarr.json": content for name, content in (arrays | groups).items()}
+
+
+def coordinate_files(root: Mapping[str, Any], names: Iterable[str]) -> list[str]:
+    """Return the names that belong to chunks of coordinates, from the metadata of the study."""
+    members = root["consolidated_metadata"]["metadata"]
+    groups = {"": root["attributes"]} | {name: members[name]["attributes"] for name in group_names(members)}
+    data = {group_name(name, array) for name, of in groups.items() for array in ("status", *of.get("outputs", ()))}
+    chunks = tuple(f"{name}/c" for name in members if name not in data and name not in groups)
+    return [name for name in names if name.startswith(chunks)]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A file that differs from what was written, or that should not exist.
 
     Parameters
     ----------
-    files : mapping of str to bytes
-        Contents of the files, including the metadata of the study, by their names in the store.
-    before : mapping of str to str
-        Digests of the previous versions of the files.
+    kind : str
+        ``damaged``, ``missing``, ``swapped`` or ``foreign``.
+    name : str
+        The file.
+    what : str
+        The fault, for messages.
     """
 
-    files: Mapping[str, bytes]
-    before: Mapping[str, str]
-
-    def accepts(self, name: str, content: bytes | None, root: bytes | None) -> bool:
-        """Return whether a file is intact.
-
-        A new file may be missing as long as `root`, the metadata of the study, is still the previous version.
-        """
-        if content is None:
-            return name not in self.before and root is not None and digest(root) == self.before.get("zarr.json")
-        return content == self.files[name] or digest(content) == self.before.get(name)
-
-    @property
-    def age(self) -> int:
-        """Number of times that the study had been laid out when the copy was made."""
-        return len(json.loads(self.files["zarr.json"])["attributes"]["history"])
+    kind: str
+    name: str
+    what: str
 
 
-def copy_name(series: str) -> str:
-    """Return the name of the copy of the layout of a group."""
-    return group_name(series, "status/layout.json")
+@dataclass(frozen=True)
+class LayoutRecord:
+    """The record of the layout of a study.
 
-
-def copy_of(series: str, files: Mapping[str, bytes], before: Mapping[str, str]) -> dict[str, bytes]:
-    """Return name and content of the file with the copy of the layout of a group."""
-    encoded = {name: base64.b64encode(content).decode() for name, content in files.items()}
-    held = {"files": encoded, "before": before}
-    stated = digest(json.dumps(held, sort_keys=True).encode())
-    return {copy_name(series): json.dumps({**held, "digest": stated}, sort_keys=True).encode()}
-
-
-def read_copy(url: str, series: str) -> Copy | None:
-    """Return the copy of the layout of a group, or None if the store has no copy.
-
-    Raises
-    ------
-    StoreError
-        If the copy is damaged.
+    Parameters
+    ----------
+    files : mapping of str to list of str
+        Digests of all versions of each file of the layout, the newest last. The record is written before these files.
+        A run may be killed between these writes, so a file may have any of the versions.
+    root : str
+        The newest ``zarr.json``, from which `mdr_dask.store.repair` restores this file.
     """
-    content = read_bytes(url, copy_name(series))
-    if content is None:
-        return None
+
+    files: Mapping[str, list[str]]
+    root: str
+
+
+def read_record(url: str) -> LayoutRecord | None:
+    """Return the record of the layout, or None if it is missing or damaged."""
+    content = read_bytes(url, RECORD)
+    held = None if content is None else unsealed(content)
     try:
-        held = json.loads(content)
-        stated = held.pop("digest")
-        if stated != digest(json.dumps(held, sort_keys=True).encode()):
-            raise ValueError
-        files = {name: base64.b64decode(text) for name, text in held["files"].items()}
-        if group_name(series, "status/zarr.json") not in files:
-            raise ValueError
-        return Copy(files, dict(held["before"]))
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        raise StoreError(f"{url}: {copy_name(series)} is damaged") from None
+        files = None if held is None else {name: list(versions) for name, versions in held["files"].items()}
+        return None if held is None or not files else LayoutRecord(files, str(held["root"]))
+    except (TypeError, KeyError, AttributeError):
+        return None
 
 
-def damaged_layout(url: str, series: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Yield name and fault (``missing`` or ``damaged``) of every layout file that is not intact."""
-    root = document(url) or {}
-    copies = []
-    for name in series:
-        try:
-            copy = read_copy(url, name)
-        except StoreError:
-            yield copy_name(name), "damaged"
-            continue
-        if copy is not None:
-            copies.append(copy)
-        elif ((document(url, name) or root).get("attributes", {})).get("mdr_dask_layout", 0) > 1:
-            yield copy_name(name), "missing"
-    names, held = list(dict.fromkeys(name for copy in copies for name in copy.files)), read_bytes(url, "zarr.json")
-    for name, content in read_many(url, names):
-        if not any(copy.accepts(name, content, held) for copy in copies if name in copy.files):
-            yield name, "missing" if content is None else "damaged"
+def layout_faults(url: str) -> Iterator[Finding]:
+    """Yield every file of the layout that is missing or has a digest that is not in the record of the layout."""
+    record, content = read_record(url), read_bytes(url, "zarr.json")
+    if record is None:
+        is_damaged = read_bytes(url, RECORD) is not None
+        if is_damaged or (document(url) or {"attributes": {}})["attributes"].get("mdr_dask_layout", 0) > 1:
+            yield Finding("damaged" if is_damaged else "missing", RECORD, "the record of the layout")
+        return
+    owners = {versions[-1]: name for name, versions in record.files.items()}
+    is_older = content is not None and digest(content) in record.files["zarr.json"][:-1]
+    for name, content in read_many(url, record.files):
+        if content is None:
+            if not is_older:  # otherwise a run was stopped before it wrote this file
+                yield Finding("missing", name, "part of the layout")
+        elif (found := digest(content)) not in record.files[name]:
+            other = owners.get(found)
+            what = f"holds what belongs to {other}" if other else "not what was laid out"
+            yield Finding("swapped" if other else "damaged", name, what)
 
 
 def _signpost(members: Mapping[str, Any]) -> dict[str, str]:
     """Return a comment for a study with series, because such a study looks empty when opened as one dataset."""
-    series = sorted(name for name, member in members.items() if member["node_type"] == "group")
-    groups = " or ".join(f"group={name!r}" for name in series)
+    series = group_names(members)
+    groups = " or ".join(f"group={name!r}" for name in sorted(series))
     text = f"the results of each series are in a group: open_datatree, or open_zarr with {groups}"
     return {"comment": text} if series else {}
 
 
-def _laid_out_files(template: Template) -> dict[str, bytes]:
-    """Return the metadata of all arrays of a group, and the chunks of its coordinates."""
+def _arrays_and_coordinates(template: Template) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """Return the metadata of all arrays of a group by the name of the array, and the chunks of its coordinates."""
     coordinates = _coordinates(template)
-    held = [_coordinate_files(name, *coordinate) for name, coordinate in coordinates.items()]
+    files: dict[str, Any] = {}
+    store = zarr.storage.MemoryStore(files)
+    for name, (dims, values, attrs) in coordinates.items():
+        array = zarr.create_array(
+            store,
+            name=name,
+            shape=values.shape,
+            chunks=(_COORDINATE_CHUNK,) * values.ndim,
+            dtype="str" if values.dtype == object else values.dtype,
+            compressors=_compressors(),
+            dimension_names=dims,
+            attributes=attrs,
+        )
+        array[...] = values
     along = " ".join(name for name, (dims, _, _) in coordinates.items() if dims != (name,))
-    arrays = {}
     for output in template.outputs:
         attrs = {"units": output.unit, "long_name": output.long_name, "coordinates": along}
         if output.has_error and output.error in template.outputs:
             attrs["ancillary_variables"] = output.error.name
         if output.comment:
             attrs["comment"] = output.comment
-        arrays[output.name] = _array_file(template, output.dims, template.extra_shape(output), "float64", attrs)
+        _create(store, template, output.name, output.dims, template.extra_shape(output), "float64", attrs)
     flags: dict[str, Any] = {
         "long_name": "state of the case",
         "units": "1",
@@ -225,18 +258,26 @@ def _laid_out_files(template: Template) -> dict[str, bytes]:
         "flag_values": [int(status) for status in Status],
         "flag_meanings": " ".join(status.name.lower() for status in Status),
     }
-    arrays["status"] = _array_file(template, (), (), "int8", flags)
-    files = {f"{name}/zarr.json": content for name, content in arrays.items()}
-    return {name: content for each in (*held, files) for name, content in each.items()}
+    _create(store, template, "status", (), (), "int8", flags)
+    end = "/zarr.json"
+    found = {name: content.to_bytes() for name, content in files.items() if name != "zarr.json"}
+    arrays = {name.removesuffix(end): json.loads(content) for name, content in found.items() if name.endswith(end)}
+    return arrays, {name: content for name, content in found.items() if not name.endswith(end)}
 
 
-def _array_file(
-    template: Template, further: tuple[str, ...], extra: tuple[int, ...], dtype: str, attrs: dict[str, Any]
-) -> bytes:
-    """Return the metadata of an output or of the ledger."""
-    files: dict[str, Any] = {}
+def _create(
+    store: Store,
+    template: Template,
+    name: str,
+    further: tuple[str, ...],
+    extra: tuple[int, ...],
+    dtype: str,
+    attrs: dict[str, Any],
+) -> None:
+    """Create an output or the ledger in a store in memory."""
     zarr.create_array(
-        zarr.storage.MemoryStore(files),
+        store,
+        name=name,
         shape=(*template.shape, *extra),
         chunks=tuple(max(1, length) for length in (*(template.chunks[dim] for dim in template.dims), *extra)),
         dtype=dtype,
@@ -245,26 +286,6 @@ def _array_file(
         dimension_names=(*template.dims, *further),
         attributes=attrs,
     )
-    return bytes(files["zarr.json"].to_bytes())
-
-
-def _coordinate_files(
-    name: str, dims: tuple[str, ...], values: NDArray[Any], attrs: dict[str, Any]
-) -> dict[str, bytes]:
-    """Return the files of a coordinate."""
-    files: dict[str, Any] = {}
-    array = zarr.create_array(
-        zarr.storage.MemoryStore(files),
-        name=name,
-        shape=values.shape,
-        chunks=(_COORDINATE_CHUNK,) * values.ndim,
-        dtype="str" if values.dtype == object else values.dtype,
-        compressors=_compressors(),
-        dimension_names=dims,
-        attributes=attrs,
-    )
-    array[...] = values
-    return {file: content.to_bytes() for file, content in files.items() if file.startswith(f"{name}/")}
 
 
 def _compressors() -> list[Any]:

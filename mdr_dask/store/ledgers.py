@@ -17,7 +17,7 @@ from mdr_dask.errors import StoreError
 from mdr_dask.models.base import Status
 from mdr_dask.plan import BlockIndex
 from mdr_dask.store.files import chunk_name, group_name, guarded, listed, read_many
-from mdr_dask.store.layout import damaged_layout
+from mdr_dask.store.layout import layout_faults
 from mdr_dask.store.study import array_of, document
 
 #: Largest number of faults that a message names.
@@ -110,22 +110,25 @@ def _read(url: str, blocks: Blocks, metadata: Mapping[str, Any]) -> NDArray[np.i
     return np.asarray(whole[tuple(map(slice, metadata["shape"]))])
 
 
-def require_sound(url: str, series: Sequence[str]) -> None:
+def require_sound(url: str, series: Sequence[str], to_run: bool = False) -> None:
     """Raise StoreError if the layout of a study is damaged or a chunk of a finished block is missing.
 
-    Only the layout and the ledger are read, no values; `mdr_dask.store.verify` compares every file with its digest.
+    Only the layout and the ledger are read, no values; `mdr_dask.store.verify` compares every file with its digest. A
+    run writes missing files of the layout again, so missing files are no fault `to_run`.
     """
-    faults = _faults(url, series)
+    faults = _faults(url, series, to_run)
     if any(faults):  # check again: a run may have changed a file during the first check
-        first = list(itertools.islice(_faults(url, series), NAMED + 1))
+        first = list(itertools.islice(_faults(url, series, to_run), NAMED + 1))
         if first:
             more = ", and more" if len(first) > NAMED else ""
-            remedy = f"'mdr-dask verify {url}' names everything that is damaged, and repairs it with --repair"
+            remedy = f"'mdr-dask verify --repair {url}' removes what is damaged, and the next run writes it again"
             raise StoreError(f"{url}: damaged: {'; '.join(first[:NAMED])}{more}; {remedy}")
 
 
-def _faults(url: str, series: Sequence[str]) -> Iterator[str]:
-    yield from (f"{name} is {kind}" for name, kind in damaged_layout(url, series))
+def _faults(url: str, series: Sequence[str], to_run: bool) -> Iterator[str]:
+    for fault in layout_faults(url):
+        if not (to_run and fault.kind == "missing"):
+            yield f"{fault.name} is {fault.kind}"
     for name in series:
         metadata = document(url, name) or {}
         blocks = Blocks.of(name, metadata)

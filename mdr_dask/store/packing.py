@@ -11,7 +11,8 @@ from pathlib import Path
 
 from mdr_dask.errors import StoreError
 from mdr_dask.store.files import listed, read_many
-from mdr_dask.store.verification import CHECKSUMS, Finding, Inspection, of_store, verify
+from mdr_dask.store.layout import Finding
+from mdr_dask.store.verification import CHECKSUMS, Inspection, of_store, verify
 
 
 def contents(url: str) -> Iterator[tuple[str, bytes]]:

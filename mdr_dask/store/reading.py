@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from mdr_dask.errors import StoreError
 from mdr_dask.store.files import bytes_of, group_name
 from mdr_dask.store.ledgers import require_sound
-from mdr_dask.store.study import document, series_names
+from mdr_dask.store.study import require_valid_file, series_names
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -72,7 +72,7 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
 def _open_sorted(url: str, series: str) -> xr.Dataset:
     import xarray as xr
 
-    document(url, series)
+    require_valid_file(url, series)
     opened = partial(xr.open_zarr, bytes_of(url), group=group_name(series) or None, consolidated=True, zarr_format=3)
     dataset: xr.Dataset = opened(chunks=None)
     if dataset.nbytes > LAZY_BYTES:

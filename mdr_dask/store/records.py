@@ -6,7 +6,6 @@ hundred thousand files.
 
 from __future__ import annotations
 
-import json
 import logging
 import re
 import uuid
@@ -16,7 +15,7 @@ from functools import lru_cache
 from typing import Any
 
 from mdr_dask.plan import RECORDS_TOGETHER, BlockIndex
-from mdr_dask.store.files import chunk_name, digest, group_name, listed, read_bytes, read_many, remove, write_stages
+from mdr_dask.store.files import chunk_name, group_name, listed, read_bytes, read_many, remove, unsealed, write_stages
 
 log = logging.getLogger("mdr_dask.store")
 
@@ -33,25 +32,13 @@ def name_of(series: str, index: BlockIndex, attempt: int) -> str:
     return f"{folder(series)}{'.'.join(map(str, index))}-{attempt}.json"
 
 
-def encoded(record: Mapping[str, Any]) -> bytes:
-    """Return a record as one line of JSON that includes the digest of the record."""
-    text = json.dumps(record, sort_keys=True)
-    return json.dumps({**record, "digest": digest(text.encode())}, sort_keys=True).encode()
-
-
 def decoded(line: bytes) -> dict[str, Any] | None:
     """Return a record, or None if it is damaged. Records of version 0.1 have no digest and count as undamaged."""
+    record = unsealed(line)
     try:
-        record: dict[str, Any] = json.loads(line)
-        if not _is_one(record):
-            return None
-        stated = record.pop("digest", None)
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        return record if record is not None and _is_one(record) else None
+    except (TypeError, KeyError, AttributeError):
         return None
-    if stated is None or stated == digest(line.replace(f'"digest": "{stated}", '.encode(), b"", 1)):
-        return record
-    text = json.dumps(record, sort_keys=True)
-    return record if stated == digest(text.encode()) else None
 
 
 def _is_one(found: Mapping[str, Any]) -> bool:

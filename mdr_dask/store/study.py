@@ -27,29 +27,63 @@ def document(url: str, series: str = "") -> Mapping[str, Any] | None:
     StoreError
         If this program did not write the metadata.
     """
-    name = group_name(series, "zarr.json")
-    content = read_bytes(url, name)
+    content = read_bytes(url, "zarr.json")
     if content is None:
         return None
-    with guarded(url, f"reading {name}"):
-        found, fault = _checked(content)
+    group = group_name(series)
+    with guarded(url, "reading zarr.json"):
+        found, fault = _checked(content, group)
     if fault is not None:
-        raise StoreError(f"{url}: {name}{fault}; 'mdr-dask verify {url}' names what is damaged")
+        raise StoreError(f"{url}: zarr.json{fault}; 'mdr-dask verify {url}' names what is damaged")
     return found
 
 
-@lru_cache(maxsize=16)
-def _checked(content: bytes) -> tuple[dict[str, Any], str | None]:
-    """Return the metadata of a group, and the first fault in them or None."""
+def require_valid_file(url: str, series: str) -> None:
+    """Raise StoreError if this program did not write the metadata file of a series."""
+    name = group_name(series, "zarr.json")
+    content = read_bytes(url, name)
+    with guarded(url, f"reading {name}"):
+        _, fault = _checked(content, "") if content is not None else (None, " is missing")
+    if fault is not None:
+        raise StoreError(f"{url}: {name}{fault}; 'mdr-dask verify {url}' names what is damaged")
+
+
+def group_document_of(root: bytes, series: str) -> Mapping[str, Any] | None:
+    """Return the metadata of a group from the content of ``zarr.json``; None if there is no such group."""
+    return _checked(root, group_name(series))[0]
+
+
+@lru_cache(maxsize=32)
+def _checked(content: bytes, group: str) -> tuple[dict[str, Any] | None, str | None]:
+    """Return the metadata of a study or of one of its groups, and the first fault in them or None."""
     found = parsed(content)
     if not isinstance(found, dict) or not isinstance(found.get("attributes", {}), dict):
         return found, " is damaged"
     attributes = found.get("attributes", {})
     layout = attributes.get("mdr_dask_layout")
     is_newer = isinstance(layout, int) and layout > LAYOUT  # `attributes` refuses a later layout with its own message
-    if "mdr_dask_layout" in attributes and not only_claimed(attributes) and not is_newer:
-        return found, next((f": {fault}" for fault in faults(found)), None)
-    return found, None
+    if "mdr_dask_layout" not in attributes or only_claimed(attributes) or is_newer:
+        return None if group else found, None
+    fault = next(faults(found), None)
+    if fault is None and group:
+        return _group(found, group)
+    return found, fault and f": {fault}"
+
+
+def _group(root: Mapping[str, Any], group: str) -> tuple[dict[str, Any] | None, str | None]:
+    """Return the metadata of a group, from the metadata of its study, and their first fault."""
+    members = root["consolidated_metadata"]["metadata"]
+    if members.get(group, {}).get("node_type") != "group":
+        return None, None
+    own = {"metadata": members_of(members, group)}
+    found = {**root, "attributes": members[group]["attributes"], "consolidated_metadata": own}
+    fault = next(faults(found), None)
+    return found, fault and f": {group}: {fault}"
+
+
+def members_of(members: Mapping[str, Any], group: str) -> dict[str, Any]:
+    """Return the members of a group by their names in it, from all members of a study."""
+    return {name.removeprefix(f"{group}/"): each for name, each in members.items() if name.startswith(f"{group}/")}
 
 
 def array_of(metadata: Mapping[str, Any], store: Store, path: str = "") -> Any:
@@ -91,8 +125,8 @@ def is_study(url: str) -> bool:
 def _root_attributes(url: str) -> dict[str, Any] | None:
     """Return the attributes of the Zarr group at a path or URL, or None if there is no group."""
     found = document(url)
-    if found is None and read_bytes(url, "status/zarr.json") is not None:
-        raise StoreError(f"{url}: zarr.json is missing; 'mdr-dask verify --repair {url}' writes it again from its copy")
+    if found is None and read_bytes(url, "layout.json") is not None:
+        raise StoreError(f"{url}: zarr.json is missing; 'mdr-dask verify --repair {url}' writes it again")
     return None if found is None else dict(found.get("attributes", {}))
 
 

@@ -1,4 +1,4 @@
-"""Compare a store with the digests in its records and the copy of its layout, and repair it."""
+"""Compare a store with the digests in its records, and repair it."""
 
 from __future__ import annotations
 
@@ -11,13 +11,12 @@ from typing import Any
 
 import zarr
 
-from mdr_dask.errors import StoreBusyError, StoreError
+from mdr_dask.errors import StoreBusyError
 from mdr_dask.plan import BlockIndex
 from mdr_dask.store.files import (
     ASIDE,
     CLAIMS,
     LAYOUT,
-    ROOT,
     bytes_of,
     digest,
     group_name,
@@ -26,13 +25,22 @@ from mdr_dask.store.files import (
     read_many,
     remove,
     set_aside,
+    write_bytes,
     write_stages,
 )
-from mdr_dask.store.layout import Copy, copy_name, copy_of, read_copy
+from mdr_dask.store.layout import (
+    RECORD,
+    Finding,
+    coordinate_files,
+    group_names,
+    layout_faults,
+    metadata_files,
+    read_record,
+)
 from mdr_dask.store.ledgers import Blocks
 from mdr_dask.store.locks import at_work, exclusive
 from mdr_dask.store.records import decoded, folder, lines, name_of
-from mdr_dask.store.study import attributes, document, refuse_file, series_names
+from mdr_dask.store.study import attributes, document, group_document_of, refuse_file
 
 IGNORED = (".partial", ASIDE, "status/seal.json")  # development versions wrote status/seal.json
 #: Folder in a published store with the files that do not belong to the study itself.
@@ -43,25 +51,6 @@ _CRATE = "ro-crate-metadata.json"
 
 #: Digests of the chunks that each attempt at a block has written, by array, in the order of the attempts.
 History = list[Mapping[str, str]]
-
-
-@dataclass(frozen=True)
-class Finding:
-    """A file that differs from what was written, or that should not exist.
-
-    Parameters
-    ----------
-    kind : str
-        ``damaged``, ``missing``, ``swapped`` or ``foreign``.
-    name : str
-        The file.
-    what : str
-        The fault, for messages.
-    """
-
-    kind: str
-    name: str
-    what: str
 
 
 @dataclass
@@ -86,10 +75,6 @@ class Inspection:
         Facts that are not damage, such as an interrupted run or an earlier version.
     groups : list of Group
         The groups of the store.
-    copies : list of Copy
-        Copies of the layouts of the groups.
-    uncopied : dict of str to set of str
-        Layout files of each group that has no copy of its layout.
     files, blocks : int
         Number of files, and number of blocks in the ledgers.
     """
@@ -97,8 +82,6 @@ class Inspection:
     findings: list[Finding] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     groups: list[Group] = field(default_factory=list)
-    copies: list[Copy] = field(default_factory=list)
-    uncopied: dict[str, set[str]] = field(default_factory=dict)
     files: int = 0
     blocks: int = 0
 
@@ -124,8 +107,8 @@ def verify(url: str) -> Inspection:
 def repair(url: str) -> tuple[Inspection, Inspection]:
     """Repair a store as far as possible, and return the inspections before and after the repair.
 
-    Metadata and coordinates are written again from their copies. Damaged blocks are removed, so that the next run
-    computes them. Records and chunks that do not belong to the study are renamed. Other foreign files are kept.
+    Metadata are written again. Damaged coordinates and damaged blocks are removed, so that the next run writes them
+    again. Records and chunks that do not belong to the study are renamed. Other foreign files are kept.
 
     Raises
     ------
@@ -137,15 +120,14 @@ def repair(url: str) -> tuple[Inspection, Inspection]:
     refuse_file(url)
     with exclusive(url):
         found = _inspect(url)
-        damaged = {finding.name for finding in found.findings}
-        latest = sorted(found.copies, key=lambda copy: copy.age)
-        files = {name: content for copy in latest for name, content in copy.files.items() if name in damaged}
-        root = {name: files.pop(name) for name in ["zarr.json"] if name in files}
-        write_stages(url, [files, root])
-        for series, names in found.uncopied.items():
-            contents = {name: content for name, content in read_many(url, sorted(names)) if content is not None}
-            if not names & damaged and contents.keys() == names:
-                write_stages(url, [copy_of(series, contents, {})])
+        bad = {finding.name for finding in found.findings}
+        record = read_record(url)
+        if record is not None and "zarr.json" in bad:
+            write_bytes(url, "zarr.json", record.root.encode())
+        root = document(url) or {}
+        metadata = {name: content for name, content in metadata_files(root).items() if name in bad}
+        write_stages(url, [metadata])
+        remove(url, [name for name in (RECORD, *coordinate_files(root, bad)) if name in bad])
         for group in found.groups:
             for block in sorted(group.bad_blocks):
                 remove(url, [group.blocks.chunk(name, block) for name in group.blocks.further])  # the ledger first
@@ -181,91 +163,42 @@ def _inspect(url: str) -> Inspection:
 
 
 def _check_layout(url: str, found: Inspection, present: set[str]) -> set[str]:
-    """Compare metadata and coordinates with their copies; return the names of all layout files."""
-    suffix, known, documents = copy_name(""), {"zarr.json"}, {}
-    series = {
-        name.removesuffix(suffix).rstrip("/") for name in present if name.endswith(suffix) and name.count("/") < 3
-    }
-    try:
-        attributes(url)
-        series |= {"" if name == ROOT else name for name in series_names(url)}
-    except StoreError:
-        if not series:
-            raise
-    for name in sorted(series):
-        known.add(copy_name(name))
-        copy = _copy(url, name, found)
-        if copy is not None:
-            documents[name] = json.loads(copy.files[group_name(name, "zarr.json")])
-            continue
-        documents[name] = _document(url, name) or {}
-        layout = documents[name].get("attributes", {}).get("mdr_dask_layout", LAYOUT)
-        if layout < LAYOUT:
+    """Compare metadata and coordinates with the record of the layout; return the names of all files of the layout."""
+    record = read_record(url)
+    if record is None:
+        attributes(url)  # raises StoreError if there is no study
+    found.findings += layout_faults(url)
+    content = read_bytes(url, "zarr.json") or b""
+    if record is not None and any(finding.name == "zarr.json" for finding in found.findings):
+        content = record.root.encode()
+    root = json.loads(content)
+    members = root["consolidated_metadata"]["metadata"]
+    for name in ["", *group_names(members)]:
+        group = group_document_of(content, name)
+        if group is not None and "status" in group["consolidated_metadata"]["metadata"]:
+            found.groups.append(Group(Blocks.of(name, group)))
+    if record is None:
+        if root["attributes"]["mdr_dask_layout"] < LAYOUT:
             found.notes.append("made by version 0.1, without digests: files that were swapped are not found")
-        elif copy_name(name) not in present:
-            found.findings.append(Finding("missing", copy_name(name), "the copy of the layout"))
-        known |= _unverified(url, name, documents[name], found, present)
-        data = [group_name(name, f"{array}/c/") for array in documents[name].get("attributes", {}).get("outputs", ())]
-        data.append(group_name(name, "status/c/"))
-        found.uncopied[name] = {"zarr.json", *(k for k in known if k in present and not k.startswith(tuple(data)))}
-        found.uncopied[name] -= {copy_name(each) for each in series}
-    for name, metadata in documents.items():
-        if "status" in metadata.get("consolidated_metadata", {}).get("metadata", {}):
-            found.groups.append(Group(Blocks.of(name, metadata)))
-    return known | _compared(url, found)
-
-
-def _copy(url: str, series: str, found: Inspection) -> Copy | None:
-    try:
-        copy = read_copy(url, series)
-    except StoreError:
-        found.findings.append(Finding("damaged", copy_name(series), "the copy of the layout"))
-        return None
-    found.copies += [copy] if copy else []
-    return copy
-
-
-def _compared(url: str, found: Inspection) -> set[str]:
-    """Compare layout files with their copies; return the names of these files."""
-    contents = {content: name for copy in found.copies for name, content in copy.files.items()}
-    names, root = {name for copy in found.copies for name in copy.files}, read_bytes(url, "zarr.json")
-    for name, content in read_many(url, sorted(names)):
-        if any(copy.accepts(name, content, root) for copy in found.copies if name in copy.files):
-            continue
-        if content is None:
-            found.findings.append(Finding("missing", name, "part of the layout"))
-        elif content in contents:
-            found.findings.append(Finding("swapped", name, f"holds what belongs to {contents[content]}"))
-        else:
-            found.findings.append(Finding("damaged", name, "not what was laid out"))
-    if root is not None and any(copy.before.get("zarr.json") == digest(root) for copy in found.copies):
+        found.findings += _unrecorded_faults(url, root)
+        return {RECORD, "zarr.json", *metadata_files(root), *coordinate_files(root, present)}
+    if digest(content) in record.files["zarr.json"][:-1]:
         found.notes.append("a run was stopped while it laid the study out; the next run goes on")
-    return names
+    return {RECORD, *record.files}
 
 
-def _document(url: str, series: str) -> Mapping[str, Any] | None:
-    try:
-        return document(url, series)
-    except StoreError:
-        return None
-
-
-def _unverified(url: str, series: str, metadata: Mapping[str, Any], found: Inspection, present: set[str]) -> set[str]:
-    """Check the metadata and coordinates of a group without a copy of its layout; return the names of their files."""
-    members = metadata.get("consolidated_metadata", {}).get("metadata", {})
-    known = {group_name(series, "zarr.json")}
-    for name, member in members.items():
-        if member["node_type"] == "array" and "/" not in name:
-            path = group_name(series, name)
-            known |= {file for file in present if file.startswith(f"{path}/c")} | {f"{path}/zarr.json"}
-            content = read_bytes(url, f"{path}/zarr.json")
-            if content is None:
-                found.findings.append(Finding("missing", f"{path}/zarr.json", "the metadata of an array"))
-            elif _parsed(content) != member:
-                found.findings.append(Finding("damaged", f"{path}/zarr.json", "not as in the metadata of the study"))
-            elif name not in ("status", *metadata["attributes"]["outputs"]) and (fault := _reading(url, path)):
-                found.findings.append(Finding("damaged", path, fault))
-    return known
+def _unrecorded_faults(url: str, root: Mapping[str, Any]) -> Iterator[Finding]:
+    """Yield the faults of metadata and coordinates that can be found without a record of the layout."""
+    known = metadata_files(root)
+    for name, content in read_many(url, known):
+        if content is None:
+            yield Finding("missing", name, "part of the layout")
+        elif _parsed(content) != json.loads(known[name]):
+            yield Finding("damaged", name, "not as in the metadata of the study")
+    members = root["consolidated_metadata"]["metadata"]
+    for name in coordinate_files(root, [f"{name}/c" for name in members]):
+        if fault := _reading(url, name.removesuffix("/c")):
+            yield Finding("damaged", name, fault)
 
 
 def _parsed(content: bytes) -> Any:
