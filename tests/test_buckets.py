@@ -250,6 +250,11 @@ def test_a_bucket_that_is_missing_and_credentials_that_are_missing_are_one_sente
     with pytest.raises(StoreError, match="bucket does not exist") as refused:
         run(small(toy), "s3://nothing-here/a.zarr")
     assert "\n" not in str(refused.value)
+    for command in ("status", "show", "verify"):
+        assert main([command, "s3://nothing-here/a.zarr"]) == 2
+        assert "bucket does not exist" in capsys.readouterr().err
+    assert main(["status", "s3://studies/none.zarr"]) == 2
+    assert "no store here" in capsys.readouterr().err
     for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
         monkeypatch.delenv(name)
     monkeypatch.setenv("AWS_EC2_METADATA_DISABLED", "true")

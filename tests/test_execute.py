@@ -25,7 +25,7 @@ def digests(url: str) -> dict[str, str]:
     return {
         str(path.relative_to(url)): hashlib.sha256(path.read_bytes()).hexdigest()
         for path in sorted(Path(url).rglob("*"))
-        if path.is_file() and path.suffix not in (".json", ".jsonl", ".aside")
+        if path.is_file() and path.suffix not in (".json", ".jsonl")
     }
 
 

@@ -275,8 +275,8 @@ RECORDS = "status/records/*.jsonl"
     [
         (RECORDS, empty, "damaged", None, "an empty record"),
         (RECORDS, of_no_block, "foreign", None, "the record of block [9, 9], which does not exist"),
-        (RECORDS, of_another_block, "swapped", name_of("", (0, 0), 1), "the record of block [1, 0]"),
-        ("height/c/0/0", values_of_another_block, "swapped", None, "holds what belongs to height/c/0/1"),
+        (RECORDS, of_another_block, "damaged", name_of("", (0, 0), 1), "the record of block [1, 0]"),
+        ("height/c/0/0", values_of_another_block, "damaged", None, "not what was written"),
         ("status/c/0/0", Path.unlink, "missing", None, "the ledger of a block that was done"),
         ("zarr.json", Path.unlink, "missing", None, "part of the layout"),
         ("zarr.json", retitled, "damaged", None, "not what was laid out"),

@@ -16,12 +16,14 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("store")
 @click.option(
-    "--repair", is_flag=True, help="Write metadata again, mark damaged blocks as missing, rename what does not belong."
+    "--repair",
+    is_flag=True,
+    help="Write metadata again; remove damaged blocks and coordinates for the next run.",
 )
 @click.option("--limit", type=click.IntRange(min=0), default=40, show_default=True, help="Most lines; 0 for all.")
 @click.option("--json", "form", flag_value="json", help="Print one JSON document.")
 def verify(store: str, repair: bool, limit: int, form: str | None) -> int:
-    """Read every file of a store and name what is damaged, missing, swapped or foreign; exit code 1 if anything is.
+    """Read every file of a store and name what is damaged, missing or foreign; exit code 1 if anything is.
 
     \b
     mdr-dask verify results/quickstart.zarr
@@ -60,9 +62,7 @@ def _print(store: str, found: Inspection, limit: int) -> None:
     bad = sum(len(group.bad_blocks) for group in found.groups)
     click.echo(f"{store}: {found.files} files, {found.blocks} blocks: {len(rows) or 'no'} faults")
     if bad:
-        click.echo(
-            f"{bad} blocks are damaged; with --repair they are marked as missing, and the next run computes them"
-        )
+        click.echo(f"{bad} blocks are damaged; --repair removes them, and the next run computes them again")
 
 
 def _document(found: Inspection) -> dict[str, object]:

@@ -28,8 +28,6 @@ T = TypeVar("T")
 ROOT = "-"
 #: Folder of claims in a store whose file system, or server, has no locks.
 CLAIMS = ".claims/"
-#: Suffix of files that were set aside: they are kept but no longer read.
-ASIDE = ".aside"
 #: Files in the folder of a study whose first run was stopped before laying it out.
 KEPT = ("zarr.json", "layout.json", CLAIMS.rstrip("/"))
 #: Number of simultaneous requests to a server.
@@ -311,13 +309,12 @@ def remove(url: str, files: Iterable[str]) -> None:
                 (path / name).unlink(missing_ok=True)
 
 
-def set_aside(url: str, files: Iterable[str]) -> None:
-    """Rename files, so that they are kept but no longer read."""
-    for name in files:
-        content = read_bytes(url, name)
-        if content is not None:
-            write_bytes(url, f"{name}{ASIDE}", content)
-            remove(url, [name])
+def require_bucket(url: str) -> None:
+    """Raise StoreError if a store at a URL would lie in a bucket that does not exist or cannot be read."""
+    if local(url) is None and "://" not in bytes_of(url).path:
+        bucket = bytes_of(url).path.partition("/")[0]
+        with guarded(url, f"reading {bucket!r}"):
+            sync(_answered(bytes_of(url).fs._ls(bucket)))
 
 
 def sweep(url: str) -> None:

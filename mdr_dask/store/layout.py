@@ -158,7 +158,7 @@ class Finding:
     Parameters
     ----------
     kind : str
-        ``damaged``, ``missing``, ``swapped`` or ``foreign``.
+        ``damaged``, ``missing`` or ``foreign``.
     name : str
         The file.
     what : str
@@ -206,16 +206,13 @@ def layout_faults(url: str) -> Iterator[Finding]:
         if is_damaged or (document(url) or {"attributes": {}})["attributes"].get("mdr_dask_layout", 0) > 1:
             yield Finding("damaged" if is_damaged else "missing", RECORD, "the record of the layout")
         return
-    owners = {versions[-1]: name for name, versions in record.files.items()}
     is_older = content is not None and digest(content) in record.files["zarr.json"][:-1]
     for name, content in read_many(url, record.files):
         if content is None:
             if not is_older:  # otherwise a run was stopped before it wrote this file
                 yield Finding("missing", name, "part of the layout")
-        elif (found := digest(content)) not in record.files[name]:
-            other = owners.get(found)
-            what = f"holds what belongs to {other}" if other else "not what was laid out"
-            yield Finding("swapped" if other else "damaged", name, what)
+        elif digest(content) not in record.files[name]:
+            yield Finding("damaged", name, "not what was laid out")
 
 
 def _signpost(members: Mapping[str, Any]) -> dict[str, str]:

@@ -16,7 +16,7 @@ from mdr_dask.store.verification import CHECKSUMS, Inspection, of_store, verify
 
 
 def contents(url: str) -> Iterator[tuple[str, bytes]]:
-    """Yield name and content of every file of a store, except published files and files that were set aside."""
+    """Yield name and content of every file of a store, except published files."""
     for name, content in read_many(url, of_store(listed(url))):
         if content is not None:
             yield name, content

@@ -11,7 +11,7 @@ from zarr.abc.store import Store
 from zarr.storage import StorePath
 
 from mdr_dask.errors import StoreError
-from mdr_dask.store.files import KEPT, LAYOUT, ROOT, group_name, guarded, local, parsed, read_bytes
+from mdr_dask.store.files import KEPT, LAYOUT, ROOT, group_name, guarded, local, parsed, read_bytes, require_bucket
 from mdr_dask.store.schema import faults
 
 _HINTS = {".yaml": "; 'mdr-dask run {}' runs a campaign", ".zip": "; unpack it first"}
@@ -146,6 +146,7 @@ def attributes(url: str) -> dict[str, Any]:
     refuse_file(url)
     found = _root_attributes(url)
     if found is None:
+        require_bucket(url)
         raise StoreError(f"{url}: no store here; 'mdr-dask run CAMPAIGN' makes one")
     if "mdr_dask_layout" not in found:
         raise StoreError(f"{url}: a Zarr store, but not a study of mdr_dask")

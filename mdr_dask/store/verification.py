@@ -14,7 +14,6 @@ import zarr
 from mdr_dask.errors import StoreBusyError
 from mdr_dask.plan import BlockIndex
 from mdr_dask.store.files import (
-    ASIDE,
     CLAIMS,
     LAYOUT,
     bytes_of,
@@ -24,7 +23,6 @@ from mdr_dask.store.files import (
     read_bytes,
     read_many,
     remove,
-    set_aside,
     write_bytes,
     write_stages,
 )
@@ -42,12 +40,11 @@ from mdr_dask.store.locks import at_work, exclusive
 from mdr_dask.store.records import decoded, folder, lines, name_of
 from mdr_dask.store.study import attributes, document, group_document_of, refuse_file
 
-IGNORED = (".partial", ASIDE, "status/seal.json")  # development versions wrote status/seal.json
+#: Ending of temporary files, which do not belong to the study.
+IGNORED = ".partial"
 #: Folder in a published store with the files that do not belong to the study itself.
 PUBLISHED = "published/"
 CHECKSUMS = f"{PUBLISHED}checksums.sha256"
-#: A file of a published study that earlier versions wrote next to the store's own files.
-_CRATE = "ro-crate-metadata.json"
 
 #: Digests of the chunks that each attempt at a block has written, by array, in the order of the attempts.
 History = list[Mapping[str, str]]
@@ -60,7 +57,7 @@ class Group:
     blocks: Blocks
     bad_blocks: set[BlockIndex] = field(default_factory=set)
     bad_records: set[str] = field(default_factory=set)
-    strangers: list[str] = field(default_factory=list)
+    foreign: list[str] = field(default_factory=list)
 
 
 @dataclass
@@ -108,7 +105,7 @@ def repair(url: str) -> tuple[Inspection, Inspection]:
     """Repair a store as far as possible, and return the inspections before and after the repair.
 
     Metadata are written again. Damaged coordinates and damaged blocks are removed, so that the next run writes them
-    again. Records and chunks that do not belong to the study are renamed. Other foreign files are kept.
+    again. Damaged records, and foreign files among the chunks and records, are removed. Other foreign files are kept.
 
     Raises
     ------
@@ -131,15 +128,15 @@ def repair(url: str) -> tuple[Inspection, Inspection]:
         for group in found.groups:
             for block in sorted(group.bad_blocks):
                 remove(url, [group.blocks.chunk(name, block) for name in group.blocks.further])  # the ledger first
-            _set_aside_records(url, group)
-            set_aside(url, group.strangers)
+            _remove_records(url, group)
+            remove(url, group.foreign)
         return found, _inspect(url)
 
 
 def of_store(names: Iterable[str]) -> Iterator[str]:
-    """Yield the names of files that belong to a study; leave out files of a run, a repair or a publication."""
+    """Yield the names of files that belong to a study; leave out files of a run or a publication."""
     for name in names:
-        if not name.endswith(IGNORED) and not name.startswith((CLAIMS, PUBLISHED)) and name != _CRATE:
+        if not name.endswith(IGNORED) and not name.startswith((CLAIMS, PUBLISHED)):
             yield name
 
 
@@ -157,7 +154,7 @@ def _inspect(url: str) -> Inspection:
             series = group.blocks.series
             prefixes = [folder(series), *(group_name(series, f"{array}/c/") for array in group.blocks.further)]
             if name.startswith(tuple(prefixes)):
-                group.strangers.append(name)
+                group.foreign.append(name)
                 break
     return found
 
@@ -179,7 +176,7 @@ def _check_layout(url: str, found: Inspection, present: set[str]) -> set[str]:
             found.groups.append(Group(Blocks.of(name, group)))
     if record is None:
         if root["attributes"]["mdr_dask_layout"] < LAYOUT:
-            found.notes.append("made by version 0.1, without digests: files that were swapped are not found")
+            found.notes.append("made by version 0.1, without digests: files that changed places are not found")
         found.findings += _unrecorded_faults(url, root)
         return {RECORD, "zarr.json", *metadata_files(root), *coordinate_files(root, present)}
     if digest(content) in record.files["zarr.json"][:-1]:
@@ -222,7 +219,7 @@ def _reading(url: str, path: str, block: BlockIndex | None = None) -> str | None
 
 
 def _check_records(url: str, group: Group, found: Inspection, present: set[str]) -> set[str]:
-    """Find records that are damaged, swapped or foreign; return the names of all record files."""
+    """Find records that are damaged or foreign; return the names of all record files."""
     series, known = group.blocks.series, set[str]()
     for name, line in lines(url, series):
         known.add(name)
@@ -230,7 +227,7 @@ def _check_records(url: str, group: Group, found: Inspection, present: set[str])
         if record is None:
             finding = Finding("damaged", name, "a record is not what was written")
         elif name.endswith(".json") and name != name_of(series, tuple(record["block"]), record["attempt"]):
-            finding = Finding("swapped", name, f"the record of block {record['block']}")
+            finding = Finding("damaged", name, f"the record of block {record['block']}")
         elif not group.blocks.has(tuple(record["block"])):
             finding = Finding("foreign", name, f"the record of block {record['block']}, which does not exist")
         else:
@@ -248,12 +245,6 @@ def _check_blocks(url: str, group: Group, found: Inspection, present: set[str]) 
     """Compare the chunks of every block with the digests in its records; return the names of all chunks."""
     blocks, known = group.blocks, set[str]()
     histories, merged = _histories(url, group)
-    owners = {
-        (name, chunk): block
-        for block, history in histories.items()
-        for chunks in history
-        for name, chunk in chunks.items()
-    }
     begun = 0
     for block in blocks.indices:
         names = {blocks.chunk(name, block): name for name in blocks.further}
@@ -267,7 +258,7 @@ def _check_blocks(url: str, group: Group, found: Inspection, present: set[str]) 
             continue
         found.blocks += 1
         contents = {names[name]: content for name, content in read_many(url, names)}
-        faults = list(_faults(url, group, block, histories.get(block, []), contents, owners))
+        faults = list(_faults(url, group, block, histories.get(block, []), contents))
         if faults:
             group.bad_blocks.add(block)
             found.findings += faults
@@ -302,7 +293,6 @@ def _faults(
     block: BlockIndex,
     history: History,
     contents: Mapping[str, bytes | None],
-    owners: Mapping[tuple[str, str], BlockIndex],
 ) -> Iterator[Finding]:
     """Yield the faults of a block that is in the ledger."""
     if not history:
@@ -319,12 +309,8 @@ def _faults(
         elif content is None:
             yield from [Finding("missing", file, "a chunk of a block that is done")] if expected else []
         elif digest(content) not in (expected or written):
-            other = owners.get((name, digest(content)))
-            if other is not None and other != block:
-                yield Finding("swapped", file, f"holds what belongs to {group.blocks.chunk(name, other)}")
-            else:
-                old = digest(content) in written
-                yield Finding("damaged", file, "of an earlier attempt" if old else "not what was written")
+            is_older = digest(content) in written
+            yield Finding("damaged", file, "of an earlier attempt" if is_older else "not what was written")
 
 
 def _expected(history: History, status: str, name: str) -> set[str]:
@@ -341,8 +327,8 @@ def _expected(history: History, status: str, name: str) -> set[str]:
     return found
 
 
-def _set_aside_records(url: str, group: Group) -> None:
-    """Rename files that contain damaged records, or records of damaged blocks.
+def _remove_records(url: str, group: Group) -> None:
+    """Remove files that contain damaged records, or records of damaged blocks.
 
     The other records in these files are first copied to a new file.
     """
@@ -356,4 +342,4 @@ def _set_aside_records(url: str, group: Group) -> None:
     ]
     if good:
         write_stages(url, [{f"{folder(series)}{uuid.uuid4().hex[:12]}.jsonl": b"".join(line + b"\n" for line in good)}])
-    set_aside(url, sorted(bad))
+    remove(url, sorted(bad))
