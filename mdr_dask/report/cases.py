@@ -18,8 +18,22 @@ from mdr_dask.report.words import markup, plain
 MOST_CASES = 4000
 
 
-def cases_of(groups: Mapping[str, xr.Dataset]) -> list[Json]:
+def thinned(data: xr.Dataset) -> tuple[xr.Dataset, list[str]]:
+    """Load at most `MOST_CASES` cases, with evenly spread values of the longest axes; return texts on omitted values."""
+    dims, left_out = [str(dim) for dim in data["status"].dims if dim != "realisation"], []
+    while (cases := math.prod(data.sizes[dim] for dim in dims)) > MOST_CASES:
+        longest = max(dims, key=lambda dim: data.sizes[dim])
+        size = data.sizes[longest]
+        most = max(1, min(size - 1, size * MOST_CASES // cases), size // 4)
+        data, sentences = curves.thin(data, longest, most)
+        left_out += sentences
+    return data.load(), left_out
+
+
+def cases_of(groups: Mapping[str, xr.Dataset], left_out: Mapping[str, list[str]]) -> list[Json]:
     """Return the cases of every series that has an output without further dimensions.
+
+    `groups` and `left_out` hold, for each series, the two results of `thinned`.
 
     Returns
     -------
@@ -28,20 +42,19 @@ def cases_of(groups: Mapping[str, xr.Dataset]) -> list[Json]:
         out. Columns have a number for each case: ``at`` holds the varied parameters in the units of figures; ``value``,
         ``low``, ``high``, ``lines`` (standard error) and ``grid`` (grid error) belong to each output.
     """
-    found = [_series(name, data) for name, data in groups.items()]
+    found = [_series(name, data, left_out[name]) for name, data in groups.items()]
     return [series for series in found if series["outputs"] and series["axes"]]
 
 
-def _series(name: str, data: xr.Dataset) -> Json:
+def _series(name: str, data: xr.Dataset, left_out: list[str]) -> Json:
     outputs = [output for output in main_outputs(data) if set(data[output].dims) <= set(data["status"].dims)]
     dims = [str(dim) for dim in data["status"].dims if dim != "realisation"]
-    data, reduced = _thinned(data[[*outputs, *_companions(data, outputs), "status"]], dims)
     varied = [axis for dim in dims for axis in curves.parameters_along(data, dim) if axis in data.coords]
     varied = [axis for axis in varied if data[axis].size > 1]
     shape = xr.DataArray(np.zeros([data.sizes[dim] for dim in dims]), dims=dims)
     return {
         "name": name,
-        "reduced": reduced,
+        "reduced": left_out,
         "axes": {axis: {**_named(axis, data[axis]), "dim": str(data[axis].dims[0])} for axis in varied},
         "at": {axis: _column(labels.shown(axis, data[axis]), data[axis].dims, shape) for axis in varied},
         "outputs": {output: _named(output, data[output]) for output in outputs},
@@ -55,24 +68,6 @@ def main_outputs(data: xr.Dataset) -> list[str]:
     names = [str(name) for name in data.data_vars if name != "status"]
     errors = {str(data[name].attrs.get("ancillary_variables")) for name in names}
     return [name for name in names if name not in errors]
-
-
-def _companions(data: xr.Dataset, outputs: list[str]) -> list[str]:
-    found = (aggregation.companion(data, output) for output in outputs)
-    return [str(error.name) for error in found if error is not None]
-
-
-def _thinned(data: xr.Dataset, dims: list[str]) -> tuple[xr.Dataset, list[str]]:
-    """Return at most `MOST_CASES` cases, with evenly spread values of the longest axes, and texts on omitted values."""
-    left_out: list[str] = []
-    while (total := math.prod(data.sizes[dim] for dim in dims)) > MOST_CASES:
-        longest = max(dims, key=lambda dim: data.sizes[dim])
-        most = max(
-            1, min(data.sizes[longest] - 1, data.sizes[longest] * MOST_CASES // total, 2 + data.sizes[longest] // 2)
-        )
-        data, sentences = curves.thin(data, longest, most)
-        left_out += sentences
-    return data, left_out
 
 
 def _named(name: str, values: xr.DataArray) -> Json:

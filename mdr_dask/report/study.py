@@ -23,7 +23,7 @@ from mdr_dask.plots import curves, labels, page
 from mdr_dask.plots.base import provenance
 from mdr_dask.questions import progress
 from mdr_dask.questions.columns import fixed_words
-from mdr_dask.report.cases import cases_of, main_outputs
+from mdr_dask.report.cases import cases_of, main_outputs, thinned
 from mdr_dask.report.figures import Json, drawn_of
 from mdr_dask.report.subjects import Subject, subject_of
 from mdr_dask.units import seconds
@@ -32,8 +32,6 @@ from mdr_dask.units import seconds
 MOST_ROWS = 60
 #: Largest number of values of an axis that are listed.
 LISTED = 6
-#: Largest number of cases of a series that are read; in larger studies, evenly spread values of the axes are read.
-MOST_CASES = 4000
 
 
 class Table(NamedTuple):
@@ -111,43 +109,39 @@ def read_study(url: str) -> Study:
 
 def _read(url: str) -> Study:
     held, whole = store.attributes(url), store.datasets(url)
-    groups = {name: _thinned(data) for name, data in whole.items()}
+    read = {name: thinned(data) for name, data in whole.items()}
+    groups, left_out = (
+        {name: data for name, (data, _) in read.items()},
+        {name: texts for name, (_, texts) in read.items()},
+    )
     with page.with_units(labels.chosen_units(groups)):
-        return _study(url, held, whole, groups)
+        return _study(url, held, whole, groups, left_out)
 
 
-def _thinned(data: xr.Dataset) -> xr.Dataset:
-    """Load at most `MOST_CASES` cases of a series, with evenly spread values of the longest axes."""
-    dims = [str(dim) for dim in data["status"].dims if dim != "realisation"]
-    while (cases := math.prod(data.sizes[dim] for dim in dims)) > MOST_CASES:
-        longest = max(dims, key=lambda dim: data.sizes[dim])
-        size = data.sizes[longest]
-        most = max(1, min(size - 1, size * MOST_CASES // cases), size // 4)
-        data, _ = curves.thin(data, longest, most)
-    return data.load()
-
-
-def _study(url: str, held: Mapping[str, Any], whole: Mapping[str, xr.Dataset], groups: dict[str, xr.Dataset]) -> Study:
-    reduced = any(whole[name]["status"].size > data["status"].size for name, data in groups.items())
+def _study(
+    url: str,
+    held: Mapping[str, Any],
+    whole: Mapping[str, xr.Dataset],
+    groups: dict[str, xr.Dataset],
+    left_out: Mapping[str, list[str]],
+) -> Study:
+    omitted = [text for texts in left_out.values() for text in texts]
     model = str(held["model"])
     counted = progress.counts(url)
     records = [record for name in groups for record in store.records(url, name)]
     drawn = list(
         drawn_of(
-            {name: plot for name, plot in plots.available(model).items() if not (reduced and plot.fitted)},
+            {name: plot for name, plot in plots.available(model).items() if not (omitted and plot.fitted)},
             groups,
             lambda name: provenance(name, [url], f"mdr-dask plot {shlex.quote(url)} {name}"),
         )
     )
-    if not reduced:
+    if not omitted:
         laws, not_fitted = _laws(url, model, groups)
     else:
-        laws = []
-        first = next(iter(groups.values()))
-        not_fitted = [("all laws", f"the study is large; use mdr-dask fit {shlex.quote(url)} NAME")]
-        note = f"figures and errors are made from evenly spread values of the axes, such as {dict(first.sizes)}"
+        laws, not_fitted = [], [("all laws", f"the study is large; use mdr-dask fit {shlex.quote(url)} NAME")]
         drawn = [
-            one | {"left_out": "; ".join(p for p in (one["left_out"], note) if p)} if isinstance(one, dict) else one
+            one | {"left_out": "; ".join(filter(None, [one["left_out"], *omitted]))} if isinstance(one, dict) else one
             for one in drawn
         ]
     return Study(
@@ -169,7 +163,7 @@ def _study(url: str, held: Mapping[str, Any], whole: Mapping[str, xr.Dataset], g
         errors=[table for name, data in groups.items() for table in _errors(name, data)],
         figures=sorted((one for one in drawn if isinstance(one, dict)), key=_shows_no_errors),
         not_drawn=[one for one in drawn if isinstance(one, tuple)],
-        cases=cases_of(groups),
+        cases=cases_of(groups, left_out),
         subject=subject_of(model),
         digests=_digests(url, held, records),
         rerun=_rerun(url, held),

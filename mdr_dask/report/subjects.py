@@ -68,35 +68,37 @@ SHARED_LOAD = (
 
 #: Limits of the method for rough surfaces, common to several models.
 _ROUGH = (
-    "Friction and forces of one-dimensional lines with the spectrum given, as means and scatter of an ensemble.",
-    "Trends with load, velocity, modulus and spectrum, and the exponents of its laws.",
+    "Friction and forces of rough lines with the given spectrum, as means over an ensemble and their scatter.",
+    "Trends with load, velocity, modulus and spectrum, and the exponents of laws of friction.",
 )
 _NOT_ROUGH = (
-    "Area in contact, pressure in contact, separation and gaps of a surface: the length in contact of the line is its "
-    "stiffness once more, and says nothing about the area.",
-    "Friction of a surface in partial contact to better than a factor of about two: beside a sliding half-space the "
-    "lines had 0.60 to 2.17 of its friction.",
-    "One sample at one place: phases are random.",
-    "Adhesion and heat are left out.",
+    "Area in contact, pressure in contact, separation and gaps of a surface: the length in contact of the line is "
+    "proportional to the contact stiffness and does not give the area.",
+    "Friction of a surface in partial contact to better than a factor of about two: the lines had 0.60 to 2.17 times "
+    "the friction of a sliding half-space.",
+    "The friction of one sample at one place, because the phases of the lines are random.",
+    "Adhesion and heat, which the model does not contain.",
 )
 
 SUBJECTS: dict[str, Subject] = {
     "sliding_friction": Subject(
-        "A viscoelastic body slides steadily over a rigid rough line. The method of dimensionality reduction puts "
-        "independent elements in the place of the half-space. Their displacement is the largest of what pressed them "
-        "before, faded by relaxation; one pass over cubic cells gives it without running in. The depth follows from "
-        "the normal force. Lines are self-affine with random phases, or measured; results are means over them.",
+        "A viscoelastic body slides steadily over a rigid rough line. The method of dimensionality reduction replaces "
+        "the half-space by independent elements. An element that is not in contact relaxes, so its displacement is "
+        "the largest of all earlier indentations after their relaxation. One pass along the line, which consists of "
+        "cubic pieces, finds the steady displacement. The indentation depth follows from the normal force. The lines "
+        "are self-affine with random phases, or measured, and the results are means over the lines.",
         (
             Equation(r"f = 4 G \, \mathrm{d}x \, (u + \tau \dot{u}) \geq 0", "force of an element of a Kelvin solid"),
             Equation(
                 r"u(s) = \max_{s' \leq s} w(s') \, e^{-(s - s') / (v \tau)}",
-                "displacement of an element that the line w has passed under at velocity v",
+                "displacement of an element at the position s, after the line w has moved past it at the velocity v",
             ),
             Equation(r"F_N = 4 G \int u \, \mathrm{d}s", "normal force"),
             Equation(
                 r"F_x = 4 G \left[ v \tau \int_{c} w'^2 \, \mathrm{d}s + \sum_{f} \frac{u_l^2 - u_t^2}{2} \right], "
                 r"\quad \mu = \frac{F_x}{F_N}",
-                "friction: the part in contact c, and what every flight f dissipates between leaving l and touching t",
+                "friction: integral over the intervals c in contact, and the energy that is dissipated in every free "
+                "recovery f, from the end l of a contact to the beginning t of the next one",
             ),
         ),
         (PRL, SHAPES, BOOK, OBJECTION),
@@ -105,59 +107,66 @@ SUBJECTS: dict[str, Subject] = {
         "docs/friction.md",
     ),
     "velocity_jump": Subject(
-        "A body slides steadily over a rough line under a constant load until its velocity jumps. The ends are steady "
-        "solutions; between them the depth is marched in time, and at each moment one pass over the line finds the "
-        "patches in contact, whose forces are closed forms. Every line has its own steady friction after the jump.",
+        "A body slides steadily over a rough line under a constant load until its velocity jumps. Friction before the "
+        "jump and long after it follows from steady solutions. The indentation depth between them is computed in time "
+        "steps. In each step, one pass along the line finds the patches in contact, and their forces are closed "
+        "forms. Every line has its own steady friction after the jump.",
         (
             Equation(
                 r"u(x, t) = \max_{t' \leq t} \left( d(t') + p(x') \right) e^{-(t - t')}, \quad x' = x - V (t - t')",
                 "displacement, with the time in relaxation times and V = v tau / L",
             ),
             Equation(
-                r"\Delta\mu_0 = \mu(t_0 + 0) - \mu_1", "the jump of friction, as depth and displacements do not jump"
+                r"\Delta\mu_0 = \mu(t_0 + 0) - \mu_1",
+                "the jump of friction at the time of the velocity jump, when depth and displacements are continuous",
             ),
             Equation(
-                r"\mu(t) - \mu_2 \propto e^{-b (t - t_0) / \tau}", "one exponential, where the fit says that it holds"
+                r"\mu(t) - \mu_2 \propto e^{-b (t - t_0) / \tau}",
+                "relaxation as one exponential, if the fit finds that this law holds",
             ),
         ),
         (KINETICS, PRL, BOOK, OBJECTION),
         (*_ROUGH, "The change of friction after a jump, and how fast it relaxes."),
-        (*_NOT_ROUGH, "The course after a jump was not compared with a half-space."),
+        (*_NOT_ROUGH, "The transient after a jump, to a known accuracy: it was not compared with a half-space."),
         "docs/kinetics.md",
     ),
     "mixed_lubrication": Subject(
-        "Two rough rollers are pressed together on an oil film. Film and asperities share the load after Johnson, "
-        "Greenwood and Poon. The film is that of a line contact; the asperities are springs of the method of "
-        "dimensionality reduction. Where lines overlap by more than the film, clusters of points break the boundary "
-        "layer if they squeeze it thinner than its least thickness.",
+        "Two rough rollers are pressed together with an oil film between them. Film and asperities share the load as "
+        "in the theory of Johnson, Greenwood and Poon. The film is the film of a line contact, and the asperities are "
+        "springs of the method of dimensionality reduction. Where the lines overlap by more than the film thickness, "
+        "clusters of points are in contact. A cluster breaks through the boundary layer if it squeezes the layer to "
+        "less than its smallest thickness.",
         (
-            Equation(r"F_a(h) + \gamma F = F", "load on asperities and on the film h, which has the share gamma"),
+            Equation(
+                r"F_a(h) + \gamma F = F",
+                "balance of loads: asperities carry F_a at the film thickness h, the film carries the share gamma",
+            ),
             Equation(
                 r"\frac{h_0}{R^*} = 2.922 \, W^{-0.166} U^{0.692} G^{0.470}",
-                "central film after Pan and Hamrock, where the campaign asks for it",
+                "central film thickness of Pan and Hamrock, if the campaign selects this formula",
             ),
             Equation(
                 r"h_{layer} = \frac{\pi \tau_0 D^3}{12 F}",
-                "thickness to which a cluster of length D under the force F squeezes a layer of strength tau_0",
+                "thickness to which a cluster of length D and force F squeezes a layer with the shear strength tau_0",
             ),
             Equation(r"R = \rho / L", "electrical resistance of a length L in intimate contact"),
         ),
         (ROLLING, SHARED_LOAD, BOOK),
         (
-            "Film, shares of the load and friction of the model's assumptions.",
-            "Share of time with any breakthrough of the layer, as a twin-disc rig measures it.",
+            "Film thickness, shares of the load and friction, under the assumptions of the model.",
+            "Share of time with at least one breakthrough of the layer, which a twin-disc rig measures.",
         ),
         (
-            "Area in contact and gaps of the surfaces, since lines stand for them.",
-            "Heat in the contact, rolling friction and the chemistry of layers are left out.",
-            "Layer strength and thickness apart from each other: only their ratio counts.",
+            "Area in contact and gaps of the surfaces, because lines represent them.",
+            "Heat in the contact, rolling friction and the chemistry of layers, which the model does not contain.",
+            "Strength and thickness of the layer separately: the results depend on their ratio only.",
         ),
         "docs/mixed-lubrication.md",
     ),
     "ehl_line": Subject(
-        "Two rollers run on a film of oil. Reynolds' equation, the elastic deformation and the balance of load are "
-        "solved together by Newton's method on grids that are halved until the errors of the films meet the accuracy. "
-        "Where the film is torn the pressure is zero.",
+        "A film of oil separates two rollers. Newton's method solves Reynolds' equation, the elastic deformation and "
+        "the balance of load together. The spacing of the grid is halved until the errors of the film thicknesses "
+        "meet the accuracy. The pressure is zero where the film cavitates.",
         (
             Equation(
                 r"\frac{\mathrm{d}}{\mathrm{d}X} \left( \frac{\rho H^3}{\eta} \frac{\mathrm{d}P}{\mathrm{d}X} \right) "
@@ -166,7 +175,7 @@ SUBJECTS: dict[str, Subject] = {
             ),
             Equation(
                 r"H(X) = H(0) + \frac{X^2}{2} - \frac{1}{\pi} \int P(s) \ln \left| \frac{X - s}{s} \right| \mathrm{d}s",
-                "film between deformed rollers",
+                "film thickness between the deformed rollers",
             ),
             Equation(r"\int P \, \mathrm{d}X = \frac{\pi}{2}, \quad P \geq 0", "balance of load"),
         ),
@@ -177,20 +186,26 @@ SUBJECTS: dict[str, Subject] = {
         ),
         ("Film thickness and pressure of a smooth, isothermal, steady line contact, each with its error.",),
         (
-            "Heat, shear thinning in the film, roughness and time are left out.",
-            "Traction is laid over the film of rolling, so it holds for small sliding.",
-            "With Barus' law the pressure spike does not converge.",
+            "Heat, shear thinning in the film, roughness and changes in time, which the model does not contain.",
+            "Traction at large sliding: it is computed from the film of pure rolling.",
+            "The height of the pressure spike with Barus' law, which does not converge on finer grids.",
         ),
         "docs/ehl.md",
     ),
     "fretting_wear": Subject(
-        "A body of revolution is pressed into a half-space and oscillates tangentially. It wears where it slips, by "
-        "the local law of Reye, Archard and Khrushchov. Normal and tangential contact are solved by the method of "
-        "dimensionality reduction, which is exact for such bodies.",
+        "A body of revolution is pressed into a half-space and oscillates tangentially. Where it slips, it wears "
+        "according to the local law of Reye, Archard and Khrushchov. The method of dimensionality reduction, which is "
+        "exact for bodies of revolution, solves the normal and the tangential contact.",
         (
-            Equation(r"\Delta h = \frac{k}{\sigma_0} \, p \, \Delta u", "wear of a place under the pressure p"),
-            Equation(r"g(x) = |x| \int_0^{|x|} \frac{f'(r)}{\sqrt{x^2 - r^2}} \, \mathrm{d}r", "line of the body f(r)"),
-            Equation(r"\mu E^* \left( d - g(c) \right) = G^* U_0", "radius c of the part that sticks"),
+            Equation(
+                r"\Delta h = \frac{k}{\sigma_0} \, p \, \Delta u",
+                "depth of wear at a point with the pressure p and the slip Delta u",
+            ),
+            Equation(
+                r"g(x) = |x| \int_0^{|x|} \frac{f'(r)}{\sqrt{x^2 - r^2}} \, \mathrm{d}r",
+                "line g(x) that replaces the body with the profile f(r)",
+            ),
+            Equation(r"\mu E^* \left( d - g(c) \right) = G^* U_0", "radius c of the stick area"),
         ),
         (
             FRETTING,
@@ -200,13 +215,14 @@ SUBJECTS: dict[str, Subject] = {
             BOOK,
         ),
         (
-            "Worn profile, volume, radius of contact and pressure of one body of revolution, exact in its limits and "
-            "with an error between them.",
-            "With the fast rule, its own simplified law: its distance from the exact evolution is up to 0.32 d_0.",
+            "Worn profile, worn volume, contact radius and pressure of one body of revolution: exact in the limits of "
+            "few and very many cycles, and with an estimated error between them.",
+            "With the fast rule, results of a simplified law, whose profiles differ from the exact evolution by up to "
+            "0.32 d_0.",
         ),
         (
-            "Bodies that are not of revolution, rough bodies, wear particles that stay in the contact.",
-            "The wear coefficient itself: it is an input, or is fitted to a measurement.",
+            "Wear of rough bodies and of bodies that are not of revolution, and effects of wear particles.",
+            "The wear coefficient, which is an input or is fitted to a measurement.",
         ),
         "docs/wear.md",
     ),

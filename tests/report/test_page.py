@@ -95,7 +95,7 @@ def test_figures_of_the_page_hold_what_their_tables_hold(url, study):
 
 def test_cases_hold_the_means_and_both_errors_of_the_store(url):
     (data,) = store.datasets(url).values()
-    (series,) = cases.cases_of(store.datasets(url))
+    (series,) = cases.cases_of(store.datasets(url), {"": []})
     mean = data["friction_coefficient"].mean("realisation")
     scatter = data["friction_coefficient"].std("realisation", ddof=1) / 2
     grid = data["friction_coefficient_error"].mean("realisation")
@@ -106,18 +106,8 @@ def test_cases_hold_the_means_and_both_errors_of_the_store(url):
     np.testing.assert_allclose(series["at"]["velocity"], np.tile(data["velocity"], 3), rtol=DIGITS)
 
 
-def test_not_even_two_values_of_an_axis_stay_where_they_are_too_many(url, monkeypatch):
-    monkeypatch.setattr(cases, "MOST_CASES", 2)
-    (series,) = cases.cases_of(store.datasets(url))
-    assert len(series["states"]) == 2
-
-
-def test_large_studies_are_reduced_and_say_so(url, monkeypatch):
-    monkeypatch.setattr(cases, "MOST_CASES", 6)
+def test_long_figures_are_thinned_out_and_say_so(url, monkeypatch):
     monkeypatch.setattr(figures, "MOST_POINTS", 9)
-    (series,) = cases.cases_of(store.datasets(url))
-    assert len(series["states"]) <= 6
-    assert "values of velocity" in " ".join(series["reduced"])
     drawn = plots.available("sliding_friction")["velocity"].describe(store.datasets(url))
     shown = figures.figure_data("velocity", "", drawn, {})
     assert sum(len(trace["x"]) for trace in shown["traces"]) < 20
@@ -127,9 +117,9 @@ def test_large_studies_are_reduced_and_say_so(url, monkeypatch):
 
 
 def test_pages_of_large_studies_are_made_from_a_part_of_their_results(url, monkeypatch):
-    monkeypatch.setattr(study_room, "MOST_CASES", 8)
+    monkeypatch.setattr(cases, "MOST_CASES", 8)
     study = read_study(url)
-    assert all("evenly spread values of the axes" in figure["left_out"] for figure in study.figures)
+    assert all("spread evenly" in figure["left_out"] for figure in study.figures)
     assert study.not_fitted == [("all laws", f"the study is large; use mdr-dask fit {url} NAME")]
     assert "60 of 60" in study.facts["results"]
     velocities = {value for trace in study.figures[0]["traces"] for value in np.ravel(trace["of"]["velocity"])}
