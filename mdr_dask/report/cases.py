@@ -19,7 +19,10 @@ MOST_CASES = 4000
 
 
 def thinned(data: xr.Dataset) -> tuple[xr.Dataset, list[str]]:
-    """Load at most `MOST_CASES` cases, with evenly spread values of the longest axes; return texts on omitted values."""
+    """Load at most `MOST_CASES` cases, with evenly spread values of the longest axes.
+
+    Return these cases, and texts about the omitted values.
+    """
     dims, left_out = [str(dim) for dim in data["status"].dims if dim != "realisation"], []
     while (cases := math.prod(data.sizes[dim] for dim in dims)) > MOST_CASES:
         longest = max(dims, key=lambda dim: data.sizes[dim])

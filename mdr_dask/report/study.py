@@ -203,11 +203,11 @@ def _facts(held: Mapping[str, Any], counted: list[Json], records: list[Json]) ->
     said = ", ".join(f"{number} {state.replace('_', ' ')}" for state, number in states.items() if number)
     facts = {
         "results": f"{settled} of {total} ({settled / max(total, 1):.0%}): {said}",
-        "laid out": str(held["created"]),
+        "store created": str(held["created"]),
         "time in the model": seconds(spent),
         "computed by": f"mdr_dask {held['versions']['mdr_dask']}, model version {held['model_version']}",
         "seed": str(held["seed"]),
-        "accuracy asked for": f"{held['accuracy']:g}, relative" if held.get("accuracy") else "that of the model",
+        "accuracy": f"{held['accuracy']:g}, relative" if held.get("accuracy") else "default of the model",
     }
     if records:
         last = datetime.fromtimestamp(max(float(record["finished"]) for record in records), UTC)
@@ -273,8 +273,8 @@ def _machines(records: list[Json], held: Mapping[str, Any]) -> list[Table]:
     return [
         Table("Machines", ["machine", "blocks", "processes", "time in the model"], rows),
         Table("Processors and programs", ["kind", "blocks"], [[kind, str(count)] for kind, count in kinds.items()]),
-        Table("Versions when it was laid out", ["program", "version"], versions),
-        Table("History", ["what happened"], [[str(line)] for line in held["history"]]),
+        Table("Versions when the store was created", ["program", "version"], versions),
+        Table("History", ["event"], [[str(line)] for line in held["history"]]),
     ]
 
 
@@ -357,15 +357,16 @@ def _errors(name: str, data: xr.Dataset) -> Iterator[Table]:
         )
     headings = [
         "output",
-        "lines, median",
-        "lines, largest",
-        "grid, median",
-        "grid, largest",
-        "share of the grid, median",
+        "standard error, median",
+        "standard error, largest",
+        "grid error, median",
+        "grid error, largest",
+        "share of the grid error, median",
     ]
     note = (
-        "Standard error of the mean over realisations (lines) and estimated discretisation error (grid), relative to "
-        "the mean of each case. A dash: not known. Over 100 %: the mean is zero within its error."
+        "Standard error of the mean over realisations, and estimated discretisation error of the mean (grid error), "
+        "relative to the mean of each case. A dash means that the error is unknown, and over 100 % that the error is "
+        "larger than the mean."
     )
     if rows:
         yield Table(f"Errors{' of ' + name if name else ''}", headings, rows, note)
@@ -389,7 +390,7 @@ def _digests(url: str, held: Mapping[str, Any], records: list[Json]) -> dict[str
         "campaign, sha256": hashlib.sha256(str(held["campaign"]).encode()).hexdigest(),
         "digests of all chunks, sha256": hashlib.sha256("\n".join(written).encode()).hexdigest(),
         "model": f"{held['model']} version {held['model_version']}",
-        "this page": f"made {now} on {platform.node()} from {Path(url).name}",
+        "this page": f"written {now} on {platform.node()} from {Path(url).name}",
     }
 
 
