@@ -11,21 +11,21 @@ import curves
 import numpy as np
 import pytest
 import xarray as xr
-from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.interpolate import PchipInterpolator
 from test_execute import digests, run
 
 from mdr_dask import bootstrap, execute, store
 from mdr_dask.campaign import loads
 from mdr_dask.cli import main
 from mdr_dask.errors import CampaignError
-from mdr_dask.execute import Part, Resources, stages
+from mdr_dask.execute import Part, Resources
 from mdr_dask.fits.base import Fit
 from mdr_dask.fits.interpolant import law
 from mdr_dask.models.base import Status
 from mdr_dask.plots import page
 from mdr_dask.plots.view import View, figure_of
 from mdr_dask.questions.table import Question, table
-from mdr_dask.refinement import Mean, Stage, interpolation_error, refined
+from mdr_dask.refinement import Mean, Stage, refined
 
 AXIS = "{adaptive: [1 mm, 1 km], until: 1 %, at_most: 60}"
 
@@ -97,18 +97,6 @@ def test_a_smooth_knee_anywhere_is_interpolated_within_the_tolerance(study, url,
         ratios.append(away / truth.max() / (float(until[0]) / 100))
     assert np.mean(np.array(ratios) <= 1) >= 0.9
     assert max(ratios) <= 2
-
-
-def test_an_interval_is_predicted_from_earlier_values_alone():
-    places, levels = np.linspace(0, 1, 5), np.array([0, 2, 1, 2, 0])
-    values = np.array([0.0, 0.0, 4.0, 4.0, 4.0])
-    found = interpolation_error(places, levels, values[None, None], np.zeros((1, 5)))[0]
-    before = PchipInterpolator(places[::2], values[::2]), CubicSpline(places[::2], values[::2])
-    now = PchipInterpolator(places, values)
-    for k in range(4):
-        last = places[[1, 1, 3, 3][k]]
-        at = last + np.array([0, 0.25, 0.5, 0.75]) * (places[k] + places[k + 1] - 2 * last)
-        assert found[k] == pytest.approx(max(np.abs(f(at) - now(at)).max() for f in before))
 
 
 def test_where_few_values_are_allowed_the_widest_intervals_are_halved_first(study):
@@ -267,15 +255,6 @@ def test_values_that_are_there_are_used_and_more_go_behind_them(study, url):
     assert run(wider, url).done == needed.done - (store.datasets(url + "2")[""].y.notnull().sel(shift=[0.2, 0.6])).sum()
 
 
-def test_a_tighter_tolerance_goes_on(study, tmp_path):
-    wide, tight = study("shift: [0.2, 0.6]"), study("shift: [0.2, 0.6]", AXIS.replace("1 %", "0.1 %"))
-    once, twice = str(tmp_path / "once.zarr"), str(tmp_path / "twice.zarr")
-    first = run(wide, twice).done
-    second = run(tight, twice).done
-    assert run(tight, once).done == first + second
-    np.testing.assert_array_equal(means(once)[1], means(twice)[1])
-
-
 def test_two_axes_are_refined_together(study, url):
     run(study("shift: {adaptive: [-1, 1], until: {half: 1 %}, at_most: 20}", more="outputs: [y, half]"), url)
     data = store.datasets(url)[""].y.mean("realisation")
@@ -411,23 +390,3 @@ def test_an_axis_is_refined_by_outputs_of_one_number(until, outputs, message):
     with pytest.raises(CampaignError) as refused:
         loads(f"name: c\nmodel: ehl_line\nparameters: {{{parameters}}}\noutputs: [{outputs}]\n", "c.yaml", ".")
     assert message in str(refused.value)
-
-
-@pytest.mark.parametrize("errors", [True, False])
-def test_an_axis_is_refined_by_means_with_the_errors_of_their_grids(errors, url, monkeypatch):
-    """Where the store holds them."""
-    seen, of = [], stages.Mean.of
-    monkeypatch.setattr(
-        stages.Mean, "of", lambda values, done, error: seen.append((values, error)) or of(values, done, error)
-    )
-    body = "shear_modulus: 10 MPa, relaxation_time: 1 ms, normal_force: 1 N"
-    lines = f"length: 20 mm, points: 300, rms_roughness: 1 um, {body}"
-    speeds = "{adaptive: [1 mm/s, 1 m/s], until: {friction_coefficient: 50 %}}"
-    campaign = f"name: c\nmodel: sliding_friction\nrealisations: 2\nerrors: {str(errors).lower()}\n"
-    run(loads(f"{campaign}parameters: {{{lines}, velocity: {speeds}}}\n", "c.yaml", "."), url)
-    data = store.datasets(url)[""]
-    values, error = seen[-1]
-    np.testing.assert_array_equal(np.sort(np.ravel(values)), np.sort(np.ravel(data["friction_coefficient"])))
-    assert (error is not None) == errors
-    if errors:
-        np.testing.assert_array_equal(np.sort(np.ravel(error)), np.sort(np.ravel(data["friction_coefficient_error"])))

@@ -167,20 +167,6 @@ def test_what_more_realisations_cannot_narrow_ends_the_rounds(own, url):
     assert not [event for event in told if event.name == "not answered"]
 
 
-@pytest.mark.parametrize("doubted", ["more", "less"])
-def test_what_is_left_without_scatter_is_the_less_of_two_looks(doubted):
-    """With a little less scatter and a little more; at one of both the law is doubted, by half of its interval."""
-
-    def law(series):
-        scatter = series[""]["height"].std("realisation")
-        half = scatter.where((scatter > 1.005) != (doubted == "more"), 0.5 * (1 + scatter))
-        return xr.Dataset({"level": 0 * half, "level_low": -half, "level_high": half})
-
-    heights = xr.Dataset({"height": ("realisation", [-1.0, 1.0])})
-    (left,) = answers.without_scatter(dataclasses.replace(LEVEL, compute=law), "level", {"": heights}).values()
-    assert float(left) == pytest.approx(0.0, abs=1e-9)
-
-
 def test_zone_one_goes_on_in_region_one_alone_and_ends_narrow_enough(url):
     run(study("zone_one.alpha: 0.06"), url)
     data = store.datasets(url)
@@ -191,12 +177,6 @@ def test_zone_one_goes_on_in_region_one_alone_and_ends_narrow_enough(url):
     assert (done.sel(normal_force=1.0) == 10).all()  # beyond zone 1
     assert (done.sel(velocity=1.0) == 10).all()  # beyond region I
     assert float(found.loads) == 3
-
-
-def test_what_is_no_output_is_a_constant_of_a_fit():
-    wanted = study("friction_coefficient: 1 %, zone_one.alpha: 0.01, plateau: 2 %").replication
-    assert wanted.until == {"friction_coefficient": Tolerance(relative=0.01)}
-    assert wanted.answers == {"zone_one.alpha": Tolerance(absolute=0.01), "plateau.plateau": Tolerance(relative=0.02)}
 
 
 @pytest.mark.parametrize(

@@ -126,14 +126,6 @@ def test_a_store_that_cannot_be_written_ends_a_distributed_run_with_one_error(to
         run_on(workers, campaign, url)
 
 
-@pytest.mark.slow
-def test_a_worker_of_another_version_is_refused(toy, url, workers, monkeypatch):
-    campaign = toy.campaign(toy.axis("position", [1.0, 2.0]))
-    monkeypatch.setattr(execute.cells, "versions", lambda _: ("9.9", 1))
-    with pytest.raises(ClusterError, match=r"worker .* has mdr_dask .* with toy 1, this program is mdr_dask 9\.9"):
-        run_on(workers, campaign, url)
-
-
 def test_a_task_of_another_version_is_refused_before_anything_is_written(toy, url, monkeypatch):
     campaign = toy.campaign(toy.axis("position", [1.0, 2.0]))
     monkeypatch.setattr(task, "versions", lambda _: ("0.0", 7))

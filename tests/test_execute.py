@@ -10,7 +10,7 @@ import xarray as xr
 
 from mdr_dask import execute, store
 from mdr_dask.campaign import Replication, Tolerance
-from mdr_dask.errors import StoreBusyError, StoreError
+from mdr_dask.errors import StoreError
 from mdr_dask.execute import Part, Progress, Resources
 from mdr_dask.models.base import Status
 from mdr_dask.store import layout
@@ -100,16 +100,6 @@ def test_an_interrupted_run_goes_on_and_ends_with_the_same_bytes(toy, tmp_path):
     assert digests(whole) == digests(broken)
 
 
-def test_a_block_without_its_ledger_chunk_is_computed_again(toy, url):
-    campaign = replace(toy.campaign(toy.axis("position", [1.0, 2.0])), blocks={"realisation": 2})
-    run(campaign, url)
-    before = digests(url)
-    (Path(url) / "status/c/0/1").unlink()
-    (Path(url) / "height/c/0/1").unlink()
-    assert run(campaign, url).done == 4
-    assert digests(url) == before
-
-
 def test_failures_are_recorded_counted_and_retried_on_request_only(toy, url):
     campaign = toy.campaign(toy.axis("position", [1.0, 2.0, 3.0]), fail_above=2.5)
     assert run(campaign, url).failed == 6
@@ -155,28 +145,6 @@ def test_more_values_and_more_realisations_extend_a_store(toy, url):
     np.testing.assert_array_equal(after, values(url + "2"))
 
 
-def test_a_new_series_leaves_the_old_one_untouched(toy, url):
-    campaign = toy.campaign(toy.axis("position", [1.0, 2.0]), name="near")
-    run(campaign, url)
-    before = digests(url)
-    far = replace(campaign.series[0], name="far", axes=(toy.axis("position", [10.0]),))
-    run(replace(campaign, series=(campaign.series[0], far)), url)
-    after = digests(url)
-    assert {name: after[name] for name in before} == before
-    assert set(store.datasets(url)) == {"near", "far"}
-
-
-def test_series_grow_too(toy, url):
-    small = toy.campaign(toy.axis("position", [1.0, 2.0]), name="near")
-    run(small, url)
-    large = toy.campaign(toy.axis("position", [1.0, 2.0, 3.0]), name="near", realisations=Replication(9, 9, {}))
-    assert run(large, url).done == 27 - 12
-    assert xr.open_zarr(url, group="near").height.shape == (3, 9)
-    tree = xr.open_datatree(url, engine="zarr")
-    assert tree["near"].height.shape == (3, 9)
-    tree.close()
-
-
 def test_a_store_of_another_campaign_is_refused_and_untouched(toy, url):
     run(toy.campaign(toy.axis("position", [1.0, 2.0])), url)
     before = digests(url), (Path(url) / "zarr.json").read_bytes()
@@ -194,13 +162,6 @@ def test_a_foreign_group_is_refused(toy, url):
     xr.Dataset({"a": ("x", [1.0])}).to_zarr(url, consolidated=False)
     with pytest.raises(StoreError, match="but not a study of mdr_dask"):
         run(toy.campaign(toy.axis("position", [1.0])), url)
-
-
-def test_a_second_runner_is_refused_with_the_name_of_the_first(toy, url):
-    campaign = toy.campaign(toy.axis("position", [1.0]))
-    with store.exclusive(url), pytest.raises(StoreBusyError, match=r"process \d+ on .* is running on this store"):
-        run(campaign, url)
-    assert run(campaign, url).done == 6
 
 
 def test_readers_see_the_old_shape_until_a_grown_one_is_published(toy, url, monkeypatch):
@@ -295,20 +256,6 @@ def test_large_groups_are_read_through_dask(toy, url, monkeypatch):
     lazy = store.datasets(url)[""]
     assert all(array.chunks for array in lazy.data_vars.values())
     xr.testing.assert_identical(lazy.compute(), expected)
-
-
-def test_records_tell_times_and_solves(toy, url):
-    run(toy.campaign(toy.axis("position", [1.0, 2.0])), url)
-    record = next(store.records(url, ""))
-    assert record["solves"] == 12
-    assert record["compute_seconds"] > 0
-
-
-def test_a_store_in_memory_works_like_one_on_disk(toy):
-    pytest.importorskip("fsspec")
-    campaign = toy.campaign(toy.axis("position", [1.0, 2.0]))
-    assert run(campaign, "memory://study.zarr").done == 12
-    assert run(campaign, "memory://study.zarr").kept == 12
 
 
 def test_a_message_stands_where_its_result_does_in_the_ledger(toy, url):

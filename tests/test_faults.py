@@ -1,6 +1,5 @@
 """What is left behind by every write that fails, and by every write that was the last one."""
 
-import os
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -16,9 +15,6 @@ from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.errors import StoreError
 from mdr_dask.execute import Resources
 from mdr_dask.store import files
-
-#: What writes wait for; the tests do without it, but for that of itself.
-FLUSH = files.flush
 
 
 def run(campaign, url, **options):
@@ -160,17 +156,6 @@ def test_the_root_of_a_store_with_series_says_where_to_look(toy, tmp_path):
     where = "the results of each series are in a group: open_datatree, or open_zarr with group='far' or group='near'"
     assert xr.open_zarr(url).attrs["comment"] == where
     assert "comment" not in xr.open_zarr(url, group="far").attrs
-
-
-def test_files_and_folders_are_flushed_and_what_is_missing_is_told(tmp_path, monkeypatch):
-    flushed = []
-    monkeypatch.setattr(os, "fsync", lambda descriptor: flushed.append(os.fstat(descriptor).st_ino))
-    (tmp_path / "block").write_bytes(b"1")
-    for path in (tmp_path / "block", tmp_path):
-        FLUSH(path)
-        assert flushed[-1] == path.stat().st_ino
-    with pytest.raises(FileNotFoundError):
-        FLUSH(tmp_path / "nothing")
 
 
 @pytest.mark.parametrize("act", ["put", "give_name"])

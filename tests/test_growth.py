@@ -50,13 +50,6 @@ def test_named_values_grow_and_those_left_out_stay(toy, url):
     assert values(url).position.to_numpy().tolist() == ["near", "far", "middle", "2.5"]
 
 
-def test_names_on_an_axis_of_numbers_are_refused(toy, url):
-    run(toy.campaign(toy.axis("position", [1.0])), url)
-    named = replace(toy.axis("position", [1.0, 2.0]), labels=("near", "far"), unit=None)
-    with pytest.raises(StoreError, match="axis position: numbers in the store, names in the campaign"):
-        run(toy.campaign(named), url)
-
-
 def test_axes_in_another_order_are_the_same_study(toy, url):
     one, other = toy.axis("position", [1.0, 2.0]), toy.axis("slope", [3.0, 5.0])
     run(toy.campaign(one, other), url)
@@ -139,30 +132,12 @@ def test_a_series_named_like_an_array_at_the_root_and_a_study_beside_series_are_
         run(plain, url + "2")
 
 
-def test_a_series_left_out_stays_readable(toy, url):
-    plain = toy.campaign(toy.axis("position", [1.0]))
-    near, far = (replace(plain.series[0], name=name) for name in ("near", "far"))
-    run(replace(plain, series=(near, far)), url)
-    longer = replace(near, axes=(toy.axis("position", [1.0, 2.0]),))
-    run(replace(plain, series=(longer,)), url)
-    assert {name: found.sizes["position"] for name, found in store.datasets(url).items()} == {"near": 2, "far": 1}
-
-
 def test_a_renamed_campaign_goes_on_and_a_changed_accuracy_does_not(toy, url):
     campaign = toy.campaign(toy.axis("position", [1.0]))
     run(campaign, url)
     assert run(replace(campaign, name="renamed", text="# more"), url).kept == 6
     with pytest.raises(StoreError, match=r"accuracy: None in the store, 0\.01 in the campaign"):
         run(replace(campaign, accuracy=0.01), url)
-
-
-def test_a_reader_from_before_keeps_its_shape_while_the_store_grows(toy, url):
-    run(toy.campaign(toy.axis("position", [1.0, 4.0])), url)
-    early = xr.open_zarr(url, chunks=None)
-    expected = values(url)
-    run(toy.campaign(toy.axis("position", [1.0, 2.0, 4.0]), realisations=Replication(9, 9, {})), url)
-    np.testing.assert_array_equal(early.height, expected)
-    assert early.position.to_numpy().tolist() == [1.0, 4.0]
 
 
 def test_another_campaign_takes_the_place_of_one_that_was_never_laid_out(toy, url, monkeypatch):
@@ -199,15 +174,6 @@ def test_leftovers_of_a_killed_write_are_not_read_and_removed_by_the_next_run(to
     assert run(campaign, url, retry_failed=True).kept == 6
     assert digests(url) == before
     assert not any(leftover.exists() for leftover in leftovers)
-
-
-def test_a_damaged_chunk_is_named(toy, url):
-    campaign = toy.campaign(toy.axis("position", [1.0]))
-    run(campaign, url)
-    chunk = Path(url, "status/c/0/0")
-    chunk.write_bytes(chunk.read_bytes()[:-1] + b"x")
-    with pytest.raises(StoreError, match=r"study\.zarr: reading status failed: .*checksum.*'mdr-dask verify"):
-        run(campaign, url)
 
 
 def test_the_outlook_counts_what_is_there_and_touches_nothing(toy, url):
@@ -324,7 +290,7 @@ class StoreAgainstDict(RuleBasedStateMachine):
 StoreAgainstDict.TestCase.settings = settings(
     max_examples=12, stateful_step_count=8, deadline=None, suppress_health_check=list(HealthCheck)
 )
-TestStoreAgainstDict = StoreAgainstDict.TestCase
+TestStoreAgainstDict = pytest.mark.slow(StoreAgainstDict.TestCase)
 
 
 STRUCTURED = """

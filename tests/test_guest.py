@@ -16,11 +16,10 @@ import xarray as xr
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import mdr_dask
-from mdr_dask import execute, models, store
+from mdr_dask import execute, store
 from mdr_dask.cli import main
 from mdr_dask.errors import MachineError, StoreError
 from mdr_dask.execute import Part, Resources
-from mdr_dask.models.per_case import per_case
 
 PAGE = (Path(__file__).parents[1] / "docs/own-model.md").read_text()
 MODULE, CAMPAIGN = (re.search(rf"^```{kind}\n(.*?)^```", PAGE, flags=re.M | re.S)[1] for kind in ("python", "yaml"))
@@ -257,8 +256,3 @@ def test_a_long_study_in_plain_python_goes_on_in_processes(example):
     Path("long.yaml").write_text(f"{CAMPAIGN}store: {{path: long.zarr, blocks: {{normal_force: 1, realisation: 1}}}}\n")
     assert example("run", "long.yaml", "--quiet", line="    import time; time.sleep(0.05)").returncode == 0
     assert len({record["process"] for record in store.records("long.zarr", "")}) > 1
-
-
-def test_models_in_plain_python_are_marked():
-    assert per_case(lambda case, random: {}).is_plain_python
-    assert not hasattr(models.load("ehl_line").compute, "is_plain_python")

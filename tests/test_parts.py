@@ -7,7 +7,6 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import psutil
 import pytest
 from killed_parts import run_with_kills, study
@@ -16,7 +15,7 @@ from test_faults import two_series
 
 from mdr_dask import execute, store
 from mdr_dask.campaign import Replication, Tolerance
-from mdr_dask.cli import main, watching
+from mdr_dask.cli import main
 from mdr_dask.errors import StoreBusyError
 from mdr_dask.execute import Part, Resources
 from mdr_dask.models.base import Status
@@ -38,15 +37,6 @@ def campaign_file(tmp_path, monkeypatch):
 
 def run_part(campaign, url, number, count, **options):
     return execute.run(campaign, url, Resources(threads=1), lambda _: None, part=Part(number, count), **options)
-
-
-@pytest.mark.parametrize("count", [1, 2, 3, 8, 64])
-def test_blocks_are_dealt_out_evenly_and_no_value_of_an_axis_to_one_part(count):
-    numbers = np.array([Part.of(position, count).number for position in range(10 * count * count)])
-    assert np.ptp(np.bincount(numbers)[1:]) == 0
-    for blocks in {count, 2 * count}:  # of the last axis
-        column = numbers.reshape(-1, blocks)[:count, 0]
-        assert len(set(column)) > count / 3
 
 
 @pytest.mark.parametrize("kind", ["axes", "series", "more parts than blocks", "growth"])
@@ -213,8 +203,3 @@ def listening():
     """Return the ports at which this process listens."""
     found = psutil.Process().net_connections("inet")
     return {connection.laddr.port for connection in found if connection.status == psutil.CONN_LISTEN}
-
-
-def test_a_watched_line_tells_every_state_that_there_is():
-    row = {"series": "force", "results": 20, "missing": 5, "done": 12, "not_converged": 0, "failed": 2, "not_needed": 1}
-    assert watching._line(row) == "force: 15 of 20 results (75%): 5 missing, 12 done, 2 failed, 1 not needed"

@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from mdr_dask import plan
 from mdr_dask.campaign import Replication, Tolerance, load
 from mdr_dask.errors import CampaignError
 from mdr_dask.execute import Resources, run
-from mdr_dask.execute.cells import Cells
 
 SLOW_CASE = 0.05
 
@@ -75,12 +73,6 @@ def test_blocks_hold_no_more_than_the_work_aimed_at_unless_one_result_does(toy, 
     assert block <= max(plan.BLOCK_SECONDS, 10.0**cost) * (1 + 1e-9)
 
 
-def test_a_large_study_is_cut_into_blocks_of_about_the_work_aimed_at(toy, costs):
-    costs(SLOW_CASE)
-    (template,) = plan.templates(study(toy, (40, 25), 100), 100)
-    assert 0.5 * plan.BLOCK_SECONDS <= SLOW_CASE * math.prod(template.chunks.values()) <= plan.BLOCK_SECONDS
-
-
 def test_whole_axes_stay_whole_until_a_block_is_far_too_long(toy, costs):
     costs(1e-3, whole=("slope",))
     (template,) = plan.templates(study(toy, (30, 50), 20), 20)
@@ -90,33 +82,12 @@ def test_whole_axes_stay_whole_until_a_block_is_far_too_long(toy, costs):
     assert template.chunks["slope"] <= 4
 
 
-def test_blocks_that_are_alike_are_estimated_once(toy, costs):
-    """Laying out asks the model for the time of each different block, and of no block twice."""
-    asked = []
-
-    def seconds(block):
-        asked.append((block.realisations, *(tuple(column.tolist()) for column in block.columns.values())))
-        return SLOW_CASE * block.cases * len(block.realisations)
-
-    costs(SLOW_CASE, seconds=seconds, whole=("position",))
-    plan.templates(study(toy, (9, 7), 12), 12)
-    assert len(asked) == len(set(asked)) > 3
-
-
 def test_rounds_fill_whole_blocks(toy, costs):
     costs(SLOW_CASE)
     until = {"height": Tolerance(relative=0.01)}
     campaign = study(toy, (3, 3), 1, replication=Replication(12, 100, until))
     (template,) = plan.templates(campaign, 12)
     assert 12 % template.chunks["realisation"] == 0
-
-
-def test_stored_chunks_are_kept(toy):
-    campaign = study(toy, (3, 4), 5)
-    chunks = {"position": 2, "slope": 3, "realisation": 4}
-    (template,) = plan.templates(campaign, 5, {"": chunks})
-    assert template.chunks == chunks
-    assert template.grid == (2, 2, 2)
 
 
 @settings(deadline=None, suppress_health_check=list(HealthCheck), max_examples=25)
@@ -164,13 +135,6 @@ def test_a_case_too_large_for_the_memory_is_refused(toy, costs, monkeypatch):
         plan.templates(study(toy, (2, 2), 2), 2)
 
 
-def test_chunks_stay_below_the_largest_chunk(toy, costs):
-    costs(1e-12)
-    campaign = study(toy, (2000, 100), 100)
-    (template,) = plan.templates(campaign, 100)
-    assert 8 * math.prod(template.chunks.values()) <= plan.CHUNK_BYTES
-
-
 TOO_LARGE = sorted((Path(__file__).parent / "campaign/invalid_plans").glob("*.yaml"))
 
 
@@ -199,12 +163,3 @@ def test_blocks_that_last_very_long_are_cut_even_where_it_repeats_work(toy, cost
     costs(1.0, whole=("position",), seconds=lambda block: 2 * plan.SHARED_SECONDS)
     (template,) = plan.templates(study(toy, (8, 6), 1), 1)
     assert template.chunks["position"] == 1
-
-
-def test_a_block_takes_the_share_of_its_time_that_is_wanted_of_it():
-    wanted = np.zeros((4, 6), dtype=bool)
-    wanted[0, :3] = True
-    template = SimpleNamespace(region=lambda index: (slice(2 * index, 2 * index + 2),), seconds=lambda _: 40.0)
-    cells = Cells(template, wanted, ~wanted, 0, 0)
-    assert [cells.seconds(0), cells.seconds(1)] == [10.0, 0.0]
-    assert cells.new == wanted.size

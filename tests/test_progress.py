@@ -3,10 +3,7 @@
 import re
 import sys
 import time
-from contextlib import contextmanager
 from dataclasses import replace
-from types import ModuleType, SimpleNamespace
-from typing import NamedTuple
 
 import pytest
 from test_execute import run
@@ -96,92 +93,6 @@ def test_a_terminal_is_told_what_takes_long_and_a_pipe_is_not(monkeypatch, capsy
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     with at_work("drawing"):
         _wait_for(capsys, r"drawing, \d+ s")
-
-
-#: States of a run at moments: before it is known, at its start, half way, over with kept and spared results, and empty.
-STATES = (
-    (None, 0.4),
-    (Progress(total=200, estimated=8.0), 61.0),
-    (after_blocks(49), 97.6),
-    (Progress(total=83, kept=11, done=29, failed=5, not_needed=7), 4000.2),
-    (Progress(), 2.0),
-)
-
-
-def test_a_terminal_and_a_notebook_have_a_bar_that_is_drawn_anew_at_every_beat(monkeypatch):
-    told = []
-
-    class Bar:
-        def __init__(self, *columns, console, transient):
-            told.append((len(columns), columns[0].bar_width, columns[1].text_format, console.stderr, transient))
-
-        def __enter__(self):
-            return self
-
-        def __exit__(self, *_):
-            told.append("gone")
-
-        def add_task(self, description, total):
-            told.append((description, total))
-            return 7
-
-        def update(self, task, **state):
-            told.append((task, *(state[name] for name in ("total", "completed", "description"))))
-
-    class Written(NamedTuple):
-        data: str
-
-    class Handle:
-        def update(self, html):
-            told.append(html.data)
-
-    @contextmanager
-    def beating(draw, pause):
-        for state, elapsed in STATES:
-            draw(state, elapsed)
-        yield pause
-
-    def displayed(html, display_id):
-        told.append((html.data, display_id))
-        return Handle()
-
-    monkeypatch.setattr(shown, "_beating", beating)
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    monkeypatch.delitem(sys.modules, "ipykernel", raising=False)
-    monkeypatch.setattr("rich.progress.Progress", Bar)
-    with reporter(quiet=False) as pause:
-        assert pause == shown.LIVE_PAUSE == 0.5
-    assert told[:4] == [
-        (2, 20, "{task.description}", True, True),
-        ("preparing, 0 s", None),
-        (7, None, 0, "preparing, 0 s"),
-        (7, 200, 0, "0 %, 1 min 1 s, 0 of 200 results, 0 failed"),
-    ]
-    assert told[4:] == [
-        (7, 1000, 490, "49 %, 1 min 38 s, about 13 s left, 490 of 1000 results, 0 failed"),
-        (7, 83, 52, "62 %, 1 h 6 min, 52 of 83 results, 5 failed"),
-        (7, 1, 0, "0 %, 2 s, 0 of 0 results, 0 failed"),
-        "gone",
-    ]
-    told.clear()
-    for module in ("ipykernel", "IPython"):
-        monkeypatch.setitem(sys.modules, module, ModuleType(module))
-    monkeypatch.setitem(sys.modules, "IPython.display", SimpleNamespace(HTML=Written, display=displayed))
-    with reporter(quiet=False) as pause:
-        assert pause == shown.LIVE_PAUSE
-    assert told == [
-        ("<progress ></progress> preparing, 0 s", True),
-        "<progress ></progress> preparing, 0 s",
-        '<progress value="0" max="200"></progress> 0 %, 1 min 1 s, 0 of 200 results, 0 failed',
-        '<progress value="490" max="1000"></progress> 49 %, 1 min 38 s, about 13 s left, 490 of 1000 results, 0 failed',
-        '<progress value="52" max="83"></progress> 62 %, 1 h 6 min, 52 of 83 results, 5 failed',
-        '<progress value="0" max="1"></progress> 0 %, 2 s, 0 of 0 results, 0 failed',
-        "",
-    ]
-    told.clear()
-    with reporter(quiet=True) as report:
-        assert report(None) is None
-    assert not told
 
 
 def _wait_for(capsys, line):

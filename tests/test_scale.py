@@ -1,6 +1,5 @@
 """Stores of many blocks: what is opened and decoded grows no faster than it must, and nothing is overlooked for it."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,8 +12,6 @@ from mdr_dask import store
 from mdr_dask.cli import main
 from mdr_dask.execute import Resources, run
 from mdr_dask.store import ledgers
-from mdr_dask.store.files import sealed
-from mdr_dask.store.records import decoded
 
 
 @pytest.fixture
@@ -63,19 +60,3 @@ def test_a_missing_chunk_of_a_finished_block_is_named_before_anything_is_read(ur
     for command in ("status", "show"):
         assert main([command, url]) == 2
         assert "height/c/2/1 is missing" in capsys.readouterr().err
-
-
-def test_a_run_with_nothing_to_do_does_not_count_attempts(url, monkeypatch):
-    monkeypatch.setattr(store, "attempts", lambda *_: pytest.fail("read the records of a finished study"))
-    campaign = toy.campaign(toy.axis("position", np.arange(1.0, 14.0).tolist()), fail_above=12.5)
-    progress = run(replace(campaign, replication=toy.Replication(5, 5, {})), url, Resources(), lambda _: None)
-    assert (progress.kept, progress.blocks) == (65, 0)
-
-
-@pytest.mark.parametrize(("old", "new"), [(b'"attempt": 1', b'"attempt": 2'), (b'"digest": "', b'"digest": "0')])
-def test_a_record_that_was_changed_is_none(old, new):
-    line = sealed({"attempt": 1, "block": [0, 3], "chunks": {"status": "ab"}, "messages": []})
-    assert decoded(line)["block"] == [0, 3]
-    assert decoded(json.dumps(json.loads(line), indent=1).encode()) is not None
-    assert old in line
-    assert decoded(line.replace(old, new)) is None

@@ -18,9 +18,8 @@ from mdr_dask.cli import main
 from mdr_dask.errors import StoreError
 from mdr_dask.execute import Resources
 from mdr_dask.store import locks
-from mdr_dask.store.files import digest, sealed
+from mdr_dask.store.files import sealed
 from mdr_dask.store.records import name_of
-from mdr_dask.task import run_block
 
 
 @pytest.fixture(scope="module")
@@ -103,15 +102,6 @@ def test_a_run_that_was_killed_leaves_nothing_to_find_fault_with(toy, url, monke
         assert found.findings == []
     assert found.notes == ["some blocks were begun and not finished; the next run computes them"]
     assert run(small(toy), url).done == 12
-
-
-def test_the_checksum_of_bytes_and_their_checksum_is_no_digest():
-    """Why chunks are not told apart by the checksum that they end with."""
-    import google_crc32c
-
-    ends = [content + google_crc32c.value(content).to_bytes(4, "little") for content in (b"one", b"another")]
-    assert len({google_crc32c.value(end) for end in ends}) == 1
-    assert len({digest(end) for end in ends}) == 2
 
 
 def test_records_of_many_blocks_lie_together(toy, url, monkeypatch):
@@ -232,30 +222,14 @@ def test_blocks_tell_the_kind_of_machine_and_a_second_kind_is_named(toy, url, mo
     assert any("blocks come from 2 kinds of machine, last digits may differ" in sentence for sentence in sentences)
 
 
-def test_a_task_is_done_once(toy, url, monkeypatch):
-    late = late_task(toy, url, monkeypatch)
-    with pytest.raises(StoreError, match="nothing was written"):
-        run_block(late)
-    assert run(small(toy), url).done == 12
-
-
 def empty(path):
     path.write_bytes(b"")
-
-
-def retitled(path):
-    held = json.loads(path.read_text())
-    path.write_text(json.dumps({**held, "attributes": {**held["attributes"], "title": "another"}}))
 
 
 def of_another_block(path):
     (path.parent / Path(name_of("", (0, 0), 1)).name).write_bytes(
         sealed({"attempt": 1, "block": [1, 0], "chunks": {"status": "ab"}, "messages": []})
     )
-
-
-def values_of_another_block(path):
-    path.write_bytes(path.with_name("1").read_bytes())
 
 
 def of_no_block(path):
@@ -276,10 +250,7 @@ RECORDS = "status/records/*.jsonl"
         (RECORDS, empty, "damaged", None, "an empty record"),
         (RECORDS, of_no_block, "foreign", None, "the record of block [9, 9], which does not exist"),
         (RECORDS, of_another_block, "damaged", name_of("", (0, 0), 1), "the record of block [1, 0]"),
-        ("height/c/0/0", values_of_another_block, "damaged", None, "not what was written"),
         ("status/c/0/0", Path.unlink, "missing", None, "the ledger of a block that was done"),
-        ("zarr.json", Path.unlink, "missing", None, "part of the layout"),
-        ("zarr.json", retitled, "damaged", None, "not what was laid out"),
     ],
 )
 def test_each_fault_is_told_in_its_words(toy, url, name, harm, kind, told, what):
