@@ -95,19 +95,23 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
     content = read_bytes(url, "zarr.json") or b""
     if is_new:
         content = group_document(members, study | attributes | _signpost(members))
-    root = json.loads(content)
-    metadata = metadata_files(root)
+    _write(url, content, coordinates)
+
+
+def _write(url: str, root: bytes, coordinates: Mapping[str, bytes]) -> None:
+    """Write the record of a layout, then the files that differ from the new layout, and ``zarr.json`` (`root`) last."""
+    metadata = metadata_files(json.loads(root))
+    members = json.loads(root)["consolidated_metadata"]["metadata"]
     groups = {name: metadata.pop(name) for name in [f"{group}/zarr.json" for group in group_names(members)]}
-    files = {**coordinates, **metadata, **groups, "zarr.json": content}
-    record, recorded = read_record(url), list(files)
-    if record is None:
-        recorded = list({*files, *coordinate_files(root, listed(url))})
+    files = {**coordinates, **metadata, **groups, "zarr.json": root}
+    record = read_record(url)
+    recorded = files if record else {*files, *coordinate_files(json.loads(root), listed(url))}
     before = dict(read_many(url, recorded))
     known = record.files if record else {name: [digest(old)] for name, old in before.items() if old is not None}
-    digests = {name: [*dict.fromkeys([*known.get(name, ()), digest(new)])] for name, new in files.items()}
+    versions = {name: [*dict.fromkeys([*known.get(name, ()), digest(new)])] for name, new in files.items()}
+    first = {RECORD: sealed({"files": {**known, **versions}, "root": root.decode()})}
     changed = {name: new for name, new in (coordinates | metadata).items() if new != before[name]}
-    held_record = sealed({"files": {**known, **digests}, "root": content.decode()})
-    write_stages(url, [{RECORD: held_record}, changed, groups, {"zarr.json": content}])
+    write_stages(url, [first, changed, groups, {"zarr.json": root}])
 
 
 def is_laid_out(url: str, layout: Sequence[Template]) -> bool:
@@ -192,10 +196,16 @@ def read_record(url: str) -> LayoutRecord | None:
     content = read_bytes(url, RECORD)
     held = None if content is None else unsealed(content)
     try:
-        files = None if held is None else {name: list(versions) for name, versions in held["files"].items()}
-        return None if held is None or not files else LayoutRecord(files, str(held["root"]))
-    except (TypeError, KeyError, AttributeError):
+        record = None if held is None else LayoutRecord(dict(held["files"]), str(held["root"]))
+    except (TypeError, KeyError, ValueError):
         return None
+    return record if record is not None and _is_valid(record.files) else None
+
+
+def _is_valid(files: Mapping[Any, Any]) -> bool:
+    """Return whether all names are inside the store, because the record may come from an unknown source."""
+    inside = all(not name.startswith("/") and ".." not in name.split("/") for name in files)
+    return inside and "zarr.json" in files and all(isinstance(versions, list) for versions in files.values())
 
 
 def layout_faults(url: str) -> Iterator[Finding]:
