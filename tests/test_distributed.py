@@ -80,13 +80,13 @@ def test_within_five_seconds_a_user_is_told_what_is_waited_for_and_within_the_li
     central.sync = answer
     central.threads, after = SILENT[what]
     workers = window.TaskWindow(central, lambda e: told.append((clock.now, e.sentence)), 30, 0, lambda: None, str, None)
-    workers._look()
+    workers._check()
     central.threads = after
 
     def look_on():
         while True:
-            clock.now += window.LOOK
-            workers._look()
+            clock.now += window.CHECK_PAUSE
+            workers._check()
 
     with pytest.raises(ClusterError, match=r"for \d+ s; what is in the store is kept: run the campaign again"):
         look_on()
@@ -96,7 +96,7 @@ def test_within_five_seconds_a_user_is_told_what_is_waited_for_and_within_the_li
     assert clock.now <= 35
     central.status = "closed"
     with pytest.raises(ClusterError, match="the scheduler went away; what is in the store is kept"):
-        workers._look()
+        workers._check()
 
 
 @pytest.mark.slow

@@ -184,7 +184,7 @@ def test_a_log_tells_what_happened_and_a_watch_until_nobody_is_at_work(toy, camp
     told = [line.partition(" ")[2] for line in capsys.readouterr().out.splitlines()]
     assert told[0] == "8 of 8 results (100%): 4 done, 4 failed"
     assert re.fullmatch(r"at work: process \d+ on .*", told[1])
-    assert told[2:] == ["at work: nobody"]
+    assert told[2:] == ["at work: no run"]
 
 
 @pytest.mark.slow

@@ -69,7 +69,7 @@ def _follow(store: str, count: Callable[[], list[Row]], show: Callable[[list[str
     while True:
         start = time.monotonic()
         who = at_work(store)
-        show([*map(_line, count()), f"at work: {', '.join(who) or 'nobody'}"])
+        show([*map(_line, count()), f"at work: {', '.join(who) or 'no run'}"])
         if not who:
             return
         time.sleep(max(PAUSE, SHARE * (time.monotonic() - start)))

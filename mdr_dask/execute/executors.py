@@ -146,7 +146,7 @@ class Executor(AbstractContextManager["Executor"]):
             except BaseException as error:
                 begun = sum(not future.cancel() for future in running)
                 if isinstance(error, KeyboardInterrupt) and begun:
-                    what = f"finishing {begun} blocks that have begun; interrupt once more to drop them"
+                    what = f"finishing {begun} blocks that have begun; a second interrupt stops at once"
                     self._tell(Event("stopping", {"blocks": begun}, what))
                 raise
 

@@ -337,7 +337,7 @@ def _require_seen(job: _Job, current: _Round) -> None:
     lost = sum(cells.new for cells in _find(replace(job, retry_failed=False), current))
     if lost:
         where = "workers need a shared file system or a URL"
-        raise StoreError(f"{job.url}: {lost} results that were computed are not seen from here; {where}")
+        raise StoreError(f"{job.url}: {lost} results that were computed are not found from here; {where}")
 
 
 def _others_are_done(job: _Job, part: Part, current: _Round) -> bool:

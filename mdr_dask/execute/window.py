@@ -20,11 +20,11 @@ from mdr_dask.execute.events import Event, Settle, Tell, of_block
 from mdr_dask.task import Outcome, Work, finished, one_blas_thread, run_block, write_off
 
 #: Seconds between two checks of the cluster.
-LOOK = 1.0
+CHECK_PAUSE = 1.0
 #: Seconds between two messages that there is no worker.
-SILENCE = 3.0
+REPORT_PAUSE = 3.0
 #: Seconds to wait for a short answer of the scheduler.
-ANSWER = 3.0
+ANSWER_LIMIT = 3.0
 #: Name of the Dask topic under which workers report blocks that they begin.
 TOPIC = "mdr_dask"
 KEPT = "what is in the store is kept: run the campaign again"
@@ -72,9 +72,9 @@ class TaskWindow:
         self._running: dict[Future, Work] = {}
         self._threads = 0
         self._had_workers = False
-        self._looked = self._seen = self._told = time.monotonic()
+        self._checked_at = self._had_worker_at = self._reported_at = time.monotonic()
         client.subscribe_topic(TOPIC, lambda event: tell(Event("block begun", event[1])))
-        client.subscribe_topic("all", self._hear_of_worker)
+        client.subscribe_topic("all", self._report_worker)
 
     def run(self, works: Iterable[Work], settle: Settle) -> None:
         """Compute blocks. A block whose worker died is computed once more, in a child process of a worker.
@@ -95,14 +95,14 @@ class TaskWindow:
                 self._submit(_run_apart if self._case_timeout else _run, work)
 
         try:
-            self._look()
+            self._check()
             fill()
             while self._running:
-                if time.monotonic() - self._looked > LOOK:
-                    self._look()
+                if time.monotonic() - self._checked_at > CHECK_PAUSE:
+                    self._check()
                     fill()
                 try:
-                    future = self._ended.get(timeout=LOOK)
+                    future = self._ended.get(timeout=CHECK_PAUSE)
                     outcomes = _outcomes(future)
                 except Empty:
                     continue
@@ -116,7 +116,7 @@ class TaskWindow:
                     self._submit(_run_apart, work)
                     continue
                 if outcomes is None:
-                    outcomes = [(work, write_off(work, "its workers died again and again: often out of memory"))]
+                    outcomes = [(work, write_off(work, "its workers died repeatedly: often out of memory"))]
                 for part, outcome in outcomes:
                     settle(part, outcome)
                 fill()
@@ -128,34 +128,34 @@ class TaskWindow:
         self._running[future] = work
         future.add_done_callback(self._ended.put)
 
-    def _look(self) -> None:
+    def _check(self) -> None:
         """Raise ClusterError if the scheduler has disappeared or there was no worker for too long."""
         if self._client.status != "running":
             raise ClusterError(f"the scheduler went away; {KEPT}")
         self._replace_lost()
         try:
-            found = self._client.sync(self._client.scheduler.ncores, callback_timeout=ANSWER)
+            found = self._client.sync(self._client.scheduler.ncores, callback_timeout=ANSWER_LIMIT)
             self._threads, what = sum(found.values()), "no worker"
         except TimeoutError:
             self._threads, what = 0, "no answer of the scheduler"
-        now = self._looked = time.monotonic()
+        now = self._checked_at = time.monotonic()
         if self._threads:
-            self._seen = self._told = now
+            self._had_worker_at = self._reported_at = now
             self._had_workers = True
             return
-        waited, complaint = now - self._seen, self._last_message()
+        waited, complaint = now - self._had_worker_at, self._last_message()
         if complaint and not self._had_workers:
             raise ClusterError(f"the cluster starts no worker: {complaint}")
         why = f" ({complaint})" if complaint else ""
         if waited > self._patience:
             raise ClusterError(f"{what} for {waited:.0f} s{why}; {KEPT}, with more --patience if need be")
-        if now - self._told >= SILENCE:
-            self._told = now
+        if now - self._reported_at >= REPORT_PAUSE:
+            self._reported_at = now
             what = "all workers are gone" if self._had_workers and what == "no worker" else f"{what} yet"
             sentence = f"{what}, waiting for {waited:.0f} s{why}; giving up after {self._patience:.0f} s"
             self._tell(Event("waiting for workers", {"seconds": round(waited, 1), "complaint": complaint}, sentence))
 
-    def _hear_of_worker(self, event: tuple[float, dict[str, Any]]) -> None:
+    def _report_worker(self, event: tuple[float, dict[str, Any]]) -> None:
         facts = event[1]
         if facts.get("action") == "add-worker":
             self._tell(Event("worker joined", {"worker": facts["worker"]}))
@@ -168,7 +168,7 @@ def _outcomes(future: Future) -> Outcomes | None:
     from concurrent.futures import CancelledError
 
     try:
-        outcomes: Outcomes = future.result(timeout=ANSWER)
+        outcomes: Outcomes = future.result(timeout=ANSWER_LIMIT)
     except KilledWorker:
         return None
     except CancelledError:

@@ -134,9 +134,9 @@ def _opened(url: str, series: str, store: Store, names: Iterable[str] = ()) -> d
 @lru_cache(maxsize=64)
 def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
     """Return the arrays of a group; they are cached as long as the layout stays the same."""
-    seen = layout_mark(url)
-    if seen != layout:
-        raise StoreError(f"{url}: {_other_store(seen)}")
+    found = layout_mark(url)
+    if found != layout:
+        raise StoreError(f"{url}: {_other_store(found)}")
     return _opened(url, series, bytes_of(url))
 
 
@@ -155,11 +155,11 @@ def _whole_chunks(array: Any) -> dict[str, Any]:
     return {**array.metadata.to_dict(), "shape": shape}
 
 
-def _other_store(seen: str | None) -> str:
-    here = platform.node()
-    if seen is None:
-        return f"not seen from {here}; the workers need a shared file system or a URL"
-    return f"{here} sees another store of that name, or a later shape; the workers need a shared file system or a URL"
+def _other_store(found: str | None) -> str:
+    here, remedy = platform.node(), "the workers need a shared file system or a URL"
+    if found is None:
+        return f"not seen from {here}; {remedy}"
+    return f"{here} finds another store at this path, or a later shape of it; {remedy}"
 
 
 def layout_mark(url: str) -> str | None:

@@ -222,7 +222,7 @@ def layout_faults(url: str) -> Iterator[Finding]:
             if not is_older:  # otherwise a run was stopped before it wrote this file
                 yield Finding("missing", name, "part of the layout")
         elif digest(content) not in record.files[name]:
-            yield Finding("damaged", name, "not what was laid out")
+            yield Finding("damaged", name, "not what was written")
 
 
 def _signpost(members: Mapping[str, Any]) -> dict[str, str]:

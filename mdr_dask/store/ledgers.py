@@ -79,7 +79,9 @@ def ledger(url: str, series: str, shape: tuple[int, ...] | None = None) -> NDArr
             raise StoreError(f"{url}: {group_name(series, 'zarr.json')} is missing")
         return np.full(shape, Status.MISSING, dtype=np.int8)
     if "axes" not in metadata.get("attributes", {}):
-        raise StoreError(f"{url}: {group_name(series, 'zarr.json')} is damaged; 'mdr-dask verify {url}' says more")
+        raise StoreError(
+            f"{url}: {group_name(series, 'zarr.json')} is damaged; 'mdr-dask verify {url}' names all faults"
+        )
     status = _read(url, Blocks.of(series, metadata), metadata["consolidated_metadata"]["metadata"]["status"])
     if shape is None:
         return status

@@ -182,7 +182,7 @@ def gate(url: str) -> Iterator[None]:
                 break
             except StoreBusyError as error:
                 if time.monotonic() - start > PATIENCE and not is_reported:
-                    log.warning("%s; waiting until it has looked at the store", error.args[0].partition(";")[0])
+                    log.warning("%s; waiting until it releases the store", error.args[0].partition(";")[0])
                     is_reported = True
                 time.sleep(KNOCK)
         yield
@@ -271,7 +271,7 @@ def while_locked(url: str, lock: Lock) -> Iterator[None]:
 def note_begun(url: str, lock: Lock, begun: list[str]) -> None:
     """Record which blocks a run has begun; the next run needs them if this process crashes."""
     if lock.claim is None and local(url) is not None:
-        content = "\n".join([_me(), *begun]) + "\n"
+        content = "\n".join([_this_process(), *begun]) + "\n"
         with guarded(url, "noting a block"), _runner(url, lock).open("r+") as file:
             file.write(content)
             file.truncate()
@@ -368,14 +368,14 @@ def _busy(url: str, who: str) -> StoreBusyError:
 
 def _holder(url: str, name: str = "") -> str:
     """Return the process that holds a lock, as text for messages."""
-    names = [_told(url, _claim(name, number)).get("who", "") for number in _numbers(url, name)]
+    names = [_read_claim(url, _claim(name, number)).get("who", "") for number in _numbers(url, name)]
     for runner in _runners(url, name) if local(url) is not None else ():
         with suppress(OSError):
             names.append(runner.read_text().partition("\n")[0])
     return next(filter(None, names), "another process")
 
 
-def _me() -> str:
+def _this_process() -> str:
     return f"process {os.getpid()} on {platform.node()}"
 
 
@@ -400,7 +400,7 @@ def _registered(url: str, name: str) -> Iterator[Lock]:
     lock = Lock(name, uuid.uuid4().hex, begun=tuple(begun))
     mine = _runner(url, lock)
     with guarded(url, "locking it"):
-        mine.write_text("\n".join([_me(), *begun]) + "\n")
+        mine.write_text("\n".join([_this_process(), *begun]) + "\n")
     try:
         yield lock
     finally:
@@ -471,7 +471,7 @@ def _claimed(url: str, name: str) -> Iterator[Lock]:
         ended.set()
         alive.join()
         with suppress(StoreError):  # without a network the claim stays, and the next run replaces it
-            if _told(url, _claim(name, number)).get("owner") == owner:
+            if _read_claim(url, _claim(name, number)).get("owner") == owner:
                 remove(url, [_claim(name, number), _life(name, number)])
 
 
@@ -482,35 +482,37 @@ def _make_claim(url: str, name: str, owner: str) -> int:
         if not standing or not _is_alive(url, name, max(standing)):
             break
         if read_bytes(url, _claim(name, max(standing))) is not None:  # otherwise its owner has just ended
-            raise _busy(url, _told(url, _claim(name, max(standing))).get("who", "another process"))
+            raise _busy(url, _read_claim(url, _claim(name, max(standing))).get("who", "another process"))
     else:
         raise _busy(url, "another process")
     number = max(standing, default=0) + 1
-    content = json.dumps({"owner": owner, "who": _me(), "time": time.time()}).encode()
+    content = json.dumps({"owner": owner, "who": _this_process(), "time": time.time()}).encode()
     if not create(url, _claim(name, number), content):
-        held = _told(url, _claim(name, number))
+        held = _read_claim(url, _claim(name, number))
         if held.get("owner") != owner:  # it is ours if only the reply to the first request was lost
             raise _busy(url, held.get("who", "another process"))
     elif not name and (not conditional(url) or create(url, _claim(name, number), content)):
-        log.warning("%s: nothing keeps two runs apart here (no conditional write): start one at a time", url)
+        log.warning(
+            "%s: nothing prevents two simultaneous runs here (no conditional write): start one run at a time", url
+        )
     remove(url, [old for n in standing for old in (_claim(name, n), _life(name, n))])
     return number
 
 
 def _is_alive(url: str, name: str, number: int) -> bool:
     """Return whether the owner of a claim is active: its last sign of life is recent, or a new one appears soon."""
-    claim = _told(url, _claim(name, number))
-    last = _told(url, _life(name, number)) or claim
+    claim = _read_claim(url, _claim(name, number))
+    last = _read_claim(url, _life(name, number)) or claim
     if time.time() - last.get("time", 0.0) <= SILENCE:
         return True
     if not claim and read_bytes(url, _claim(name, number)) is None:
         return True  # its owner has just ended, and another run may have started
     log.warning("%s: waiting %g s for a sign of life of %s", url, 2 * BEAT, claim.get("who", "another process"))
     time.sleep(2 * BEAT)
-    return (_told(url, _life(name, number)) or claim) != last
+    return (_read_claim(url, _life(name, number)) or claim) != last
 
 
-def _told(url: str, name: str) -> dict[str, Any]:
+def _read_claim(url: str, name: str) -> dict[str, Any]:
     """Return the content of a claim or of a sign of life; empty if the file is missing or not yet complete."""
     try:
         return read_json(url, name) or {}

@@ -180,7 +180,7 @@ def _check_layout(url: str, found: Inspection, present: set[str]) -> set[str]:
         found.findings += _unrecorded_faults(url, root)
         return {RECORD, "zarr.json", *metadata_files(root), *coordinate_files(root, present)}
     if digest(content) in record.files["zarr.json"][:-1]:
-        found.notes.append("a run was stopped while it laid the study out; the next run goes on")
+        found.notes.append("a run was stopped while it wrote the layout; the next run continues")
     return {RECORD, *record.files}
 
 
