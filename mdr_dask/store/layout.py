@@ -110,7 +110,7 @@ def _write(url: str, root: bytes, coordinates: Mapping[str, bytes]) -> None:
     known = record.files if record else {name: [digest(old)] for name, old in before.items() if old is not None}
     versions = {name: [*dict.fromkeys([*known.get(name, ()), digest(new)])] for name, new in files.items()}
     first = {RECORD: sealed({"files": {**known, **versions}, "root": root.decode()})}
-    changed = {name: new for name, new in (coordinates | metadata).items() if new != before[name]}
+    changed = {name: new for name, new in {**coordinates, **metadata}.items() if new != before[name]}
     write_stages(url, [first, changed, groups, {"zarr.json": root}])
 
 
