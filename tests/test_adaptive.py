@@ -272,13 +272,6 @@ def test_whole_numbers_end_where_there_are_none_between(study, url):
     assert store.datasets(url)[""]["count"].to_numpy().tolist() == list(range(1, 10))
 
 
-def test_series_are_refined_each_for_itself(study, url):
-    campaign = study("shift: 0.1", more="series: {easy: {shape: flat}, hard: {shape: kink}}")
-    run(campaign, url)
-    found = store.datasets(url)
-    assert found["easy"].sizes["x"] == 9 < found["hard"].sizes["x"]
-
-
 def test_what_may_come_is_said_before(study, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     text = f"name: c\nmodel: curves\nparameters: {{x: {AXIS}, shift: [0.1, 0.2]}}\n"
@@ -345,13 +338,6 @@ def test_laws_and_tables_know_what_was_not_needed(study, url):
         away = np.abs(found.y.sel(shift=shift).to_numpy() - truth)
         assert away.max() < 0.015
         assert np.mean(away <= found.y_error.sel(shift=shift).to_numpy() + 1e-9) > 0.8
-
-
-@pytest.mark.parametrize(("ends", "middle"), [((1, 8), 4.5), ((2, 30), 60**0.5), ((-1, 30), 14.5)])
-def test_an_axis_of_more_than_a_decade_begins_in_equal_ratios(study, ends, middle):
-    first = study("shift: 0", f"{{adaptive: {list(ends)}, until: 1 %, at_most: 60}}").series[0].axes[0].values
-    assert (first[0], first[-1]) == ends
-    assert first[len(first) // 2] == pytest.approx(middle)
 
 
 def test_a_figure_has_the_values_that_each_curve_needed(study, url):

@@ -42,28 +42,10 @@ def needs_more(*given):
     return growth_needed(*given) > 1
 
 
-def test_only_results_that_are_done_count():
-    values = np.array([[1.0, 2.0, np.nan, 3.0]])
-    mean, error = mean_and_error(values, np.array([[True, True, False, True]]))
-    assert mean == pytest.approx(2.0)
-    assert error == pytest.approx(1 / np.sqrt(3))
-
-
 def test_a_case_that_never_succeeds_is_given_up_and_a_single_success_is_not_enough():
     status = np.array([[Status.FAILED, Status.FAILED], [Status.DONE, Status.FAILED]], dtype=np.int8)
     values = {"y": np.array([[np.nan, np.nan], [1.0, np.nan]])}
     assert needs_more(values, status, {"y": Tolerance(relative=0.5)}).tolist() == [False, True]
-
-
-def test_few_results_are_enough_only_where_they_hardly_scatter():
-    generator = np.random.default_rng(0)
-    scatter = np.array([0.0, 1e-6, 1e-3, 1e-3])[:, None]
-    values = {"y": 1 + scatter * generator.standard_normal((4, 7))}
-    status = np.full((4, 7), Status.DONE, dtype=np.int8)
-    status[2, 0] = Status.FAILED
-    until = {"y": Tolerance(relative=0.01)}
-    assert needs_more({"y": values["y"][:, :3]}, status[:, :3], until).tolist() == [False, False, True, True]
-    assert needs_more(values, status, until).tolist() == [False, False, True, False]
 
 
 @pytest.mark.parametrize(("count", "asked", "needed"), [(6, 0.2, 7), (8, 0.15, 8), (8, 0.14, 9.18), (8, 0.1, 12)])

@@ -61,14 +61,6 @@ def folder(made, tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_files_and_their_size_are_told(made, tmp_path, capsys):
-    assert main(["publish", str(made / "road.zarr"), "-o", str(tmp_path / "again.zip")]) == 0
-    with zipfile.ZipFile(tmp_path / "again.zip") as packed:
-        count = len(packed.namelist())
-    size = (tmp_path / "again.zip").stat().st_size
-    assert f"again.zip: {count} files, {size / 1e6:.1f} MB\n" in capsys.readouterr().out
-
-
 def test_plain_xarray_opens_the_zip(made, folder):
     opened = xr.open_zarr(zarr.storage.ZipStore("road.zip", mode="r"))
     (original,) = datasets(str(made / "road.zarr")).values()
