@@ -114,7 +114,7 @@ class Template:
         blocks, arrays = math.prod(self.grid), len(self.outputs) + 1
         axes = {axis.name for axis in self.series.axes}
         coordinates = axes | set(self.extra) | (numbers_of(self.series.parameters).keys() - self.sizes.keys())
-        return blocks * arrays + math.ceil(blocks / RECORDS_TOGETHER) + 2 * (len(coordinates) + 1) + arrays + 2
+        return blocks * arrays + math.ceil(blocks / RECORDS_TOGETHER) + 2 * (len(coordinates) + 1) + arrays + 1
 
     def block_indices(self) -> Iterator[BlockIndex]:
         """Yield all blocks; the first realisations of all cases come first, so that all cases soon have results."""
@@ -414,7 +414,7 @@ def estimate(campaign: Campaign) -> Estimate:
         blocks=sum(part.blocks for part in parts),
         bytes=sum(part.bytes for part in parts),
         seconds=sum(part.seconds for part in parts),
-        files=sum(part.files for part in parts) + any(series.name for series in campaign.series),
+        files=1 + sum(part.files for part in parts) + any(series.name for series in campaign.series),
         notes=tuple(dict.fromkeys((*(note for part in parts for note in part.notes), *measured.notes(campaign)))),
         compiling=model.compiling,
         growth=sum(part.cases * part.growth for part in parts) / sum(part.cases for part in parts),
