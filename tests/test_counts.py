@@ -78,3 +78,14 @@ def test_a_light_command_loads_no_heavy_package(command, tmp_path):
         [sys.executable, "-P", "-c", code, *command], cwd=tmp_path, capture_output=True, text=True, check=True
     )
     assert found.stdout.splitlines()[-1] == "0"
+
+
+def test_a_report_imports_no_kernels_and_no_drawing():
+    """The laws and figures that every study may have."""
+    code = (
+        "import sys; from mdr_dask import fits, plots, report; "
+        "fits.available('my:MODEL'); plots.available('my:MODEL'); "
+        "print({'numba', 'scipy.stats', 'matplotlib.figure'} & set(sys.modules))"
+    )
+    found = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "set()"

@@ -207,6 +207,21 @@ def test_metadata_that_never_end_are_refused(toy, url, capsys):
     assert main(["status", url]) == 0
 
 
+def test_a_record_of_the_layout_that_names_files_outside_the_store_touches_none(toy, url):
+    run(small(toy), url)
+    outside = Path(url).with_name("mine.txt")
+    outside.write_text("mine")
+    record = json.loads(Path(url, "layout.json").read_text())
+    del record["digest"]
+    record["files"]["position/c/../../../mine.txt"] = ["0"]
+    Path(url, "layout.json").write_bytes(sealed(record))
+    found, _ = store.repair(url)
+    assert [(each.kind, each.name) for each in found.findings] == [("damaged", "layout.json")]
+    assert outside.read_text() == "mine"
+    assert run(small(toy), url).kept == 12
+    assert store.verify(url).findings == []
+
+
 def test_blocks_tell_the_kind_of_machine_and_a_second_kind_is_named(toy, url, monkeypatch):
     run(small(toy), url)
     told = {record["kind"] for record in store.records(url, "")}
