@@ -118,8 +118,8 @@ def cost_lines(costs: Estimate) -> Iterator[str]:
     more = costs.rounds
     cases, results = _counted("case", costs.cases, costs.growth), _counted("result", costs.results, more)
     yield f"{cases} x {_counted('realisation', costs.realisations, costs.at_most / costs.realisations)} = {results}"
-    solves, remain = _counted("solve", costs.solves, more), "remains" if costs.solves * more == 1 else "remain"
-    yield f"{solves} {remain} after sharing, in {_counted('block', costs.blocks, more)}"
+    solutions, blocks = _counted("different solution", costs.solves, more), _counted("block", costs.blocks, more)
+    yield f"{solutions} to compute, in {blocks}"
     if costs.solves == 0:
         yield "no case can be computed: all will fail (mdr-dask status --failures shows the reasons)"
     yield f"about {_counted('file', costs.files, more)} in the store"
@@ -127,7 +127,7 @@ def cost_lines(costs: Estimate) -> Iterator[str]:
     times = " to ".join(dict.fromkeys(seconds(START + count * costs.seconds) for count in (1, more)))
     compiling = f"; compiling, the first time, about {seconds(costs.compiling)} more" if costs.compiling else ""
     yield f"{sizes} uncompressed, about {times} on one core{compiling}"
-    yield "the time is an estimate of the model, not a measurement on this machine"
+    yield "the time is an estimate, not a measurement on this machine"
     if more > 1:
         yield "ranges: from the first round to the last one, if no case meets its tolerance earlier"
 

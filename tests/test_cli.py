@@ -80,7 +80,7 @@ def test_dry_run_says_how_far_rounds_may_go(campaign, capsys):
     assert main(["run", str(campaign), "--dry-run"]) == 0
     said = capsys.readouterr().out
     assert "8 cases x 8 to 24 realisations = 64 to 192 results" in said
-    assert "64 to 192 solves remain after sharing" in said
+    assert "64 to 192 different solutions to compute" in said
     assert "from the first round to the last one" in said
     assert main(["run", str(campaign), "--dry-run", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)

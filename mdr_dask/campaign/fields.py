@@ -144,7 +144,7 @@ def is_independent(parameters: type[BaseModel], path: Path, data: Any) -> bool:
 
 
 def choices(parameters: type[BaseModel], path: Path) -> tuple[str, ...]:
-    """Return texts for the structures in which a path leads to a field, such as ``indenter: {shape: power}``."""
+    """Return how a nested parameter may be written: ``indenter: {shape: power, ...}`` for the path of its exponent."""
     name, *rest = path
     if name not in parameters.model_fields or not rest:
         return ()

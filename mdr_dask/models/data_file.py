@@ -1,4 +1,4 @@
-"""Files that a campaign names."""
+"""Data files that are named in a campaign."""
 
 from __future__ import annotations
 

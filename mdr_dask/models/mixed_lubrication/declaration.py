@@ -143,7 +143,10 @@ class MixedLubrication(Parameters):
         return 2 * float(np.pi) * self.roller_radius
 
     def source(self) -> Source:
-        """Return the source of the lines. Cases with equal sources can share lines."""
+        """Return how the rough lines are obtained: generated, measured, or from spectra of surfaces.
+
+        Cases with equal sources can share lines.
+        """
         one, two = self.surface_1, self.surface_2
         if one is not None and two is not None and one.profile is not None and two.profile is not None:
             return Measured(one.profile, two.profile, self.rms_roughness is not None)
