@@ -118,12 +118,6 @@ def test_problems_of_a_file_go_to_stderr_with_exit_code_2(campaign, capsys):
     assert not Path("results").exists()
 
 
-def test_a_case_too_large_for_the_memory_is_refused(campaign, capsys):
-    campaign.write_text(CAMPAIGN.replace("points: 500", "points: 1000000\n  oversampling: 256"))
-    assert main(["check", str(campaign)]) == 2
-    assert "GiB of memory" in capsys.readouterr().err
-
-
 def test_show_selects_with_units_and_prints_csv_and_json(filled, capsys):
     arguments = ["show", filled, "friction_coefficient", "--select", "normal_force=100 mN"]
     assert main([*arguments, "--select", "velocity=5 mm/s..1 km/s", "--csv"]) == 0
@@ -156,12 +150,6 @@ def test_aggregates_are_written_to_files(filled, tmp_path, capsys, suffix):
         opened = xr.open_dataset(path, engine="h5netcdf" if suffix == ".nc" else "zarr")
         assert opened.friction_coefficient_interval.sizes["bound"] == 2
         opened.close()
-
-
-def test_another_campaign_is_refused_by_the_store(campaign, filled, capsys):
-    campaign.write_text(CAMPAIGN.replace("0.5 um", "0.6 um"))
-    assert main(["run", str(campaign), "--quiet"]) == 2
-    assert "rms_roughness: 5e-07 in the store, 6e-07 in the campaign" in capsys.readouterr().err
 
 
 def command(*arguments: str) -> list[str]:
@@ -316,18 +304,6 @@ def test_a_plan_of_rounds_counts_the_first_of_them(toy, tmp_path, monkeypatch, c
     assert main(["run", "rounds.yaml", "--dry-run", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert (document["counted"], document["kept"], document["to_do"]) == ("first round", 8, 0)
-
-
-def test_a_reader_that_has_seen_enough_is_no_error(filled):
-    line = subprocess.run(
-        f"{sys.executable} -m mdr_dask show {filled} --realisations --limit 0 --json | head -1",
-        shell=True,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert line.stdout.startswith('{"units": ')
-    assert line.stderr == ""
 
 
 def test_a_store_may_be_named_by_a_file_url(campaign, tmp_path, capsys):

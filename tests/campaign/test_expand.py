@@ -52,15 +52,6 @@ def test_decades_are_decades():
     assert axis.values == tuple(float(f"1e{power}") for power in range(-6, 7))
 
 
-def test_tenths_are_tenths():
-    axis = axes("  normal_force: 1\n  hurst: {linear: [0, 100 %, 11]}\n")["hurst"]
-    assert axis.values == tuple(n / 10 for n in range(11))
-
-
-def test_ranges_may_fall():
-    assert axes("  normal_force: {geometric: [1 kN, 1 N, 4]}\n")["normal_force"].values == (1e3, 1e2, 10.0, 1.0)
-
-
 def test_whole_numbers_are_rounded_each_once():
     axis = axes("  normal_force: 1\n  points: {geometric: [2, 10, 20]}\n")["points"]
     assert axis.values == (2, 3, 4, 5, 6, 7, 8, 9, 10)
@@ -86,14 +77,6 @@ def test_an_entry_of_a_structure_varies_under_its_dotted_path():
     assert (axis.path, axis.name, axis.unit) == ("indenter.angle", "indenter_angle", "rad")
     assert axis.values == (0.1, 0.3, 0.5, 0.7, 0.9, 1.1, 1.3)
     assert series.parameters.indenter.angle == 0.1
-
-
-def test_two_entries_of_one_structure_vary_independently():
-    found = axes(
-        "  normal_force: 1\n  indenter: {shape: power, exponent: {values: [1, 2]}, radius: {linear: [1 mm, 3 mm, 3]}}\n"
-    )
-    assert found["indenter.exponent"].values == (1.0, 2.0)
-    assert found["indenter.radius"].values == (0.001, 0.002, 0.003)
 
 
 def test_whole_structures_are_labelled_as_written():
@@ -139,11 +122,6 @@ def test_a_series_replaces_parameters_wholly():
     assert flat.name == "flat"
     assert flat.sizes == {}
     assert (flat.parameters.normal_force, flat.parameters.indenter.shape) == (3.0, "plane")
-
-
-def test_a_series_may_give_what_the_base_leaves_out():
-    campaign = read("", "series:\n  light: {normal_force: 1 mN}\n  heavy: {normal_force: 1 kN}\n")
-    assert [series.parameters.normal_force for series in campaign.series] == [1e-3, 1e3]
 
 
 def test_a_problem_of_the_base_is_reported_once():

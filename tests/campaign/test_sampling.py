@@ -30,10 +30,6 @@ def test_zip_takes_values_together():
     assert values(series, "velocity") == (1.0, 10.0, 100.0)
 
 
-def test_zip_may_repeat_a_value():
-    assert values(read("  normal_force: [1, 1, 2]\n", "sampling: zip\n"), "normal_force") == (1.0, 1.0, 2.0)
-
-
 @pytest.mark.parametrize("design", ["sobol", "latin_hypercube"])
 def test_drawn_cases_fill_their_ranges(design):
     number = 64
@@ -64,15 +60,6 @@ def test_drawn_whole_numbers_are_whole():
     assert all(type(value) is int and 2 <= value <= 1000 for value in values(series, "points"))
 
 
-def test_entries_of_structures_are_drawn_too():
-    series = read(
-        "  normal_force: 1\n  indenter: {shape: cone, angle: {linear: [5 deg, 75 deg]}}\n", "sampling: {sobol: 4}\n"
-    )
-    [axis] = series.axes
-    assert (axis.path, axis.name, axis.dim) == ("indenter.angle", "indenter_angle", "case")
-    assert all(math.radians(5) <= value <= math.radians(75) for value in axis.values)
-
-
 def test_a_table_gives_the_cases(tmp_path):
     (tmp_path / "cases.csv").write_text(
         "normal_force [mN],indenter.angle [deg],oversampling,points\n1,10,auto,100\n\n2.5,20,2,200\n3000,30,4,300\n"
@@ -101,14 +88,6 @@ def test_a_column_within_a_parameter_says_what_the_file_lacks(tmp_path, column, 
     (tmp_path / "cases.csv").write_text(f"normal_force [N],{column}\n1,0.5\n2,0.6\n")
     with pytest.raises(CampaignError, match=f"cases.csv:1:18: {column}: {message}"):
         read("", "sampling: {table: cases.csv}\n", tmp_path)
-
-
-def test_cells_may_carry_units(tmp_path):
-    (tmp_path / "cases.csv").write_text("normal_force,scheme,shift\n1 mN,exact,true\n2 kN,euler,false\n")
-    series = read("", "sampling: {table: cases.csv}\n", tmp_path)
-    assert values(series, "normal_force") == (0.001, 2000.0)
-    assert values(series, "scheme") == ("exact", "euler")
-    assert values(series, "shift") == (True, False)
 
 
 @pytest.mark.parametrize(("low", "high"), [(2.0, 50.0), (50.0, 2.0)])
