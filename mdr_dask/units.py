@@ -183,11 +183,12 @@ def spelt(value: str) -> str:
     return ""
 
 
-def expected(unit: str) -> str:
-    """Return the name of a quantity for a message: ``a length (such as '20 mm')``."""
+def expected(unit: str, usual: str = "") -> str:
+    """Return the name of a quantity with an example, for a message: ``a length (such as '20 mm')``."""
     spaced = unit.replace("*", " ").replace("**", "^")
     other = (f"a quantity in {unit}", f"1 {unit}") if is_unit(unit) else (f"a bare number in {unit}", "")
     name, example = _MEANINGS.get(spaced) or other
+    example = usual or example
     return f"{name} (such as {example!r})" if example else name
 
 

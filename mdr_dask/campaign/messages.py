@@ -193,7 +193,7 @@ def _wanted(details: ErrorDetails, path: Path, kind: type[BaseModel], data: Any)
         behind = f" {unit}" if bound and unit not in (None, "1") else ""
         return f"a {noun} {words} {fields.plain(bound)}{behind}"
     if error == "float_type" and unit is not None:
-        return expected(unit)
+        return _quantity(path, kind, data)
     if context.get("class_name") == "DataFile":
         return "the name of a file"
     if error in ("literal_error", "enum"):
@@ -230,11 +230,15 @@ def _listed(words: Iterable[str]) -> str:
 
 
 def _missing(path: Path, kind: type[BaseModel], data: Any) -> str:
+    info, wanted = _field(kind, path, data), _quantity(path, kind, data)
+    what = f"missing, expected {wanted}" if wanted else "missing"
+    return f"{what}: {info.description}" if info and info.description else what
+
+
+def _quantity(path: Path, kind: type[BaseModel], data: Any) -> str:
+    """Return the name of a quantity with a usual value; empty for a field without a unit."""
     info, unit = _field(kind, path, data), fields.unit_at(kind, path, data)
-    if info is None:
-        return "missing"
-    what = f"missing, expected {expected(unit)}" if unit else "missing"
-    return f"{what}: {info.description}" if info.description else what
+    return expected(unit, "".join(fields.usual(info)[:1])) if info and unit else ""
 
 
 def _unknown(path: Path, kind: type[BaseModel], data: Any) -> str:
