@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Sequence
 from contextlib import suppress
 from decimal import Decimal
@@ -66,6 +67,7 @@ newton = kilogram * meter / second ** 2 = N
 kilogram_force = 9.80665 * newton = kgf
 pound_force = 4.4482216152605 * newton = lbf
 pascal = newton / meter ** 2 = Pa
+pascal_second = pascal * second = Pas
 bar = 1e5 * pascal
 atmosphere = 101325 * pascal = atm
 psi = pound_force / inch ** 2
@@ -111,6 +113,11 @@ _MEANINGS = {
 _MOST_LETTERS = 60
 _BAD_POWER = re.compile(r"(\*\*|\^)\s*(?!\(?[-+]?\d{1,2}\)?(?![\d.]|\s*(\*\*|\^)))")
 
+#: A number before a unit, as in ``10^3 um^3``, ``1e-6 mm^3`` or ``x 1000 N``.
+_FACTOR = re.compile(
+    r"[x×*]?\s*(10\s*\^\s*[+-]?\d+|\d+(?:\.\d+)?(?:e[+-]?\d+)?|e[+-]?\d+)[\s×x*]*(?=[^\W\d]|°)", re.IGNORECASE
+)
+_DEGREES = re.compile(r"(?:(?i:deg(?:rees?)?|°)\s*([CFcf])|([CF]))")
 _NOT_A_UNIT = re.compile(r"[,._]|\d(?!\s*/)|.*%.*%")
 #: Patterns of a number with a decimal comma, of a number whose comma may separate thousands, and of a text that looks
 #: like several numbers.
@@ -160,7 +167,7 @@ def to_si(value: str, unit: str) -> float:
         factor, offset = conversion(given, unit) if given else (1.0, 0.0)
     except ValueError as error:
         raise ValueError(f"{error}, got {value!r}{spelt(value)}") from None
-    si = _times(number, factor) + offset
+    si = scaled(number, factor) + offset
     if not math.isfinite(si):
         raise ValueError(f"expected a finite number, got {value!r}")
     return si
@@ -301,10 +308,11 @@ def example_unit(unit: str) -> str:
 
 def is_unit(text: str) -> bool:
     """Return whether a text is a known unit."""
-    if not _may_be_unit(text):
+    unit = _factor_and_unit(text[: 2 * _MOST_LETTERS])[1]
+    if not _may_be_unit(unit):
         return False
     try:
-        registry().parse_units(_spelling(text))
+        registry().parse_units(unit)
     except Exception:  # pint's parser raises many types
         return False
     return True
@@ -314,7 +322,8 @@ def _may_be_unit(text: str) -> bool:
     return not (_NOT_A_UNIT.match(text) or len(text) > _MOST_LETTERS or _BAD_POWER.search(text))
 
 
-def _times(number: str, factor: float) -> float:
+def scaled(number: str, factor: float) -> float:
+    """Return a number times a factor, correctly rounded if the factor is a power of ten."""
     power = round(math.log10(factor))
     if math.isclose(factor, 10.0**power, rel_tol=1e-12):
         return float(Decimal(number).scaleb(power))
@@ -344,7 +353,8 @@ def conversion(given: str, unit: str) -> tuple[float, float]:
 
     units = registry()
     try:
-        source, target = (units.parse_units(_spelling(text)) for text in (given, unit))
+        before, spelling = _factor_and_unit(given)
+        source, target = (units.parse_units(text) for text in (spelling, _factor_and_unit(unit)[1]))
         zero, one = (units.Quantity(size, source).to(target).magnitude for size in (0.0, 1.0))
     except UndefinedUnitError as error:
         word = error.args[0] if isinstance(error.args[0], str) else next(iter(error.args[0]))
@@ -355,7 +365,7 @@ def conversion(given: str, unit: str) -> tuple[float, float]:
     except Exception:  # pint's parser raises many types: TypeError, AssertionError, ...
         raise ValueError(f"expected {expected(unit)}") from None
     factor = one - zero
-    return (1.0 if math.isclose(factor, 1.0) else factor, zero) if zero else (one, 0.0)
+    return (before * (1.0 if math.isclose(factor, 1.0) else factor), zero) if zero else (before * one, 0.0)
 
 
 #: Coherent SI units of the dimensions that pint derives from `DEFINITIONS`.
@@ -373,23 +383,28 @@ def dimension_of(unit: str) -> tuple[Any, str]:
     """
     if unit not in ("", "1") and not is_unit(unit):
         raise ValueError(f"unknown unit {unit!r}{_nearest(unit)}")
-    dimension = registry().parse_units(_spelling(unit)).dimensionality
+    dimension = registry().parse_units(_factor_and_unit(unit)[1]).dimensionality
     coherent = " * ".join(f"{_COHERENT[name.strip('[]')]}**{power}" for name, power in dimension.items())
     return dimension, coherent or "1"
 
 
-def _spelling(unit: str) -> str:
-    unit = unit.replace("%", " percent ").strip()
-    return "" if unit == "1" else f"1{unit}" if unit.startswith("/") else unit
+def _factor_and_unit(text: str) -> tuple[float, str]:
+    """Return the number before a unit, or 1, and the unit in the spelling of pint: ``mm^3`` for ``mm³`` or ``mm3``."""
+    text = re.sub(r"[⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻]+", lambda power: "^" + unicodedata.normalize("NFKC", power[0]), text)
+    text = unicodedata.normalize("NFKC", text.replace("º", "°").replace("%", " percent ")).strip()
+    found = _FACTOR.match(text)
+    number = re.sub(r"^10\s*\^\s*", "1e", found[1]) if found else "1"
+    unit = text[found.end() :] if found else text
+    unit = unit.replace("−", "-").replace("·", " ").replace("microns", "micron")
+    unit = re.sub(r"(?<=[A-Za-zμ])\^?\{?(-?\d{1,2})\}?(?!\d)", r"^\1", unit)
+    if degrees := _DEGREES.fullmatch(unit):
+        unit = f"deg{(degrees[1] or degrees[2]).upper()}"
+    unit = "" if unit == "1" else f"1{unit}" if unit.startswith("/") else unit
+    return float(f"1{number}" if number[0] in "eE" else number), unit
 
 
 def _nearest(word: str, unit: str = "") -> str:
     """Return a hint for an unknown unit: the nearest known one, with the dimension of `unit` if `unit` is given."""
-    if word in ("C", "F"):  # probably temperatures, not coulomb and farad
-        return ", temperatures are in 'degC', '°C' or 'K'"
-    power = re.fullmatch(r"([a-zA-Zµ]+)(\d)", word)
-    if power and is_unit(power[1]):
-        return f" (write {power[1]}^{power[2]})"
     common = COMMON.split()
     hint = did_you_mean(word, [each for each in common if dimension_of(each) == dimension_of(unit)] if unit else common)
     return hint if "mean" in hint else f", expected {expected(unit)}" if unit else ""

@@ -1,4 +1,4 @@
-"""The one reader of tables: dialects that say the same, and one sentence for what is wrong."""
+"""The reader of tables: equal numbers from all dialects, and one sentence for each error."""
 
 import pickle
 
@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mdr_dask.errors import MdrDaskError
-from mdr_dask.tables import Column, TableError, read_table
+from mdr_dask.headings import Column
+from mdr_dask.tables import TableError, read_table
 
 COLUMNS = (
     Column("frequency", "rad/s", ("f", "omega"), above=0),
@@ -42,7 +43,7 @@ def test_dialects_of_one_table_are_the_same_numbers_to_the_bit(dialect):
 
 @pytest.mark.parametrize("one", ["1", "-", "[1]"])
 def test_a_row_of_units_has_a_sign_for_what_has_none(one):
-    """A tan delta of 1 in the first row of numbers is none."""
+    """A tan delta of 1 in the first line of numbers is not a unit."""
     read = read_table(f"f,E',tan delta\nrad/s,MPa,{one}\n1,2,0.3\n4,5,1\n", "a.csv", COLUMNS)
     assert read["storage modulus"].tolist() == [2e6, 5e6]
     assert read["tan delta"].tolist() == [0.3, 1.0]
@@ -64,7 +65,7 @@ def test_frequencies_are_angular_ones(heading, value, expected):
     assert read["storage modulus"] == 0.007
 
 
-#: `$` stands for ``column storage modulus: ``
+#: `$` is replaced by ``column storage modulus: ``
 WRONG = {
     "nothing": ("", "1:1: expected a line of names and at least one line of values"),
     "comments only": ("# f\n", "1:1: expected a line of names and at least one line of values"),
@@ -101,16 +102,12 @@ WRONG = {
     ),
     "below absolute zero": (
         "f [Hz],E' [Pa],T [C]\n1,2,-300\n",
-        "2:5: column temperature: expected a value above 0, got '-300 degC'",
+        "2:5: column temperature: expected a value above 0, got '-300 C'",
     ),
     "overflow": ("f [Hz],E' [MPa]\n1,1e305\n", "2:3: $expected a finite number"),
     "decimal comma in commas": (
         "f [Hz],E' [Pa]\n1,5,2\n",
         "2:1: expected 2 values as in line 1, got 3 (put semicolons between the values if they have decimal commas)",
-    ),
-    "too wide": (
-        ",".join("x" * 2000) + "\n" + ",".join("1" * 2000) + "\n",
-        "1:1: expected at most 1000 columns, got 2000",
     ),
     "no names": ("1,2,3,4,5\n1,2,3,4,5\n", "1:1: expected the names of the 5 columns in the first line"),
     "long cell": (
@@ -150,7 +147,7 @@ def test_a_given_unit_serves_a_table_without_one():
     assert read_table("x\n5\n", "a.csv", [column])["x"] == 0.005
     assert read_table("5\n6\n", "a.csv", [column])["x"][1] == 0.006
     assert read_table("x [mm]\n5\n", "a.csv", [column])["x"] == 0.005
-    with pytest.raises(TableError, match="the file says um, got the unit 'mm'"):
+    with pytest.raises(TableError, match="the file states um, got the unit 'mm'"):
         read_table("x [um]\n5\n", "a.csv", [column])
 
 

@@ -13,8 +13,9 @@ from mdr_dask import models
 from mdr_dask.arrays import FloatArray
 from mdr_dask.campaign.definition import Campaign, Series
 from mdr_dask.errors import DataError, did_you_mean, distinguishable
+from mdr_dask.headings import Column, match, plain
 from mdr_dask.models.numbers import numbers_of
-from mdr_dask.tables import Column, Sheet, match, plain, read_sheet, read_table
+from mdr_dask.tables import Line, Sheet, read_sheet, read_table
 from mdr_dask.units import shown
 
 ERROR = "standard_error"
@@ -47,8 +48,8 @@ class Measured:
         Standard errors of the values, if the table has them.
     conditions : dict of str to array, shape (points,)
         The values of the parameters at each measurement, in SI, by the name of the parameter's coordinate.
-    lines : tuple of int
-        The line of each measurement in the table, counted from 1.
+    lines : tuple of Line
+        The line of each measurement in the table.
     remark : str
         Text on unused columns and on rows without a number; empty if all columns and rows are used.
     """
@@ -58,7 +59,7 @@ class Measured:
     values: FloatArray
     errors: FloatArray | None
     conditions: Mapping[str, FloatArray]
-    lines: tuple[int, ...]
+    lines: tuple[Line, ...]
     remark: str = ""
 
 
@@ -83,13 +84,12 @@ def read_measured(
         If the text is not a table, has no column or several columns for outputs, or has fewer than two points.
     """
     sheet = read_sheet(text, source)
-    names = [cell.text for cell in sheet.names]
     of_outputs = {name: Column(name, unit) for name, unit in outputs.items()}
-    found = [name for name, column in of_outputs.items() if any(column.holds(heading) for heading in names)]
+    found = [name for name, column in of_outputs.items() if any(column.holds(name) for name in sheet.names)]
     if len(found) != 1:
-        near = () if found else (did_you_mean(name, [*outputs]) for name in names)
+        near = () if found else (did_you_mean(name, [*outputs]) for name in sheet.names)
         hint = next((each for each in near if "mean" in each), "")
-        got = ", ".join(found or names) or "no names"
+        got = ", ".join(found or sheet.names) or "no names"
         wanted = f"a column with one output of the study ({', '.join(outputs)})"
         raise DataError(f"{source}: expected {wanted}, got {got}{hint}")
     output = found[0]
@@ -118,17 +118,17 @@ def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...],
     A heading without the name of a quantity, such as ``std``, belongs to the nearest column before it.
     """
     output, headings, given, before = columns[-1], [], "", None
-    for cell, unit in zip(sheet.names, sheet.units, strict=True):
-        column, _ = match(cell.text, unit, columns)
+    for name, unit in zip(sheet.names, sheet.units, strict=True):
+        column, _ = match(name, unit, columns)
         before = column or before
         if column is output:
             given = unit
-        found = _ERROR.search(plain(cell.text))
+        found = _ERROR.search(plain(name))
         if column or not found:
             continue
-        of = plain(cell.text).replace(found[0], "", 1).strip(" ()").removeprefix("of ")
+        of = plain(name).replace(found[0], "", 1).strip(" ()").removeprefix("of ")
         if output.holds(of) or (not of and before in (output, None)):
-            headings.append((cell.text, unit))
+            headings.append((name, unit))
     return tuple(name for name, _ in headings), "" if any(unit for _, unit in headings) else given
 
 
@@ -187,7 +187,7 @@ def _sentences(found: Measured, model: str, series: Series, units: Mapping[str, 
     yield f"conditions {', '.join(ranges.values()) or 'none'}"
     yield f"unknowns {', '.join(_unknown(found, series)) or 'none: every axis is a column of the table'}"
     outside = [
-        f"line {line}, {name} {shown(float(value), units[name])}"
+        f"{line}, {name} {shown(float(value), units[name])}"
         for name, (low, high) in _reach(model, series, found.conditions).items()
         for line, value in zip(found.lines, found.conditions[name], strict=True)
         if not low - SAME * abs(low) <= value <= high + SAME * abs(high)

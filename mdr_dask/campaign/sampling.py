@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ from mdr_dask.campaign.spec import Drawn, LatinHypercubeSpec, SaltelliSpec
 from mdr_dask.campaign.variation import Item, Origin, Variation
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.models.base import Parameters
-from mdr_dask.tables import Cell, Sheet, TableError, decoded, read_sheet
+from mdr_dask.tables import Line, Sheet, TableError, decoded, read_sheet
 
 if TYPE_CHECKING:
     from mdr_dask.arrays import FloatArray
@@ -112,25 +112,24 @@ def tabled(
         for line, column, what in error.problems:
             problems.add(Place(name, line, column), "", what)
         return None
-    unused = [
-        cell
-        for cell, *entries in zip(sheet.names, *sheet.rows, strict=True)
-        if _is_unused(cell.text, [entry.text for entry in entries], parameters)
-    ]
-    malformed = [cell for cell in sheet.names if cell not in unused and not _PATH.match(cell.text)]
-    for cell in malformed:
-        problems.add(_place(name, cell), "", _NOT_A_HEADING)
-    if len(unused) == len(sheet.names):
+    indices = range(len(sheet.names))
+    unused = [index for index in indices if _is_unused(sheet.names[index], sheet.cells[:, index], parameters)]
+    used = [index for index in indices if index not in unused]
+    malformed = [index for index in used if not _PATH.match(sheet.names[index])]
+    for index in malformed:
+        problems.add(_place(name, sheet.head, index), "", _NOT_A_HEADING)
+    if not used:
         problems.add(Place(name, 1, 1), "", _NOT_A_HEADING)
-    if malformed or len(unused) == len(sheet.names):
+    if malformed or not used:
         return None
     if unused:
-        remarks.append(f"table {name}: not used: {', '.join(cell.text for cell in unused if cell.text)}")
-    columns = [_column(name, sheet, index) for index in range(len(sheet.names)) if sheet.names[index] not in unused]
+        named = [sheet.names[index] for index in unused if sheet.names[index]]
+        remarks.append(f"table {name}: not used: {', '.join(named)}")
+    columns = [_column(name, sheet, index) for index in used]
     return tuple(columns) if _are_sound(columns, parameters, data, problems) else None
 
 
-def _is_unused(heading: str, entries: Sequence[str], parameters: type[Parameters]) -> bool:
+def _is_unused(heading: str, entries: Iterable[str], parameters: type[Parameters]) -> bool:
     """Return whether a column is not a parameter; a column of numbers with a similar name is a misspelt parameter."""
     if heading.split(".")[0] in parameters.model_fields:
         return False
@@ -139,17 +138,16 @@ def _is_unused(heading: str, entries: Sequence[str], parameters: type[Parameters
 
 
 def _column(name: str, sheet: Sheet, index: int) -> Variation:
-    heading, unit = sheet.names[index], sheet.units[index]
-    path = tuple(heading.text.split("."))
+    path = tuple(sheet.names[index].split("."))
     items = [
-        Item(_value(cell.text, unit), Origin(dotted(path), _place(name, cell)), cell.text)
-        for cell in (row[index] for row in sheet.rows)
+        Item(_value(text, sheet.units[index]), Origin(dotted(path), _place(name, line, index)), text)
+        for line, text in zip(sheet.lines, sheet.cells[:, index], strict=True)
     ]
-    return Variation(path, Origin(dotted(path), _place(name, heading)), tuple(items))
+    return Variation(path, Origin(dotted(path), _place(name, sheet.head, index)), tuple(items))
 
 
-def _place(name: str, cell: Cell) -> Place:
-    return Place(name, cell.line, cell.column)
+def _place(name: str, line: Line, index: int) -> Place:
+    return Place(name, *line.problem(index, "")[:2])
 
 
 def _value(text: str, unit: str) -> Any:

@@ -24,8 +24,8 @@ KINDS = ("map", "scan", "spectrum")
 @click.option("--as", "kind", type=click.Choice(KINDS), help="What the files are.  [from their content]")
 @click.option("--spacing", help="Distance between points, if the file has heights alone, such as 2um.")
 @click.option("--spacing-y", help="Distance between rows, if different from --spacing.")
-@click.option("--unit", help="Unit of the heights, if the file does not say.")
-@click.option("--x-unit", help="Unit of positions in the file, if the file does not say.")
+@click.option("--unit", help="Unit of the heights, if the file has none.")
+@click.option("--x-unit", help="Unit of positions in the file, if the file has none.")
 @click.option("--detrend", help="none, mean, plane (of a map), line (of a scan) or parabola.")
 @click.option("--window", type=click.Choice(("hann", "none")), help="none only of a periodic surface.  [hann]")
 @click.option(
@@ -132,14 +132,13 @@ def _kind(file: str, options: dict[str, Any]) -> str:
     """Return the kind of a file: spectra are recognised by the names of columns, maps and scans by their dimensions."""
     from mdr_dask.models.data_file import DataFile
     from mdr_dask.models.parts.height_file import TEXT, dimensions
+    from mdr_dask.models.parts.surface_files import is_spectrum
     from mdr_dask.tables import decoded
 
     if "spacing_y" in options or "direction" in options:
         return "map"
-    if file.lower().endswith(TEXT):
-        head = decoded(Path(file).read_bytes(), file)[:2000].lower()
-        if re.search(r"c_?(2d|1d|cut|iso)|psd|c\(q\)|wave ?(number|vector)|\b(log|log10|lg)[ _(]+[qk]\b", head):
-            return "spectrum"
+    if file.lower().endswith(TEXT) and is_spectrum(decoded(Path(file).read_bytes(), file)):
+        return "spectrum"
     return "map" if dimensions(DataFile.of(Path(file))) == 2 else "scan"
 
 

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.tables import JOINED, SYNONYMS, decoded, is_called, numbers, read_sheet
+from mdr_dask.headings import JOINED, SYNONYMS, is_called
+from mdr_dask.tables import AGREE, decoded, numbers, read_sheet
 from mdr_dask.units import conversion, is_unit
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def read_table(path: str | Path) -> pd.DataFrame:
     if not sheet.names:
         raise DataError(f"{path}: expected names of columns, got numbers")
     values = numbers(sheet)
-    names = [cell.text for cell in sheet.names]
+    names = list(sheet.names)
     if len(set(names)) < len(names):
         raise DataError(f"{path}: expected each name of a column once, got {', '.join(names)!r:.200}")
     kept = [k for k, column in enumerate(values.T) if not np.all(np.isnan(column))]  # columns of words are left out
@@ -78,13 +79,23 @@ def finite_rows(frame: pd.DataFrame, columns: list[str]) -> tuple[pd.DataFrame, 
 
 
 def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
-    """Return the column with exactly this name, else the only column with a synonym of it, else None."""
+    """Return the column with this name, or the first one with a synonym of it.
+
+    The result is None without such a column, or if several columns have synonyms and do not agree.
+    """
     columns = [str(name) for name in frame.columns]
     if wanted in columns:
         return wanted
     names = [wanted, ALIASES.get(wanted, wanted), *(name for name in SYNONYMS if is_called(wanted, name))]
     loose = [each for each in columns if is_called(each, *names) or _joined(each, wanted)]
-    return loose[0] if len(loose) == 1 else None
+    return loose[0] if loose and all(_agree(frame[loose[0]], frame[each]) for each in loose[1:]) else None
+
+
+def _agree(one: pd.Series, other: pd.Series) -> bool:
+    """Return whether two columns differ only by their units: by a constant factor or a constant difference."""
+    first, second = one.to_numpy(dtype=np.float64), other.to_numpy(dtype=np.float64)
+    with np.errstate(all="ignore"):
+        return any(np.ptp(each) <= AGREE * abs(np.median(each)) for each in (second / first, second - first))
 
 
 def _joined(column: str, wanted: str) -> bool:

@@ -142,7 +142,7 @@ def _at_fixed(dataset: xr.Dataset, measured: Measured) -> xr.Dataset:
         if off.any():
             worst = int(np.flatnonzero(off)[0])
             measured_at, *known = written_apart(str(held.attrs.get("units", "1")), wanted[worst], *ends)
-            place = f"{measured.source}:{measured.lines[worst]}"
+            place = f"{measured.source}:{measured.lines[worst].number}"
             has = f"has it from {' to '.join(known)}" if held.ndim else f"holds it at {known[0]}"
             raise DataError(f"{place}: {name} of {measured_at}: this study {has}")
     return dataset

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any
@@ -49,9 +51,26 @@ class DataFile(BaseModel):
         """
         return decoded(self.read_bytes(), self.path)
 
+    @contextmanager
+    def in_errors(self) -> Iterator[None]:
+        """Put the name of the file before the messages of errors that are raised in a ``with`` statement."""
+        try:
+            yield
+        except DataError as problem:
+            raise DataError(f"{self.name}: {problem}") from None
+
     def notes(self) -> tuple[str, ...]:
         """Return a note with the columns of a table and their ranges; no note for other files."""
         return _notes_of_file(self) if Path(self.path).stat().st_size < LARGEST_TABLE else ()
+
+
+def check_in_campaign(info: ValidationInfo, check: Callable[[], object]) -> None:
+    """Call a function if a campaign is read; its DataError becomes the ValueError that pydantic expects."""
+    if info.context is not None:
+        try:
+            check()
+        except DataError as problem:
+            raise ValueError(str(problem)) from None
 
 
 @lru_cache(maxsize=64)

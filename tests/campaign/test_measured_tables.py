@@ -39,7 +39,7 @@ def test_errors_without_a_unit_have_that_of_the_output():
 def test_rows_without_a_number_are_left_out_and_counted():
     found = read("run;velocity [m/s];mu;remark\nA;1;0,3;\nB;2;n.a.;filter\nC;3;0,4;\nend of test\n")
     assert found.values.tolist() == [0.3, 0.4]
-    assert found.lines == (2, 4)
+    assert [line.number for line in found.lines] == [2, 4]
     assert "rows without a number are left out: 1" in found.remark
     assert "'end of test'" in found.remark
 

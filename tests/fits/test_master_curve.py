@@ -6,7 +6,7 @@ import pytest
 import xarray as xr
 
 from mdr_dask.errors import DataError
-from mdr_dask.fits.curve_tables import clusters, read_table
+from mdr_dask.fits.curve_tables import clusters, column_of, read_table
 from mdr_dask.fits.master_curve import FITS, friction_of_roughness, master_curve, rereferenced
 
 DATA = Path(__file__).parents[1] / "data" / "dma"
@@ -90,7 +90,7 @@ def test_frame_of_columns_with_other_names():
 
 def test_measured_moduli_with_a_row_of_units_and_scattering_temperatures():
     table = read_table(DATA / "freq_user_raw.csv")
-    assert table.attrs["units"] == {"f": "Hz", "E_stor": "MPa", "E_loss": "MPa", "T": "degC", "Set": "-"}
+    assert table.attrs["units"] == {"f": "Hz", "E_stor": "MPa", "E_loss": "MPa", "T": "C", "Set": "-"}
     kept = table[(table["T"] > 39) & (table["T"] < 80)]
     kept.attrs.update(table.attrs)
     result = master_curve(kept)
@@ -206,6 +206,14 @@ def test_comments_semicolons_and_spaces_are_understood(tmp_path):
             f"# made up\nforce{separator}mu\n\n1{separator}0.5\n% more\n2{separator}0.25\n"
         )
         assert read_table(tmp_path / "table.csv").to_numpy().tolist() == [[1, 0.5], [2, 0.25]]
+
+
+def test_columns_of_one_quantity_that_agree_are_one():
+    frame = pd.DataFrame({"Frequency": [1.0, 10.0, 100.0], "Angular frequency": [6.28, 62.8, 628.0]})
+    assert column_of(frame, "frequency") == "Frequency"
+    assert column_of(frame.assign(Frequency=[1.0, 10.0, 90.0]), "frequency") is None
+    warm = pd.DataFrame({"Temp.": [20.0, 40.0], "T": [293.15, 313.15]})
+    assert column_of(warm, "temperature") == "Temp."
 
 
 def test_tables_that_are_ambiguous_or_incomplete_are_refused():

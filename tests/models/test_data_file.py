@@ -1,4 +1,4 @@
-"""Files named by a campaign: read as they were, or one clear error."""
+"""Files named by a campaign: read unchanged, or refused with one error."""
 
 import hashlib
 

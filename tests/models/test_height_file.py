@@ -1,6 +1,7 @@
 """Maps and scans as instruments and people write them are read as they stand, or refused with a remedy."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from references.areal import areal_surface
 
@@ -165,6 +166,8 @@ def test_encodings_of_windows_are_read(tmp_path):
         ),
         ("x [um] y [um] z [nm]\n" + joined(xyz(), " "), Units("", "", 1e-6), "leave out `spacing`"),
         (joined(np.c_[xyz(), xyz()]), XYZ, "expected a map, or columns x, y and z, got 6 columns: name them"),
+        (joined(np.c_[ROWS.ravel()[:, None], xyz()[:, :2]]), XYZ, "the order of the columns must be x, y, z"),
+        (joined(ROWS[:2]), UNITS, "expected a map, got 2 rows of 40 heights: write a scan as columns"),
         ("no numbers at all\n", UNITS, "expected the same number of heights in every row"),
         ("", UNITS, "expected the same number of heights in every row"),
     ],
@@ -203,6 +206,20 @@ def test_a_scan_is_read_as_it_stands_and_codes_are_no_heights(layout, code, tmp_
     assert ("points counted as missing: 2 points" in " ".join(remarks)) == bool(code)
 
 
+@pytest.mark.parametrize("heading", [["Position [mm]", "Height [µm]"], ["Height [µm]"]])
+def test_scans_in_workbooks_are_read(heading, tmp_path):
+    pytest.importorskip("openpyxl")
+    columns = {"Position [mm]": PLACE, "Height [µm]": HEIGHT}
+    sheet = [["Profile 7", *[""] * (len(heading) - 1)], heading, *np.column_stack([columns[name] for name in heading])]
+    pd.DataFrame(sheet).to_excel(tmp_path / "line.xlsx", header=False, index=False)
+    file = DataFile.of(tmp_path / "line.xlsx")
+    assert dimensions(file) == 1
+    step = 1e-3 * (PLACE[1] - PLACE[0])
+    scan = read_scan(file, Units(spacing=None if len(heading) == 2 else step))
+    np.testing.assert_allclose(scan.position, 1e-3 * PLACE, atol=1e-12)
+    np.testing.assert_allclose(scan.height, 1e-6 * HEIGHT, atol=1e-15)
+
+
 def test_levels_of_a_grating_are_heights(tmp_path):
     path = tmp_path / "grating.txt"
     levels = np.tile([0.0] * 6 + [2.5] + [5.0] * 3, 20)
@@ -217,8 +234,8 @@ def test_levels_of_a_grating_are_heights(tmp_path):
     [
         ("x, z", Units("um"), "unit of its positions: give `x_unit`"),
         ("x, z", Units("", "mm"), "unit of its heights: give `unit`"),
-        ("names", Units("nm"), "the file says um, got the unit 'nm'"),
-        ("names", Units("", "um"), "the file says mm, got the unit 'um'"),
+        ("names", Units("nm"), "the file states um, got the unit 'nm'"),
+        ("names", Units("", "um"), "the file states mm, got the unit 'um'"),
     ],
 )
 def test_a_scan_that_leaves_doubt_is_refused(layout, units, message, tmp_path):
@@ -228,6 +245,9 @@ def test_a_scan_that_leaves_doubt_is_refused(layout, units, message, tmp_path):
         read_scan(DataFile.of(path), units)
     path.write_text(joined(np.c_[PLACE, PLACE**2 + 0.1 * PLACE]))
     with pytest.raises(DataError, match="one column of positions and one of heights, got 2 columns: name them"):
+        read_scan(DataFile.of(path), Units("um", "mm"))
+    path.write_text(joined(np.c_[np.arange(200), 2 + np.arange(200), HEIGHT]))
+    with pytest.raises(DataError, match="one column of positions and one of heights, got 3 columns: name them"):
         read_scan(DataFile.of(path), Units("um", "mm"))
 
 

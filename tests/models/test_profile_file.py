@@ -45,21 +45,6 @@ def test_a_line_without_units_is_no_road_of_20_metres(tmp_path):
         line_of(ProfileFile.model_validate(str(tmp_path / "line.csv")))
 
 
-def test_columns_go_by_their_names(tmp_path):
-    rows = "\n".join(f"{z:.17g},{i}" for i, z in enumerate(HEIGHT))
-    (tmp_path / "line.csv").write_text(f"height [um],position [mm]\n{rows}\n")
-    line = line_of(ProfileFile.model_validate(str(tmp_path / "line.csv")))
-    assert line.length == pytest.approx(16e-3)
-    assert line.height.max() == pytest.approx(1e-6)
-
-
-def test_a_changed_file_is_refused(tmp_path):
-    profile = write(tmp_path / "line.csv")
-    (tmp_path / "line.csv").write_text("0 0\n")
-    with pytest.raises(DataError, match="changed since the campaign was read"):
-        line_of(profile)
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [

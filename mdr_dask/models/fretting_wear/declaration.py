@@ -11,10 +11,11 @@ from pydantic import Field, field_validator, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
+from mdr_dask.headings import Column
 from mdr_dask.models.base import Alternatives, Coordinate, Model, Number, Output, Parameters, deferred, quantity
 from mdr_dask.models.data_file import NamedFile
 from mdr_dask.models.parts.indenter import Other
-from mdr_dask.tables import Column, read_table
+from mdr_dask.tables import read_table
 
 
 class Parabola(Parameters):

@@ -10,10 +10,11 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
+from mdr_dask.headings import Column
 from mdr_dask.models.base import Alternatives, Parameters, quantity
 from mdr_dask.models.data_file import DataFile, NamedFile
 from mdr_dask.physics.lubrication.oil import Oil, density_at, kinematic_viscosity, walther_constants, walther_fit
-from mdr_dask.tables import Column, read_sheet, read_table
+from mdr_dask.tables import read_sheet, read_table
 from mdr_dask.units import conversion, shown, shown_apart
 
 _TWO = ("temperature_1", "viscosity_1", "temperature_2", "viscosity_2")
@@ -127,10 +128,10 @@ def _fitted(file: DataFile, density: float, density_temperature: float) -> _Fit:
     """
     text = file.read_text()
     is_dynamic = any(_is_dynamic(unit) for unit in read_sheet(text, file.name).units)
-    viscous = Column("dynamic viscosity", "Pa s", ("eta", "η", "mu", "viscosity"), above=0)
+    viscous = Column("dynamic viscosity", "Pa s", above=0)
     if not is_dynamic:
-        viscous = Column("kinematic viscosity", "m^2/s", ("nu", "ν", "viscosity"), above=0)
-    table = read_table(text, file.name, (Column("temperature", "K", ("T", "temp"), above=0), viscous))
+        viscous = Column("kinematic viscosity", "m^2/s", above=0)
+    table = read_table(text, file.name, (Column("temperature", "K", above=0), viscous))
     order = np.argsort(table["temperature"])
     temperature, viscosity = table["temperature"][order], table[viscous.name][order]
     if is_dynamic:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
+from mdr_dask.headings import Column, match
 from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts import positions
-from mdr_dask.tables import Column, match, numbers, read_sheet, read_table
+from mdr_dask.tables import numbers, read_sheet, read_table
 from mdr_dask.units import shown, to_si
 
 if TYPE_CHECKING:
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 TEXT = (".csv", ".txt", ".dat", ".xyz", ".asc", ".tsv", ".grd", ".prn", ".xlsx")
 SAME = 0.01
 """Relative difference up to which two lengths count as equal, because numbers in files are rounded."""
+LEAST_LINES = 3
+"""Smallest number of rows and columns of a table of heights that counts as a map."""
 MOST_COLUMNS = 6
 """Largest number of columns in a file that holds a line scan or a table of x, y, z; a map has more columns."""
 
@@ -132,10 +135,8 @@ def read_scan(file: DataFile, units: Units) -> Scan:
     remarks = (*gaps, *codes)
     missing = ~np.isfinite(z)
     if missing.any():
-        try:
+        with file.in_errors():
             require_few_missing(missing)
-        except DataError as problem:
-            raise DataError(f"{file.name}: {problem}") from None
         order = np.argsort(x)
         z[missing] = np.interp(x[missing], x[order][~missing[order]], z[order][~missing[order]])
         remarks = (*remarks, f"missing points interpolated: {np.count_nonzero(missing)}")
@@ -176,15 +177,15 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
                     f"{shown(length, 'm')} in {source}: leave out `{option}` or correct the file"
                 )
         spacings.append(known[0][1] if known else None)
-    unsaid = []
+    missing = []
     if any(grid.steps) and metre is None:
-        unsaid.append("the unit of its positions: give `x_unit`, such as um")
+        missing.append("the unit of its positions: give `x_unit`, such as um")
     elif spacings[0] is None:
-        unsaid.append("its spacing: give `spacing`, such as 1 um")
+        missing.append("its spacing: give `spacing`, such as 1 um")
     if not height:
-        unsaid.append("the unit of its heights: give `unit`, such as um")
-    if unsaid:
-        raise DataError("\n".join(f"{file.name}: does not state {what}" for what in unsaid))
+        missing.append("the unit of its heights: give `unit`, such as um")
+    if missing:
+        raise DataError("\n".join(f"{file.name}: does not state {what}" for what in missing))
     assert spacings[0] is not None
     return _metre(file, height, "unit"), (spacings[0], spacings[1] or spacings[0])
 
@@ -308,6 +309,9 @@ def _grid_of_text(file: DataFile) -> _Grid:
     stated = _stated(file, lines[:first], lines[first])
     if cells.shape[1] <= MOST_COLUMNS < len(cells):
         return _scattered(file, lines, first, cells, stated)
+    if min(cells.shape) < LEAST_LINES:
+        rows, columns = cells.shape
+        raise DataError(f"{file.name}: expected a map, got {rows} rows of {columns} heights: write a scan as columns")
     before = sum(bool(line.strip()) and line.lstrip()[0] not in "#%" for line in lines[:first])
     remarks = [f"lines before the heights: {before}"] if before else []
     grid = _without_positions(file, cells.to_numpy(dtype="float64"), stated, tuple(remarks))
@@ -318,10 +322,8 @@ def _grid_of_text(file: DataFile) -> _Grid:
 
 
 def _without_positions(file: DataFile, rows: FloatArray, stated: Units, remarks: tuple[str, ...]) -> _Grid:
-    try:
+    with file.in_errors():
         heights, steps, found = positions.without_positions(rows)
-    except DataError as problem:
-        raise DataError(f"{file.name}: {problem}") from None
     return _Grid(heights, steps, stated, (*remarks, *found))
 
 
@@ -469,8 +471,8 @@ def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFra
         sheet = None
     if sheet is not None and sheet.names:
         found: dict[str, tuple[int, str]] = {}
-        for place, (cell, unit) in enumerate(zip(sheet.names, sheet.units, strict=True)):
-            column, written = match(cell.text, unit, COORDINATES)
+        for place, (name, unit) in enumerate(zip(sheet.names, sheet.units, strict=True)):
+            column, written = match(name, unit, COORDINATES)
             if column is not None:
                 found.setdefault(column.name, (place, written))
         return tuple(found[name] for name in "xyz") if len(found) == len(COORDINATES) else ()
@@ -495,26 +497,24 @@ def _scattered(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame
     try:
         rows, steps = positions.scattered(x, y, z)
     except DataError as problem:
-        raise DataError(f"{file.name}: {problem}") from None
+        raise DataError(f"{file.name}: {problem}: without names, the order of the columns must be x, y, z") from None
     return _Grid(rows, steps, stated._replace(position=units[0] or stated.position, height=units[2] or stated.height))
-
-
-def _spaced(file: DataFile, height: FloatArray, units: Units) -> FloatArray:
-    """Return the positions, m, of equidistant heights with the spacing stated by the user."""
-    import numpy as np
-
-    if units.spacing is None:
-        raise DataError(
-            f"{file.name}: expected a column x: name the column, or give `spacing`, the distance between heights"
-        )
-    return np.asarray(units.spacing * np.arange(height.size), dtype=np.float64)
 
 
 def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]:
     """Return positions and heights, m, of a table.
 
-    The columns are found by their names, or, without names, by their numbers.
+    The columns are found by their names, or, without names, by their numbers. Heights alone need a spacing.
     """
+    import numpy as np
+
+    def spaced(height: FloatArray) -> tuple[FloatArray, FloatArray]:
+        if units.spacing is None:
+            raise DataError(
+                f"{file.name}: expected a column x: name the column, or give `spacing`, the distance between heights"
+            )
+        return np.asarray(units.spacing * np.arange(height.size), dtype=np.float64), height
+
     text = file.read_text()
     sheet = read_sheet(text, file.name)
     if sheet.names:
@@ -525,30 +525,21 @@ def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]
         table = read_table(text, file.name, columns, allow_missing=True)
         if "x" in table and units.spacing is not None:
             raise DataError(f"{file.name}: the file has positions: leave out `spacing`")
-        return table["x"] if "x" in table else _spaced(file, table["z"], units), table["z"]
-    table_of = numbers(sheet)
-    if table_of.shape[1] == 1:
-        if not units.height:
-            raise DataError(f"{file.name}: does not state the unit of its heights: give `unit`, such as um")
-        height = table_of[:, 0] * _metre(file, units.height, "unit")
-        return _spaced(file, height, units), height
-    rises = [k for k, one in enumerate(positions.rising(table_of.T)) if one]
-    counted = [k for k in rises if positions.is_numbered(table_of[:, k])]
-    along = [k for k in rises if k not in counted] or rises or [0]
-    across = [k for k in range(table_of.shape[1]) if k not in rises and k not in along]
-    if len(along) != 1 or len(across) != 1:
+        return (table["x"], table["z"]) if "x" in table else spaced(table["z"])
+    rows = numbers(sheet)
+    count = rows.shape[1]
+    rises = [k for k, one in enumerate(positions.rising(rows.T)) if one]
+    numbered = [k for k in rises if positions.is_numbered(rows[:, k])]
+    along = [] if count == 1 else [k for k in rises if k not in numbered] or rises or [0]
+    across = [k for k in range(count) if count == 1 or (k not in rises and k not in along)]
+    if len(across) != 1 or len(along) > 1:
         raise DataError(
-            f"{file.name}: expected one column of positions and one of heights, got {table_of.shape[1]} columns: name "
-            "them in the first line, such as x [mm], z [um]"
+            f"{file.name}: expected one column of positions and one of heights, got {count} columns: name them in the "
+            "first line, such as x [mm], z [um]"
         )
-    unsaid = [
-        f"{file.name}: does not state the unit of its {what}: give `{option}`, such as um"
-        for what, option, unit in (("heights", "unit", units.height), ("positions", "x_unit", units.position))
-        if not unit
-    ]
-    if unsaid:
-        raise DataError("\n".join(unsaid))
-    return (
-        table_of[:, along[0]] * _metre(file, units.position, "x_unit"),
-        table_of[:, across[0]] * _metre(file, units.height, "unit"),
-    )
+    wanted = [("heights", "unit", units.height), ("positions", "x_unit", units.position)][: 1 + len(along)]
+    missing = [f"does not state the unit of its {what}: give `{option}`" for what, option, unit in wanted if not unit]
+    if missing:
+        raise DataError("\n".join(f"{file.name}: {sentence}, such as um" for sentence in missing))
+    height = rows[:, across[0]] * _metre(file, units.height, "unit")
+    return (rows[:, along[0]] * _metre(file, units.position, "x_unit"), height) if along else spaced(height)

@@ -10,9 +10,10 @@ import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.errors import DataError
+from mdr_dask.headings import Column
 from mdr_dask.models.base import Parameters, quantity
 from mdr_dask.models.data_file import NamedFile
-from mdr_dask.tables import Column, read_table
+from mdr_dask.tables import read_table
 
 if TYPE_CHECKING:
     from mdr_dask.physics.transients.elements.loading_history import Piece
@@ -148,9 +149,9 @@ def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> 
 @lru_cache(maxsize=16)
 def _table_rows(file: NamedFile, force: float) -> list[tuple[float, float, float]]:
     columns = (
-        Column("time", "s", ("t",), least=0),
-        Column("velocity", "m/s", ("v", "speed")),
-        Column("force", "N", ("normal force", "load", "F"), needed=False, above=0),
+        Column("time", "s", least=0),
+        Column("velocity", "m/s"),
+        Column("force", "N", ("normal force",), needed=False, above=0),
     )
     table = read_table(file.read_text(), file.name, columns)
     time, velocity = table["time"], table["velocity"]

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 
-from mdr_dask.errors import DataError
 from mdr_dask.models.base import Alternatives, Parameters, quantity
+from mdr_dask.models.data_file import check_in_campaign
 from mdr_dask.models.parts.moduli_table import SAME_TEMPERATURE, Moduli, ModulusTable, one_curve, vertical_factor
 from mdr_dask.models.parts.temperature import Arrhenius, Law, ShiftFactors, Wlf
 from mdr_dask.units import shown
@@ -117,11 +117,7 @@ class Material(Parameters):
         superposing = self.dma_table is not None and self.dma_table.table_temperature is None
         if (self.temperature is not None and not laws) or (self.temperature is None and laws and not superposing):
             raise ValueError(f"expected a temperature together with one of {', '.join(LAWS)}, got only one of both")
-        if info.context is not None:
-            try:
-                solid_of(self)
-            except DataError as problem:
-                raise ValueError(str(problem)) from None
+        check_in_campaign(info, lambda: solid_of(self))
         return self
 
     def notes(self) -> tuple[str, ...]:

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, ValidationInfo, model_validator
 
-from mdr_dask.errors import DataError
 from mdr_dask.models.base import quantity
-from mdr_dask.models.data_file import NamedFile
+from mdr_dask.models.data_file import NamedFile, check_in_campaign
 from mdr_dask.models.parts.height_file import Scan, Units, read_scan
 from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.models.parts.surface_files import doubts_of_line
@@ -46,11 +45,7 @@ class ProfileFile(NamedByFile):
     @model_validator(mode="after")
     def _holds_a_line(self, info: ValidationInfo) -> ProfileFile:
         """Raise an error for an invalid file when the campaign is read, before any case is computed."""
-        if info.context is not None:
-            try:
-                line_of(self)
-            except DataError as problem:
-                raise ValueError(str(problem)) from None
+        check_in_campaign(info, lambda: line_of(self))
         return self
 
     def notes(self) -> tuple[str, ...]:

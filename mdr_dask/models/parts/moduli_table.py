@@ -13,17 +13,18 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.errors import DataError
+from mdr_dask.headings import Column, is_called, plain
 from mdr_dask.models.base import quantity
-from mdr_dask.models.data_file import NamedFile
+from mdr_dask.models.data_file import NamedFile, check_in_campaign
 from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.models.parts.temperature import Law
-from mdr_dask.tables import Column, Read, TableError, is_called, plain, read_sheet, read_table
+from mdr_dask.tables import Read, TableError, read_sheet, read_table
 from mdr_dask.units import shown
 
 #: Names of columns that hold moduli in tension; the names are first simplified by `plain`.
 _IN_TENSION = re.compile(r"(?<!\w)e(?:'|1|[ _]?stor|$)|young|tensile|tension")
 SAME_TEMPERATURE = 1.0  # largest difference, in K, between temperatures that count as equal
-#: Gap between the moduli of neighbouring curves, in decades; a wider gap cannot be due to the scatter of an instrument.
+#: Largest gap between the moduli of neighbouring curves, in decades, that the scatter of an instrument can explain.
 APART = 0.02
 
 
@@ -61,11 +62,7 @@ class ModulusTable(NamedByFile):
     @model_validator(mode="after")
     def _holds_moduli(self, info: ValidationInfo) -> ModulusTable:
         """Raise an error for an invalid table when the campaign is read, before any case is computed."""
-        if info.context is not None:
-            try:
-                _measured(self)
-            except DataError as problem:
-                raise ValueError(str(problem)) from None
+        check_in_campaign(info, lambda: _measured(self))
         return self
 
     def notes(self) -> tuple[str, ...]:
@@ -125,9 +122,21 @@ def _as_measured(chosen: ModulusTable, law: Law | None) -> Moduli:
         near = _near(temperature, chosen.table_temperature)
         return Moduli(omega[near], storage[near], loss[near], chosen.table_temperature, ends)
     member, levels = _levels(temperature)
-    if chosen.reference is None:
-        return _by_law(chosen, law, (omega, storage, loss), member, levels, ends)
-    return _by_curves(chosen, chosen.reference, law, (omega, storage, loss), member, levels, ends)
+    if chosen.reference is not None:
+        reference = chosen.reference
+        across, along, text = _superposed(chosen)
+        shift, rise = 10**across, 10**along
+        text = f"both moduli, {_vertical(chosen)}{text}{_compared(levels, across, law, reference)}"
+    elif law is not None:
+        reference, text = law.reference, f"the shift factors given, moduli {_vertical(chosen)}"
+        shift, rise = law.factor(levels), vertical_factor(chosen, levels, reference)
+    else:
+        raise DataError(
+            f"{chosen.file.name}: has several temperatures: choose one by table_temperature, or superpose them by "
+            "giving a reference temperature or a law (wlf, arrhenius or shift_factors)"
+        )
+    text = f"superposed at {shown(reference, 'K')} by {text}"
+    return Moduli(omega * shift[member], storage * rise[member], loss * rise[member], reference, ends, text)
 
 
 def _near(temperature: FloatArray, wanted: float) -> FloatArray:
@@ -140,25 +149,6 @@ def _levels(temperature: FloatArray) -> tuple[IntArray, FloatArray]:
     member = np.empty(order.size, dtype=np.intp)
     member[order] = np.append(0, np.cumsum(np.diff(temperature[order]) > SAME_TEMPERATURE))
     return member, np.array([temperature[member == number].mean() for number in range(int(member.max()) + 1)])
-
-
-Rows = tuple[FloatArray, FloatArray, FloatArray]
-
-
-def _by_law(
-    chosen: ModulusTable, law: Law | None, rows: Rows, member: IntArray, levels: FloatArray, ends: tuple[float, float]
-) -> Moduli:
-    """Return the moduli of all temperatures, shifted in frequency by the factors of a law."""
-    if law is None:
-        raise DataError(
-            f"{chosen.file.name}: has several temperatures: choose one by table_temperature, or superpose them by "
-            "giving a reference temperature or a law (wlf, arrhenius or shift_factors)"
-        )
-    omega, storage, loss = rows
-    reference = law.reference
-    rise = vertical_factor(chosen, levels, reference)[member]
-    text = f"superposed at {shown(reference, 'K')} by the given shift factors, moduli {_vertical(chosen)}"
-    return Moduli(omega * law.factor(levels)[member], storage * rise, loss * rise, reference, ends, text)
 
 
 def vertical_factor(chosen: ModulusTable, temperature: FloatArray, reference: float) -> FloatArray:
@@ -180,41 +170,24 @@ def _vertical(chosen: ModulusTable) -> str:
     return f"multiplied by b_T = rho0 T0 / (rho T), with an expansion of {EXPANSION:g} 1/K"
 
 
-def _by_curves(
-    chosen: ModulusTable,
-    reference: float,
-    law: Law | None,
-    rows: Rows,
-    member: IntArray,
-    levels: FloatArray,
-    ends: tuple[float, float],
-) -> Moduli:
-    """Return the moduli of all temperatures, shifted to the reference temperature so that the curves overlap."""
-    _require_overlap(rows[1], member, levels)
-    across, along, text = _superposed(
-        reference, chosen.vertical, tuple(levels), member.tobytes(), *(each.tobytes() for each in rows)
-    )
-    omega, storage, loss = rows
-    rise = 10 ** np.array(along)[member]
-    text = (
-        f"superposed at {shown(reference, 'K')} by both moduli, {_vertical(chosen)}{text}"
-        f"{_compared(levels, across, law, reference)}"
-    )
-    return Moduli(omega * 10 ** np.array(across)[member], storage * rise, loss * rise, reference, ends, text)
-
-
 @lru_cache(maxsize=16)
-def _superposed(
-    reference: float, vertical: Literal["modulus", "none"], levels: tuple[float, ...], member: bytes, *rows: bytes
-) -> tuple[FloatArray, FloatArray, str]:
-    """Return horizontal and vertical shift factors of each temperature, and a text about these factors."""
+def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
+    """Return log10 of horizontal and vertical shift factors of each temperature, and a text about these factors.
+
+    With these factors the curves overlap at the reference temperature.
+    """
     from mdr_dask.physics.superposition.master_curve import rereference, superpose
 
-    points, groups = np.log10([np.frombuffer(row) for row in rows]), np.frombuffer(member, dtype=np.intp)
-    parts = [groups == number for number in range(len(levels))]
-    free = superpose(levels, [(points[0, part], points[1:, part]) for part in parts], vertical)
-    found = rereference(free, reference)
-    low, high = found.interval()[:, : len(levels)]
+    omega, storage, loss, temperature = _measured(chosen)
+    assert temperature is not None
+    assert chosen.reference is not None
+    member, levels = _levels(temperature)
+    _require_overlap(storage, member, levels)
+    x, y = np.log10(omega), np.log10([storage, loss])
+    parts = [member == number for number in range(levels.size)]
+    free = superpose(levels, [(x[part], y[:, part]) for part in parts], chosen.vertical)
+    found = rereference(free, chosen.reference)
+    low, high = found.interval()[:, : levels.size]
     ends = ", ".join(
         f"{found.horizontal[k]:.2f} ({low[k]:.2f}, {high[k]:.2f}) at {shown(levels[k], 'K')}" for k in (0, -1)
     )
@@ -259,12 +232,24 @@ def _require_overlap(storage: FloatArray, member: IntArray, levels: FloatArray) 
 
 def _table(chosen: ModulusTable) -> Read:
     """Return the columns of the file."""
-    name = chosen.file.name
-    content = chosen.file.read_text()
+    name, content = chosen.file.name, chosen.file.read_text()
+    columns = (
+        Column("frequency", "rad/s", above=0, given_unit=chosen.frequency_unit),
+        Column(
+            "storage modulus",
+            "Pa",
+            ("tensile storage modulus", "Young's modulus"),
+            above=0,
+            given_unit=chosen.modulus_unit,
+        ),
+        Column("loss modulus", "Pa", ("tensile loss modulus",), needed=False, above=0, given_unit=chosen.modulus_unit),
+        Column("temperature", "K", needed=False, above=0),
+        Column("tan delta", "1", needed=False, above=0),
+    )
     try:
-        return read_table(content, name, _columns(chosen))
+        return read_table(content, name, columns)
     except TableError as problem:
-        headings = [cell.text for cell in read_sheet(content, name).names]
+        headings = read_sheet(content, name).names
         has = {name: any(is_called(each, name) for each in headings) for name in ("time", "frequency")}
         if has["time"] and not has["frequency"]:
             raise DataError(
@@ -297,20 +282,3 @@ def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray,
             "column G' if it is a modulus of shear"
         )
     return omega, storage, loss, temperature
-
-
-def _columns(chosen: ModulusTable) -> tuple[Column, ...]:
-    """Return the columns of a table of a dynamic mechanical analysis."""
-    return (
-        Column("frequency", "rad/s", above=0, given_unit=chosen.frequency_unit),
-        Column(
-            "storage modulus",
-            "Pa",
-            ("tensile storage modulus", "Young's modulus"),
-            above=0,
-            given_unit=chosen.modulus_unit,
-        ),
-        Column("loss modulus", "Pa", ("tensile loss modulus",), needed=False, above=0, given_unit=chosen.modulus_unit),
-        Column("temperature", "K", needed=False, above=0),
-        Column("tan delta", "1", needed=False, above=0),
-    )

@@ -10,7 +10,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, distinguishable
 from mdr_dask.models.base import Alternatives, Parameters, quantity
-from mdr_dask.models.data_file import DataFile
+from mdr_dask.models.data_file import DataFile, check_in_campaign
 from mdr_dask.models.parts.measured_line import ProfileFile
 from mdr_dask.models.parts.surface_files import Files, Found, MapFiles, ScanFiles, SpectrumTables, anisotropic
 from mdr_dask.units import shown
@@ -59,10 +59,7 @@ class Surface(Parameters):
                 "extrapolate needs longest_wavelength or shortest_wavelength, up to which the spectrum is continued"
             )
         if info.context is not None and self.profile is None:
-            try:
-                spectra_of(self)
-            except DataError as problem:
-                raise ValueError(str(problem)) from None
+            check_in_campaign(info, lambda: spectra_of(self))
             if "describe" not in info.context and (reasons := self.without_spectrum()):
                 raise ValueError("\n".join(reasons))
         return self

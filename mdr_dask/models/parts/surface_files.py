@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 from pydantic import Field
 
 from mdr_dask.errors import DataError
+from mdr_dask.headings import Column
 from mdr_dask.models.base import quantity
 from mdr_dask.models.data_file import DataFile, NamedFile
 from mdr_dask.models.parts.height_file import Scan, Units, read_map, read_scan
 from mdr_dask.models.parts.named_by_file import NamedByFile
-from mdr_dask.tables import Column, read_table
+from mdr_dask.tables import matched, read_sheet, read_table
 
 if TYPE_CHECKING:
     from mdr_dask.arrays import FloatArray
@@ -26,6 +27,16 @@ MOST_ANISOTROPY = 0.25  # a surface up to this anisotropy counts as isotropic; i
 STRIPES = 10.0  # power of waves along an axis, relative to an isotropic surface, above which a map has stripes
 FORM = 0.9  # if a parabola explains more than this fraction of the mean square, the heights contain a form
 MOST_OUTLIERS = 0.05  # largest fraction of outliers; if there are more, they count as parts of the surface
+
+#: Columns of a table of a spectrum.
+COLUMNS = (
+    Column("wavenumber", "rad/m", needed=False, above=0),
+    Column("wavelength", "m", needed=False, above=0),
+    Column("C2D", "m^4", ("C 2D",), needed=False, above=0),
+    Column("C1D", "m^3", ("C 1D",), needed=False, above=0),
+    Column("C cut", "m^3", ("cut", "scan spectrum"), needed=False, above=0),
+    Column("relative error", "1", needed=False, least=0),
+)
 
 Window = Literal["hann", "none"]
 
@@ -120,6 +131,18 @@ class MapFiles(Files):
         return tuple(mapped(self, file) for file in self.files)
 
 
+def is_spectrum(text: str) -> bool:
+    """Return whether a text begins with names of columns of a spectrum: two names, or one of several letters."""
+    try:
+        sheet = read_sheet("\n".join(text.splitlines()[:20]), "")
+    except DataError:
+        return False
+    if not sheet.names:
+        return False
+    found = [name for name, (column, *_) in zip(sheet.names, matched(sheet, COLUMNS), strict=True) if column]
+    return len(found) > 1 or any(len(name) > 1 for name in found)
+
+
 @lru_cache(maxsize=64)
 def _tabulated(file: DataFile) -> Found:
     """Return the spectrum of a table."""
@@ -128,15 +151,7 @@ def _tabulated(file: DataFile) -> Found:
     from mdr_dask.physics.surfaces.scans import averaged, of_cut
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
-    columns = (
-        Column("wavenumber", "rad/m", ("q", "k", "wave number", "wavevector"), needed=False, above=0),
-        Column("wavelength", "m", ("lambda", "λ"), needed=False, above=0),
-        Column("C2D", "m^4", ("C 2D", "C_iso", "areal spectrum"), needed=False, above=0),
-        Column("C1D", "m^3", ("C 1D", "line spectrum"), needed=False, above=0),
-        Column("C cut", "m^3", ("cut", "C_cut", "scan spectrum"), needed=False, above=0),
-        Column("relative error", "1", needed=False, least=0),
-    )
-    table = read_table(file.read_text(), file.name, columns, allow_missing=True)
+    table = read_table(file.read_text(), file.name, COLUMNS, allow_missing=True)
     places = [name for name in ("wavenumber", "wavelength") if name in table]
     kinds = [name for name in ("C2D", "C1D", "C cut") if name in table]
     problems = [
@@ -149,13 +164,11 @@ def _tabulated(file: DataFile) -> Found:
     q = table["wavenumber"] if "wavenumber" in table else 2 * np.pi / table["wavelength"]
     order = np.argsort(q)
     q, density = q[order], table[kinds[0]][order]
-    try:
+    with file.in_errors():
         if kinds == ["C cut"]:
             spectrum = of_cut(averaged(q, density, CUT_ERROR**-2))
         else:
             spectrum = Spectrum(q, density / (np.pi * q) if kinds == ["C1D"] else density)
-    except DataError as problem:
-        raise DataError(f"{file.name}: {problem}") from None
     return Found(spectrum, remarks=(table.remark,) if table.remark else ())
 
 
@@ -170,10 +183,8 @@ def line_of_scan(scans: ScanFiles, file: DataFile) -> MeasuredLine:
     from mdr_dask.physics.surfaces.measured import measured_line
 
     scan = _scan(scans, file)
-    try:
+    with file.in_errors():
         return measured_line(scan.position, scan.height, scans.detrend)
-    except DataError as problem:
-        raise DataError(f"{file.name}: {problem}") from None
 
 
 def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
@@ -211,12 +222,10 @@ def scanned(scans: ScanFiles, file: DataFile) -> Found:
     """Return the spectrum of the surface from one scan."""
     from mdr_dask.physics.surfaces.scans import cut_of_lines
 
-    line = line_of_scan(scans, file)  # outside `try`, because its errors already contain the file name
-    try:
+    line = line_of_scan(scans, file)
+    with file.in_errors():
         found = of_surface_cut(cut_of_lines([line], scans.window == "hann"))
-        return found._replace(remarks=(*_scan(scans, file).remarks, *doubts_of_line(line, scans.detrend)))
-    except DataError as problem:
-        raise DataError(f"{file.name}: {problem}") from None
+    return found._replace(remarks=(*_scan(scans, file).remarks, *doubts_of_line(line, scans.detrend)))
 
 
 def of_surface_cut(cut: Cut) -> Found:
@@ -297,7 +306,7 @@ def levelled_map(maps: MapFiles, file: DataFile) -> LevelledMap:
     from mdr_dask.physics.surfaces.maps import filled, outliers, require_points, spectrum_of_map, without_trend
 
     surface, remarks = read_map(file, Units(maps.unit, maps.x_unit, maps.spacing, maps.spacing_y))
-    try:
+    with file.in_errors():
         require_points(surface)
         missing = int(np.count_nonzero(~np.isfinite(surface.height)))
         if missing:
@@ -315,8 +324,6 @@ def levelled_map(maps: MapFiles, file: DataFile) -> LevelledMap:
         surface = without_trend(surface, maps.detrend)
         height = surface.height - np.nanmean(surface.height)
         spectrum = spectrum_of_map(filled(surface), maps.window == "hann")
-    except DataError as problem:
-        raise DataError(f"{file.name}: {problem}") from None
     if maps.detrend != "parabola":
         remarks = (*remarks, *_form(without_trend(surface, "plane").height, without_trend(surface, "parabola").height))
     remarks = (*remarks, *_steepness(float(np.sqrt(sum(spectrum.slopes[:2])))))

@@ -10,9 +10,10 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
+from mdr_dask.headings import Column
 from mdr_dask.models.base import Parameters, quantity
-from mdr_dask.models.data_file import NamedFile
-from mdr_dask.tables import Column, read_table
+from mdr_dask.models.data_file import NamedFile, check_in_campaign
+from mdr_dask.tables import read_table
 from mdr_dask.units import shown_apart
 
 
@@ -67,11 +68,7 @@ class ShiftFactors(Parameters):
     @model_validator(mode="after")
     def _holds_factors(self, info: ValidationInfo) -> ShiftFactors:
         """Raise an error for an invalid table when the campaign is read, before any case is computed."""
-        if info.context is not None:
-            try:
-                _ = self.reference
-            except DataError as problem:
-                raise ValueError(str(problem)) from None
+        check_in_campaign(info, lambda: self.reference)
         return self
 
     @property
@@ -100,7 +97,7 @@ def _shifts(factors: ShiftFactors) -> tuple[FloatArray, FloatArray]:
     """Return the ascending temperatures of a table and the descending values of log10 a_T."""
     name = factors.file.name
     columns = (
-        Column("temperature", "K", ("T", "temp"), above=0),
+        Column("temperature", "K", above=0),
         Column("a_T", "1", ("aT", "a(T)", "shift factor"), needed=False, above=0),
         Column("log10 a_T", "1", ("log aT", "log a_T", "log10 aT", "log10(aT)", "log(aT)"), needed=False),
     )
