@@ -34,6 +34,8 @@ def test_orders_of_the_uniform_grid():
     assert errors[-1][2] < 1e-3
     inside = np.abs(grid.pressure(x**2, 1.003) - 2 / np.pi * np.sqrt(np.maximum(1.003 - x**2, 0)))
     assert np.max(inside[x > 0.9]) < 1e-4  # an edge within a cell: 0.01 if it stood at the next node
+    narrow = uniform_grid(4, 4.0).pressure(np.array([0.0, 1.0, 2.0, 3.0, 4.0]), 0.5)  # the edge is at x = 0.5
+    np.testing.assert_allclose(narrow[0], 2 / np.pi)
 
 
 def test_literal_simulation_agrees_with_the_evolution_and_converges():
