@@ -20,7 +20,7 @@ from mdr_dask.physics.superposition.master_curve import superpose
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.surfaces.waves import waves_of
 
-SCHEMES = ("hermite", "piecewise_linear", "backward_euler")
+SCHEMES = ("hermite", "backward_euler")
 NODES = (2, 3, 16, 17, 255, 1024)
 LINES = ("flat", "spike", "steps", "clipped", "noise", "waves")
 

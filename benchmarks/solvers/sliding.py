@@ -140,7 +140,6 @@ SOLVERS = (
         {
             "accuracy": to(0.1, 0.01, 0.001, 1e-4),
             "time steps of a cell (thesis)": on_grids("backward_euler", 1, 4, 16),
-            "straight cells": on_grids("piecewise_linear", 4, 16),
         },
     ),
     Solver(

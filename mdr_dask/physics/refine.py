@@ -4,11 +4,12 @@ Every solver that works on a grid uses this function. If the number of cells dou
 error of a solver of order p decreases by r = 2^p per level. Let c be the relative change of the results between the
 last two levels, and b the change before that. The relative error on the last level is estimated as
 
-    error = safety max( c / (r - 1),  b / (r (r - 1)) ).
+    error = safety max( c / (r - 1),  b / (r (r - 1)) ) + e.
 
 The first term is Richardson's estimate, with the safety factor of the grid convergence index (Roache, J. Fluids Eng.
 116, 405, 1994). The second term is the same estimate with the change c = b / r that is expected after a change b.
 The second term is needed because the results on two grids may agree by chance; it is available from the third level on.
+A solver may give an additional error e that may be equal on both grids (`Solution.unseen`).
 """
 
 from __future__ import annotations
@@ -36,10 +37,14 @@ class Solution(NamedTuple):
         every grid. NaN marks positions where the output does not exist.
     outcome : int8 array, shape (cases,)
         Values of `Outcome`.
+    unseen : float or array, shape (outputs, cases)
+        Relative errors that may be equal on two grids, so that their difference does not contain them. They are added
+        to the estimate.
     """
 
     values: Sequence[FloatArray] | FloatArray
     outcome: NDArray[np.int8]
+    unseen: FloatArray | float = 0.0
 
 
 class Refined(NamedTuple):
@@ -147,7 +152,7 @@ def refine(
             change = np.broadcast_to(change.max(axis=0, initial=0.0), change.shape)
         # `before` is infinite where a previous grid had no solution; the second term is then left out
         earlier = np.where(np.isfinite(before), before, 0.0) / reduction
-        relative = safety / (reduction - 1) * np.maximum(change, earlier)
+        relative = safety / (reduction - 1) * np.maximum(change, earlier) + fine.unseen
         solved = fine.outcome == Outcome.CONVERGED
         better = solved | (outcome[left] != Outcome.CONVERGED)
         kept = left[better]

@@ -22,11 +22,10 @@ class SlidingFriction(SlidingBody):
         "until the accuracy is met",
         default="auto",
     )
-    scheme: Literal["hermite", "piecewise_linear", "backward_euler"] = Field(
+    scheme: Literal["hermite", "backward_euler"] = Field(
         default="hermite",
         description="integration along the line, for a Kelvin body only: exact between grid points that are joined by "
-        "cubic polynomials (hermite) or straight lines (piecewise_linear), or by the time steps of the original papers "
-        "(backward_euler)",
+        "cubic polynomials (hermite), or by the time steps of the original papers (backward_euler)",
     )
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
 
-Scheme = Literal["hermite", "piecewise_linear", "backward_euler"]
+Scheme = Literal["hermite", "backward_euler"]
 
 COLUMNS = ("drag", "depth", "contact_fraction", "contact_slope")
 """Names of the results of a case, in the order of the rows in which arrays of results store them."""
@@ -22,6 +22,10 @@ class Cases(NamedTuple):
 
     deborah: FloatArray
     loads: FloatArray
+
+    def only(self, cases: NDArray[Any]) -> Cases:
+        """Return the selected cases."""
+        return Cases(self.deborah[cases], self.loads[cases])
 
 
 @dataclass(frozen=True)
@@ -58,10 +62,6 @@ class Steady:
         """Return steady states from the rows of an array; results of cases that have not converged become NaN."""
         drag, depth, fraction, slope = np.where(status == Outcome.CONVERGED, columns, np.nan)
         return cls(drag, depth, fraction, slope, status)
-
-    def only(self, cases: NDArray[Any]) -> Steady:
-        """Return the steady states of the selected cases."""
-        return Steady(**{name: column[cases] for name, column in vars(self).items()})
 
 
 def valid(deborah: FloatArray, loads: FloatArray) -> NDArray[np.bool_]:

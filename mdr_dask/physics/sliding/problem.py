@@ -1,7 +1,12 @@
 """Steady sliding in dimensionless quantities: a solid, a line, and cases of speed and load.
 
-A smooth indenter or a smooth plane on a Kelvin solid is solved in closed form, other lines on a Kelvin solid by
-`kelvin_refinement`, and any other solid by `viscoelastic`.
+A smooth indenter or a smooth plane on a Kelvin solid is solved in closed form. All other cases are solved on finer and
+finer grids by :func:`mdr_dask.physics.refine.refine`, which estimates the errors. The solvers are:
+
+* `node_to_node` for a Kelvin solid on a plane, which is fastest;
+* `steady` (sweeps over cubic cells) for a Kelvin solid under an indenter, and for cases that miss the accuracy from
+  node to node;
+* `viscoelastic` (sweeps over straight cells) for any other solid.
 """
 
 from __future__ import annotations
@@ -10,18 +15,29 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.refine import Solution, refine
-from mdr_dask.physics.sliding import full_contact
-from mdr_dask.physics.sliding.cases import Scheme, Steady, valid
-from mdr_dask.physics.sliding.kelvin_refinement import FLOORS, KelvinCases, nodes_of
+from mdr_dask.physics.refine import Refined, Solution, refine
+from mdr_dask.physics.sliding import node_to_node, steady
+from mdr_dask.physics.sliding.cases import Cases, Scheme, Steady, valid
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.shapes import COLUMNS as CLOSED_COLUMNS
 from mdr_dask.physics.surfaces.shapes import PowerLaw, smooth
 
-GENERAL_LEVELS = tuple(2**k for k in range(1, 9))  # numbers of nodes per Nyquist point for a general solid
+FLOORS = (0.0, 1.0, 0.0, 0.0)
+"""Floors of drag, depth, contact fraction and contact slope: an error is relative to the floor if the value is smaller.
+
+The floor of the depth is the unit of height, which is the rms height.
+"""
+NODE_LEVELS = tuple(2**k for k in range(12))  # nodes per Nyquist point; above 2 only where contact begins or ends
+CELL_LEVELS = tuple(2**k for k in range(1, 7))
+GENERAL_LEVELS = tuple(2**k for k in range(1, 9))
+ORDER_OF_CELLS = 2.0  # order of convergence of sweeps over cubic cells if contacts are shorter than a cell
+ORDER_OF_STEPS = 1.0  # order of convergence of backward Euler
+SEARCH = 0.1  # allowed error due to the search for the depth, as a fraction of the accuracy
+REFERENCE = 0.01  # relative accuracy of the solution with which results of time steps are compared
 CLOSED_FORM = 1e-12  # relative error of the closed form of a smooth indenter, due to rounding
 
 
@@ -44,12 +60,12 @@ class Request:
         than the rms height is relative to the rms height.
     oversampling : int or "auto"
         Nodes per Nyquist point; "auto" selects the smallest number that meets the accuracy.
-    scheme : {"hermite", "piecewise_linear", "backward_euler"}
-        Scheme for a Kelvin solid.
+    scheme : {"hermite", "backward_euler"}
+        Scheme for a Kelvin solid: cubic cells, or the time steps of the papers.
     with_errors : bool
         Whether errors are requested on a given grid.
     contact : bool
-        Whether contact fraction and contact slope are requested.
+        Whether contact fraction and contact slope are requested. They need finer grids than the other results.
     """
 
     accuracy: float = 0.01
@@ -75,74 +91,133 @@ def solve(
     loads : array, shape (cases,)
         F_N / (4 G_inf L), in the unit of height.
     request : Request
-        Accuracy or grid.
+        Accuracy or grid. All results of a case have to meet the accuracy, because the drag (or another single result)
+        may agree on two grids by chance.
 
     Returns
     -------
     Steady
+        A case that misses the accuracy on the finest grid keeps its results and errors.
     array, shape (4, cases)
-        Estimated absolute discretisation errors of `Steady.columns`.
+        Estimated absolute discretisation errors of `Steady.columns`. They are infinite if a grid is given without
+        errors.
     """
+    cases = Cases(deborah, loads)
     if terms is not None:
-        return _general(line, terms, deborah, loads, request)
+        return _general(line, terms, cases, request)
     is_smooth = not np.any(line.roughness.coefficients)
     if is_smooth and (line.body is None or isinstance(line.body, PowerLaw)):
-        return _closed_form(line.body, deborah, loads)
-    cases = KelvinCases(line, request.scheme, deborah, loads, request.contact)
-    if request.oversampling == "auto":
-        return cases.to_accuracy(request.accuracy)
+        return _closed_form(line.body, cases)
+    grid = request.oversampling
+    if grid == "auto":
+        return _to_accuracy(line, cases, request)
+    if request.with_errors and request.scheme == "hermite" and grid > 1:
+        return _steady(_swept(line, cases, request, (grid // 2, grid), np.inf))
+    found = _on_grid(line, cases, request, grid, None)
+    errors = np.full((4, loads.size), np.inf)
     if request.with_errors:
-        return cases.with_errors(request.oversampling)
-    return cases.on_grid(request.oversampling), np.full((4, loads.size), np.inf)
+        # time steps converge too slowly for an estimate from two grids
+        exact, errors = solve(line, None, *cases, Request(REFERENCE, contact=request.contact))
+        errors = np.abs(found.columns - exact.columns) + errors
+        errors[np.isnan(errors)] = np.inf
+    return found, errors
 
 
-def _general(
-    line: RoughLine, terms: PronyTerms, deborah: FloatArray, loads: FloatArray, request: Request
-) -> tuple[Steady, FloatArray]:
+def _to_accuracy(line: RoughLine, cases: Cases, request: Request) -> tuple[Steady, FloatArray]:
+    """Solve every case of a Kelvin solid on the coarsest grid that meets the accuracy."""
+    columns, errors = np.full((4, cases.loads.size), np.nan), np.full((4, cases.loads.size), np.inf)
+    status = np.full(cases.loads.size, Outcome.INVALID, np.int8)
+    left = np.flatnonzero(valid(*cases))
+    on_plane = request.scheme == "hermite" and line.body is None
+    if on_plane and left.size and request.accuracy > node_to_node.ARITHMETIC:
+        search = node_to_node.NodeToNode(line, cases.only(left), SEARCH * request.accuracy, request.contact)
+        found = refine(search.solve, left.size, NODE_LEVELS, request.accuracy, node_to_node.ORDER, floors=FLOORS)
+        _write((columns, errors, status), left, found)
+        left = left[~found.met]
+    if left.size:
+        levels = CELL_LEVELS if request.scheme == "hermite" else (1, *CELL_LEVELS)
+        _write((columns, errors, status), left, _swept(line, cases.only(left), request, levels, request.accuracy))
+    return Steady.of(columns, status), errors
+
+
+def _swept(line: RoughLine, cases: Cases, request: Request, levels: tuple[int, ...], accuracy: float) -> Refined:
+    """Solve cases by sweeps over whole lines; a search starts from the depth on the previous grid."""
+    depths = np.full(cases.loads.size, np.nan)
+
+    def solve(level: int, some: IntArray) -> Solution:
+        found = _on_grid(line, cases.only(some), request, level, depths[some])
+        depths[some] = found.depth
+        return Solution(found.columns, found.status)
+
+    # with one node per Nyquist point, cubic cells do not converge at their order
+    order = ORDER_OF_CELLS if request.scheme == "hermite" and levels[0] > 1 else ORDER_OF_STEPS
+    return refine(solve, cases.loads.size, levels, accuracy, order, floors=FLOORS)
+
+
+def _on_grid(line: RoughLine, cases: Cases, request: Request, oversampling: int, depths: FloatArray | None) -> Steady:
+    """Solve cases on a grid without estimated errors; the search starts from the given depths."""
+    nodes = line.points * oversampling
+    if request.scheme == "hermite":
+        return steady.steady_sliding(line.cubic(nodes), *cases, depths)
+    return steady.stepped_sliding(line.straight(nodes), *cases, request.contact)
+
+
+def _write(results: tuple[FloatArray, FloatArray, NDArray[np.int8]], cases: IntArray, found: Refined) -> None:
+    """Replace the results of the given cases by refined results, unless the errors of the old results are smaller."""
+    columns, errors, status = results
+    better = (status[cases] != Outcome.CONVERGED) | (found.errors[0] < errors[0, cases])
+    some = cases[better]
+    columns[:, some] = np.array(found.values)[:, better]
+    errors[:, some], status[some] = found.errors[:, better], found.outcome[better]
+
+
+def _steady(found: Refined) -> tuple[Steady, FloatArray]:
+    return Steady.of(np.array(found.values), found.outcome), found.errors
+
+
+def _general(line: RoughLine, terms: PronyTerms, cases: Cases, request: Request) -> tuple[Steady, FloatArray]:
     """Solve cases of any linear solid."""
     from mdr_dask.physics.sliding import viscoelastic  # imported here, because few studies need its kernels
     from mdr_dask.physics.solids import prony
 
+    deborah, loads = cases
     columns, errors = np.full((4, loads.size), np.nan), np.full((4, loads.size), np.inf)
     status = np.full(loads.size, Outcome.INVALID, np.int8)
-    if line.body is None and request.oversampling == "auto":
-        pairs = tuple(zip(terms.moduli, terms.deborah, strict=True))
-        steady = full_contact.steady_full_contact(line.roughness, pairs, nodes_of(line), deborah, loads)
-        if steady is not None:
-            columns, status = steady.columns, steady.status
-            errors = full_contact.ROUNDING * np.abs(columns)
-    good = np.isfinite(deborah) & (deborah >= 0) & np.isfinite(loads) & (loads > 0)
-    left = np.flatnonzero((status != Outcome.CONVERGED) & good)
-    if not left.size:
-        return Steady.of(columns, status), errors
-    turned = line.from_summit()
-    # number of cells of the coarsest grid; from the second grid on, results are extrapolated from two successive grids
+    left = np.flatnonzero(np.isfinite(deborah) & (deborah >= 0) & np.isfinite(loads) & (loads > 0))
+    searches = [
+        viscoelastic.ViscoelasticCase(prony(1.0, terms.moduli, terms.deborah, deborah[k]), float(loads[k]))
+        for k in left
+    ]
+    line, is_auto = line.from_summit(), request.oversampling == "auto"
+    # number of cells of the coarsest grid; results are extrapolated from it and the next one, so that the first level
+    # for the estimate of errors has twice as many cells
     coarsest = line.points if request.oversampling == "auto" else -(-line.points * request.oversampling // 4)
-    levels = GENERAL_LEVELS if request.oversampling == "auto" else GENERAL_LEVELS[:2]
-    accuracy = request.accuracy if request.oversampling == "auto" else np.inf
-    lines: dict[int, FloatArray] = {}
-    for k in left:
-        solid = prony(1.0, terms.moduli, terms.deborah, deborah[k])
-        case = viscoelastic.ViscoelasticCase(solid, float(loads[k]))
 
-        def on_grid(level: int, _: IntArray | None, case: viscoelastic.ViscoelasticCase = case) -> Solution:
-            if level not in lines:
-                lines[level] = turned.straight(coarsest * level).height
-            return case.on(lines[level], line.body is None)
+    def solve(level: int, some: IntArray) -> Solution:
+        height = line.straight(coarsest * level).height
+        found = [searches[k].on(height, line.body is None) for k in some]
+        return Solution(
+            np.array([one.values for one in found]).reshape(-1, 4).T, np.concatenate([one.outcome for one in found])
+        )
 
-        on_grid(1, None)
-        found = refine(on_grid, 1, levels, accuracy, viscoelastic.ORDER, floors=FLOORS)
-        status[k], columns[:, k], errors[:, k] = found.outcome[0], np.concatenate(found.values), found.errors[:, 0]
+    if left.size:
+        solve(1, np.arange(left.size))
+        levels, accuracy = (GENERAL_LEVELS, request.accuracy) if is_auto else (GENERAL_LEVELS[:2], np.inf)
+        _write(
+            (columns, errors, status),
+            left,
+            refine(solve, left.size, levels, accuracy, viscoelastic.ORDER, floors=FLOORS),
+        )
     # the relative error of stresses equals the tolerance of the depth; in very fast or very slow sliding the drag is a
     # small difference of large stresses
-    rounding = viscoelastic.TOLERANCE * loads[left] * columns[3, left]
-    errors[0, left] += np.where(np.isnan(rounding), 0.0, rounding)
+    rounding = viscoelastic.TOLERANCE * loads * columns[3]
+    errors[0] += np.where(np.isnan(rounding), 0.0, rounding)
     return Steady.of(columns, status), errors
 
 
-def _closed_form(body: PowerLaw | None, deborah: FloatArray, loads: FloatArray) -> tuple[Steady, FloatArray]:
+def _closed_form(body: PowerLaw | None, cases: Cases) -> tuple[Steady, FloatArray]:
     """Return steady states on a smooth body: friction is zero on a plane, and has a closed form for an indenter."""
-    good = valid(deborah, loads)
+    (deborah, loads), good = cases, valid(*cases)
     status = np.where(good, np.int8(Outcome.CONVERGED), np.int8(Outcome.INVALID))
     columns = np.full((4, loads.size), np.nan)
     if body is None:
@@ -155,5 +230,5 @@ def _closed_form(body: PowerLaw | None, deborah: FloatArray, loads: FloatArray) 
         columns[:, good] = np.stack([drag, depth, lead + trail, np.sqrt(stretch / (lead + trail))])
         outcome = np.where(np.isnan(depth), Outcome.DEPTH_NOT_FOUND, Outcome.CONVERGED)
         status[good] = np.where(np.maximum(lead, trail) > 0.5, Outcome.OUTSIDE_LINE, outcome)
-    steady = Steady.of(columns, status)
-    return steady, CLOSED_FORM * np.abs(steady.columns)
+    found_states = Steady.of(columns, status)
+    return found_states, CLOSED_FORM * np.abs(found_states.columns)

@@ -1,23 +1,29 @@
-"""Steady sliding of any linear viscoelastic foundation along a rough line or under an indenter."""
+"""Steady sliding of any linear viscoelastic foundation along a rough line or under an indenter.
+
+`viscoelastic_sweep` moves an element once along the line. Here Newton's method finds the depth, and for a periodic line
+the stretches of the Prony terms that repeat after one period.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Solution, refine
-from mdr_dask.physics.sliding.viscoelastic_newton import solve_sliding, static_depth
-from mdr_dask.physics.sliding.viscoelastic_sweep import Travelling
+from mdr_dask.physics.sliding.viscoelastic_sweep import CLOSED, Passage, Travelling, multiply, sweep_line
 from mdr_dask.physics.solids import LinearSolid, recovery
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
 TOLERANCE = 1e-11  # last step of Newton's method relative to the depth; larger than rounding errors
+LINEAR = 1e-10  # relative residual of the linear equations of a step; much smaller than the error after the step
+SWEEPS = 80
 SHORTEST = 1e-9  # cells: Prony terms with a smaller tau v are added to the dashpot, a term with a tenth of this tau v
 BALANCE = 1e-3  # largest relative error of the carried load in a converged solution
-RESOLVED = 0.5  # a result is extrapolated if its relative change between two grids is at most this
 ORDER = 2.0  # order of convergence without extrapolation; extrapolation raises it unless few cells are in contact
 
 DRAG, DEPTH, FRACTION, SLOPE = range(4)
@@ -141,7 +147,7 @@ class ViscoelasticCase:
         result = values.copy()
         if self._before is not None:
             change = values - self._before
-            extrapolated = np.abs(change) <= RESOLVED * np.abs(values)
+            extrapolated = np.abs(change) <= np.abs(values)  # so that no sign changes
             result[extrapolated] += change[extrapolated] / 3
             result[FRACTION] = min(max(result[FRACTION], 0.0), 1.0)
         self._before = values
@@ -185,3 +191,262 @@ def _travelling(solid: LinearSolid, cell: float) -> Travelling:
         deborah = np.append(shortest, deborah)
     modes = recovery(moduli, deborah)
     return Travelling(moduli, deborah, modes.times, modes.stretch.T.copy(), modes.amplitude.T.copy())
+
+
+class Swept(NamedTuple):
+    """Contacts and free recoveries of a sweep, and the solid.
+
+    Parameters
+    ----------
+    decayed : array, shape (pieces, terms)
+        1 - exp(-length / decay length), for every recovery mode in each free recovery, and for every Prony term in each
+        contact.
+    lengths : array, shape (pieces,)
+        Lengths of free recoveries and contacts alternately, as in `Passage`.
+    solid : Travelling
+        The solid.
+    """
+
+    decayed: FloatArray
+    lengths: FloatArray
+    solid: Travelling
+
+
+@jit
+def follow(
+    direction: FloatArray, swept: Swept, periodic: bool, product: FloatArray, workspace: FloatArray
+) -> None:  # pragma: no cover
+    """Write the changes of the integrals of the stretches e_m and of u over the line for given changes of the unknowns.
+
+    Contacts and free recoveries of fixed lengths act linearly on the stretches. The shift of the places where contact
+    begins and ends has an effect of second order only, because u is continuous there. Each free recovery costs three
+    products of a matrix and a vector.
+
+    Parameters
+    ----------
+    direction : array, shape (terms + 1,)
+        Changes of the stretches e_m at the start of the line, and change of the depth.
+    swept : Swept
+        Contacts and free recoveries.
+    periodic : bool
+        Whether the line is periodic; otherwise the recovery behind the line is included.
+    product : array, shape (terms + 1,), output
+        Changes of the integrals of e_m, and of the integral of u.
+    workspace : array, shape (3, terms)
+    """
+    decayed, lengths, solid = swept
+    moduli, deborah, times, stretch_of, amplitude_of = solid
+    terms, pieces = moduli.size, decayed.shape[0]
+    depth, glass = direction[terms], 1.0 + moduli.sum()
+    stretch, modes, integral = workspace[0], workspace[1], workspace[2]
+    product[:] = 0.0
+    stretch[:terms] = direction[:terms]
+    for piece in range(pieces):
+        if piece % 2 == 1:
+            product[terms] += depth * lengths[piece]
+            for m in range(terms):
+                product[m] += deborah[m] * decayed[piece, m] * stretch[m]
+                stretch[m] *= 1 - decayed[piece, m]
+        elif lengths[piece] > 0:
+            _take_stress(stretch, depth, moduli, glass)
+            multiply(amplitude_of, stretch, modes)
+            strain = 0.0
+            for k in range(terms):
+                integral[k] = modes[k] * times[k] * decayed[piece, k]
+                product[terms] += integral[k] if periodic or piece < pieces - 1 else modes[k] * times[k]
+                modes[k] *= 1 - decayed[piece, k]
+                strain += modes[k]
+            multiply(stretch_of, modes, stretch)
+            multiply(stretch_of, integral, modes)
+            for m in range(terms):
+                product[m] += modes[m]
+                stretch[m] += depth - strain
+
+
+@jit
+def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: float) -> None:  # pragma: no cover
+    """Change the strain instantly so that the change of the stress becomes 0, as at the start of free recovery.
+
+    The strains of the dashpots do not change.
+    """
+    if stretch.size == 0:
+        return
+    stress = depth
+    for m in range(stretch.size):
+        stress += moduli[m] * stretch[m]
+    balance = depth - stress / glass
+    for m in range(1, stretch.size):
+        stretch[m] -= stress / glass
+        balance += moduli[m] * stretch[m]
+    stretch[0] = -balance / moduli[0]
+
+
+@jit
+def _decays(lengths: FloatArray, deborah: FloatArray, times: FloatArray) -> FloatArray:  # pragma: no cover
+    """Return `Swept.decayed` for contacts and free recoveries of the given lengths, shape (pieces, terms)."""
+    decayed = np.empty((lengths.size, deborah.size))
+    for piece in range(lengths.size):
+        scales = deborah if piece % 2 == 1 else times
+        for m in range(deborah.size):
+            decayed[piece, m] = -np.expm1(-lengths[piece] / scales[m])
+    return decayed
+
+
+@jit
+def newton_step(
+    residual: FloatArray, scale: FloatArray, swept: Swept, workspace: FloatArray, step: FloatArray
+) -> None:  # pragma: no cover
+    """Solve the linear system of a Newton step on a periodic line by the method of generalised conjugate residuals.
+
+    After division of its rows by `scale`, the matrix of derivatives is the identity plus an operator that is smooth as
+    a function of the relaxation time. The singular values of such an operator decrease fast, so that four to seven
+    products are enough for any number of terms.
+
+    Parameters
+    ----------
+    residual, scale : array, shape (n,)
+        Required changes of the integrals of e_m and u (n = terms + 1), and the magnitude of the derivatives of these
+        integrals. The residual is overwritten.
+    swept : Swept
+        Contacts and free recoveries.
+    workspace : array, shape (3, n - 1)
+        The workspace of `follow`.
+    step : array, shape (n,), output
+    """
+    n = residual.size
+    directions, products, norms = np.empty((n, n)), np.empty((n, n)), np.empty(n)
+    residual /= scale
+    step[:] = 0.0
+    wanted = LINEAR * LINEAR * _dot(residual, residual)
+    for j in range(n):
+        if not _dot(residual, residual) > wanted:  # also if it is not finite
+            break
+        direction, product = directions[j], products[j]
+        direction[:] = residual
+        follow(direction, swept, True, product, workspace)
+        product /= scale
+        for _ in range(2):  # twice because of rounding errors
+            for i in range(j):
+                share = _dot(product, products[i]) / norms[i]
+                for k in range(n):
+                    product[k] -= share * products[i, k]
+                    direction[k] -= share * directions[i, k]
+        norms[j] = _dot(product, product)
+        share = _dot(residual, product) / norms[j]
+        for k in range(n):
+            step[k] += share * direction[k]
+            residual[k] -= share * product[k]
+
+
+@jit
+def _dot(one: FloatArray, other: FloatArray) -> float:  # pragma: no cover
+    total = 0.0
+    for k in range(one.size):
+        total += one[k] * other[k]
+    return total
+
+
+@jit
+def static_depth(profile: FloatArray, strain_area: float) -> float:  # pragma: no cover
+    """Return the depth at which sum max(0, depth + profile) is `strain_area` (> 0), by Newton's method from above."""
+    depth = 0.0
+    for value in profile:
+        depth -= value
+    depth = (depth + strain_area) / profile.size
+    for _ in range(200):
+        total, touching = 0.0, 0
+        for value in profile:
+            if depth + value > 0:
+                total += depth + value
+                touching += 1
+        if touching == 0:
+            depth = strain_area
+            continue
+        step = (total - strain_area) / touching
+        depth -= step
+        if abs(step) <= 1e-12 * depth:
+            break
+    return depth
+
+
+@jit
+def solve_sliding(
+    profile: FloatArray,
+    strain_area: float,
+    periodic: bool,
+    solid: Travelling,
+    tolerance: float,
+    unknown: FloatArray,
+    totals: FloatArray,
+) -> tuple[bool, int, bool]:  # pragma: no cover
+    """Find the depth that carries the load, and for a periodic line the stretches that repeat after one period.
+
+    In the steady state the integral of the stress is equal to the integral of u, so that the load prescribes the
+    integral of u. The strain is a convex, increasing function of the unknowns (in contact it is the larger of two
+    convex, increasing functions). After its first step Newton's method therefore approaches the solution from above.
+
+    Parameters
+    ----------
+    profile : array, shape (nodes,)
+        Heights, positive towards the elastomer, relative to the highest node. A periodic line starts at the highest
+        node and repeats it at the end.
+    strain_area : float
+        F_N / (4 G_inf dx) with the length dx of a cell; equal to the integral of u, in cells times height.
+    periodic : bool
+        Whether the line is periodic. On any other line, elements enter undeformed and recover behind the end of the
+        line, so that the depth is the only unknown.
+    solid : Travelling
+        The solid.
+    tolerance : float
+        The iteration ends when a step, relative to the depth, is at most this.
+    unknown : array, shape (terms + 1,), input and output
+        First guess, replaced by the solution: the stretches e_m at the first node, then the depth.
+    totals : array, shape (6,), output
+        See `sweep_line`.
+
+    Returns
+    -------
+    converged, sweeps, inside : bool, int, bool
+        `inside` is False if an element is in contact at the end of a line that is not periodic.
+    """
+    moduli, deborah, times = solid.moduli, solid.deborah, solid.times
+    terms, nodes = moduli.size, profile.size
+    size = terms + 1
+    passage, penetration = Passage(np.empty(2 * nodes + 4), np.empty(terms), totals), np.empty(nodes)
+    of_sweep, workspace = np.empty((10, max(terms, 1))), np.empty((3, terms))
+    residual, scale, step, product = np.empty(size), np.empty(size), np.zeros(size), np.empty(size)
+    for m in range(terms):
+        scale[m] = -deborah[m] * np.expm1(-(nodes - 1) / deborah[m])
+    steepest = 0.0
+    for i in range(nodes - 1):
+        steepest = max(steepest, abs(profile[i + 1] - profile[i]))
+    rounding = 1e-15 * nodes * steepest  # error of a height due to the rounding of a place
+    for sweeps in range(1, SWEEPS + 1):
+        for i in range(nodes):
+            penetration[i] = unknown[terms] + profile[i]
+        start = unknown[:terms]
+        pieces, end = sweep_line(penetration, start, solid, not periodic, passage, of_sweep)
+        found = passage.lengths[:pieces]
+        swept = Swept(_decays(found, deborah, times), found, solid)
+        if periodic:
+            for m in range(terms):
+                residual[m] = -passage.imbalance[m]
+            residual[terms] = strain_area - totals[0]
+            scale[terms] = totals[3]
+            newton_step(residual, scale, swept, workspace, step)
+        else:
+            # all stretches change by the change of the depth, because the strains of the dashpots do not change
+            residual[:] = 1.0
+            follow(residual, swept, False, product, workspace)
+            # the load is the integral of the stress: u behind the line is unknown if its end is in contact
+            step[terms] = (strain_area - totals[1]) / product[terms]
+        largest = 0.0
+        for j in range(size):
+            weight = min(1.0, moduli[j]) if j < terms else 1.0  # the stretch of a soft Prony term has little influence
+            largest = max(largest, weight * abs(step[j]))
+            unknown[j] += step[j]
+        if not np.isfinite(largest):
+            return False, sweeps, True
+        if largest <= tolerance * unknown[terms] + rounding:
+            return True, sweeps, periodic or end == CLOSED
+    return False, SWEEPS, True

@@ -39,10 +39,6 @@ class Travelling(NamedTuple):
     amplitude_of: FloatArray
 
 
-SURFACE_LAYER = 1e-7
-"""First guess of the place of separation, in cells, if a Prony term relaxes within a shorter distance."""
-
-
 @jit
 def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> None:  # pragma: no cover
     """Write the product of a matrix, given by its columns, and a vector."""
@@ -94,7 +90,7 @@ def separation_point(
 ) -> float:  # pragma: no cover
     """Return the place in (0, end] where the stress falls to zero, by Newton's method inside a bracket."""
     low, high = 0.0, end
-    point = SURFACE_LAYER if deborah.size and deborah[0] < SURFACE_LAYER and end > SURFACE_LAYER else 0.5 * end
+    point = min(0.5 * end, deborah[0]) if deborah.size else 0.5 * end  # the stress changes fastest within deborah[0]
     for _ in range(200):
         pressure, rate = _pressure_inside(point, start, slope, stretch, moduli, deborah)
         if pressure > 0:

@@ -1,15 +1,18 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mdr_dask.physics.sliding import node_to_node as line_nodes
 from mdr_dask.physics.sliding import steady as sliding
 from mdr_dask.physics.sliding.cases import Cases
-from mdr_dask.physics.sliding.kelvin_refinement import FLOORS, KelvinCases
 from mdr_dask.physics.sliding.node_to_node import NodeToNode, ends_of, nodes, refine, weights
+from mdr_dask.physics.sliding.problem import FLOORS, Request
+from mdr_dask.physics.sliding.problem import solve as solve_problem
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.surfaces.rough_line import RoughLine
-from mdr_dask.physics.surfaces.waves import Waves
+from mdr_dask.physics.surfaces.waves import Waves, waves_of
 
 POINTS, MODES = 400, 200
 LOADS = np.geomspace(1e-3, 30, 7)
@@ -27,9 +30,10 @@ def cases():
     return deborah.ravel(), loads.ravel()
 
 
-def settled(refinement, deborah, loads, height, slope, error=1e-9):
+def settled(refinement, deborah, loads, height, error=1e-9):
     """Return drag, depth, contact fraction and slope on a grid of 2 * refinement nodes per Nyquist point."""
-    search, every = NodeToNode(height, slope, Cases(deborah, loads), error), np.arange(loads.size)
+    plane = RoughLine(replace(waves_of(height), points=height.size // 2))
+    search, every = NodeToNode(plane, Cases(deborah, loads), error, True), np.arange(loads.size)
     for level in 2 ** np.arange(int(np.log2(refinement)) + 2):
         found = search.solve(int(level), every)
     return np.array(found.values)
@@ -42,12 +46,12 @@ def exact_states(deborah, loads, hurst=0.7, oversampling=64):
 @pytest.mark.parametrize("hurst", [0.2, 0.7])
 def test_grids_converge_to_the_exact_sweep(hurst):
     deborah, loads = cases()
-    height, slope, _ = line(hurst)
+    height, _, _ = line(hurst)
     exact = exact_states(deborah, loads, hurst)
     many = exact.contact_fraction * POINTS > 10
     typical = []
     for refinement, most in ((1, 0.04), (2, 3e-3), (4, 5e-4)):
-        state = settled(refinement, deborah, loads, height, slope)
+        state = settled(refinement, deborah, loads, height)
         drag, depth, fraction, _ = state
         error = np.abs(drag / exact.drag - 1)[many]
         typical.append(np.mean(error[error > 1e-9]))
@@ -60,9 +64,9 @@ def test_grids_converge_to_the_exact_sweep(hurst):
 
 
 def test_full_contact_is_exact_on_any_grid():
-    height, slope, rms = line()
+    height, _, rms = line()
     deborah, loads = np.array([1e-4, 1e-3]), np.array([50.0, 300.0])
-    drag, depth, fraction, contact_slope = settled(1, deborah, loads, height, slope, 5e-3)
+    drag, depth, fraction, contact_slope = settled(1, deborah, loads, height, 5e-3)
     assert drag == pytest.approx(deborah * rms**2, rel=1e-11)
     assert fraction == pytest.approx(1.0)
     assert contact_slope == pytest.approx(rms, rel=1e-11)
@@ -106,11 +110,11 @@ def test_integrals_over_cells_see_the_shortest_waves():
 
 @pytest.mark.parametrize("count", [1, 5, 42])
 def test_a_case_is_the_same_among_any_others(count):
-    height, slope, _ = line(0.3)
+    height, _, _ = line(0.3)
     deborah, loads = cases()
 
     def solve(some):
-        return settled(4, deborah[some], loads[some], height, slope, 5e-3)
+        return settled(4, deborah[some], loads[some], height, 5e-3)
 
     everything = solve(np.arange(loads.size))
     some = np.random.default_rng(count).permutation(loads.size)[:count]
@@ -120,10 +124,10 @@ def test_a_case_is_the_same_among_any_others(count):
 def test_a_line_that_does_not_divide_by_the_blocks():
     # 26 modes: 104 nodes, 3 blocks of 32 and 8 more
     amplitude, phase = roughness.amplitudes(26, 0.8), roughness.phases(3, 1, 26)
-    height, slope = (roughness.line(amplitude, phase, 104, order) for order in (0, 1))
+    height = roughness.line(amplitude, phase, 104)
     fine = periodic_line(*(roughness.line(amplitude, phase, 52 * 64, order) for order in (0, 1)))
     deborah, loads = np.array([1e-3, 1e-2]), np.array([0.3, 1.0])
-    state = settled(8, deborah, loads, height, slope)
+    state = settled(8, deborah, loads, height)
     assert state[0] == pytest.approx(sliding.steady_sliding(fine, deborah, loads).drag, rel=0.002)
 
 
@@ -133,7 +137,7 @@ def random_line(generator, points, hurst):
 
 
 def truth(surface, deborah, loads, oversampling=64):
-    return KelvinCases(surface, "hermite", deborah, loads).on_grid(oversampling)
+    return sliding.steady_sliding(surface.cubic(surface.points * oversampling), deborah, loads)
 
 
 def test_planes_are_solved_from_node_to_node(monkeypatch):
@@ -141,7 +145,7 @@ def test_planes_are_solved_from_node_to_node(monkeypatch):
     surface, deborah, loads = random_line(np.random.default_rng(4), 400, 0.7), *np.array([[1e-2, 0.1], [0.3, 3.0]])
     swept = truth(surface, deborah, loads)
     monkeypatch.setattr(sliding, "steady_sliding", None)
-    steady, errors = KelvinCases(surface, "hermite", deborah, loads).to_accuracy(0.01)
+    steady, errors = solve_problem(surface, None, deborah, loads, Request(0.01))
     assert np.all(np.abs(steady.drag - swept.drag) <= errors[0])
     assert np.all(errors[0] <= 0.01 * steady.drag)
 
@@ -160,7 +164,7 @@ def judged(seed, lines, accuracy):
     """Return errors over estimates and over the accuracy for drag, contact fraction and slope, shape (3, cases)."""
     ratios, shares = [], []
     for surface, deborah, loads in drawn(seed, lines):
-        steady, errors = KelvinCases(surface, "hermite", deborah, loads).to_accuracy(accuracy)
+        steady, errors = solve_problem(surface, None, deborah, loads, Request(accuracy))
         exact = truth(surface, deborah, loads).columns
         off = np.abs(steady.columns - exact)
         floors = np.array(FLOORS)[:, None]
@@ -201,19 +205,19 @@ def test_edges_of_the_contact_in_slow_sliding(points, hurst, force, velocity):
     surface = RoughLine(Waves(0.5 * roughness.amplitudes(points // 2, hurst) * factors, points), None)
     exact = truth(surface, deborah, loads)
     for accuracy in (0.05, 0.01, 0.002):
-        steady, errors = KelvinCases(surface, "hermite", deborah, loads).to_accuracy(accuracy)
+        steady, errors = solve_problem(surface, None, deborah, loads, Request(accuracy))
         assert np.all(np.abs(steady.columns - exact.columns) <= errors)
         assert np.all(errors <= accuracy * np.maximum(np.abs(steady.columns), np.array(FLOORS)[:, None]))
 
 
-@pytest.mark.parametrize("scheme", ["hermite", "piecewise_linear", "backward_euler"])
+@pytest.mark.parametrize("scheme", ["hermite", "backward_euler"])
 @pytest.mark.parametrize("oversampling", [1, 8])
 def test_errors_on_a_given_grid(scheme, oversampling):
     ratios = []
     for surface, deborah, loads in drawn(3, 8):
-        cases = KelvinCases(surface, scheme, deborah, loads)
-        steady, errors = cases.with_errors(oversampling)
-        assert np.array_equal(steady.drag, cases.on_grid(oversampling).drag, equal_nan=True)
+        steady, errors = solve_problem(surface, None, deborah, loads, Request(0.01, oversampling, scheme))
+        without, _ = solve_problem(surface, None, deborah, loads, Request(0.01, oversampling, scheme, False))
+        assert np.array_equal(steady.drag, without.drag, equal_nan=True)
         ratios.append(np.abs(steady.drag - truth(surface, deborah, loads).drag) / errors[0])
     known = np.concatenate(ratios)
     assert np.mean(known[np.isfinite(known)] <= 1.01) >= 0.9

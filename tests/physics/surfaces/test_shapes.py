@@ -6,6 +6,7 @@ from scipy.optimize import brentq
 
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import problem
+from mdr_dask.physics.sliding.cases import Cases
 from mdr_dask.physics.surfaces import shapes as indenter
 
 SHAPES = ((0.3, 1.0), (0.2, 1.5), (0.5, 2.0), (1.0, 4.0))
@@ -74,19 +75,18 @@ def test_sweep_agrees_with_the_closed_form(coefficient, exponent):
     assert steady.contact_fraction == pytest.approx(exact[indenter.LEADING] + exact[indenter.TRAILING], rel=1e-3)
 
 
-@pytest.mark.parametrize("scheme", ["piecewise_linear", "backward_euler"])
-def test_other_schemes_tend_to_the_closed_form(scheme):
+def test_time_steps_tend_to_the_closed_form():
     load, deborah = np.full(3, 0.02), np.array([1e-2, 0.1, 1.0])
     exact = solve(load, deborah, 0.5, 2.0)[indenter.DRAG]
     errors = [
-        np.max(np.abs(under_indenter(np.zeros(n), None, 0.5, 2.0, deborah, load, scheme).drag / exact - 1))
+        np.max(np.abs(under_indenter(np.zeros(n), None, 0.5, 2.0, deborah, load, "backward_euler").drag / exact - 1))
         for n in (2000, 8000)
     ]
     assert errors[1] < 0.3 * errors[0]
     assert errors[0] < 0.05
 
 
-@pytest.mark.parametrize("scheme", ["hermite", "piecewise_linear", "backward_euler"])
+@pytest.mark.parametrize("scheme", ["hermite", "backward_euler"])
 def test_a_contact_that_leaves_the_line_fails(scheme):
     zeros, load = np.zeros(200), np.array([0.005, 0.2, 2.0])
     steady = under_indenter(zeros, zeros, 0.5, 2.0, np.full(3, 1e-3), load, scheme)
@@ -100,7 +100,7 @@ def test_the_closed_form_ends_where_an_edge_leaves_the_line(deborah):
     lead = solve(loads, np.full(200, deborah), 0.5, 2.0)[indenter.LEADING]
     assert lead[0] < 0.49
     assert np.any((lead > 0.5) & (lead < 0.51))
-    steady, _ = problem._closed_form(indenter.PowerLaw(0.5, 2.0), np.full(200, deborah), loads)
+    steady, _ = problem._closed_form(indenter.PowerLaw(0.5, 2.0), Cases(np.full(200, deborah), loads))
     assert (steady.status == Outcome.OUTSIDE_LINE).tolist() == (lead > 0.5).tolist()
     assert np.isnan(steady.drag).tolist() == (lead > 0.5).tolist()
 
