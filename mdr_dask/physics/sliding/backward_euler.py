@@ -1,9 +1,10 @@
 """The method of the papers: steady state of a Kelvin foundation by backward Euler, many cases on a line at once.
 
-u_i = max(w_i, lambda u_(i-1)) with w = depth + height and lambda = 1 / (1 + dt / tau). Because u is periodic, F_N / (4
-G dx) is the sum of u_i, and F_x / (4 G) the sum of (u_i - lambda u_(i-1)) / (1 - lambda) (w_i - w_(i-1)). Blocks of
-nodes that are entirely in contact or entirely free are summed in closed form. In the other blocks the inner loops run
-over cases, as vector instructions. The results of a case do not depend on the other cases.
+The displacement at node i is u_i = max(w_i, lambda u_(i-1)), with the penetration w = depth + height and lambda = 1 /
+(1 + dt / tau), where dt is the time in which the body travels the distance dx of two nodes. Because u is periodic, F_N
+/ (4 G dx) is the sum of u_i, and F_x / (4 G) is the sum of (u_i - lambda u_(i-1)) / (1 - lambda) (w_i - w_(i-1)).
+Blocks of nodes that are entirely in contact or entirely free are summed in closed form. In the other blocks the inner
+loops run over cases, as vector instructions. The results of a case do not depend on the other cases.
 """
 
 from __future__ import annotations
@@ -21,9 +22,9 @@ from mdr_dask.physics.sliding.cases import Cases
 ITERATIONS = 200
 COARSENING = 8  # ratio of the numbers of nodes of successive grids in the search for the depth
 COARSEST = 64  # largest number of nodes of the grid on which the search for the depth starts
-CONVERGED = 1e-9  # tolerance of the product of the last two relative steps of the depth, the error of a secant
+CONVERGED = 1e-9  # largest product of the last two relative steps of the depth, which is the error of the extrapolation
 EXACT_STEP = 1e-13  # relative step of the depth that is as small as rounding errors
-COARSE = 1e-3  # tolerance of the same product on all grids except the finest
+COARSE = 1e-3  # instead of CONVERGED on all grids except the finest
 
 BLOCK = 256  # nodes
 LANES = 8  # number of cases in one vector instruction
@@ -31,10 +32,12 @@ LANES = 8  # number of cases in one vector instruction
 # Indices of the results of a sweep for every case
 CARRIED, STIFFNESS, DRAG = range(3)
 SUMS = 3
-# Indices of the properties of a block of nodes: bounds of height and rise, height of the previous node, sums
+# Indices of the properties of a block of nodes: largest and smallest height, smallest rise, height of the node before
+# the block, and the sums of height, rise, height times rise, and rise squared
 PEAK, LOWEST, STEEPEST, BEFORE, HEIGHTS, RISES, WORK, SQUARES = range(8)
 KNOWN = 8
-# Indices of the state of a case in a sweep; LOAD, RATE and LOSS are sums over the nodes of a block
+# Indices of the state of a case in a sweep: displacement u, its derivative with respect to the depth (FADE), the decay
+# of u over a block, the sum of decays over a block, and the sums over the nodes of a block of u, FADE and drag
 U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS = range(7)
 ROWS = 7
 
@@ -130,9 +133,9 @@ def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
 
 @jit
 def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) -> int:
-    """Add the sums of a block for the cases in which it is entirely in contact or entirely free.
+    """Add the sums of a block for every case in which the whole block is in contact or the whole block is free.
 
-    Put the other cases, in which contact begins or ends in the block, into the queue, and return their number.
+    Write the indices of the other cases to the queue, and return their number.
     """
     peak, lowest, steepest, before = block[PEAK], block[LOWEST], block[STEEPEST], block[BEFORE]
     heights, rises, work, squares = block[HEIGHTS], block[RISES], block[WORK], block[SQUARES]
@@ -210,8 +213,8 @@ def _walk_some(height: FloatArray, rise: FloatArray, moving: Moving, lanes: Lane
 def _sweep(line: Nodal, moving: Moving, lanes: Lanes) -> None:
     """Move one element of every case along the line and write the sums.
 
-    On a periodic line the element starts and ends at the highest node; on any other line it starts undeformed at the
-    first node. The queue contains the cases for which a block cannot be summed in closed form.
+    On a periodic line the element starts and ends at the highest node. On any other line the element starts undeformed
+    at the first node.
     """
     height, rise, blocks, periodic = line
     deborah, depth = moving.deborah, moving.depth
@@ -244,9 +247,9 @@ def _newton(
 ) -> None:
     """Find the depth of every case; `depths` contains guesses and is overwritten, `drags` is NaN if no depth is found.
 
-    The load is a convex, increasing, piecewise linear function of the depth, so that Newton's method approaches the
-    root from above after its first step. No sweep follows the last step, because the drag is extrapolated along the
-    secant through the last two sweeps.
+    The load is a convex, increasing, piecewise linear function of the depth. After its first step Newton's method
+    therefore approaches the solution from above. No sweep follows the last step. Instead, the drag is extrapolated to
+    the last depth along the secant through the last two sweeps.
     """
     count = depths.size
     active, lanes, before = np.arange(count), lanes_for(count), np.full((2, count), np.nan)

@@ -1,10 +1,11 @@
 """One sweep along a line of cubic cells: the steady state of a Kelvin foundation at a given depth.
 
-All lengths are in cells: a cell has length 1, a slope is the rise over one cell, ``deborah`` is v tau / dx. Heights are
-positive towards the elastomer and are measured from the highest point of the line, so that the penetration is w = depth
-+ height with depth > 0. In contact u = w; a free element recovers as exp(-s / deborah). The derivative du/d(depth) is 1
-in contact; behind a contact it decays in proportion to u. The shift of the places where contact begins and ends has an
-effect of second order only.
+All lengths are in cells: a cell has the length 1, a slope is the rise over one cell, and ``deborah`` is v tau / dx with
+the length dx of a cell. Heights are positive towards the elastomer. They are measured from the highest point of the
+line, so that the penetration is w = depth + height with depth > 0. The displacement of an element is u = w in contact;
+after contact ends, u decays as exp(-s / deborah) with the distance s. The derivative of u with respect to the depth is
+1 in contact, and decays like u after contact ends. A change of the depth also shifts the places where contact begins
+and ends; this shift has an effect of second order on the load.
 """
 
 from __future__ import annotations
@@ -61,10 +62,11 @@ def blocks_of(cells: Cells) -> Blocks:
 
 
 class Barriers(NamedTuple):
-    """Limits of the depth for cells and blocks at a Deborah number; the limit of a block is NaN until it is computed.
+    """Limits of the depth for cells and blocks at one Deborah number.
 
     At a depth above `cell` (or `block`), the force on elements in contact is positive everywhere in the cell (or
-    block). At a depth up to `idle`, the force is positive nowhere in the cell.
+    block). At a depth up to `idle`, the force is positive nowhere in the cell. The limit of a block is NaN until the
+    limits of its cells are computed.
     """
 
     cell: FloatArray
@@ -95,10 +97,10 @@ def places_for(patches: int) -> Places:
 def write_barriers(
     height: FloatArray, enter: FloatArray, leave: FloatArray, deborah: float, block: int, barriers: Barriers
 ) -> None:
-    """Write the barriers of the cells of a block, which follow from the force w + deborah w'.
+    """Write the barriers of a block and of its cells, which follow from the force w + deborah w'.
 
-    The barrier of the block is the largest barrier of its cells. `idle` follows from the Bernstein control points of
-    the force, which bound the force in the cell.
+    The barrier of the block is the largest barrier of its cells. `idle` follows from the Bernstein coefficients of the
+    force, which are bounds of the force in the cell.
     """
     every, written, idle = -np.inf, barriers.cell, barriers.idle
     for i in range(block * BLOCK, min((block + 1) * BLOCK, written.size)):
@@ -133,7 +135,7 @@ def _decayed(x: float) -> float:
 def contact_end(w0: float, a: float, b: float, c: float, deborah: float, start: float) -> float:
     """Return the first place from `start` to 1 where the force w + deborah w' falls to 0, or `NONE`.
 
-    The force is not negative at the start.
+    The penetration is w = w0 + a x + b x^2 + c x^3. The force must not be negative at `start`.
     """
     # search the monotone pieces of the cubic force; its sign at the start may be lost to rounding
     p, q, r = w0 + deborah * a, a + 2 * deborah * b, b + 3 * deborah * c
@@ -185,9 +187,9 @@ class FreeElement(NamedTuple):
 
 @jit
 def _contact_begin_between(element: FreeElement, deborah: float, low: float, high: float) -> float:
-    """Return the place between `low` and `high` where w rises to u exp(-(x - start) / deborah).
+    """Return the place x between `low` and `high` where the line reaches a free element.
 
-    At `high`, w must be larger than this expression.
+    There w rises to u exp(-(x - start) / deborah). At `high`, w must be larger than this expression.
     """
     w0, a, b, c, u, start = element
     if w0 + low * (a + low * (b + low * c)) >= u - u * _decayed((low - start) / deborah):
@@ -212,7 +214,8 @@ def _contact_begin_between(element: FreeElement, deborah: float, low: float, hig
 def _contact_begin(element: FreeElement, deborah: float, low: float, stop: float) -> float:
     """Return the first place from `low` to `stop` where contact with a free element begins, or `NONE`.
 
-    The product (w - u_free) exp(x / deborah) increases while the force w + deborah w' is positive.
+    With the displacement u_free of the free element, the product (w - u_free) exp(x / deborah) increases with x
+    wherever the force w + deborah w' is positive. So contact begins at most once in each interval of positive force.
     """
     w0, a, b, c, u, start = element
     for _ in range(3):
@@ -231,7 +234,7 @@ def _contact_begin(element: FreeElement, deborah: float, low: float, stop: float
 
 @jit
 def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) -> tuple[float, float]:
-    """Return the integrals of w and w'^2 from `start` to `end`, by Gauss's rule, which is exact here."""
+    """Return the integrals of w and w'^2 from `start` to `end`; Gauss's rule is exact for these polynomials."""
     half, middle = 0.5 * (end - start), 0.5 * (end + start)
     x, y = middle - half * 0.7745966692414834, middle + half * 0.7745966692414834
     before, centre, after = (
@@ -248,9 +251,10 @@ def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) 
 def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> tuple[float, float, float, float]:
     """Return the integral of u over a free recovery, the drag, and their derivatives with respect to the depth.
 
-    The order is: integral, its derivative, drag, its derivative. The integral of u is deborah times the decrease of u,
-    and the drag is half the decrease of u^2. The derivative of the drag includes the shift of the place where contact
-    begins; `slope` is the slope of the line there.
+    The element is free over the length `travelled`. The order of the results is: integral, derivative of the integral,
+    drag, derivative of the drag. The integral of u is deborah times the decrease of u, and the drag is half the
+    decrease of u^2. The derivative of the drag includes the shift of the place where contact begins; `slope` is the
+    slope of the line at this place.
     """
     lost = _decayed(travelled / deborah) if u > 0 else 1.0
     memory = deborah * lost
@@ -261,7 +265,7 @@ def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> 
 def _skip_free(
     peak: FloatArray, block_peak: FloatArray, depth: float, decay: float, block_decay: float, i: int, free: float
 ) -> tuple[int, float]:
-    """Skip cells in which a free element stays out of contact; return the first other cell and u at its start."""
+    """Skip cells in which a free element stays out of contact; return the next cell and u at the start of this cell."""
     n, blocks = peak.size - 1, block_peak.size
     while i < n and peak[i] + depth <= free * decay:
         if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_peak[i // BLOCK] + depth <= free * block_decay:
@@ -279,24 +283,24 @@ def _skip_free(
 def sweep_cells(
     cells: Cells, every: Blocks, barriers: Barriers, deborah: float, depth: float, sums: FloatArray, places: Places
 ) -> int:
-    """Move an element once along the line; return the number of contact patches.
+    """Move one element once along the line; return the number of contact patches.
 
     Parameters
     ----------
     cells, every : Cells, Blocks
         The line, and its blocks.
-    barriers : Barriers
-        Barriers of blocks that are still NaN are written when an element in contact reaches them.
+    barriers : Barriers, input and output
+        Barriers that are still NaN are written for every block that an element in contact reaches.
     deborah : float
         v tau in cells.
     depth : float
         Penetration of the highest point.
-    sums : array, shape (SUMS,)
-        Written: the integral of u, which equals F_N / (4 G dx); the derivative of this integral with respect to the
-        depth; F_x / (4 G); the derivative of F_x / (4 G) with respect to the depth; the length in contact; the integral
-        of w'^2 over the length in contact; and 1 if an end of a line that is not periodic is in contact, otherwise 0.
-    places : Places
-        Written: where each patch begins and ends; patches beyond the capacity of the arrays are only counted.
+    sums : array, shape (SUMS,), output
+        The integral of u, which equals F_N / (4 G dx); the derivative of this integral with respect to the depth;
+        F_x / (4 G); the derivative of F_x / (4 G) with respect to the depth; the length in contact; the integral of
+        w'^2 over the length in contact; and 1 if an end of a line that is not periodic is in contact, otherwise 0.
+    places : Places, output
+        The positions where each patch begins and ends; patches beyond the capacity of the arrays are only counted.
     """
     # local names, because reading an array from a tuple takes more time than computing a cell
     height, enter, leave, peak, mean, stretches = (
@@ -401,7 +405,7 @@ def sweep_cells(
 def patches_at(
     cells: Cells, every: Blocks, barriers: Barriers, deborah: float, depth: float, sums: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return where each patch of the steady state at a depth begins and ends; `sums` as in `sweep_cells`."""
+    """Return the positions where each patch of the steady state begins and ends; arguments as in `sweep_cells`."""
     n = cells.mean.size - 1
     places = places_for(n // 8 + 2)
     count = sweep_cells(cells, every, barriers, deborah, depth, sums, places)

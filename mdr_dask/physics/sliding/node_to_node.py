@@ -1,15 +1,18 @@
-"""Steady sliding of a Kelvin foundation from node to node of a periodic line, for many cases at once.
+"""Steady sliding of a Kelvin foundation along a periodic line, for many cases at once; fast, but approximate in cells.
 
-In a cell the line is a cubic through heights and slopes at its ends, w = d + h + s x + ..., and De is the Deborah
-number v tau in cells. Contact ends where the force w + De w' falls to 0, and begins where the gap closes. A cell that
-is partly in contact adds only positive terms, which avoids cancellation in slow sliding: the integrals of w and De w'^2
-over the part in contact, and of u and u^2 / De over the free part. Cells that are entirely in contact are integrated
-exactly, so that full contact is exact on any grid. Lengths are in cells, as in module `kelvin`.
+All lengths are in cells: neighbouring nodes have the distance 1, and De = v tau is the Deborah number in cells. Inside
+a cell the penetration w = d + h is a cubic, which follows from heights and slopes at the two nodes (d is the depth, h
+the height of the line). Contact ends where the force w + De w' falls to 0. Contact begins where the line reaches the
+displacement u of the free element. Both places inside a cell are found approximately.
 
-All cases are moved along the line together, block by block. Vector instructions decide for all cases whether a block is
-entirely in contact or entirely free; the integrals over such a block are sums in closed form. In the other blocks each
-case is moved from cell to cell. The results of a case do not depend on the other cases. The depth that carries the load
-is found by Newton's method on finer and finer grids, each time starting from the depth on the previous grid.
+The load is the integral of w in contact and of u out of contact. The drag is the integral of De w'^2 in contact and of
+u^2 / De out of contact. All terms are positive, so that no digits are lost in slow sliding. The integrals over cells
+that are entirely in contact are exact, and so are the results in full contact on any grid.
+
+One sweep moves one element of every case along the line, block by block. Sums in closed form are used for a case in
+which the block is entirely in contact or entirely free. The element of any other case moves from cell to cell. The
+results of a case do not depend on the other cases. Newton's method finds the depth that carries the load, first on a
+coarse grid, then on finer grids.
 """
 
 from __future__ import annotations
@@ -31,7 +34,7 @@ from mdr_dask.physics.surfaces.cubic_line import highest_point
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 BLOCK = 32  # cells
-WING = 4  # nodes on each side from which the nodes of a finer grid are interpolated
+WING = 4  # the nodes of a finer grid in a cell are interpolated from this number of nodes on each side of the cell
 BEFORE, AFTER = WING + 1, WING + 2  # numbers of nodes added from the previous and the next period, for `refine`
 ABOVE = 4 / 27  # a cubic cell rises above its ends by at most this factor times the sum of its inward slopes
 SUMMIT = 64  # number of nodes in the cell of the highest point; the highest of these nodes is used as the summit
@@ -40,13 +43,14 @@ NO_ENDS: FloatArray = np.empty((2, 0))
 # Indices of the bounds and sums of a block of cells
 PEAK, LOWEST, STEEPEST, HEIGHTS, SQUARES = range(5)
 KNOWN = 5
-# Rows of a tile: HEIGHT and SLOPE for each node (from the node before the tile on), then three values for each cell
+# Rows of a tile: height and slope at each node (beginning with the node before the tile), then for each cell the
+# integrals of height and of slope squared, and the largest height
 HEIGHT, SLOPE, MEAN, SQUARE, TOP = range(5)
 IN_A_TILE = 5
 
 
 class Nodes(NamedTuple):
-    """A periodic line on a grid of n cells.
+    """The heights and slopes of a periodic line at n nodes, with bounds and sums over blocks of cells.
 
     Parameters
     ----------
@@ -54,9 +58,10 @@ class Nodes(NamedTuple):
         Heights relative to the first node, and slopes as rises per cell; the arrays begin with `BEFORE` nodes of the
         previous period and end with `AFTER` nodes of the next period.
     ends : array, shape (2, BEFORE + n + AFTER) or (2, 0)
-        From `ends_of`, with the same additional nodes.
+        The corrections of `ends_of`, with the same additional nodes.
     blocks : array, shape (n // BLOCK, KNOWN)
-        Bounds and sums over the cells of a block.
+        For every block: upper bound of the height, lowest node, smallest slope, integrals of height and of slope
+        squared.
     top : float
         Height of the first node.
     rise : float
@@ -113,7 +118,7 @@ def ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
 
 
 def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolved: bool, ends: FloatArray) -> Nodes:
-    """Return every stride-th node of a line; unless `resolved`, slopes are computed from differences of heights.
+    """Return every stride-th node of a line.
 
     Parameters
     ----------
@@ -122,9 +127,10 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
     first : int
         Index of the first node, whose height is subtracted from all heights.
     resolved : bool
-        Whether the nodes are close enough for the given slopes to be used.
+        Whether the nodes are close enough for the given slopes to be used; otherwise slopes are computed from
+        differences of heights.
     ends : array, shape (2, n) or (2, 0)
-        From `ends_of`. If the array is empty, integrals over cells are computed from neighbouring nodes.
+        The corrections of `ends_of`. If the array is empty, integrals over cells are computed from neighbouring nodes.
     """
     n = height.size // stride
     h, s = np.empty((2, BEFORE + n + AFTER))
@@ -194,9 +200,9 @@ def _integrals(
 ) -> None:
     """Write the integrals of height and slope squared over cells; `square` must have one more element than cells.
 
-    The arrays begin one node before the first cell. If there are no exact corrections, Euler-Maclaurin corrections are
-    used, with derivatives from heights and slopes at the neighbouring nodes. In the sum over a whole line, these
-    corrections cancel.
+    The other arrays begin one node before the first cell. The trapezium rule is corrected with `of_height` and
+    `of_square`, which come from `ends_of`. If they are empty, the corrections follow from the Euler-Maclaurin formula,
+    with derivatives computed from heights and slopes at the neighbouring nodes.
     """
     if of_height.size > 0:
         for k in range(cells):
@@ -240,9 +246,9 @@ def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatAr
         Index of the node of the line at which the tile begins, and number of cells of the line in the tile.
     weights : array, shape (2, refinement, 4 WING)
         From :func:`weights`.
-    tile : array, shape (IN_A_TILE, cells refinement + 3)
-        Written. Rows: heights and slopes, from the node before the tile to the node after it; integrals of height and
-        of slope squared over each cell; largest height in each cell.
+    tile : array, shape (IN_A_TILE, cells refinement + 3), output
+        Heights and slopes, from the node before the tile to the node after the tile; integrals of height and of slope
+        squared over each cell; largest height in each cell.
     """
     refinement, h, s = weights.shape[1], tile[HEIGHT], tile[SLOPE]
     # exact corrections are available only at the nodes of the line
@@ -283,10 +289,7 @@ def weights(refinement: int) -> FloatArray:
 
 @jit
 def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: FloatArray, slope: FloatArray) -> None:
-    """Write heights and slopes on the finer grid over some cells of a line.
-
-    The nodes range from one fine node before these cells to one fine node behind them.
-    """
+    """Write heights and slopes on a finer grid, from one fine node before the given cells to one after them."""
     refinement = weights.shape[1]
     h, s = line.height, line.slope
     for place in range(-1, cells * refinement + 2):
@@ -308,31 +311,34 @@ def with_summit(line: Nodes) -> Nodes:
 
 
 LANES = 64  # number of cases that are computed together
-SMALL, LARGE = 1e-300, 1e12  # a positive number close to zero; largest value of 1 / De that is used
+SMALL, LARGE = 1e-300, 1e12  # a positive number that prevents division by zero; largest value of 1 / De
 CLOSED = 1e-9  # largest relative difference of the displacements at the start and at the end of a converged period
 RESOLVED = 10  # smallest number of cells in contact with which a grid resolves the contact
 
 ITERATIONS = 25
 COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most COARSENING * COARSEST nodes
-LAST_STEP = 0.03  # largest relative last step of the depth; the results are extrapolated along their secants
-SECANT_ERROR = 0.1  # error of this extrapolation, as a fraction of the extrapolated change
-FIRST_STEP, FIRST_ERROR = 0.1, 0.03  # largest relative last step and drag error on grids that only provide a guess
+LAST_STEP = 0.03  # largest relative last step of the depth; the results of the last step are extrapolated linearly
+SECANT_ERROR = 0.1  # assumed error of this extrapolation, as a fraction of the extrapolated change
+FIRST_STEP, FIRST_ERROR = 0.1, 0.03  # instead of LAST_STEP and the allowed error, on grids that only provide a guess
 ROUNDING = 1e-12  # relative step of the depth that is as small as rounding errors
 ORDER = 3.0  # order of convergence: four inside cells, lower where contact begins or ends; measured: 3.3
 ARITHMETIC = 5e-5  # relative error of the integrals over cells that are partly in contact, on any grid
 
 ROWS = 15
-# Offset of each quantity in the workspace of a sweep: state and sums of the cases, then constants of the cases
+# Offset of each quantity in the workspace of a sweep. State and sums of the cases: displacement, its derivative with
+# respect to the depth, whether in contact, load, stiffness, drag, length in contact, integral of slope squared there.
+# Constants of the cases: depth, De, exp(-1 / De), 1 / De, decay over a block, displacement at the start of the period.
+# CALM: whether the last block was entirely in contact or entirely free.
 U, FADE, CONTACT, LOAD, RATE, LOSS, LENGTH, STRETCH = range(0, 8 * LANES, LANES)
 DEPTH, DEBORAH, DECAY, INVERSE, THROUGH, BEGAN, CALM = range(8 * LANES, ROWS * LANES, LANES)
-# Indices of the results of a case, which are extrapolated along secants
+# Indices of the results of a case that are extrapolated over the last step of the depth
 DRAG, FRACTION, CONTACT_SLOPE = range(3)
 SECANTS = 3
 
 
 @jit_inline
 def _fading(time: float) -> float:
-    """Return exp(-time) for time >= 0, with an error of at most 1e-4 up to time 1."""
+    """Return exp(-time) for time >= 0, with an error of at most 1e-4 for times up to 1."""
     y = time * 0.125
     y = y if y < 1.0 else 1.0
     e = 1.0 + y * (-1.0 + y * (0.5 - y * (1 / 6)))
@@ -342,7 +348,7 @@ def _fading(time: float) -> float:
 
 
 class Cell(NamedTuple):
-    """Penetration w = w0 + s0 x + a x^2 + b x^3 in a cell, for one case; w1 and s1 are value and slope at x = 1."""
+    """Penetration w = w0 + s0 x + a x^2 + b x^3 in a cell, for one case; w1 and s1 are w and w' at x = 1."""
 
     w0: float
     s0: float
@@ -376,10 +382,11 @@ def _tilt(cell: Cell, x: float) -> float:
 def _contact_end(
     cell: Cell, r: float, begins: float, force: float, force_end: float, inverse: float
 ) -> tuple[float, float, float]:
-    """Return where the force falls to 0 in a cell, w there, and the fraction of w left at the end of the cell.
+    """Return the place where the force falls to 0 in a cell, w at this place, and the remaining fraction of w.
 
-    A secant from `begins`, where the force begins to fall, gives a first estimate of the place, which one Newton step
-    improves.
+    The remaining fraction is the ratio of the free element's displacement at the end of the cell to w. Linear
+    interpolation between `begins`, where the force begins to fall, and the end of the cell gives a first estimate of
+    the place. One Newton step improves this estimate.
     """
     fall = (1 - begins) / (force - force_end)
     x = begins + force * fall
@@ -398,8 +405,8 @@ def _contact_end(
 def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: float) -> tuple[float, float]:
     """Return the place before `last` where the gap closes, and the fraction of the displacement u that remains there.
 
-    At `last` the line is above the free element: the gap is negative. A parabola through the gap at the start of the
-    cell and at `last` gives a first estimate of the place, which one Newton step improves.
+    The gap is the distance between the free element and the line; it is negative at `last`. A parabola through the gap
+    at the start of the cell and at `last` gives a first estimate of the place. One Newton step improves this estimate.
     """
     gap, closing = u - cell.w0, cell.s0 + u * inverse
     bow = (gap - closing * last - gap_last) / (last * last + SMALL)
@@ -419,10 +426,10 @@ def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: 
 def _contact_in_cell(
     cell: Cell, r: float, u: float, kept: float, inverse: float
 ) -> tuple[bool, float, float, float, float]:
-    """Return whether a free element comes into contact in a cell, and where this contact ends.
+    """Return whether a free element comes into contact in a cell, and the place where this contact ends.
 
-    Then return, for the place where the contact ends: w, the fraction of w that remains at the end of the cell, and the
-    gap between line and element if there were no contact.
+    Three values at the place where the contact ends follow: w, the fraction of w that remains at the end of the cell,
+    and the gap between line and element if there were no contact.
     """
     force, gap = cell.w1 + r * cell.s1, kept - cell.w1
     if force > 0:
@@ -507,9 +514,9 @@ def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
 def _pass_block(
     block: FloatArray, last: float, refinement: int, workspace: FloatArray, count: int, queue: NDArray[np.int64]
 ) -> int:
-    """Add the sums of a block for the cases in which it is entirely in contact or entirely free.
+    """Add the sums of a block for every case in which the whole block is in contact or the whole block is free.
 
-    Put the other cases, in which contact begins or ends in the block, into the queue, and return their number.
+    Write the indices of the other cases to the queue, and return their number.
     """
     peak, lowest, steepest = block[PEAK], block[LOWEST], block[STEEPEST]
     steepest /= refinement
@@ -554,7 +561,7 @@ def sweep(
 ) -> None:
     """Move one element of every case along one period of the line, which begins and ends at the summit of the line.
 
-    Blocks in which contact begins or ends are computed on the finer grid for which the weights are given.
+    Blocks in which contact begins or ends are computed on a finer grid, to which `weights` interpolate.
     """
     refinement, blocks = weights.shape[1], line.blocks
     n = line.height.size - BEFORE - AFTER
@@ -637,13 +644,14 @@ def _search(
     cases : Cases
         v tau / L, and F_N / (4 G L) in the unit of height.
     last_step, error : float
-        Largest relative last step of the depth, and largest relative error of the drag due to this step.
+        Largest relative last step of the depth, and largest relative error of the drag due to the extrapolation over
+        this step.
     depths : array, shape (cases,)
         Penetration of the summit: first guesses, replaced by the solutions.
-    rates : array, shape (cases, SECANTS)
-        Derivatives of the logarithms of the results with respect to the depth; NaN where unknown; updated.
-    results : array, shape (cases, SECANTS)
-        Written for the cases whose depth is found.
+    rates : array, shape (cases, SECANTS), input and output
+        Derivatives of the logarithms of the results with respect to the depth; NaN where unknown.
+    results : array, shape (cases, SECANTS), output
+        Not changed for cases whose depth is not found.
     place : _Workspace
         Work arrays for this grid.
     """
@@ -725,7 +733,7 @@ class NodeToNode:
         if level == 1:
             return self._start()
         if level == 2:
-            cell, _, _ = highest_point(self._height, self._slope)
+            cell, _ = highest_point(self._height, self._slope)
             ends, first = ends_of(self._height, self._slope), (cell + 1) % self._height.size
             self._line = with_summit(nodes(self._height, self._slope, first, 1, True, ends))
         some, top = self._cases.only(cases), self._line.top + self._line.rise
@@ -757,9 +765,9 @@ class NodeToNode:
     def _solution(self, results: FloatArray, depth: FloatArray, level: int) -> Solution:
         """Return the results on a grid.
 
-        Two grids may both miss a patch that is about to come into contact. It is shorter than a cell, otherwise it
-        would contain a node. Its slope is small, because its summit is in contact. It changes the contact fraction by
-        up to one cell, and the contact slope by up to half of this fraction.
+        Two grids may both miss a small patch of contact. Such a patch is hardly longer than a cell, because a longer
+        one contains nodes. It therefore adds up to one cell to the length in contact. It reduces the rms slope of the
+        contact by at most half this relative amount, because the slope is small near the summit of an asperity.
         """
         drag, fraction, slope = results.T
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -163,9 +163,9 @@ def _on_grid(line: RoughLine, cases: Cases, request: Request, oversampling: int,
 
 
 def _write(results: tuple[FloatArray, FloatArray, NDArray[np.int8]], cases: IntArray, found: Refined) -> None:
-    """Replace the results of the given cases by refined results, unless the errors of the old results are smaller."""
+    """Replace the results of cases that have missed the accuracy, if the new results meet it or have smaller errors."""
     columns, errors, status = results
-    better = (status[cases] != Outcome.CONVERGED) | (found.errors[0] < errors[0, cases])
+    better = (status[cases] != Outcome.CONVERGED) | found.met | (found.errors[0] < errors[0, cases])
     some = cases[better]
     columns[:, some] = np.array(found.values)[:, better]
     errors[:, some], status[some] = found.errors[:, better], found.outcome[better]

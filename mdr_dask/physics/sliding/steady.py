@@ -16,7 +16,6 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import backward_euler
 from mdr_dask.physics.sliding.cases import Cases, Steady, valid
 from mdr_dask.physics.sliding.kelvin import (
-    BLOCK,
     DISPLACEMENT,
     DRAG,
     DRAG_RATE,
@@ -36,10 +35,8 @@ from mdr_dask.physics.sliding.kelvin import (
 from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 
 ITERATIONS = 200
-PATIENCE = 20  # number of sweeps after which the interval that contains the depth is bisected
-OUTLINES, OUTLINED = 12, 0.02  # guess from the peaks of blocks: largest number of iterations, last step of log depth
-OUTLINED_FROM = 64.0  # smallest v tau, in cells, for this guess; at lower speeds the line between the peaks matters
-LOST = 1e-13  # a case is lost to rounding if the line rises by a smaller fraction of the depth where contact begins
+PATIENCE = 20  # after this number of sweeps the search bisects the interval that contains the depth
+LOST = 1e-13  # smallest rise of the line where contact begins, relative to the depth, that rounding errors allow
 TRAIL = 5  # entries of a trail: log depth, log load, slope d(log depth) / d(log load), its change, Deborah number
 LATTICE_BITS = 20  # depths are searched on a lattice of relative spacing 2**-LATTICE_BITS: see `_solve`
 
@@ -60,45 +57,15 @@ def _next(depth: float) -> float:
 
 @jit
 def _begin(trail: FloatArray, depth: float, load: float) -> None:
-    """Start a `trail` from a guess of the depth for a load."""
+    """Start a `trail` (see `TRAIL`) from a guess of the depth for a load."""
     trail[0], trail[1], trail[2], trail[3], trail[4] = math.log(depth), math.log(load), 0.7, 0.0, 0.0
 
 
 @jit
-def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tuple[float, float]:
-    """Return a guess of log depth for a load, and d(log depth) / d(log load), from the peaks of the blocks alone.
-
-    Two upper bounds limit the guess: the depth at which full contact carries the load, and the depth at which a tangent
-    of the load reaches it. If the depth is not positive because of rounding, `start` is returned.
-    """
-    fade, memory = np.exp(-BLOCK / deborah), -deborah * math.expm1(-BLOCK / deborah)
-    depth, most, slope = math.exp(start), load / (memory * peak.size) - peak.mean(), 1.0
-    for _ in range(OUTLINES):
-        depth = min(depth, most)
-        free, gain, carried, stiffness = 0.0, 0.0, 0.0, 0.0
-        for i in range(peak.size):
-            if depth + peak[i] > free:
-                free, gain = depth + peak[i], 1.0
-            carried += free
-            stiffness += gain
-            free, gain = free * fade, gain * fade
-        if not carried > 0:  # the highest point is outside all whole blocks
-            depth *= 2
-            continue
-        most = min(most, depth + (load / memory - carried) / stiffness)
-        slope = carried / (stiffness * depth)
-        ahead = slope * (math.log(load) - math.log(memory * carried))
-        depth *= math.exp(ahead)
-        if abs(ahead) < OUTLINED:
-            break
-    return (math.log(depth), slope) if depth > 0 else (start, 1.0)
-
-
-@jit
 def _follow(sums: FloatArray, depth: float, deborah: float, trail: FloatArray) -> None:
-    """Write log depth, log load, their slope and the change of this slope to `trail`, from the last two sweeps.
+    """Write log depth, log load, slope and change of the slope (see `TRAIL`) to `trail`, from the last two sweeps.
 
-    At a new Deborah number the change of the slope is kept, because it hardly depends on the Deborah number.
+    At a new Deborah number the old change of the slope is kept, because it hardly depends on the Deborah number.
     """
     carried = sums[DISPLACEMENT]
     load, slope = np.log(carried), carried / (sums[STIFFNESS] * depth)
@@ -129,12 +96,13 @@ class _Swept(NamedTuple):
 def _solve(
     line: _Swept, deborah: float, load: float, trail: FloatArray, sums: FloatArray, places: Places
 ) -> tuple[float, bool]:
-    """Return the largest lattice depth that carries no more than the load, and success; write the sums at this depth.
+    """Return the largest lattice depth that carries at most the load, and whether it was found; write `sums` for it.
 
-    The load is a convex, increasing function of the depth. The depths at which its tangents reach the load are
-    therefore upper bounds of the root, and so is the depth at which full contact carries the load. The search ends at a
-    lattice depth below the root whose tangent reaches the load before the next lattice depth. Only one lattice depth
-    meets this condition, so that the result does not depend on the `trail`.
+    The carried load is a convex, increasing function of the depth. The depth at which a tangent of this function
+    reaches the given load is therefore an upper bound of the solution. Another upper bound is the depth at which full
+    contact carries the load. The search ends at a lattice depth below the solution if the tangent at this depth reaches
+    the load before the next lattice depth. Only one lattice depth meets this condition, so that the result does not
+    depend on the guess in `trail`.
     """
     cells, blocks, barriers, mean = line
     low, high = 0.0, np.inf
@@ -183,9 +151,8 @@ def _states(
 ) -> None:
     """Solve cases on one line at one Deborah number, in order of load; write results in the order of `cases.COLUMNS`.
 
-    The search for a depth starts from the guess of the case if the guess is a number, otherwise from the depth of the
-    previous case. The first search starts from the trail `first`, which is then replaced by the trail of the first
-    solved case.
+    The search for the depth of a case starts from its guess. If the guess is NaN, it starts from the depth of the
+    previous case, and for the first case from the trail `first`. The trail of the first solved case replaces `first`.
     """
     (cells, _, _, _), (deborahs, loads) = line, cases
     n, places = cells.mean.size - 1, places_for(0)
@@ -263,9 +230,9 @@ def steady_on_cells(
 
 
 def stepped_sliding(line: CubicLine, deborah: FloatArray, loads: FloatArray, contact: bool = True) -> Steady:
-    """Return the steady states by the time-stepping method of the papers, from the heights at the nodes.
+    """Return the steady states by the time-stepping method of the papers (backward Euler), from heights at nodes.
 
-    In each time step the body travels one cell.
+    In each time step the body travels one cell. The method is of first order in the length of a cell.
 
     Parameters
     ----------
@@ -303,28 +270,15 @@ def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> t
     """
     order = np.lexsort((cases.loads, cases.deborah))
     ordered, ordered_status = np.full((order.size, 4), np.nan), np.zeros(order.size, np.int8)
-    deborah, loads, starts, first = (
-        cases.deborah[order],
-        cases.loads[order],
-        guesses[order],
-        np.zeros(TRAIL),
-    )
+    deborah, loads, starts, first = cases.deborah[order], cases.loads[order], guesses[order], np.zeros(TRAIL)
     n, mean = cells.mean.size - 1, float(np.mean(cells.mean[:-1]))
     _begin(first, loads[0] / n - mean, loads[0])
-    outlined, beyond = first[0], 0.0
     barriers = barriers_for(n)
     edges = np.flatnonzero(np.diff(deborah, prepend=-1.0, append=-1.0))
     for some in (slice(*ends) for ends in pairwise(edges)):
         barriers.block.fill(np.nan)  # barriers are valid for one speed only
-        speed, load = deborah[some.start], loads[some.start]
-        outlines = blocks.peak.size > 0 and speed > OUTLINED_FROM and not starts[some.start] > 0
-        if outlines:
-            outlined, slope = _outlined(blocks.peak, speed, load, outlined)
-            first[:3] = outlined + beyond, np.log(load), slope
         line, alike = _Swept(cells, blocks, barriers, mean), Cases(deborah[some], loads[some])
         _states(line, alike, starts[some], first, ordered[some], ordered_status[some])
-        outlined = outlined if outlines else first[0]
-        beyond = first[0] - outlined  # this difference changes slowly with the speed
     results, status = np.empty_like(ordered), np.empty_like(ordered_status)
     results[order], status[order] = ordered, ordered_status
     highest = int(np.argmax(cells.peak[:-1]))
@@ -334,10 +288,10 @@ def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> t
 
 
 def _is_lost(cases: Cases, near: FloatArray, depth: FloatArray) -> NDArray[np.bool_]:
-    """Return whether, in each case, the rise of the line where contact begins is as small as rounding errors.
+    """Return the cases in which the line rises so little where contact begins that rounding errors dominate.
 
-    The rise is F_N / (4 G dx) divided by v tau / dx. `near` contains the heights of the two nodes next to the highest
-    point, relative to the highest point.
+    If the dashpots carry the load, this rise is F_N / (4 G dx) divided by v tau / dx. `near` contains the heights of
+    the two nodes next to the highest point, relative to the highest point.
     """
     fall = -np.min(near)
     with np.errstate(over="ignore"):

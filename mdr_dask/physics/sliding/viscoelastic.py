@@ -31,13 +31,13 @@ DRAG, DEPTH, FRACTION, SLOPE = range(4)
 
 @dataclass(frozen=True)
 class ViscoelasticSteady:
-    """A steady state; all values are NaN if it did not converge.
+    """A steady state; all values are NaN if the solver did not converge.
 
     Parameters
     ----------
     values : array, shape (4,)
-        The columns of a `Steady`: F_x / (4 G_inf) in the unit of height squared; penetration of the mean line, or of z
-        = 0 under an indenter; fraction of the line in contact; rms slope of the part of the line in contact.
+        F_x / (4 G_inf) in the unit of height squared; penetration of the mean line, or under an indenter of the height
+        0; fraction of the line in contact; rms slope of the part of the line in contact.
     errors : array, shape (4,)
         Estimated absolute discretisation errors of the values.
     status : Outcome
@@ -55,9 +55,10 @@ class ViscoelasticSteady:
 def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float) -> ViscoelasticSteady:
     """Return the steady state of a foundation of independent elements that slides along a line.
 
-    The force on an element of width dx is f = 4 dx [G_inf u + sum G_m (u - a_m) + eta v u'], where a_m is the strain of
-    the dashpot of Prony term m (thesis 3.3.3 for any linear rheology). An element that has travelled the distance s is
-    either in contact, with u = w(s) = d + h(s), or free, with f = 0.
+    The force on an element of width dx is f = 4 dx [G_inf u + sum G_m (u - a_m) + eta v u'], where u is the
+    displacement of the element and a_m the displacement of the dashpot of Prony term m (thesis 3.3.3, extended to any
+    linear rheology). After the distance s the element is either in contact, with u = w(s) = d + h(s), or free, with
+    f = 0; d is the depth and h the height of the line.
 
     Parameters
     ----------
@@ -76,8 +77,9 @@ def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float
 
     Notes
     -----
-    The sweep of a line with straight cells is exact. The result is extrapolated from the results on all nodes and on
-    every second node. Its error is estimated from the difference to the extrapolated result on half as many nodes.
+    The sweep along a line with straight cells is exact. The result is extrapolated from the results on all nodes and on
+    every second node. The error is estimated from the change of this extrapolated result when the number of nodes is
+    halved.
     """
     cells = line.enter.size
     if not np.all(np.isfinite(line.height)):
@@ -112,13 +114,13 @@ class ViscoelasticCase:
             raise ValueError(f"the load must be positive and finite, got {load!r}")
         self._solid, self._load = solid, load
         self._state: FloatArray | None = (
-            None  # stretches of the Prony terms at the first node, then depth of the summit
+            None  # stretches of the Prony terms at the first node, then penetration of the highest node
         )
         self._before: FloatArray | None = None  # results on the previous grid
         self.sweeps = 0
 
     def on(self, height: FloatArray, periodic: bool) -> Solution:
-        """Solve the case on the next finer grid; extrapolate from the previous grid, if there is one.
+        """Solve the case on the next finer grid; extrapolate from this and the previous grid, if there is one.
 
         Parameters
         ----------
@@ -158,8 +160,8 @@ class ViscoelasticCase:
     ) -> tuple[Outcome, FloatArray, FloatArray]:
         """Solve the case on one grid; return the outcome, the state and the four results.
 
-        The search starts from `start`, the state on the previous grid, or from a static contact if `start` is None. The
-        computed depth is the penetration of the summit.
+        The search starts from `start`, the state on the previous grid. If `start` is None, it starts from the static
+        contact. The computed depth is the penetration of the highest node.
         """
         terms, cells = solid.moduli.size, below.size - 1
         if start is None or start.size != terms + 1:
@@ -179,7 +181,8 @@ class ViscoelasticCase:
 def _travelling(solid: LinearSolid, cell: float) -> Travelling:
     """Return a solid with lengths in cells and stresses divided by the static modulus.
 
-    The dashpot, and Prony terms that relax within a very small fraction of a cell, are replaced by one term.
+    One Prony term with a very short relaxation time replaces the dashpot and all terms that relax within a very small
+    fraction of a cell. It has the same viscosity.
     """
     static = solid.static_modulus
     fast = solid.times < SHORTEST * cell
@@ -194,15 +197,15 @@ def _travelling(solid: LinearSolid, cell: float) -> Travelling:
 
 
 class Swept(NamedTuple):
-    """Contacts and free recoveries of a sweep, and the solid.
+    """The contacts and free recoveries (pieces) of a sweep, and the solid.
 
     Parameters
     ----------
     decayed : array, shape (pieces, terms)
-        1 - exp(-length / decay length), for every recovery mode in each free recovery, and for every Prony term in each
-        contact.
+        1 - exp(-length / decay length). The decay lengths are those of the recovery modes in a free recovery, and those
+        of the Prony terms in a contact.
     lengths : array, shape (pieces,)
-        Lengths of free recoveries and contacts alternately, as in `Passage`.
+        Lengths of free recoveries and contacts in turn, as in `Passage`.
     solid : Travelling
         The solid.
     """
@@ -218,9 +221,8 @@ def follow(
 ) -> None:  # pragma: no cover
     """Write the changes of the integrals of the stretches e_m and of u over the line for given changes of the unknowns.
 
-    Contacts and free recoveries of fixed lengths act linearly on the stretches. The shift of the places where contact
-    begins and ends has an effect of second order only, because u is continuous there. Each free recovery costs three
-    products of a matrix and a vector.
+    A contact or free recovery of fixed length changes the stretches linearly. The places where contact begins and ends
+    shift as well, but this has an effect of second order only, because u is continuous at these places.
 
     Parameters
     ----------
@@ -265,9 +267,9 @@ def follow(
 
 @jit
 def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: float) -> None:  # pragma: no cover
-    """Change the strain instantly so that the change of the stress becomes 0, as at the start of free recovery.
+    """Change the strain suddenly so that the stress becomes 0, as at the start of free recovery.
 
-    The strains of the dashpots do not change.
+    All numbers are changes due to `direction` in `follow`. The strains of the dashpots stay the same.
     """
     if stretch.size == 0:
         return
@@ -283,7 +285,7 @@ def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: f
 
 @jit
 def _decays(lengths: FloatArray, deborah: FloatArray, times: FloatArray) -> FloatArray:  # pragma: no cover
-    """Return `Swept.decayed` for contacts and free recoveries of the given lengths, shape (pieces, terms)."""
+    """Return `Swept.decayed`, shape (pieces, terms), for contacts and free recoveries of the given lengths."""
     decayed = np.empty((lengths.size, deborah.size))
     for piece in range(lengths.size):
         scales = deborah if piece % 2 == 1 else times

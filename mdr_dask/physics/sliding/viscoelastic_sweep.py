@@ -1,9 +1,10 @@
 """Sweep of a linear viscoelastic foundation along a line of straight cells, exact inside every cell.
 
-Lengths are in cells, stresses in units of the static modulus. The penetration w at a node is the displacement of an
-element in contact there. The stretch of Prony term m is e = u - a, with de/ds = du/ds - e / deborah and deborah = tau v
-/ cell. In contact the stretches have closed forms; a free element recovers as a sum of modes. Contact begins and ends
-inside cells.
+Lengths are in cells of the length dx, stresses in units of the static modulus. An element in contact at a node has the
+displacement u = w, the penetration at the node. The stretch e_m = u - a_m of Prony term m is the displacement minus
+that of the dashpot of the term; it follows de_m/ds = du/ds - e_m / deborah_m with deborah_m = tau_m v / dx and the
+travelled distance s. In contact the stretches have closed forms. A free element recovers as a sum of exponential modes.
+Contact can begin and end at any place inside a cell.
 """
 
 from __future__ import annotations
@@ -55,8 +56,8 @@ def step_factors(
 ) -> None:  # pragma: no cover
     """Write the factors decay, gain and area of a straight piece of the line for every Prony term.
 
-    In a piece of the given slope, the stretch e changes to decay e + gain slope, and the integral of the stretch is
-    gain e + area slope.
+    Over a piece of the given length and a constant slope, the stretch e changes to decay * e + gain * slope, and its
+    integral is gain * e + area * slope.
     """
     for m in range(deborah.size):
         x = length / deborah[m]
@@ -110,9 +111,10 @@ def separation_point(
 def contact_point(
     low: float, high: float, start: float, slope: float, modes: FloatArray, times: FloatArray
 ) -> float:  # pragma: no cover
-    """Return the place t where the recovering strain meets the straight line start + slope (t - low).
+    """Return the place t where a free element meets the straight line start + slope (t - low), with low <= t <= high.
 
-    Newton's method converges from `low` without overshooting, because the difference of the two functions is convex.
+    Newton's method converges from `low` without overshooting, because the strain of a free element is a convex function
+    of t.
     """
     point = low
     for _ in range(60):
@@ -134,6 +136,7 @@ def contact_point(
 
 @jit
 def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[float, float]:  # pragma: no cover
+    """Return the strain of a free element after a distance, and its derivative."""
     strain, rate = 0.0, 0.0
     for k in range(times.size):
         term = modes[k] * np.exp(-distance / times[k])
@@ -146,14 +149,13 @@ def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[f
 def _next_contact(
     place: float, node: int, modes: FloatArray, times: FloatArray, penetration: FloatArray, last: int
 ) -> float:  # pragma: no cover
-    """Return where the strain that recovers from `place` meets the profile again, or -1 if it does not.
+    """Return the place where an element that is free from `place` on meets the line again, or -1 if it does not.
 
-    The search begins in the cell that ends at `node`. This must be the next cell after a separation, because a convex
-    strain that separates from a straight cell does not meet this cell again.
+    The search begins in the cell that ends at `node`. After a separation this must be the next cell, because a convex
+    strain that separates from a straight cell does not meet the same cell again.
 
-    The logarithm of a sum of decaying exponentials is convex, so that the exponential function that is tangent to the
-    sum is a lower bound. Nodes below this
-    bound are skipped without evaluation of the sum.
+    The logarithm of a sum of decaying exponentials is convex. An exponential function that is tangent to the sum is
+    therefore a lower bound. Nodes below this bound are skipped without evaluation of the sum.
     """
     strain, rate = _strain_of(0.0, modes, times)
     bound = strain
@@ -180,7 +182,7 @@ class Passage(NamedTuple):
     Parameters
     ----------
     lengths : array, shape (>= 2 nodes + 2,)
-        Lengths of free recoveries and contacts alternately. The first entry belongs to a free recovery and may be 0.
+        Lengths of free recoveries and contacts in turn. The first entry belongs to a free recovery and may be 0.
     imbalance : array, shape (terms,)
         Integral of e_m over the line.
     totals : array, shape (6,)
@@ -202,14 +204,14 @@ def sweep_line(
     passage: Passage,
     workspace: FloatArray,
 ) -> tuple[int, int]:  # pragma: no cover
-    """Move an element once along the line and add the contributions of each contact and each free recovery.
+    """Move an element once along the line; write the lengths of contacts and free recoveries, and the integrals.
 
     Parameters
     ----------
     penetration : array, shape (nodes,)
         w at each node; the last node of a periodic line repeats the first node.
     start : array, shape (terms,)
-        Stretches e_m of an element at the first node with the penetration of this node; ignored if `undeformed`.
+        Stretches e_m of an element whose displacement is the penetration of the first node; ignored if `undeformed`.
     solid : Travelling
         The solid.
     undeformed : bool
@@ -274,14 +276,14 @@ def _contact(
     totals: FloatArray,
     workspace: FloatArray,
 ) -> tuple[float, float, float, bool]:  # pragma: no cover
-    """Move along the profile from `begin` until the stress falls to zero or the line ends; arrays as in `sweep_line`.
+    """Move an element in contact from `begin` until the stress falls to zero or the line ends; see `sweep_line`.
 
     Returns
     -------
     place, strain, pressure, left
         The place where the contact or the line ends, strain and remaining stress at this place, and whether the contact
-        ends. The stretches are in ``workspace[0]``, and ``workspace[2, 0]`` is the next node at which contact can
-        begin.
+        ends there. The stretches are in ``workspace[0]``, and ``workspace[2, 0]`` is the end of the next cell in which
+        contact can begin.
     """
     terms, last = moduli.size, penetration.size - 1
     e, following = workspace[0], workspace[9]
@@ -339,9 +341,9 @@ def _stretch(
 def _begin_recovery(
     strain: float, excess: float, e: FloatArray, moduli: FloatArray, modes: FloatArray, amplitude_of: FloatArray
 ) -> None:  # pragma: no cover
-    """Write the recovery modes after a decrease of the strain by `excess`.
+    """Write the recovery modes of an element whose strain has suddenly decreased from `strain` by `excess`.
 
-    The stretch of the shortest Prony term is adjusted so that the stress is zero.
+    The stretch of the fastest Prony term is adjusted so that the stress is exactly zero.
     """
     stress = strain - excess
     for m in range(moduli.size):

@@ -172,6 +172,18 @@ def _highest(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[
     return best, place, highest
 
 
+def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float]:
+    """Return the cell of the highest point of a periodic cubic line, and the position in the cell (0 to 1).
+
+    Parameters
+    ----------
+    height, slope : array, shape (n,)
+        Heights, and their derivatives with respect to the position divided by the length of the line.
+    """
+    line = periodic_line(height, slope)
+    return _highest(line.height, line.enter, line.leave)[:2]
+
+
 def cut(line: CubicLine) -> Cells:
     """Split a line into its cells; a periodic line starts at its highest point."""
     best, place, top = _highest(line.height, line.enter, line.leave)
@@ -256,34 +268,3 @@ def _resum(slope: FloatArray, stretch: FloatArray) -> None:
             stretch[i] += difference
         here, after, correction = after, further, next_correction
     stretch[n] = kept
-
-
-@jit
-def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float, float]:
-    """Return the cell of the highest point of a periodic cubic line, the position in the cell (0 to 1), and the height.
-
-    Parameters
-    ----------
-    height, slope : array, shape (n,)
-        Heights, and their derivatives with respect to the position divided by the length of the line.
-    """
-    n, node = height.size, -np.inf
-    for i in range(n):
-        node = max(node, height[i])
-    best, best_place, highest, rise = 0, 0.0, -np.inf, STEEPEST_RISE / n
-    for i in range(n):
-        following = i + 1 if i + 1 < n else 0
-        after = height[following]
-        if max(height[i], after) + rise * max(slope[i] - slope[following], 0.0) < node:
-            continue
-        enter, leave, place = slope[i] / n, slope[following] / n, 0.0
-        if enter > 0 > leave and max(height[i], after) + STEEPEST_RISE * (enter - leave) > highest:
-            b, c = 3 * (after - height[i]) - 2 * enter - leave, enter + leave - 2 * (after - height[i])
-            place = min(max(-enter / (b - math.sqrt(max(b * b - 3 * enter * c, 0.0))), 0.0), 1.0)
-            b, c = b * place * place, c * (place * place * place)
-        else:
-            b, c = 0.0, 0.0
-        peak = height[i] + place * enter + b + c
-        if peak > highest:
-            best, best_place, highest = i, place, peak
-    return best, best_place, highest

@@ -57,5 +57,5 @@ class RoughLine:
         if self.body is not None:
             return self
         nodes = SEEN * self.points
-        cell, place, _ = highest_point(self.heights(nodes), self.slopes(nodes))
+        cell, place = highest_point(self.heights(nodes), self.slopes(nodes))
         return replace(self, roughness=self.roughness.from_place((cell + place) / nodes))

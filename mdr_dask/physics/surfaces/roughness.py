@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.jit import jit
 from mdr_dask.physics.surfaces.waves import series
 
 ComplexArray = NDArray[np.complex128]
-
-# Taylor coefficients of the sine in descending powers of x^2; for |x| <= pi / 4 the error is below rounding
-SINE = tuple((-1) ** k / math.factorial(2 * k + 1) for k in reversed(range(8)))
-COSINE = tuple((-1) ** k / math.factorial(2 * k) for k in reversed(range(9)))
 
 
 def amplitudes(modes: int, hurst: float, rolloff: float = 0.0, longest: float = 0.0) -> FloatArray:
@@ -93,30 +87,9 @@ def phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
 
 @lru_cache(maxsize=8)  # numbers of modes are powers of two, so eight entries cover a factor of 100
 def _phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
-    factors = np.empty((modes, 2))
-    _turn(_generator(seed, realisation).random(modes), factors)
+    factors: ComplexArray = np.exp(1j * phases(seed, realisation, modes))
     factors.flags.writeable = False
-    pairs: ComplexArray = factors.view(np.complex128)[:, 0]
-    return pairs
-
-
-@jit
-def _turn(share: FloatArray, factors: FloatArray) -> None:
-    """Write cosine and sine of fractions 0..1 of a full circle, by series about the nearest quarter circle."""
-    for k in range(share.size):
-        quarter = np.floor(4 * share[k] + 0.5)
-        x = 2 * np.pi * (share[k] - 0.25 * quarter)
-        y = x * x
-        sine, cosine = 0.0, 0.0
-        for term in SINE:
-            sine = sine * y + term
-        for term in COSINE:
-            cosine = cosine * y + term
-        sine *= x
-        swapped = quarter == 1 or quarter == 3
-        one, other = (sine, cosine) if swapped else (cosine, sine)
-        factors[k, 0] = -one if quarter == 1 or quarter == 2 else one
-        factors[k, 1] = -other if quarter == 2 or quarter == 3 else other
+    return factors
 
 
 def line(amplitude: FloatArray, phase: FloatArray, nodes: int, derivative: int = 0) -> FloatArray:
