@@ -1,7 +1,7 @@
 """Compilation of numerical kernels by numba: `jit` for kernels, `jit_inline` for small functions inside them.
 
-Numba recompiles a kernel only when the file of the kernel changes. After a change of a function that kernels in other
-files call, empty the cache or set NUMBA_CACHE_DIR to a new folder; the tests do this automatically.
+Numba compiles a kernel again only if the file of the kernel has changed. If you change a function that kernels in other
+files call, empty numba's cache or set NUMBA_CACHE_DIR to a new folder. The tests do this automatically.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ UNCOUNTED = OPTIONS | {"_nrt": False}  # without its runtime, numba does not cou
 
 
 def jit(function: Kernel) -> Kernel:
-    """Compile a function of numbers and arrays, and store its machine code in numba's cache.
+    """Compile a function of numbers and arrays, and store the machine code in numba's cache.
 
-    If the cache cannot be written or read, the function is compiled again in every process, which only costs time.
+    If the cache cannot be written or read, every process compiles the function again, which only costs time.
     """
     return _cached(function, OPTIONS)
 
@@ -30,8 +30,7 @@ def jit(function: Kernel) -> Kernel:
 def jit_uncounted(function: Kernel) -> Kernel:
     """Compile a function that creates no arrays, without reference counting for arrays.
 
-    Functions that read arrays from named tuples inside loops, and pass these tuples on, are several times slower with
-    reference counting.
+    With reference counting, functions that read arrays from named tuples inside loops are several times slower.
     """
     return _cached(function, UNCOUNTED)
 

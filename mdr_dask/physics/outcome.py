@@ -6,10 +6,7 @@ from enum import IntEnum
 
 
 class Outcome(IntEnum):
-    """How a solver ended; kernels return the number, and messages to users contain the `sentence`.
-
-    Kernels compare members with integers, because numba treats members as constants.
-    """
+    """How a solver ended: compiled functions return the number, and messages to users contain the `sentence`."""
 
     CONVERGED = 0
     DEPTH_NOT_FOUND = 1

@@ -1,15 +1,16 @@
 """Grid refinement: solve on a grid and on the next finer one, and estimate the error from the difference.
 
-Every solver that works on a grid uses this function. If the number of cells doubles from one level to the next, the
-error of a solver of order p decreases by r = 2^p per level. Let c be the relative change of the results between the
-last two levels, and b the change before that. The relative error on the last level is estimated as
+Every solver that works on a grid uses this function. The number of cells doubles from one level to the next, so that
+the error of a solver of order p decreases by r = 2^p per level. Let c be the relative change of the results from the
+last level but one to the last level, and b the change from the level before. The relative error on the last level is
+estimated as
 
     error = safety max( c / (r - 1),  b / (r (r - 1)) ) + e.
 
 The first term is Richardson's estimate, with the safety factor of the grid convergence index (Roache, J. Fluids Eng.
-116, 405, 1994). The second term is the same estimate with the change c = b / r that is expected after a change b.
-The second term is needed because the results on two grids may agree by chance; it is available from the third level on.
-A solver may give an additional error e that may be equal on both grids (`Solution.unseen`).
+116, 405, 1994). The second term is the same estimate with b / r, the change that is expected after the change b. It is
+needed because the results on two grids may agree by chance; it is available from the third level on. The last term e is
+an error that two grids may have in common, so that their difference does not show it (`Solution.unseen`).
 """
 
 from __future__ import annotations
@@ -33,13 +34,13 @@ class Solution(NamedTuple):
     Parameters
     ----------
     values : sequence of array, shape (cases, ...)
-        One array per output. It contains one number per case, or one profile per case at positions that are the same on
-        every grid. NaN marks positions where the output does not exist.
+        One array per output, with one number or one profile per case. The positions of a profile are the same on every
+        grid. NaN marks positions where the output does not exist.
     outcome : int8 array, shape (cases,)
         Values of `Outcome`.
     unseen : float or array, shape (outputs, cases)
-        Relative errors that may be equal on two grids, so that their difference does not contain them. They are added
-        to the estimate.
+        Relative errors that two grids may have in common, so that the difference of their results does not show them.
+        They are added to the estimate.
     """
 
     values: Sequence[FloatArray] | FloatArray
@@ -96,19 +97,19 @@ def refine(
         Increasing levels, such as numbers of cells. The cell size is halved from each level to the next. All cases are
         solved on the first two levels; with only one level the errors are infinite.
     accuracy : float
-        Allowed error of every output, relative to its largest absolute value, or to its floor if the floor is larger.
-        Infinity to stop at the second level and obtain the errors there.
+        Allowed error of every output, relative to the largest absolute value of the output, or to its floor if the
+        floor is larger. With infinity every case is solved on the first two levels only.
     order : float
         Order of convergence p of the dominant part of the error of the solver.
     safety : float
         Safety factor of the estimate.
     floors : float or array, shape (outputs,)
         One floor for all outputs, or one floor for each. If the absolute value of an output is below its floor, the
-        relative error is computed with respect to the floor. Floors are needed for outputs that can be zero, such as a
-        probability.
+        error is divided by the floor instead of the value. Outputs that can be zero, such as a probability, need a
+        floor.
     shared : bool
-        Whether all outputs of a case get the relative error of the output with the largest change. Two grids may agree
-        by chance in one output but hardly in all. Choose False for outputs that converge at different rates.
+        Whether all outputs of a case get the relative error of the output with the largest change. One output may agree
+        on two grids by chance, but hardly all outputs. Choose False for outputs that converge at different rates.
 
     Returns
     -------
@@ -196,6 +197,7 @@ def _largest(sizes: FloatArray) -> FloatArray:
 
 
 def _only(solution: Solution, cases: NDArray[np.bool_]) -> Solution:
+    """Return the values and outcomes of the selected cases."""
     return Solution([value[cases] for value in solution.values], solution.outcome[cases])
 
 

@@ -1,7 +1,8 @@
 """Linear viscoelastic solids: a spring, Prony terms and a dashpot in parallel; their moduli, fits and temperature laws.
 
-The stress due to a shear strain u is ``G_inf u + sum G_m (u - a_m) + eta du/dt`` with ``da_m/dt = (u - a_m) / tau_m``.
-A solid without Prony terms is a Kelvin solid, a solid with one Prony term and no dashpot a standard solid.
+The stress due to a shear strain u is ``G_inf u + sum G_m (u - a_m) + eta du/dt``, where a_m is the strain of the
+dashpot of Prony term m, which follows ``da_m/dt = (u - a_m) / tau_m``. A solid without Prony terms is a Kelvin solid. A
+solid with one Prony term and no dashpot is a standard solid.
 """
 
 from __future__ import annotations
@@ -124,7 +125,10 @@ def complex_modulus(solid: LinearSolid, angular_frequency: ArrayLike) -> NDArray
 
 
 def relaxation_modulus(solid: LinearSolid, time: ArrayLike) -> FloatArray:
-    """Return G(t), Pa: the stress at times t > 0, s, after a unit step of strain; a dashpot does not contribute."""
+    """Return G(t), Pa, the stress divided by the strain at the time t > 0, s, after a step of the strain.
+
+    A dashpot does not contribute.
+    """
     elapsed = np.asarray(time, dtype=np.float64)
     terms = solid.moduli * np.exp(-elapsed[..., None] / solid.times)
     return np.asarray(solid.static_modulus + terms.sum(axis=-1), dtype=np.float64)
@@ -170,7 +174,7 @@ def power_law_series(
     highest: float,
     terms_per_decade: int = 2,
 ) -> SeriesFit:
-    """Return a Prony series for G'' = loss_modulus (omega / frequency)^exponent (thesis eq. 3.45) in a range.
+    """Return a Prony series for the law G'' = loss_modulus (omega / frequency)^exponent (thesis eq. 3.45).
 
     Parameters
     ----------
@@ -327,7 +331,8 @@ def at_temperature(solid: LinearSolid, factor: float) -> LinearSolid:
 class Recovery:
     """Free recovery (zero stress) of a solid as a sum of decaying modes.
 
-    In mode k the strain is u = c_k exp(-t / lambda_k), and the stretch of term m is u - a_m = stretch[m, k] u.
+    In mode k the strain at the time t is u = c_k exp(-t / lambda_k), and the stretch of Prony term m is u - a_m =
+    stretch[m, k] u, where a_m is the strain of the dashpot of the term.
 
     Parameters
     ----------
@@ -357,8 +362,8 @@ def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
 
     Notes
     -----
-    The rates -1 / lambda_k are the zeros of the modulus as a function of i omega, see :func:`recovery_times`. The modes
-    are orthogonal with the weights G_m / tau_m, so that the inverse of `stretch` has a closed form.
+    The complex modulus as a function of i omega is zero at -1 / lambda_k, see :func:`recovery_times`. The modes are
+    orthogonal with the weights G_m / tau_m, so that the inverse of `stretch` has a closed form.
     """
     zeros, distance = recovery_times(moduli * times, times)
     stretch = times[:, None] / distance
@@ -369,7 +374,7 @@ def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
 
 @jit
 def _imbalance(k: int, offset: float, weight: FloatArray, times: FloatArray) -> tuple[float, float]:
-    """Return f = 1 + sum G tau / (tau - lambda) at a distance `offset` from pole `k`, and df/dlambda."""
+    """Return f = 1 + sum weight_m / (tau_m - lambda) at lambda = tau_k + offset, and df/dlambda."""
     total, rate = 1.0, 0.0
     for m in range(times.size):
         inverse = 1 / ((times[m] - times[k]) - offset)
@@ -394,8 +399,8 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
     times : array, shape (modes,)
         lambda_k, ascending: lambda_k is between tau_k and tau_(k+1), and the largest lambda_k is above the largest tau.
     distance : array, shape (modes, modes)
-        Element (m, k) is tau_m - lambda_k. Each zero is computed as its distance from the nearer pole. The differences
-        are therefore precise even if the times cover many decades.
+        Element (m, k) is tau_m - lambda_k. Each lambda_k is computed as its distance from the nearer tau_m, so that the
+        differences are precise even if the times cover many decades.
     """
     terms = times.size
     zeros, distance = np.empty(terms), np.empty((terms, terms))
@@ -413,7 +418,7 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
 
 @jit
 def _distance_to_zero(pole: int, sign: float, gap: float, weight: FloatArray, times: FloatArray) -> float:
-    """Return the distance of a zero from the nearest pole, by Newton's method with bisection of the log distance."""
+    """Return the distance of a zero from the nearest tau, by Newton's method and bisection of its logarithm."""
     high = np.log(gap)
     low = high - 80.0
     place = 0.5 * (low + high)

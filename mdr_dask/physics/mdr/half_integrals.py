@@ -1,8 +1,8 @@
 """Half-integrals of piecewise polynomials on graded panels: matrices of both transforms, exact for such polynomials.
 
-As functions of the square of the radius, both transforms are Abel's half-integrals. After the substitution z -> z - t^2
-the weights of the quadrature are integrals of polynomials. All contacts are scaled to the interval [0, 1], so that one
-set of matrices is enough.
+As functions of z, the square of the radius, both transforms of the MDR are Abel's half-integrals. The substitution z' =
+z - t^2 turns the integrands into polynomials in t, which Gauss's rule integrates exactly. All contacts are scaled to
+the interval [0, 1], so that one set of matrices is enough.
 """
 
 from __future__ import annotations
@@ -175,7 +175,7 @@ def interpolate(mesh: Mesh, values: FloatArray, places: FloatArray) -> FloatArra
 
 
 def interpolate_weighted(mesh: Mesh, rows: FloatArray, shares: FloatArray, stretch: FloatArray) -> FloatArray:
-    """Return the sum over k of shares[k] p_k(stretch[k] z) at all nodes z, where p_k interpolates rows[k]."""
+    """Return the sum over k of shares[k] p_k(stretch[k] z) at all nodes z; p_k is the polynomial through rows[k]."""
     result = np.zeros(mesh.nodes.size)
     _weighted(mesh, rows, shares, stretch, result)
     return result

@@ -1,6 +1,7 @@
-"""Profiles of unworn bodies of revolution, in units of the contact radius a0 and the depth d0 before any wear.
+"""Unworn bodies of revolution: the profile f0(r) and its image g0(x), the line of the MDR.
 
-In these units g(1) = 1. The index 0 of f0 and g0 means before any wear.
+Lengths along the surface are in units of the contact radius a0, heights in units of the depth d0, both before any wear.
+In these units g0(1) = 1. The index 0 means before any wear.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from mdr_dask.physics.mdr.transforms import forward_transform, gauss, power_fact
 
 
 class Image(NamedTuple):
-    """The image of a body in the form that compiled code needs: a piecewise cubic, or without knots a power law.
+    """The image g0 of a body for compiled code: a piecewise cubic, or a power law if there are no knots.
 
     Parameters
     ----------
@@ -259,7 +260,7 @@ FARTHEST, KNOTS = 8.0, 80
 
 
 def from_body(body: ClosedForm, depth: float) -> TableProfile:
-    """Build the profile of a body in closed form that is pressed to a depth.
+    """Build the profile of a body in closed form that is pressed to a depth, in the unit of length of the body.
 
     The profile consists of cubic pieces, which become shorter towards the breaks of the body.
     """

@@ -1,8 +1,9 @@
 """The transforms of the method of dimensionality reduction for bodies of revolution, with an error estimate.
 
-The substitution of an angle or a hyperbolic angle removes the square-root singularity of every integral. Integrals are
-split at the kinks and jumps of the profile, and computed by Gauss-Legendre rules. The number of nodes is doubled until
-two successive results agree.
+The transforms convert the profile f(r) of a body into its image g(x), the line that represents the body, and back. An
+angle, or a hyperbolic angle, as the new variable removes the square-root singularity of every integral. The integrals
+are split at the kinks and jumps of the profile and computed by Gauss-Legendre rules. The number of nodes is doubled
+until two successive results agree.
 """
 
 from __future__ import annotations
@@ -73,8 +74,8 @@ def inverse_transform(
     Returns
     -------
     Estimate
-        f(r) = (2/pi) int_0^r g(x) / sqrt(r^2 - x^2) dx, measured from the same zero as g. The estimated error exceeds
-        the tolerance if 1024 nodes per piece are not enough.
+        f(r) = (2/pi) int_0^r g(x) / sqrt(r^2 - x^2) dx; f(0) = g(0). The estimated error exceeds the tolerance if 1024
+        nodes per piece are not enough.
 
     Examples
     --------
@@ -152,7 +153,9 @@ def pressure(
     jumps: Sequence[tuple[float, float]] = (),
     tolerance: float = 1e-10,
 ) -> Estimate:
-    """Return contact pressure divided by effective modulus (thesis eq. 2.11, extended to jumps of the line load).
+    """Return the contact pressure divided by the effective modulus (thesis eq. 2.11).
+
+    The equation is extended to jumps of the line load q = d - g, with the depth d.
 
     Parameters
     ----------
@@ -163,7 +166,7 @@ def pressure(
     contact_radius : float
         Half-width a of the one-dimensional contact.
     edge_gap : float
-        d - g(a-), the jump of the line load at the edge; non-zero under a flat punch.
+        d - g(a) just inside the edge, the jump of the line load at the edge; non-zero under a flat punch.
     breaks : sequence of float
         Places where a derivative of g jumps.
     jumps : sequence of (position, height)

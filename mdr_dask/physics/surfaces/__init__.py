@@ -1,8 +1,8 @@
-"""Lines over which an elastomer slides: their sources, and their shape between nodes.
+"""Rough lines and indenters over which an elastomer slides, and spectra of measured surfaces.
 
-`waves` is the common form of all roughness. `roughness` generates lines, `measured` prepares recorded lines, and
-`shapes` holds indenters. `rough_line` puts roughness on an indenter or a plane, and `cubic_line` is the line for the
-solvers. `splines` are lines with few points, for quantities that depend on the shape between points.
-For measured surfaces, `maps` and `scans` compute a `spectrum`, from which lines are made; `self_affine` fits power
-laws.
+`waves` is the common form of all rough lines. `roughness` generates lines, `measured` prepares recorded lines, and
+`shapes` contains the indenters. `rough_line` combines roughness with an indenter or a plane, and `cubic_line` is the
+form of a line that the solvers use. `splines` describe lines with few points, for quantities that depend on the shape
+between the points. `maps` and `scans` compute the spectrum of a measured surface, in the form of `spectrum`, from which
+lines are generated. `self_affine` fits a power law to such a spectrum.
 """

@@ -16,7 +16,7 @@ from mdr_dask.physics.surfaces import shapes
 
 NONE = 2.0  # result of `summit` if the cell has no maximum
 STEEPEST_RISE = 4 / 27  # largest rise of a cubic above its ends, divided by the slopes at the ends
-UNRESOLVED = 0.5  # largest relative difference of two integrals of the squared slope (by nodes, by cells) if resolved
+UNRESOLVED = 0.5  # a line is resolved if its mean squared slopes at the nodes and in the cells differ by less
 
 
 class CubicLine(NamedTuple):
@@ -91,13 +91,13 @@ def without_kinks(line: CubicLine) -> CubicLine:
 class Cells(NamedTuple):
     """The n cells of a line, and one more cell that repeats the first cell.
 
-    A periodic line starts at its highest point.
+    A periodic line starts in the cell of its highest point.
 
     Parameters
     ----------
     height : array, shape (n + 2,)
-        Heights at the nodes relative to the highest point of the line, so never positive. Small distances from the
-        highest point, which matter in light contact, keep all digits.
+        Heights at the nodes relative to the highest point of the line, which are never positive. Light contact depends
+        on small distances from the highest point; in this form they have no rounding error.
     enter, leave : array, shape (n + 1,)
         Slopes at the start and the end of each cell.
     peak : array, shape (n + 1,)
@@ -161,7 +161,7 @@ def _peak(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> t
 
 @jit
 def _highest(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[int, float, float]:
-    """Return the first cell that contains the highest point of a line, the position in the cell, and the height."""
+    """Return the first cell with the highest point of a line, the position in the cell (0 to 1), and the height."""
     best, place, highest = 0, 0.0, -np.inf
     for i in range(enter.size):
         rise = STEEPEST_RISE * (max(enter[i], 0.0) + max(-leave[i], 0.0))
@@ -187,7 +187,7 @@ def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float]:
 def cut(line: CubicLine) -> Cells:
     """Split a line into its cells; a periodic line starts at its highest point."""
     best, place, top = _highest(line.height, line.enter, line.leave)
-    if line.smooth and place == 1:  # so that the result does not depend on the first node of the line
+    if line.smooth and place == 1:  # the same cell, wherever the numbering of the nodes begins
         best, place = (best + 1) % line.enter.size, 0.0
     columns = _turned(line, top, best if line.periodic else 0)
     if line.smooth and _is_resolved(columns[1][:-1], columns[5][:-1]):
@@ -241,7 +241,7 @@ def _turned(
 def _is_resolved(slope: FloatArray, stretch: FloatArray) -> bool:
     """Return whether the nodes resolve the line, with more than two nodes per shortest wave.
 
-    The sum of the squared slope over the nodes is then close to the integral over the cells.
+    If they do, the sum of the squared slope over the nodes is close to its integral over the cells.
     """
     by_nodes, by_cells = np.dot(slope, slope), np.sum(stretch)
     return bool(abs(by_nodes - by_cells) < UNRESOLVED * by_cells)
@@ -252,7 +252,7 @@ def _resum(slope: FloatArray, stretch: FloatArray) -> None:
     """Compute the integrals of the squared slope over cells by the Euler-Maclaurin formula; their total is exact.
 
     The first cell keeps the integral of its polynomial, because a period begins and ends inside this cell. The other
-    cells share the difference.
+    cells share the difference between this integral and that of the formula.
     """
     n, kept = slope.size - 1, stretch[0]
     before, here, after = slope[n - 1] ** 2, slope[0] ** 2, slope[1] ** 2

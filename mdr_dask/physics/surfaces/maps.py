@@ -20,8 +20,8 @@ LEAST_POINTS = 16  # smallest number of points along each axis
 MOST_MISSING = 0.05  # largest fraction of missing points that are filled
 FAR = 19.0  # deviation of an outlier, in robust standard deviations; no point of a generated surface reaches it
 BAND = 128  # number of rows processed together, so that they fit into the processor's cache
-TELLING = 1e-3  # a ring with less than this fraction of the largest ring's contribution may be due to rounding
-MOST_SCATTER = 0.02  # octaves are used if angular harmonics due to chance have at most this mean square
+TELLING = 1e-3  # a ring that contributes less than this fraction of the largest contribution may be due to rounding
+MOST_SCATTER = 0.02  # largest mean square of angular harmonics that scatter may cause in an octave that is used
 FLAT = 1e-12  # a map is flat if the range of heights, divided by the largest height, is below this value
 ROUNDING = 1e-20  # rounding error of the transform, as a fraction of the largest ring
 HANN_MODES = 0.3  # number of independent waves per wave of the transform, with Hann's window
@@ -45,7 +45,7 @@ class SurfaceMap(NamedTuple):
 def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
     """Return the points that deviate from their neighbours along both axes by more than `FAR` standard deviations.
 
-    The standard deviation is a robust estimate.
+    The standard deviation of these deviations is estimated from their median.
     """
     height = surface.height
     away = np.empty((max(height.shape[0] - 2, 0), max(height.shape[1] - 2, 0)))
@@ -67,10 +67,10 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
 
 
 def _off_neighbours(height: FloatArray) -> FloatArray:
-    """Return the distance of inner points from the mean of two neighbours, along the axis where it is smaller.
+    """Return how far inner points are from the mean of their two neighbours, along the axis where this is smaller.
 
-    A point on a crest is close to its neighbours along the crest, although it is far from its neighbours across the
-    crest.
+    The smaller distance is used because a point on a crest is close to its neighbours along the crest, but far from its
+    neighbours across the crest.
     """
     middle = height[1:-1, 1:-1]
     along = np.abs(middle - 0.5 * (height[2:, 1:-1] + height[:-2, 1:-1]))
@@ -131,9 +131,7 @@ def _harmonic(height: FloatArray, missing: NDArray[np.bool_]) -> FloatArray:
 
 
 def without_trend(surface: SurfaceMap, order: Order) -> SurfaceMap:
-    """Return a map minus its least-squares polynomial.
-
-    The polynomial is the mean, a plane, or a paraboloid with a mixed term x y.
+    """Return a map minus its least-squares polynomial: the mean, a plane, or a paraboloid with a mixed term x y.
 
     Missing points (NaN) are ignored and stay missing.
     """
@@ -180,9 +178,10 @@ class MapSpectrum:
     density : array, shape (rings,)
         C2D, m^4: the power of a ring divided by its area, so that rms height and rms gradient are preserved.
     count : array, shape (rings,)
-        Number of waves in each ring, with both signs of the wave vector.
+        Number of waves in each ring; a wave vector and its negative count as two waves.
     independent : float
-        Number of independent waves per wave of the transform; below 1 with a window.
+        Number of statistically independent waves divided by the number of waves of the transform; below 1 with a
+        window.
     rms_height : float
         rms height of the windowed map, m.
     slopes : tuple of float
@@ -212,7 +211,7 @@ class MapSpectrum:
         return float(np.sqrt(self.slopes[0] + self.slopes[1]))
 
     def spectrum(self) -> Spectrum:
-        """Return C2D between the first and the last ring that contain power."""
+        """Return C2D from the first to the last ring with power above the rounding error."""
         there = np.flatnonzero(self.density > ROUNDING * self.density.max(initial=0.0))
         rings = slice(there[0], there[-1] + 1)
         return Spectrum(self.wavenumber[rings], np.maximum(self.density[rings], ROUNDING * self.density.max()))
@@ -224,9 +223,9 @@ class MapSpectrum:
         return averaged(*rings)
 
     def along(self, axis: int) -> Spectrum:
-        """Return the C2D of an isotropic surface whose MDR line has the spectrum of the profile along an axis.
+        """Return the C2D of an isotropic surface whose MDR line has the spectrum of the straight profile along an axis.
 
-        The axis is 0 for x. This spectrum is used for sliding across grooves.
+        The axis is 0 for x and 1 for y. This spectrum represents a grooved surface that slides along this axis.
         """
         q, cut = self.cuts[axis]
         there = cut > ROUNDING * cut.max()
@@ -235,7 +234,8 @@ class MapSpectrum:
     def anisotropy(self) -> float:
         """Return the anisotropy, corrected for scatter: 0 for an isotropic surface, 1 if all waves have one direction.
 
-        It is the larger of the second and the fourth angular harmonic, each as rms over the octaves with enough waves.
+        The anisotropy is the larger of the second and the fourth angular harmonic of the power. Each harmonic is an rms
+        over the octaves of the wave number that contain enough waves.
         """
         there = np.flatnonzero(telling(self.wavenumber, self.density))
         octave = np.floor(np.log2(self.wavenumber[there] / self.wavenumber[there[0]] + 1e-9)).astype(int)
@@ -284,7 +284,7 @@ def _rings(
     size: tuple[float, float],
     modes: float,
 ) -> MapSpectrum:
-    """Return the spectrum in rings, from the squared amplitudes."""
+    """Return the spectrum in rings of the wave vector, from the squared amplitudes (power) of the waves."""
     step = 2 * np.pi / min(size)
     last = int(np.pi * min(n / length for n, length in zip(points, size, strict=True)) / step + 1e-9)
     square_x, square_y = (q_x**2)[:, None], q_y**2
@@ -324,19 +324,19 @@ def _rings(
 
 
 def telling(wavenumber: FloatArray, density: FloatArray) -> NDArray[np.bool_]:
-    """Return the rings whose contribution to the height or the gradient exceeds the rounding errors of a file."""
+    """Return the rings whose contribution to the mean square of height or gradient exceeds the rounding of a file."""
     height, gradient = density * wavenumber, density * wavenumber**3
     return np.asarray((height > TELLING * height.max()) | (gradient > TELLING * gradient.max()))
 
 
 def _cut(power: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-    """Return wave numbers and the two-sided C_cut from `power`, the power summed over both signs."""
+    """Return wave numbers and the two-sided C_cut; `power` is the sum of the power at q and at -q."""
     step = 2 * np.pi / length
     return np.asarray(step * np.arange(1, power.size + 1), dtype=np.float64), power / (2 * step)
 
 
 def _axis(power: FloatArray, ring: NDArray[np.int32], total: FloatArray, count: FloatArray) -> float:
-    """Return the median over rings of the power of waves along an axis divided by the ring's mean power."""
+    """Return the power of waves along an axis divided by the mean power of their ring; the median over rings."""
     number = np.arange(1.0, total.size + 1)
     alive = number[telling(number, total / number)]
     inner = (ring >= 4) & np.isin(ring, alive)

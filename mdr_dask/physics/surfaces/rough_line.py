@@ -9,12 +9,12 @@ from mdr_dask.physics.surfaces.cubic_line import CubicLine, highest_point, inden
 from mdr_dask.physics.surfaces.shapes import Shape
 from mdr_dask.physics.surfaces.waves import Waves
 
-SEEN = 8  # nodes per Nyquist point of the grid on which the highest point of a line is found
+SEEN = 8  # nodes per Nyquist point of the grid on which the highest point of a line is located
 
 
 @dataclass(frozen=True)
 class RoughLine:
-    """A rough line. Positions are in units of its length; roughness and body have the same unit of height.
+    """A rough line on a plane or an indenter; positions are in units of its length, all heights in one unit.
 
     Parameters
     ----------
@@ -53,7 +53,10 @@ class RoughLine:
         return self.through(self.heights(nodes), None)
 
     def from_summit(self) -> RoughLine:
-        """Return the line; a periodic line is shifted so that its highest point is a node of every grid."""
+        """Return a periodic line that begins at its highest point, so that every grid has a node there.
+
+        The line of an indenter is not periodic and is returned as it is.
+        """
         if self.body is not None:
             return self
         nodes = SEEN * self.points

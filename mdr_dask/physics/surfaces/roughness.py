@@ -67,9 +67,9 @@ def spectral_slope(amplitude: FloatArray) -> float:
 def phases(seed: int, realisation: int, modes: int) -> FloatArray:
     """Return the phases of a realisation in [0, 2 pi), shape (modes,).
 
-    The phases depend only on the seed and the index of the realisation, and the phases of a longer spectrum begin with
-    those of a shorter one. So lines of any Hurst exponent, rms height or cut-off have common random numbers (thesis
-    Fig. 2.6).
+    The phases depend only on the seed and the index of the realisation. A short spectrum has the same phases as the
+    first waves of a long one. Lines that differ in Hurst exponent, rms height or cut-off therefore have common random
+    numbers (thesis Fig. 2.6).
     """
     phase: FloatArray = 2 * np.pi * _generator(seed, realisation).random(modes)
     return phase

@@ -1,8 +1,8 @@
-"""The spectrum of an isotropic surface from straight profiles through it: the inverse Abel transform.
+"""The spectrum of an isotropic surface from straight profiles through the surface: the inverse Abel transform.
 
-A straight profile (cut) has the spectrum C_cut(q) = 2 int_q^inf C2D(k) k / sqrt(k^2 - q^2) dk, while the line of the
-MDR has the spectrum pi q C2D. The harmonics of the cut are smaller than those of this line: the rms slope of the cut is
-the rms gradient of the surface divided by sqrt(2).
+A straight profile (cut) has the spectrum C_cut(q) = 2 int_q^inf C2D(k) k / sqrt(k^2 - q^2) dk, where C2D is the
+spectrum of the surface. The line of the MDR has a larger spectrum, pi q C2D: its rms slope is the rms gradient of the
+surface, while the rms slope of the cut is smaller by the factor sqrt(2).
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from mdr_dask.physics.surfaces.measured import MeasuredLine
 from mdr_dask.physics.surfaces.spectrum import Spectrum, quadrature
 
 BINS = 10  # number of bins per decade of the wave number
-BEND = 3.0  # prior standard deviation of the change of d log C2D / d log q between bins
-NOISE_SLOPE = -0.5  # a tail of a cut with d log C / d log q above this slope is noise; a surface with H = 0 has -1
+BEND = 3.0  # prior standard deviation of the change of d log C2D / d log q from one bin to the next
+NOISE_SLOPE = -0.5  # the end of a cut is noise if d log C_cut / d log q is above this value; roughness has -1 or less
 NOISE_TAIL = 0.5  # decades at the end of the cut that are tested for noise
 STEEPEST = 30.0  # the spectrum ends where -d log C / d log q exceeds this value
 
@@ -86,7 +86,7 @@ def averaged(wavenumber: FloatArray, density: FloatArray, independent: float, co
     wavenumber, density : array, shape (waves,)
         Ascending wave numbers, and the spectrum at these wave numbers.
     independent : float
-        Number of independent squared amplitudes per wave, which gives the standard error.
+        Number of independent squared amplitudes per wave number and wave, from which the standard error follows.
     count : array, shape (waves,), optional
         Number of waves at each wave number; 1 by default.
     """
@@ -115,9 +115,10 @@ def _until_the_end(cut: Cut) -> slice:
 def of_cut(cut: Cut) -> Spectrum:
     """Return the isotropic spectrum of a surface with the given cut (inverse Abel transform).
 
-    C2D is a power law between the wave numbers of the cut, so it is positive. The logarithms of C2D are fitted to the
-    cut within the errors of the cut. The change of slope between bins has a normal prior with the standard deviation
-    `BEND`. The explicit inverse -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk would amplify noise.
+    The computed C2D is a power law between the wave numbers of the cut, and therefore positive. Its logarithms are a
+    least-squares fit to the cut, weighted with the errors of the cut. The change of the slope d log C2D / d log q from
+    bin to bin has a normal prior with the standard deviation `BEND`. The explicit inverse
+    -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk would amplify noise.
 
     Raises
     ------
@@ -127,9 +128,8 @@ def of_cut(cut: Cut) -> Spectrum:
     q, density, error = (np.asarray(column, dtype=np.float64)[_until_the_end(cut)] for column in cut)
     if q.size < 3:
         raise DataError(f"expected a spectrum of three wave numbers or more, got {q.size}")
-    edge = (
-        q[-1] ** 2 / q[-2]
-    )  # the cut at the last wave number needs shorter waves; they are assumed to end one step further
+    # waves shorter than the last wave number of the cut contribute to the cut; they are assumed to end one step further
+    edge = q[-1] ** 2 / q[-2]
     knots = np.append(q, edge)
     place, weight = quadrature(q, knots)
     where = np.clip(np.searchsorted(knots, place, side="right") - 1, 0, knots.size - 2)

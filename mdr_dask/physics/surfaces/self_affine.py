@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.surfaces.scans import Cut
 
-LEAST_ERROR = 0.05  # smallest relative error assumed for a bin, because real spectra deviate from power laws
+LEAST_ERROR = 0.05  # smallest assumed relative error of a bin, because real spectra deviate from power laws
 LEAST_BINS = 5  # smallest number of bins for the power law
 LOWEST, HIGHEST = -0.1, 1.2  # range of Hurst exponents
 CHI_SQUARED = 3.84  # 95 % quantile of chi squared for one parameter
@@ -27,7 +27,7 @@ class Interval(NamedTuple):
 
 
 class SelfAffine(NamedTuple):
-    """A power law C2D ~ q^(-2 - 2 H) between two wavelengths, m; None for a cut-off that the data do not show."""
+    """A power law C2D ~ q^(-2 - 2 H) between two wavelengths, m; a wavelength is None if the data show no cut-off."""
 
     hurst: Interval
     longest: Interval | None
@@ -43,7 +43,7 @@ def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> 
     bins : Cut
         C2D, or the spectrum of straight profiles, in logarithmic bins.
     flattest : float
-        Slope d log C / d log q above which a tail is noise: -1 for C2D, -0.5 for a straight profile.
+        The tail is noise if its slope d log C / d log q is above this value: -1 for C2D, -0.5 for a straight profile.
     decades : float
         Length of the tail in decades of the wave number.
     """
@@ -59,7 +59,7 @@ def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> 
 
 
 def steep_limit(bins: Cut) -> float:
-    """Return the wave number beyond which C2D falls more steeply than roughness can; infinite if C2D nowhere does."""
+    """Return the wave number beyond which C2D falls more steeply than any roughness; infinite if there is none."""
     wavenumber, density = bins.wavenumber, bins.density
     there = density > 0
     x, y = np.log(wavenumber[there]), np.log(density[there])
@@ -83,8 +83,8 @@ def fit_self_affine(bins: Cut) -> SelfAffine | None:
     Returns
     -------
     SelfAffine or None
-        The cut-offs lie at bins that are chosen by Schwarz's information criterion. The confidence intervals follow
-        from the likelihood and are widened by the misfit.
+        Schwarz's information criterion decides whether there are cut-offs, and at which bins. The confidence intervals
+        follow from the likelihood. They are widened if the spectrum departs from the law by more than its errors.
     """
     wavenumber, density, error = bins
     if wavenumber.size < LEAST_BINS:

@@ -48,7 +48,7 @@ class Shape(Protocol):
 
 @dataclass(frozen=True)
 class PowerLaw:
-    """The line -c |x|^n of a body of revolution, already mapped by the MDR rule; c > 0, n >= 1."""
+    """The line -c |x|^n, c > 0 and n >= 1, that represents a body of revolution according to the MDR rule."""
 
     coefficient: float
     exponent: float
@@ -143,7 +143,7 @@ def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatAr
 
 @jit
 def _trailing(drop: float, deborah: float, exponent: float) -> float:
-    """Return the solution b >= 0 of b^n + n deborah b^(n-1) = drop; 0 without a solution (possible for n = 1)."""
+    """Return the positive solution b of b^n + n deborah b^(n-1) = drop, or 0 if there is none (possible for n = 1)."""
     if exponent == 1:
         return max(drop - deborah, 0.0)
     # the logarithm of the left side is convex and increasing in y = log b: Newton's method from the right
@@ -173,11 +173,11 @@ def _carried(depth: float, deborah: float, coefficient: float, exponent: float) 
 def smooth(
     loads: FloatArray, deborah: FloatArray, coefficients: FloatArray, exponents: FloatArray, results: FloatArray
 ) -> None:
-    """Slide smooth lines c |x|^n towards -x at prescribed loads.
+    """Compute the steady states of smooth lines c |x|^n that slide towards -x over a Kelvin foundation.
 
-    The contact lies between -a and b, where d is the depth, c a^n = d and d = c (b^n + n v tau b^(n-1)); b is 0 if
-    the last equation has no solution. The load is a convex function of d with the slope a + b + v tau, so Newton's
-    method from the static depth converges to the root from above.
+    At the depth d the contact lies between -a and b, with d = c a^n and d = c (b^n + n v tau b^(n-1)). If the second
+    equation has no positive solution, b is 0. The load is a convex function of d with the derivative a + b + v tau, so
+    that Newton's method converges.
 
     Parameters
     ----------

@@ -1,8 +1,7 @@
-"""The isotropic spectrum of a surface, with its MDR line, its straight profile and its moments.
+"""The spectrum C2D(q) of an isotropic surface: spectra of its MDR line and of a straight profile, and its moments.
 
-The spectrum is a power law between adjacent points.
-
-Angular wave numbers q are in rad/m; spectra are two-sided (thesis 2.12 and 2.13).
+Between adjacent points the spectrum is a power law. Angular wave numbers q are in rad/m. Spectra are two-sided: both
+signs of the wave vector carry the same power (thesis 2.12 and 2.13).
 """
 
 from __future__ import annotations
@@ -108,12 +107,10 @@ class Spectrum:
         return Spectrum(q, self.at(q))
 
     def continued(self, longest: float = 0.0, shortest: float = 0.0, decades: float = 1.0) -> Spectrum:
-        """Return the spectrum, continued by power laws to wavelengths, m, beyond its ends.
+        """Return the spectrum, continued by power laws to wavelengths, m, beyond its ends; 0 for no continuation.
 
-        A wavelength of 0 means no continuation.
-
-        Each power law starts at the outermost point. Its slope is the slope of a straight line fitted to the logarithms
-        within `decades` of this end.
+        Each power law starts at the outermost point. Its exponent is the slope of the straight line that is fitted to
+        the logarithms of the points within `decades` of this end.
         """
         q, density = [self.wavenumber], [self.density]
         for index, end in (
@@ -177,9 +174,20 @@ def self_affine(hurst: float, longest: float, shortest: float, rms: float = 1.0,
 
 
 def quadrature(wavenumber: FloatArray, edges: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return nodes k and weights of the integral along a cut, shape (wave numbers, nodes).
+    """Return nodes k and weights of the integral that gives the spectrum of a straight profile.
 
-    sum(weight * C2D(k)) = 2 int C2D(k) k / sqrt(k^2 - q^2) dk, from k = q to infinity, for a C2D smooth between edges.
+    For every wave number q, sum(weight * C2D(k)) is 2 int C2D(k) k / sqrt(k^2 - q^2) dk from k = q to infinity.
+
+    Parameters
+    ----------
+    wavenumber : array, shape (n,)
+        Wave numbers q of the profile.
+    edges : array, shape (m,)
+        Ascending wave numbers between which C2D is smooth; C2D is 0 outside.
+
+    Returns
+    -------
+    k, weight : array, shape (n, nodes)
     """
     parts = [np.geomspace(low, high, 1 + math.ceil(math.log(high / low) / STEP))[:-1] for low, high in pairwise(edges)]
     bounds = np.append(np.concatenate(parts), edges[-1])

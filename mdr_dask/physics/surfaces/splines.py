@@ -33,8 +33,9 @@ def closest(waves: NDArray[np.complex128], nodes: int) -> FloatArray:
     Returns
     -------
     array, shape (nodes,)
-        Coefficients in the unit of the waves. Each wave is multiplied by the Fourier transform of the B-spline, and
-        divided by the sum of the squared transform over all aliases (Unser, IEEE Signal Process. Mag. 16 (1999) 22).
+        Coefficients in the unit of the waves. The coefficients of each wave are the wave times the Fourier transform of
+        the B-spline, divided by the sum of the squared transform over all aliases (Unser, IEEE Signal Process. Mag. 16
+        (1999) 22).
     """
     return series(waves * _closest(waves.size, nodes), nodes)
 
@@ -102,7 +103,7 @@ def integral(of: Piece, t: float) -> float:
 
 @jit
 def shares(t: float) -> Piece:
-    """Return the weights of the four coefficients in the integral of their piece from 0 to t."""
+    """Return the weights of the four coefficients of a piece in the integral of the piece from 0 to t."""
     square = t * t
     second, third = t * (4 - 2 * square + 0.75 * t * square) / 6, t * (1 + 1.5 * t + square - 0.75 * t * square) / 6
     return (1 - (1 - t) ** 4) / 24, second, third, square * square / 24
