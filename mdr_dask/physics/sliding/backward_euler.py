@@ -35,7 +35,6 @@ SUMS = 3
 # Indices of the properties of a block of nodes: largest and smallest height, smallest rise, height of the node before
 # the block, and the sums of height, rise, height times rise, and rise squared
 PEAK, LOWEST, STEEPEST, BEFORE, HEIGHTS, RISES, WORK, SQUARES = range(8)
-KNOWN = 8
 # Indices of the state of a case in a sweep: displacement u, its derivative with respect to the depth (FADE), the decay
 # of u over a block, the sum of decays over a block, and the sums over the nodes of a block of u, FADE and drag
 U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS = range(7)
@@ -49,7 +48,7 @@ class Nodal(NamedTuple):
     ----------
     height, rise : array, shape (n,)
         Height of each node, and its increase from the previous node.
-    blocks : array, shape (n // BLOCK, KNOWN)
+    blocks : array, shape (n // BLOCK, 8)
         From `_blocks`.
     periodic : bool
         Whether the line is periodic; it then ends at its highest node.
@@ -108,27 +107,15 @@ def _step(h: float, t: float, decay: float, depth: float, u: float, fade: float)
     return now, 1.0 if is_pressed else decay * fade, (now - free) * t
 
 
-@jit
 def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
-    """Return bounds and sums of every block, shape (n // BLOCK, KNOWN)."""
-    blocks = np.empty((height.size // BLOCK, KNOWN))
-    for j in range(blocks.shape[0]):
-        first = j * BLOCK
-        peak = lowest = height[first]
-        steepest = rise[first]
-        heights = rises = work = squares = 0.0
-        for i in range(first, first + BLOCK):
-            h, t = height[i], rise[i]
-            peak, lowest, steepest = max(peak, h), min(lowest, h), min(steepest, t)
-            heights += h
-            rises += t
-            work += h * t
-            squares += t * t
-        blocks[j, PEAK], blocks[j, LOWEST], blocks[j, STEEPEST] = peak, lowest, steepest
-        # on a line that is not periodic, elements are out of contact before the first node
-        blocks[j, BEFORE] = height[first - 1] if j > 0 or periodic else -np.inf
-        blocks[j, HEIGHTS], blocks[j, RISES], blocks[j, WORK], blocks[j, SQUARES] = heights, rises, work, squares
-    return blocks
+    """Return bounds and sums of every block, shape (n // BLOCK, 8)."""
+    whole = height.size // BLOCK * BLOCK
+    h, t = height[:whole].reshape(-1, BLOCK), rise[:whole].reshape(-1, BLOCK)
+    before = np.roll(height, 1)[:whole:BLOCK]
+    if not periodic:
+        before[:1] = -np.inf  # elements are out of contact before the first node
+    sums = h.sum(1), t.sum(1), (h * t).sum(1), (t * t).sum(1)
+    return np.column_stack([h.max(1), h.min(1), t.min(1), before, *sums])
 
 
 @jit

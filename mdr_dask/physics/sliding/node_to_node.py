@@ -42,7 +42,6 @@ SUMMIT = 64  # number of nodes in the cell of the highest point; the highest of 
 NO_ENDS: FloatArray = np.empty((2, 0))
 # Indices of the bounds and sums of a block of cells
 PEAK, LOWEST, STEEPEST, HEIGHTS, SQUARES = range(5)
-KNOWN = 5
 # Rows of a tile: height and slope at each node (beginning with the node before the tile), then for each cell the
 # integrals of height and of slope squared, and the largest height
 HEIGHT, SLOPE, MEAN, SQUARE, TOP = range(5)
@@ -59,7 +58,7 @@ class Nodes(NamedTuple):
         previous period and end with `AFTER` nodes of the next period.
     ends : array, shape (2, BEFORE + n + AFTER) or (2, 0)
         The corrections of `ends_of`, with the same additional nodes.
-    blocks : array, shape (n // BLOCK, KNOWN)
+    blocks : array, shape (n // BLOCK, 5)
         For every block: upper bound of the height, lowest node, smallest slope, integrals of height and of slope
         squared.
     top : float
@@ -75,26 +74,6 @@ class Nodes(NamedTuple):
     blocks: FloatArray
     top: float
     rise: float
-
-
-@jit
-def _take(given: FloatArray, first: int, stride: int, period: FloatArray) -> None:
-    """Write every stride-th value of `given`, from index `first` on, to `period`.
-
-    Values of the previous and of the next period are added at both ends.
-    """
-    n = period.size - BEFORE - AFTER
-    left = -(-(given.size - first) // stride)
-    filled = left if left < n else n  # up to the end of the given array
-    for i in range(filled):
-        period[BEFORE + i] = given[first + i * stride]
-    first -= given.size
-    for i in range(filled, n):
-        period[BEFORE + i] = given[first + i * stride]
-    for i in range(BEFORE):
-        period[i] = period[n + i]
-    for i in range(n + BEFORE, period.size):
-        period[i] = period[i - n]
 
 
 @lru_cache(maxsize=4)
@@ -133,59 +112,25 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
         The corrections of `ends_of`. If the array is empty, integrals over cells are computed from neighbouring nodes.
     """
     n = height.size // stride
-    h, s = np.empty((2, BEFORE + n + AFTER))
-    terms = np.empty((2, ends.shape[1] and h.size))
-    line = Nodes(h, s, terms, np.empty((n // BLOCK, KNOWN)), float(height[first]), 0.0)
-    _take_line(height, slope if resolved else slope[:0], ends, first, stride, line, np.empty((3, BLOCK + 1)))
-    return line
-
-
-@jit
-def _take_line(
-    height: FloatArray,
-    slope: FloatArray,
-    ends: FloatArray,
-    first: int,
-    stride: int,
-    line: Nodes,
-    cells: FloatArray,
-) -> None:
-    """Write the nodes and blocks of a line; if `slope` is empty, slopes are computed from differences of heights."""
-    h, s, of_height, of_square, blocks = line.height, line.slope, line.ends[0], line.ends[1], line.blocks
-    n = h.size - BEFORE - AFTER
-    _take(height, first, stride, h)
-    for i in range(h.size):
-        h[i] -= line.top
-    if slope.size > 0:
-        _take(slope, first, stride, s)
-        for i in range(s.size):
-            s[i] /= n
+    place = (first + stride * np.arange(-BEFORE, n + AFTER)) % height.size
+    h = height[place] - height[first]
+    if resolved:
+        s = slope[place] / n
     else:
-        for i in range(1, s.size - 1):
-            s[i] = 0.5 * (h[i + 1] - h[i - 1])
-        s[0], s[s.size - 1] = s[n], s[s.size - 1 - n]
-    if of_height.size > 0:
-        _take(ends[0], first, stride, of_height)
-        _take(ends[1], first, stride, of_square)
-    mean, square, above = cells[0], cells[1], cells[2]
-    for j in range(blocks.shape[0]):
-        before, begin, last = BEFORE + j * BLOCK - 1, BEFORE + j * BLOCK, BEFORE + (j + 1) * BLOCK
-        # compute the values of all cells by vector instructions, then sum them over the block
-        _integrals(h[before:], s[before:], of_height[before:], of_square[before:], BLOCK, mean, square)
-        for k in range(BLOCK):
-            i = begin + k
-            above[k] = max(h[i], h[i + 1]) + ABOVE * (max(s[i], 0.0) + max(-s[i + 1], 0.0))
-        peak, lowest, steepest, heights, squares = -np.inf, h[last], s[last], 0.0, 0.0
-        for k in range(BLOCK):
-            peak, lowest, steepest = (
-                max(peak, above[k]),
-                min(lowest, h[begin + k]),
-                min(steepest, s[begin + k]),
-            )
-            heights += mean[k]
-            squares += square[k]
-        blocks[j, PEAK], blocks[j, LOWEST], blocks[j, STEEPEST] = peak, lowest, steepest
-        blocks[j, HEIGHTS], blocks[j, SQUARES] = heights, squares
+        s = 0.5 * (np.roll(h, -1) - np.roll(h, 1))
+        s[0], s[-1] = s[n], s[-1 - n]
+    terms = np.take(ends, place, axis=1) if ends.size else ends
+    cells = n // BLOCK * BLOCK
+    mean, square = np.empty(cells), np.empty(cells + 1)
+    _integrals(h[BEFORE - 1 :], s[BEFORE - 1 :], terms[0, BEFORE - 1 :], terms[1, BEFORE - 1 :], cells, mean, square)
+    here, after = slice(BEFORE, BEFORE + cells), slice(BEFORE + 1, BEFORE + 1 + cells)
+    above = np.maximum(h[here], h[after]) + ABOVE * (np.maximum(s[here], 0.0) + np.maximum(-s[after], 0.0))
+    columns = above, np.minimum(h[here], h[after]), np.minimum(s[here], s[after]), mean, square[:-1]
+    reduced = (np.max, np.min, np.min, np.sum, np.sum)
+    blocks = np.empty((n // BLOCK, len(columns)))
+    for k, (column, reduction) in enumerate(zip(columns, reduced, strict=True)):
+        blocks[:, k] = reduction(column.reshape(-1, BLOCK), axis=1)
+    return Nodes(h, s, terms, blocks, float(height[first]), 0.0)
 
 
 @jit
@@ -601,26 +546,6 @@ def load_case(workspace: FloatArray, k: int, depth: float, deborah: float, cells
     workspace[DECAY + k], workspace[THROUGH + k] = math.exp(-1 / deborah), math.exp(-cells / deborah)
 
 
-class _Workspace(NamedTuple):
-    """Work arrays of a search: a tile of the line, the state of the cases, and the results of the last sweep."""
-
-    tile: FloatArray
-    states: FloatArray
-    queue: NDArray[np.int64]
-    lanes: NDArray[np.int64]
-    last_step: FloatArray
-    last: FloatArray
-    now: FloatArray
-    rate: FloatArray
-
-    @classmethod
-    def on(cls, refinement: int) -> _Workspace:
-        """Return the arrays for a grid with the given refinement of the line."""
-        tile, (queue, lanes) = np.empty((IN_A_TILE, BLOCK * refinement + 3)), np.empty((2, LANES), np.int64)
-        last_step, last, (now, rate) = np.empty(LANES), np.empty((LANES, SECANTS)), np.empty((2, SECANTS))
-        return cls(tile, np.empty(ROWS * LANES), queue, lanes, last_step, last, now, rate)
-
-
 @jit
 def _search(
     line: Nodes,
@@ -631,7 +556,6 @@ def _search(
     depths: FloatArray,
     rates: FloatArray,
     results: FloatArray,
-    place: _Workspace,
 ) -> None:
     """Find the depths of cases on a grid by Newton's method; no sweep follows the last step.
 
@@ -652,14 +576,13 @@ def _search(
         Derivatives of the logarithms of the results with respect to the depth; NaN where unknown.
     results : array, shape (cases, SECANTS), output
         Not changed for cases whose depth is not found.
-    place : _Workspace
-        Work arrays for this grid.
     """
     (deborah, loads), rise = cases, line.rise
     refinement = weights.shape[1]
     n, cells = (line.height.size - BEFORE - AFTER) * refinement, BLOCK * refinement
-    workspace, lanes = place.states, place.lanes
-    step_before, last, now, rate = place.last_step, place.last, place.now, place.rate
+    tile, workspace = np.empty((IN_A_TILE, cells + 3)), np.empty(ROWS * LANES)
+    queue, lanes = np.empty(LANES, np.int64), np.empty(LANES, np.int64)
+    step_before, last, now, rate = np.empty(LANES), np.empty((LANES, SECANTS)), np.empty(SECANTS), np.empty(SECANTS)
     for begin in range(0, loads.size, LANES):
         rest = loads.size - begin
         count = LANES if rest > LANES else rest
@@ -670,7 +593,7 @@ def _search(
         for _ in range(ITERATIONS):
             if count == 0:
                 break
-            sweep(line, weights, place.tile, workspace, place.queue, count)
+            sweep(line, weights, tile, workspace, queue, count)
             kept = 0
             for k in range(count):
                 case = lanes[k]
@@ -739,9 +662,7 @@ class NodeToNode:
         some, top = self._cases.only(cases), self._line.top + self._line.rise
         depths, rates, results = self._depth[cases] + top, self._rates[cases], np.full((cases.size, SECANTS), np.nan)
         depths = np.where(depths > 0, depths, _shallow(some.loads))
-        refinement = level // 2
-        workspace = _Workspace.on(refinement)
-        _search(self._line, weights(refinement), some, LAST_STEP, self._error, depths, rates, results, workspace)
+        _search(self._line, weights(level // 2), some, LAST_STEP, self._error, depths, rates, results)
         self._depth[cases], self._rates[cases] = depths - top, rates
         return self._solution(results, depths - top, level)
 
@@ -756,9 +677,7 @@ class NodeToNode:
         for stride in reversed(strides):
             results.fill(np.nan)
             line = nodes(height, self._slope, highest, stride, stride == strides[0], NO_ENDS)
-            _search(
-                line, weights(1), self._cases, FIRST_STEP, FIRST_ERROR, depths, self._rates, results, _Workspace.on(1)
-            )
+            _search(line, weights(1), self._cases, FIRST_STEP, FIRST_ERROR, depths, self._rates, results)
         self._depth = depths - line.top
         return self._solution(results, self._depth, 1)
 
