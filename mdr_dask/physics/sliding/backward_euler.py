@@ -115,7 +115,7 @@ def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
     if not periodic:
         before[:1] = -np.inf  # elements are out of contact before the first node
     sums = h.sum(1), t.sum(1), (h * t).sum(1), (t * t).sum(1)
-    return np.column_stack([h.max(1), h.min(1), t.min(1), before, *sums])
+    return np.array([h.max(1), h.min(1), t.min(1), before, *sums]).T.copy()
 
 
 @jit

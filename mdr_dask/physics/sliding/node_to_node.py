@@ -125,11 +125,14 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
     _integrals(h[BEFORE - 1 :], s[BEFORE - 1 :], terms[0, BEFORE - 1 :], terms[1, BEFORE - 1 :], cells, mean, square)
     here, after = slice(BEFORE, BEFORE + cells), slice(BEFORE + 1, BEFORE + 1 + cells)
     above = np.maximum(h[here], h[after]) + ABOVE * (np.maximum(s[here], 0.0) + np.maximum(-s[after], 0.0))
-    columns = above, np.minimum(h[here], h[after]), np.minimum(s[here], s[after]), mean, square[:-1]
-    reduced = (np.max, np.min, np.min, np.sum, np.sum)
-    blocks = np.empty((n // BLOCK, len(columns)))
-    for k, (column, reduction) in enumerate(zip(columns, reduced, strict=True)):
-        blocks[:, k] = reduction(column.reshape(-1, BLOCK), axis=1)
+    low, flat = np.minimum(h[here], h[after]), np.minimum(s[here], s[after])
+    peak, lowest, steepest = (
+        above.reshape(-1, BLOCK).max(1),
+        low.reshape(-1, BLOCK).min(1),
+        flat.reshape(-1, BLOCK).min(1),
+    )
+    heights, squares = mean.reshape(-1, BLOCK).sum(1), square[:-1].reshape(-1, BLOCK).sum(1)
+    blocks = np.array([peak, lowest, steepest, heights, squares]).T.copy()
     return Nodes(h, s, terms, blocks, float(height[first]), 0.0)
 
 
