@@ -1,7 +1,4 @@
-"""The roughness of a line, in one of four kinds.
-
-It is self-affine, generated with the spectrum of a measured surface, measured, or absent.
-"""
+"""The four kinds of roughness of a line: self-affine, with the spectrum of a measured surface, measured, or none."""
 
 from __future__ import annotations
 
@@ -62,8 +59,8 @@ def _slope(line: Generated) -> float:
 class OfSurface:
     """Lines with the spectrum of a measured surface, in units of their length and rms height.
 
-    Realisation r uses file r modulo n of the n files. The scatter between files is therefore a part of the scatter
-    between realisations, and the mean over realisations is the mean over files.
+    Realisation r uses the file with the index r modulo n, if the surface has n files. The scatter between files is
+    therefore a part of the scatter between realisations, and the mean over realisations is a mean over files.
     """
 
     surface: Surface
@@ -133,7 +130,7 @@ def _waves(line: Measured) -> Waves:
 
 @dataclass(frozen=True)
 class Smooth:
-    """No roughness; the number of points is needed, because grids depend on it."""
+    """No roughness; `points` is the number of Nyquist points, on which grids depend."""
 
     points: int
     is_random = False

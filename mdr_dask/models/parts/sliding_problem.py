@@ -35,7 +35,7 @@ STATUS = np.array(
     dtype=np.int8,
 )
 """The status that is stored for each outcome of a solver."""
-LEAST = 1e-100  # squares and products of numbers between LEAST and 1 / LEAST do not overflow or underflow
+LEAST = 1e-100  # products of three numbers between LEAST and 1 / LEAST do not overflow or underflow
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class SlidingProblems:
-    """The cases of a block as dimensionless numbers; the dimensionless solution depends only on these numbers.
+    """The cases of a block as dimensionless numbers, on which alone the dimensionless solution depends.
 
     Parameters
     ----------
@@ -90,15 +90,20 @@ class SlidingProblems:
             yield self.settings[self.which[sound[k]]], members
 
     def different(self, members: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Return Deborah number and load of the different pairs in some cases, and the pair index of each case."""
+        """Return the different pairs of Deborah number and load among some cases, and the index of the pair of each."""
         pairs, which = np.unique(self.deborah[members] + 1j * self.loads[members], return_inverse=True)
         return pairs.real.copy(), pairs.imag.copy(), which
 
 
 def combinations(*columns: NDArray[Any]) -> tuple[IntArray, IntArray]:
-    """Return the first row of every different combination of values, and the index of the combination of each row.
+    """Find the different combinations of values in the rows of some columns; objects are compared by identity.
 
-    Objects are compared by identity.
+    Returns
+    -------
+    first : int array, shape (combinations,)
+        The first row with each combination.
+    which : int array, shape (rows,)
+        The index of the combination of each row.
     """
     which = np.zeros(columns[0].size, np.int64) if columns else np.zeros(1, np.int64)
     first = np.zeros(min(which.size, 1), np.int64)
@@ -158,7 +163,7 @@ def _without_units(body: Shape | None, length: float, height: float) -> Shape | 
 
 
 def _travelling(term: tuple[FloatArray, FloatArray] | None, velocity: float, length: float) -> PronyTerms | None:
-    """Return Prony terms with relaxation times divided by L / v, the time in which the body slides by L."""
+    """Return Prony terms with relaxation times divided by L / v, the time in which the body slides by L, or None."""
     from mdr_dask.physics.sliding.problem import PronyTerms
 
     if term is None:
@@ -175,7 +180,7 @@ def refuse_immense(numbers: dict[str, FloatArray], faults: dict[int, str]) -> No
 
 
 def each(block: Block[Any], name: str) -> tuple[list[Any], IntArray]:
-    """Return the different values of a nested parameter, and, for every case, the index of its value.
+    """Return the different values of a nested parameter, and the index of the value of every case.
 
     Any part of the nested parameter may vary between the cases.
     """
@@ -234,9 +239,16 @@ def _measured(surface: Surface, points: int, length: float) -> OfSurface | Measu
 
 
 def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArray, FloatArray, list[Any], IntArray]:
-    """Return static modulus and viscosity of every case, the terms of every solid, and the solid of every case.
+    """Return the solids of a block; viscosity and moduli of Prony terms are divided by the static modulus.
 
-    Viscosity and moduli of the terms are divided by the static modulus. The terms of a Kelvin solid are None.
+    Returns
+    -------
+    static, viscosity : array, shape (cases,)
+        Static modulus, Pa, and viscosity of the dashpot, s.
+    terms : list
+        Moduli and relaxation times, s, of the Prony terms of every different solid; None for a Kelvin solid.
+    which : int array, shape (cases,)
+        Index of the solid of every case.
     """
     static, viscosity = _numbers(block, "shear_modulus"), _numbers(block, "relaxation_time")
     materials, which = each(block, "material")

@@ -14,8 +14,10 @@ from mdr_dask.models.parts.sliding_body import SlidingBody
 from mdr_dask.models.parts.sliding_problem import Setting
 
 LARGEST_LOAD = 1.0
-"""Largest tested F_N / (E* L h), with E* = 4 G of an incompressible solid. Above it the line is closer to full contact
-than the surface that it represents."""
+"""Largest tested F_N / (E* L h), with E* = 4 G of an incompressible solid.
+
+At higher loads the line comes much closer to full contact than the surface that it represents.
+"""
 LARGEST_FRACTION = 0.5  # largest tested fraction of the line in contact
 PAGE = "docs/validity.md"
 

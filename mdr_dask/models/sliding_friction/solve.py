@@ -21,8 +21,8 @@ from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 ACCURACY = 0.01  # relative accuracy if the campaign does not give an accuracy
 USUAL_ON_PLANES, USUAL = 2, 16  # nodes per Nyquist point on the finest grid that cases usually need
-BYTES_A_NODE = 150  # peak memory, bytes per node, of a line and one case on this line; measured: 20 to 130 bytes
-SECONDS_A_NODE = 1e-8  # seconds per visit of a node, order of magnitude; `seconds` counts the visits
+BYTES_A_NODE = 150  # peak memory of a line and one case on this line, bytes per node; measured: 20 to 130 bytes
+SECONDS_A_NODE = 1e-8  # time in which a sweep passes a node, s, order of magnitude
 
 #: Outputs that have errors, and the corresponding columns of a steady state.
 OUTPUTS = dict(
@@ -114,7 +114,7 @@ class _Group:
         return int(self.loads.size)
 
     def _repeat(self, result: Result, r: int) -> None:
-        """Copy the results of the first realisation, because the line is the same in all realisations."""
+        """Copy the results of the first realisation to the realisation with index r, which has the same line."""
         for array in result.values.values():
             array[self.members, r] = array[self.members, 0]
         result.status[self.members, r] = result.status[self.members, 0]
@@ -165,13 +165,13 @@ def _lines(block: Block[SlidingFriction], setting: Setting) -> int:
 
 
 def seconds(block: Block[SlidingFriction]) -> float:
-    """Return the computing time of a block, s; an order of magnitude, from the number of visits of nodes."""
+    """Return the computing time of a block, s: an order of magnitude, from the number of nodes that sweeps pass."""
     problems, nodes = sliding_problems(block), 0.0
     for setting, case, members in _groups(block, problems):
         solves = problems.different(members)[0].size
-        visits = 1 if setting.terms is None else 4 * (4 + len(setting.terms.moduli))
+        visits = 1 if setting.terms is None else 4 * (4 + len(setting.terms.moduli))  # sweeps per case
         grid = 2 if case.oversampling == "auto" else case.oversampling
-        # a line takes the time of ten visits of its nodes; most grids of a case are coarse, which halves its visits
+        # to generate a line takes the time of about ten sweeps; half a sweep per case, because most grids are coarse
         nodes += _lines(block, setting) * setting.roughness.points * grid * (10 + 0.5 * solves * visits)
     return 1e-4 + SECONDS_A_NODE * nodes
 
