@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -241,28 +241,21 @@ def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfi
     return TableProfile(_scaled(interpolant, a0, depth), _scaled(image_curve, a0, depth), a0, depth)
 
 
-class ClosedForm(Protocol):
-    """A body of revolution in closed form; lengths are in any unit."""
-
-    def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return -g(x), and the slopes of -g on the left and on the right of each position x."""
-
-    def body(self, r: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return height and slope of the body."""
-
-    @property
-    def breaks(self) -> tuple[float, ...]:
-        """Radii at which the body is not smooth."""
-
-
 #: For a body in closed form: largest radius divided by a0, and half the number of knots in each smooth piece.
 FARTHEST, KNOTS = 8.0, 80
 
 
-def from_body(body: ClosedForm, depth: float) -> TableProfile:
+def from_body(body: Any, depth: float) -> TableProfile:
     """Build the profile of a body in closed form that is pressed to a depth, in the unit of length of the body.
 
     The profile consists of cubic pieces, which become shorter towards the breaks of the body.
+
+    Parameters
+    ----------
+    body : Any
+        A body with the methods `at` and `body`, and the property `breaks`, of `surfaces.shapes.Shape`.
+    depth : float
+        Indentation depth d0 > 0.
     """
 
     def sunk(x: float) -> float:

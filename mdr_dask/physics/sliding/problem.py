@@ -23,7 +23,6 @@ from mdr_dask.physics.refine import Refined, Solution, refine
 from mdr_dask.physics.sliding import node_to_node, steady
 from mdr_dask.physics.sliding.cases import Cases, Scheme, Steady, valid
 from mdr_dask.physics.surfaces.rough_line import RoughLine
-from mdr_dask.physics.surfaces.shapes import COLUMNS as CLOSED_COLUMNS
 from mdr_dask.physics.surfaces.shapes import PowerLaw, smooth
 
 FLOORS = (0.0, 1.0, 0.0, 0.0)
@@ -223,12 +222,9 @@ def _closed_form(body: PowerLaw | None, cases: Cases) -> tuple[Steady, FloatArra
     if body is None:
         columns[:, good] = np.array([np.zeros(loads.size), loads, np.ones(loads.size), np.zeros(loads.size)])[:, good]
     elif np.any(good):
-        found = np.empty((int(good.sum()), CLOSED_COLUMNS))
-        coefficient, exponent = (np.full(len(found), number) for number in (body.coefficient, body.exponent))
-        smooth(loads[good], deborah[good], coefficient, exponent, found)
-        depth, drag, lead, trail, stretch = found.T
+        depth, drag, lead, trail, stretch = smooth(loads[good], deborah[good], body.coefficient, body.exponent)
         columns[:, good] = np.stack([drag, depth, lead + trail, np.sqrt(stretch / (lead + trail))])
         outcome = np.where(np.isnan(depth), Outcome.DEPTH_NOT_FOUND, Outcome.CONVERGED)
         status[good] = np.where(np.maximum(lead, trail) > 0.5, Outcome.OUTSIDE_LINE, outcome)
-    found_states = Steady.of(columns, status)
-    return found_states, CLOSED_FORM * np.abs(found_states.columns)
+    found = Steady.of(columns, status)
+    return found, CLOSED_FORM * np.abs(found.columns)

@@ -116,12 +116,7 @@ def line(amplitude: FloatArray, phase: FloatArray, nodes: int, derivative: int =
     >>> print(f"{height.std():.3f}")
     1.000
     """
-    return line_of_factors(amplitude, np.exp(1j * phase), nodes, derivative)
-
-
-def line_of_factors(amplitude: FloatArray, factors: ComplexArray, nodes: int, derivative: int = 0) -> FloatArray:
-    """Return the same line as :func:`line`, from the factors exp(i phi_k) of :func:`phase_factors`."""
-    coefficients = 0.5 * amplitude * factors
+    coefficients = 0.5 * amplitude * np.exp(1j * phase)
     if derivative:
         coefficients *= (2j * np.pi * np.arange(1, amplitude.size + 1)) ** derivative
     return series(coefficients, nodes)

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.jit import jit
 
 ITERATIONS = 200
-
-# Indices of the columns of the results of `smooth`
-DEPTH, DRAG, LEADING, TRAILING, STRETCH = range(5)
-COLUMNS = 5
+ROUNDING = 1e-14  # relative step at which Newton's method ends
 
 
 def mapped(exponent: float) -> float:
@@ -141,39 +137,30 @@ def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatAr
     return width
 
 
-@jit
-def _trailing(drop: float, deborah: float, exponent: float) -> float:
-    """Return the positive solution b of b^n + n deborah b^(n-1) = drop, or 0 if there is none (possible for n = 1)."""
-    if exponent == 1:
-        return max(drop - deborah, 0.0)
-    # the logarithm of the left side is convex and increasing in y = log b: Newton's method from the right
-    y = math.log(drop) / exponent
-    for _ in range(ITERATIONS):
-        b = math.exp(y)
-        step = ((exponent - 1) * y + math.log(b + exponent * deborah) - math.log(drop)) / (
-            exponent - 1 + b / (b + exponent * deborah)
-        )
-        y -= step
-        if abs(step) < 1e-15 * max(1.0, abs(y)):
-            break
-    return math.exp(y)
+class Smooth(NamedTuple):
+    """Steady states of a smooth line, one entry per case; NaN if no depth is found.
+
+    Parameters
+    ----------
+    depth : array
+        Penetration d of the tip.
+    drag : array
+        F_x / (4 G).
+    leading, trailing : array
+        Distances a and b from the tip to the leading and the trailing edge of the contact.
+    stretch : array
+        Integral of the squared slope over the contact.
+    """
+
+    depth: FloatArray
+    drag: FloatArray
+    leading: FloatArray
+    trailing: FloatArray
+    stretch: FloatArray
 
 
-@jit
-def _carried(depth: float, deborah: float, coefficient: float, exponent: float) -> tuple[float, float, float]:
-    """Return F_N / (4 G) at a depth, and the distances of the leading and the trailing edge from the tip."""
-    drop = depth / coefficient
-    a = drop ** (1 / exponent)
-    b = _trailing(drop, deborah, exponent)
-    load = depth * (a + b) - coefficient * (a ** (exponent + 1) + b ** (exponent + 1)) / (exponent + 1)
-    return load + deborah * (depth - coefficient * b**exponent), a, b
-
-
-@jit
-def smooth(
-    loads: FloatArray, deborah: FloatArray, coefficients: FloatArray, exponents: FloatArray, results: FloatArray
-) -> None:
-    """Compute the steady states of smooth lines c |x|^n that slide towards -x over a Kelvin foundation.
+def smooth(loads: FloatArray, deborah: FloatArray, coefficient: float, exponent: float) -> Smooth:
+    """Return the steady states of a smooth line c |x|^n that slides towards -x over a Kelvin foundation.
 
     At the depth d the contact lies between -a and b, with d = c a^n and d = c (b^n + n v tau b^(n-1)). If the second
     equation has no positive solution, b is 0. The load is a convex function of d with the derivative a + b + v tau, so
@@ -183,24 +170,37 @@ def smooth(
     ----------
     loads, deborah : array, shape (cases,)
         F_N / (4 G) and v tau, positive and finite.
-    coefficients, exponents : array, shape (cases,)
-        Coefficients c > 0 and exponents n >= 1 of the lines, after the MDR rule.
-    results : array, shape (cases, COLUMNS)
-        Output: depth, F_x / (4 G), a, b, and the integral of the squared slope over the contact. A row is NaN if no
-        depth is found.
+    coefficient, exponent : float
+        Coefficient c > 0 and exponent n >= 1 of the line, after the MDR rule.
     """
-    results[:] = np.nan
-    for k in range(loads.size):
-        load, de, c, n = loads[k], deborah[k], coefficients[k], exponents[k]
-        depth = c * ((n + 1) * load / (2 * n * c)) ** (n / (n + 1))
-        for _ in range(ITERATIONS):
-            carried, a, b = _carried(depth, de, c, n)
-            step = (load - carried) / (a + b + de)
-            depth = max(depth + step, 0.25 * depth)
-            if abs(step) <= 1e-14 * depth:
-                carried, a, b = _carried(depth, de, c, n)
-                stretch = (c * n) ** 2 * (a ** (2 * n - 1) + b ** (2 * n - 1)) / (2 * n - 1)
-                results[k, DEPTH] = depth
-                results[k, DRAG] = 0.5 * (depth - c * b**n) ** 2 + de * stretch
-                results[k, LEADING], results[k, TRAILING], results[k, STRETCH] = a, b, stretch
-                break
+    c, n = coefficient, exponent
+    depth, active = c * half_width(loads, c, n) ** n, np.ones(loads.size, np.bool_)
+    for _ in range(ITERATIONS):
+        a, b = (depth / c) ** (1 / n), _trailing(depth / c, deborah, n)
+        carried = depth * (a + b) - c * (a ** (n + 1) + b ** (n + 1)) / (n + 1) + deborah * (depth - c * b**n)
+        step = (loads - carried) / (a + b + deborah)
+        active &= ~(np.abs(step) <= ROUNDING * depth)
+        if not np.any(active):
+            break
+        depth = np.where(active, np.maximum(depth + step, 0.25 * depth), depth)
+    depth = np.where(active, np.nan, depth)
+    stretch = (c * n) ** 2 * (a ** (2 * n - 1) + b ** (2 * n - 1)) / (2 * n - 1)
+    return Smooth(depth, 0.5 * (depth - c * b**n) ** 2 + deborah * stretch, a, b, stretch)
+
+
+def _trailing(drop: FloatArray, deborah: FloatArray, exponent: float) -> FloatArray:
+    """Return the positive solution b of b^n + n deborah b^(n-1) = drop, or 0 if there is none (possible for n = 1)."""
+    if exponent == 1:
+        return np.maximum(drop - deborah, 0.0)
+    # the logarithm of the left side is a convex, increasing function of y = log b: Newton's method from the right
+    goal = np.log(drop)
+    y, active = goal / exponent, np.ones(drop.size, np.bool_)
+    for _ in range(ITERATIONS):
+        b = np.exp(y)
+        excess = (exponent - 1) * y + np.log(b + exponent * deborah) - goal
+        step = excess / (exponent - 1 + b / (b + exponent * deborah))
+        active &= np.abs(step) >= ROUNDING * np.maximum(1.0, np.abs(y))
+        if not np.any(active):
+            break
+        y = np.where(active, y - step, y)
+    return np.asarray(np.exp(y))

@@ -52,7 +52,7 @@ def test_the_general_solver_agrees_within_its_errors(realisation):
     steady, errors = solve(line, PronyTerms(), deborah, loads, Request(0.005))
     expected = tip(line, deborah, loads)
     assert np.all(np.abs(steady.drag / loads - expected) <= errors[0] / loads + 0.05 * expected)
-    assert errors[0, 0] < 0.1 * steady.drag[0]
+    assert errors[0, 0] < 0.2 * steady.drag[0]
 
 
 @pytest.mark.parametrize("realisation", range(3))

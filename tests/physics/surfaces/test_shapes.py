@@ -9,14 +9,13 @@ from mdr_dask.physics.sliding import problem
 from mdr_dask.physics.sliding.cases import Cases
 from mdr_dask.physics.surfaces import shapes as indenter
 
+DEPTH, DRAG, LEADING, TRAILING = range(4)
 SHAPES = ((0.3, 1.0), (0.2, 1.5), (0.5, 2.0), (1.0, 4.0))
 
 
 def solve(load, deborah, coefficient, exponent):
     load, deborah = np.atleast_1d(load).astype(float), np.atleast_1d(deborah).astype(float)
-    results = np.empty((load.size, indenter.COLUMNS))
-    indenter.smooth(load, deborah, np.full(load.size, coefficient), np.full(load.size, exponent), results)
-    return results.T
+    return np.array(indenter.smooth(load, deborah, coefficient, exponent))
 
 
 @pytest.mark.parametrize("exponent", [1, 1.5, 2, 3])
@@ -70,14 +69,14 @@ def test_sweep_agrees_with_the_closed_form(coefficient, exponent):
     exact = solve(load, deborah, coefficient, exponent)
     assert np.all(steady.status == Outcome.CONVERGED)
     # cubic cells hold a cone and a parabola exactly; a quartic to the fourth order
-    assert steady.drag == pytest.approx(exact[indenter.DRAG], rel=1e-6)
-    assert steady.depth == pytest.approx(exact[indenter.DEPTH], rel=1e-6)
-    assert steady.contact_fraction == pytest.approx(exact[indenter.LEADING] + exact[indenter.TRAILING], rel=1e-3)
+    assert steady.drag == pytest.approx(exact[DRAG], rel=1e-6)
+    assert steady.depth == pytest.approx(exact[DEPTH], rel=1e-6)
+    assert steady.contact_fraction == pytest.approx(exact[LEADING] + exact[TRAILING], rel=1e-3)
 
 
 def test_time_steps_tend_to_the_closed_form():
     load, deborah = np.full(3, 0.02), np.array([1e-2, 0.1, 1.0])
-    exact = solve(load, deborah, 0.5, 2.0)[indenter.DRAG]
+    exact = solve(load, deborah, 0.5, 2.0)[DRAG]
     errors = [
         np.max(np.abs(under_indenter(np.zeros(n), None, 0.5, 2.0, deborah, load, "backward_euler").drag / exact - 1))
         for n in (2000, 8000)
@@ -97,7 +96,7 @@ def test_a_contact_that_leaves_the_line_fails(scheme):
 def test_the_closed_form_ends_where_an_edge_leaves_the_line(deborah):
     """Its leading edge, which is the farther one, at half the line."""
     loads = np.geomspace(0.02, 0.5, 200)
-    lead = solve(loads, np.full(200, deborah), 0.5, 2.0)[indenter.LEADING]
+    lead = solve(loads, np.full(200, deborah), 0.5, 2.0)[LEADING]
     assert lead[0] < 0.49
     assert np.any((lead > 0.5) & (lead < 0.51))
     steady, _ = problem._closed_form(indenter.PowerLaw(0.5, 2.0), Cases(np.full(200, deborah), loads))
