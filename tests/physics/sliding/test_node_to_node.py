@@ -211,6 +211,29 @@ def test_edges_of_the_contact_in_slow_sliding(points, hurst, force, velocity):
         assert np.all(errors <= allowed)
 
 
+@pytest.mark.parametrize(
+    ("realisation", "points", "hurst", "load", "velocity"),
+    [
+        (27, 300, 0.6, 0.0031291346445318988, 1e-3),
+        (20, 100, 0.6, 0.030638870628004047, 1e-3),
+        (10, 300, 0.6, 0.009791483623609773, 0.1),
+        (18, 300, 0.6, 0.0031291346445318988, 0.01),
+        (28, 200, 0.5, 0.0031291346445318988, 1e-3),
+    ],
+)
+def test_a_small_patch_that_two_grids_miss_is_an_error_of_the_contact(realisation, points, hurst, load, velocity):
+    """On these lines two grids agree on a contact fraction that is 1.4 to 3.5 % too small."""
+    amplitude = roughness.amplitudes(points // 2, hurst)
+    surface = RoughLine(Waves(0.5 * amplitude * roughness.phase_factors(1, realisation, points // 2), points))
+    deborah, loads = np.array([velocity / roughness.spectral_slope(amplitude)]), np.array([load])
+    exact = truth(surface, deborah, loads)
+    steady, errors = solve_problem(surface, None, deborah, loads, Request(0.01))
+    for name, error in (("contact_fraction", errors[2]), ("contact_slope", errors[3])):
+        value = getattr(steady, name)
+        assert np.abs(value - getattr(exact, name)) <= error
+        assert error <= 0.01 * value
+
+
 @pytest.mark.parametrize("scheme", ["hermite", "backward_euler"])
 @pytest.mark.parametrize("oversampling", [1, 8])
 def test_errors_on_a_given_grid(scheme, oversampling):
