@@ -112,7 +112,7 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
         The corrections of `ends_of`. If the array is empty, integrals over cells are computed from neighbouring nodes.
     """
     n = height.size // stride
-    place = (first + stride * np.arange(-BEFORE, n + AFTER)) % height.size
+    place = (first + stride * (np.arange(-BEFORE, n + AFTER) % n)) % height.size  # n * stride may be below height.size
     h = height[place] - height[first]
     if resolved:
         s = slope[place] / n

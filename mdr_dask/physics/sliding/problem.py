@@ -1,6 +1,7 @@
 """Steady sliding in dimensionless quantities: a solid, a line, and cases of speed and load.
 
-A smooth indenter or a smooth plane on a Kelvin solid is solved in closed form. All other cases are solved on finer and
+Closed forms are used for a smooth indenter or a smooth plane on a Kelvin solid, and with an automatic grid for full
+contact of any solid with a rough plane. All other cases are solved on finer and
 finer grids by :func:`mdr_dask.physics.refine.refine`, which estimates the errors. The solvers are:
 
 * `node_to_node` for a Kelvin solid on a plane, which is fastest;
@@ -22,6 +23,7 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Refined, Solution, refine
 from mdr_dask.physics.sliding import node_to_node, steady
 from mdr_dask.physics.sliding.cases import Cases, Scheme, Steady, valid
+from mdr_dask.physics.sliding.full_contact import steady_full_contact
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.shapes import PowerLaw, smooth
 
@@ -37,7 +39,7 @@ ORDER_OF_CELLS = 2.0  # order of convergence of sweeps over cubic cells if conta
 ORDER_OF_STEPS = 1.0  # order of convergence of backward Euler
 SEARCH = 0.1  # allowed error due to the search for the depth, as a fraction of the accuracy
 REFERENCE = 0.01  # relative accuracy of the solution with which results of time steps are compared
-CLOSED_FORM = 1e-12  # relative error of the closed form of a smooth indenter, due to rounding
+ROUNDING = 1e-12  # relative error of closed forms
 
 
 @dataclass(frozen=True)
@@ -124,10 +126,9 @@ def solve(
 
 def _to_accuracy(line: RoughLine, cases: Cases, request: Request) -> tuple[Steady, FloatArray]:
     """Solve every case of a Kelvin solid on the coarsest grid that meets the accuracy."""
-    columns, errors = np.full((4, cases.loads.size), np.nan), np.full((4, cases.loads.size), np.inf)
-    status = np.full(cases.loads.size, Outcome.INVALID, np.int8)
-    left = np.flatnonzero(valid(*cases))
     on_plane = request.scheme == "hermite" and line.body is None
+    columns, errors, status = _in_full_contact(line, PronyTerms(), cases) if on_plane else _unsolved(cases)
+    left = np.flatnonzero(valid(*cases) & (status != Outcome.CONVERGED))
     if on_plane and left.size and request.accuracy > node_to_node.ARITHMETIC:
         search = node_to_node.NodeToNode(line, cases.only(left), SEARCH * request.accuracy, request.contact)
         found = refine(search.solve, left.size, NODE_LEVELS, request.accuracy, node_to_node.ORDER, floors=FLOORS)
@@ -174,43 +175,52 @@ def _steady(found: Refined) -> tuple[Steady, FloatArray]:
     return Steady.of(np.array(found.values), found.outcome), found.errors
 
 
+def _in_full_contact(
+    line: RoughLine, terms: PronyTerms, cases: Cases
+) -> tuple[FloatArray, FloatArray, NDArray[np.int8]]:
+    """Return results, errors and status of cases on a plane; the status is `Outcome.INVALID` if contact is not full."""
+    pairs = tuple(zip(terms.moduli, terms.deborah, strict=True))
+    full = steady_full_contact(line.roughness, pairs, cases)
+    errors = ROUNDING * np.abs(full.columns)
+    return full.columns, np.where(np.isnan(errors), np.inf, errors), full.status
+
+
+def _unsolved(cases: Cases) -> tuple[FloatArray, FloatArray, NDArray[np.int8]]:
+    """Return arrays for results, errors and status."""
+    columns = np.full((4, cases.loads.size), np.nan)
+    return columns, np.full_like(columns, np.inf), np.full(cases.loads.size, Outcome.INVALID, np.int8)
+
+
 def _general(line: RoughLine, terms: PronyTerms, cases: Cases, request: Request) -> tuple[Steady, FloatArray]:
     """Solve cases of any linear solid."""
     from mdr_dask.physics.sliding import viscoelastic  # imported here, because few studies need its kernels
     from mdr_dask.physics.solids import prony
 
-    deborah, loads = cases
-    columns, errors = np.full((4, loads.size), np.nan), np.full((4, loads.size), np.inf)
-    status = np.full(loads.size, Outcome.INVALID, np.int8)
-    left = np.flatnonzero(np.isfinite(deborah) & (deborah >= 0) & np.isfinite(loads) & (loads > 0))
-    searches = [
-        viscoelastic.ViscoelasticCase(prony(1.0, terms.moduli, terms.deborah, deborah[k]), float(loads[k]))
-        for k in left
-    ]
-    line, is_auto = line.from_summit(), request.oversampling == "auto"
-    # number of cells of the coarsest grid; results are extrapolated from it and the next one, so that the first level
-    # for the estimate of errors has twice as many cells
+    (deborah, loads), is_auto = cases, request.oversampling == "auto"
+    results = _in_full_contact(line, terms, cases) if is_auto and line.body is None else _unsolved(cases)
+    columns, errors, status = results
+    good = np.isfinite(deborah) & (deborah >= 0) & np.isfinite(loads) & (loads > 0)
+    left = np.flatnonzero(good & (status != Outcome.CONVERGED))
+    solids = [prony(1.0, terms.moduli, terms.deborah, deborah[k]) for k in left]
+    searches = [viscoelastic.ViscoelasticCase(solid, load) for solid, load in zip(solids, loads[left], strict=True)]
+    line = line.from_summit()
+    # number of cells of the coarsest grid; from the second grid on, results are extrapolated from two successive grids
     coarsest = line.points if request.oversampling == "auto" else -(-line.points * request.oversampling // 4)
 
     def solve(level: int, some: IntArray) -> Solution:
         height = line.straight(coarsest * level).height
         found = [searches[k].on(height, line.body is None) for k in some]
-        return Solution(
-            np.array([one.values for one in found]).reshape(-1, 4).T, np.concatenate([one.outcome for one in found])
-        )
+        values = np.concatenate([np.array(one.values) for one in found], axis=1)
+        return Solution(values, np.concatenate([one.outcome for one in found]))
 
     if left.size:
         solve(1, np.arange(left.size))
         levels, accuracy = (GENERAL_LEVELS, request.accuracy) if is_auto else (GENERAL_LEVELS[:2], np.inf)
-        _write(
-            (columns, errors, status),
-            left,
-            refine(solve, left.size, levels, accuracy, viscoelastic.ORDER, floors=FLOORS),
-        )
+        _write(results, left, refine(solve, left.size, levels, accuracy, viscoelastic.ORDER, floors=FLOORS))
     # the relative error of stresses equals the tolerance of the depth; in very fast or very slow sliding the drag is a
     # small difference of large stresses
-    rounding = viscoelastic.TOLERANCE * loads * columns[3]
-    errors[0] += np.where(np.isnan(rounding), 0.0, rounding)
+    rounding = viscoelastic.TOLERANCE * loads[left] * columns[3, left]
+    errors[0, left] += np.where(np.isnan(rounding), 0.0, rounding)
     return Steady.of(columns, status), errors
 
 
@@ -227,4 +237,4 @@ def _closed_form(body: PowerLaw | None, cases: Cases) -> tuple[Steady, FloatArra
         outcome = np.where(np.isnan(depth), Outcome.DEPTH_NOT_FOUND, Outcome.CONVERGED)
         status[good] = np.where(np.maximum(lead, trail) > 0.5, Outcome.OUTSIDE_LINE, outcome)
     found = Steady.of(columns, status)
-    return found, CLOSED_FORM * np.abs(found.columns)
+    return found, ROUNDING * np.abs(found.columns)

@@ -22,6 +22,7 @@ from mdr_dask.physics.surfaces.cubic_line import CubicLine
 TOLERANCE = 1e-11  # last step of Newton's method relative to the depth; larger than rounding errors
 LINEAR = 1e-10  # relative residual of the linear equations of a step; much smaller than the error after the step
 SWEEPS = 80
+DEEPEST_STEP = 0.7  # largest relative decrease of the depth in a step under an indenter, so that it stays positive
 SHORTEST = 1e-9  # cells: Prony terms with a smaller tau v are added to the dashpot, a term with a tenth of this tau v
 BALANCE = 1e-3  # largest relative error of the carried load in a converged solution
 ORDER = 2.0  # order of convergence without extrapolation; extrapolation raises it unless few cells are in contact
@@ -441,7 +442,7 @@ def solve_sliding(
             residual[:] = 1.0
             follow(residual, swept, False, product, workspace)
             # the load is the integral of the stress: u behind the line is unknown if its end is in contact
-            step[terms] = (strain_area - totals[1]) / product[terms]
+            step[terms] = max((strain_area - totals[1]) / product[terms], -DEEPEST_STEP * unknown[terms])
         largest = 0.0
         for j in range(size):
             weight = min(1.0, moduli[j]) if j < terms else 1.0  # the stretch of a soft Prony term has little influence

@@ -1,0 +1,59 @@
+"""Full contact of any linear solid with a rough plane: the waves of the line are independent.
+
+The displacement is u = d + h, with the depth d and the height h. The pressure of wave k, with the amplitude c_k and the
+wave number q_k, is G*(q_k v) c_k (thesis eq. 3.14 for the Kelvin solid). The drag is therefore a sum over the spectrum
+and does not depend on the phases. This is valid if the pressure is positive everywhere. The pressure is computed at m
+nodes. Between the nodes, a sum of waves with up to k periods on the line is at most 1 / cos(pi k / m) times its largest
+value at the nodes (Ehlich and Zeller, Z. Angew. Math. Mech. 44, T22, 1964).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.sliding.cases import Cases, Steady
+from mdr_dask.physics.surfaces.waves import Waves, series
+
+OVERSAMPLING = 2  # nodes per Nyquist point: the pressure between nodes is at most 41 % larger than at the nodes
+
+
+def steady_full_contact(waves: Waves, terms: Sequence[tuple[float, float]], cases: Cases) -> Steady:
+    """Return the steady states of the cases in full contact; the status of all other cases is `Outcome.INVALID`.
+
+    Parameters
+    ----------
+    waves : Waves
+        Spectrum of the line, whose length is 1.
+    terms : sequence of (float, float)
+        G_m / G_inf and tau_m v / L of the Prony terms; empty for a Kelvin solid.
+    cases : Cases
+        eta v / (G_inf L) of the dashpot, and F_N / (4 G_inf L) in the unit of height, which is the mean displacement.
+
+    Examples
+    --------
+    >>> wave = Waves(np.array([0.5 + 0j]), 2)
+    >>> found = steady_full_contact(wave, [], Cases(np.array([0.1]), np.array([5.0])))
+    >>> print((found.drag / 0.1).round(4), found.depth)  # De <h'^2>
+    [19.7392] [5.]
+    """
+    deborah, loads = cases
+    nodes = OVERSAMPLING * waves.points
+    wave = 2j * np.pi * np.arange(1, waves.coefficients.size + 1)
+    relaxing = sum((stiffness * (1 - 1 / (1 + wave * time)) for stiffness, time in terms), np.zeros(wave.size))
+    pressure, slope = series(waves.coefficients * (1 + relaxing), nodes), waves.slopes(nodes)
+    # sums over nodes are equal to sums over the spectrum
+    elastic, lost, stretch = pressure @ pressure / nodes, pressure @ slope / nodes, slope @ slope / nodes
+    with np.errstate(over="ignore", invalid="ignore"):
+        drag = lost + deborah * stretch
+        full = np.isfinite(deborah) & (deborah >= 0 if terms else deborah > 0) & np.isfinite(loads)
+        full &= loads > np.sqrt(elastic + deborah * (lost + drag))  # the largest pressure is above the rms pressure
+    bound = np.cos(np.pi * wave.size / nodes)
+    for speed in np.unique(deborah[full]):
+        total = np.abs(pressure + speed * slope)
+        full[(deborah == speed) & (loads * bound <= total.max())] = False
+    status = np.where(full, np.int8(Outcome.CONVERGED), np.int8(Outcome.INVALID))
+    ones = np.ones(loads.size)
+    return Steady.of(np.array([drag, loads, ones, np.sqrt(stretch) * ones]), status)
