@@ -1,4 +1,4 @@
-"""A headless Chromium, driven by its DevTools protocol: for tests of pages."""
+"""Drive a headless Chromium by its DevTools protocol, to test HTML pages."""
 
 import asyncio
 import base64
@@ -10,7 +10,7 @@ import tempfile
 import time
 from pathlib import Path
 
-#: Names of the program, and where CI has it from (`.ci/run`).
+#: Names of the program.
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 PATIENCE = 120.0
 
@@ -21,7 +21,7 @@ def program():
 
 
 class Browser:
-    """A page of a Chromium that has no network and tells its console, its errors and its requests."""
+    """A page in a Chromium without network; records console messages, errors and requests."""
 
     def __init__(self):
         self.profile = tempfile.mkdtemp(prefix="chromium-")
@@ -95,7 +95,7 @@ class Browser:
         self.until("document.readyState === 'complete' && location.href !== 'about:blank'")
 
     def js(self, code):
-        """Return what an expression comes to; a promise is waited for."""
+        """Return the value of an expression; wait for a promise."""
         found = self.call("Runtime.evaluate", expression=code, returnByValue=True, awaitPromise=True)
         assert "exceptionDetails" not in found, found["exceptionDetails"]
         return found["result"].get("value")

@@ -1,3 +1,5 @@
+"""Settings and fixtures of all tests."""
+
 import hashlib
 import importlib
 import os
@@ -27,12 +29,12 @@ hypothesis.settings.load_profile("repeatable")
 
 
 def pytest_collection_modifyitems(items):
-    """What waits or takes long begins first: other workers have the cores meanwhile, and none is idle in the end."""
+    """Run slow tests first, so that no worker is idle in the end."""
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 
 
 def pytest_collection_finish(session):
-    """Constants of modules are among the examples: of all modules, whatever the tests before have imported."""
+    """Import all modules: hypothesis draws constants from imported modules, whatever tests ran before."""
     if any(getattr(getattr(item, "obj", None), "is_hypothesis_test", False) for item in session.items):
         for each in pkgutil.walk_packages(mdr_dask.__path__, "mdr_dask."):
             if not each.name.endswith("__main__"):
@@ -41,7 +43,7 @@ def pytest_collection_finish(session):
 
 @pytest.fixture(autouse=True, scope="session")
 def disk_is_not_waited_for():
-    """Stores of tests need not outlive a loss of power; that blocks are flushed has a test of its own."""
+    """Do not flush files to the disk: stores of tests need not survive a loss of power."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("mdr_dask.store.files.flush", lambda path: None)
         yield
@@ -49,14 +51,14 @@ def disk_is_not_waited_for():
 
 @pytest.fixture(autouse=True, scope="session")
 def one_thread_of_linear_algebra():
-    """The workers of pytest have the cores; more threads would wait for each other, and count as work."""
+    """Use one thread of linear algebra, because the workers of pytest use all cores."""
     with threadpoolctl.threadpool_limits(1, "blas"):
         yield
 
 
 @pytest.fixture
 def toy(monkeypatch):
-    """The toy model, known to the runner for the length of a test."""
+    """Register the toy model for one test."""
     toy_model.register(monkeypatch)
     toy_model.COMPUTED.clear()
     return toy_model

@@ -1,4 +1,4 @@
-"""A model of curves that interpolation finds easy and hard: y = f(x) + noise of the realisation."""
+"""A model of smooth and awkward curves, y = f(x) + noise of the realisation, to test adaptive axes."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ MODEL = Model(
 
 
 def register(monkeypatch) -> None:
-    """Make ``model: curves`` known for the length of a test."""
+    """Register ``model: curves`` for one test."""
     module = ModuleType("mdr_dask.models.curves")
     module.MODEL = MODEL
     monkeypatch.setitem(sys.modules, "mdr_dask.models.curves", module)

@@ -1,4 +1,4 @@
-"""Stores of sliding friction as fits and figures see them, computed by the model itself."""
+"""Datasets of sliding friction, computed by the model and labelled like a store."""
 
 import json
 from math import prod
@@ -23,7 +23,7 @@ BASE = {
 
 
 def store(axes, realisations=8, outputs=("friction_coefficient", "contact_fraction", "rms_slope"), **changes):
-    """Run the model over a grid of axes (name with dots: values) and label the result as a store is."""
+    """Run the model on a grid of axes (dotted name: values) and return the result as a labelled dataset."""
     parameters = SlidingFriction.model_validate(BASE | changes)
     grid = np.meshgrid(*axes.values(), indexing="ij")
     shape = grid[0].shape
@@ -41,5 +41,5 @@ def store(axes, realisations=8, outputs=("friction_coefficient", "contact_fracti
 
 
 def relative_error(values):
-    """Return the estimated error of the friction over it."""
+    """Return the stated error of friction relative to friction."""
     return values["friction_coefficient_error"] / values["friction_coefficient"]

@@ -1,4 +1,4 @@
-"""Tables in the layouts of instruments and people: text, columns, and the expected values."""
+"""Tables in the layouts of instruments: text, columns, and the values expected in SI units."""
 
 # ruff: noqa: E501
 

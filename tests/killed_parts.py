@@ -1,4 +1,4 @@
-"""Parts of a campaign in processes of their own, killed at random instants and started again."""
+"""Run the parts of a campaign in separate processes that are killed at random and started again."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from mdr_dask.errors import StoreBusyError
 from mdr_dask.execute import Part, Resources
 from mdr_dask.store import files, locks
 
-#: Processes are copies of one that has loaded everything, and runs nothing.
+#: Processes are forked from a server that has loaded all modules.
 PROCESSES = multiprocessing.get_context("forkserver")
 PROCESSES.set_forkserver_preload(["toy", "killed_parts", "zarr", "dask", "filelock", "mdr_dask.execute.rounds"])
-#: Seconds between signs of life in a bucket, and of silence after which a part counts as killed: less than users wait.
+#: Shorter than the defaults, s: time between heartbeats in a bucket, and time after which a part counts as killed.
 BEAT, SILENCE = 0.5, 8.0
 
 
@@ -38,12 +38,12 @@ def run_part(url: str, part: Part, blocks: int, pause: float, server: dict[str, 
         with suppress(StoreBusyError):
             execute.run(study(blocks), url, Resources(threads=1), lambda _: None, part=part)
             return
-        assert files.local(url) is None, "a lock outlives who held it"
-        time.sleep(BEAT)  # the claim of the one that was killed stands until its silence is noticed
+        assert files.local(url) is None, "a lock outlives its holder"
+        time.sleep(BEAT)  # the lock of the killed part remains until its heartbeat has expired
 
 
 def run_with_kills(url: str, parts: int, kills: int, blocks: int, pause: float, seed: int = 1) -> int:
-    """Start all parts at once, kill one after the other and start it again; return how many kills hit one at work."""
+    """Start all parts, kill random parts and start them again; return the number of running parts that were killed."""
     chance = random.Random(seed)
     server = {name: value for name, value in os.environ.items() if name.startswith("AWS_")}
 

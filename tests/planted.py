@@ -1,4 +1,4 @@
-"""Stores of every model laid out by the project itself, filled with planted numbers instead of solutions."""
+"""Stores of every model that contain known numbers instead of solutions."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def make_tables(folder: Path) -> None:
 
 
 def make(folder: Path, text: str, realisations: int = 4, failed: bool = False) -> dict[str, xr.Dataset]:
-    """Lay out the store of a campaign, plant numbers in it, and open it; some cases fail on request."""
+    """Create the store of a campaign, write known numbers into it, and open it; optionally some cases have failed."""
     path = folder / "study.yaml"
     path.write_text(f"name: study\nseed: 1\nrealisations: {realisations}\n{text}")
     study = campaign.load(path)
@@ -117,7 +117,7 @@ def _anything(like: xr.DataArray, noise: xr.DataArray) -> xr.DataArray:
     return value * noise
 
 
-#: What stands for parameters that a study on a measured surface, or of a measured material, does not have.
+#: Values used for parameters that a study with measured surfaces or materials does not have.
 USUAL = {"hurst": 0.7, "rms_roughness": 0.5e-6, "length": 0.02, "shear_modulus": 1e7, "relaxation_time": 1e-3}
 
 

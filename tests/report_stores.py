@@ -1,4 +1,4 @@
-"""Stores that tests of pages look at: a small study of friction, and one whose every text is markup."""
+"""Stores for tests of report pages: a small study of friction, and one whose names and messages contain markup."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ parameters:
   velocity: {geometric: [1 mm/s, 10 m/s, 5]}
 outputs: [friction_coefficient, contact_fraction, rms_slope]
 """
-#: Ends a script, begins one, and runs one by an attribute, wherever it is taken for markup.
+#: Text that would run a script if it were inserted as markup.
 HOSTILE = "</script><script>window.ran = 1</script><img src=x onerror='window.ran = 2'><b>$x_1$"
 
 
@@ -34,7 +34,7 @@ def friction(url):
 
 
 def hostile(url, monkeypatch):
-    """Run a study whose names, meanings and messages are markup; half of its cases fail."""
+    """Run a study whose names, descriptions and messages contain markup; half of its cases fail."""
 
     def compute(block):
         result = toy_model.compute(block)

@@ -1,4 +1,4 @@
-"""Steady sliding from heights and slopes at nodes: the Kelvin body by each scheme, and any solid in units."""
+"""Solve steady sliding on a line given by heights and slopes at its nodes."""
 
 from dataclasses import dataclass, replace
 

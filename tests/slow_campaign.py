@@ -1,11 +1,11 @@
-"""A campaign of the toy model that takes its time, for processes that are stopped meanwhile."""
+"""A campaign of the toy model with slow blocks, for tests that interrupt processes."""
 
 import os
 import subprocess
 import sys
 from pathlib import Path
 
-#: The toy model, with blocks that take their time.
+#: The toy model with a pause in every block.
 MODEL = """
 import os, time
 from dataclasses import replace
@@ -28,7 +28,7 @@ store: {{path: long.zarr, blocks: {{position: 1, realisation: 1}}}}
 
 
 def make(folder: Path, blocks: int, pause: float) -> dict[str, str]:
-    """Write the campaign and its model; return the environment in which they are found."""
+    """Write the campaign and its model; return the environment variables that make them available."""
     (folder / "slow_toy.py").write_text(MODEL)
     (folder / "long.yaml").write_text(CAMPAIGN.format(blocks=blocks))
     tools = f"{Path(sys.executable).parent}:{os.environ['PATH']}"

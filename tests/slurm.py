@@ -1,4 +1,4 @@
-"""A SLURM of one node, for the length of a test: its own munge, controller and daemon in a folder."""
+"""Start and stop a SLURM of one node for tests: munge, controller and daemon in one folder."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ PartitionName=all Nodes={host} Default=YES MaxTime=INFINITE State=UP
 
 
 def reason_to_skip() -> str | None:
-    """Return why there can be no SLURM here, None if there can."""
+    """Return the reason why SLURM cannot be started, or None."""
     missing = [name for name in DAEMONS if shutil.which(name, path="/usr/sbin:/usr/bin") is None]
     if missing:
         return f"{', '.join(missing)} not installed (apt-get install slurm-wlm)"
-    return None if os.geteuid() == 0 else "SLURM's daemons are started by root alone"
+    return None if os.geteuid() == 0 else "only root can start the daemons of SLURM"
 
 
 def _ports() -> list[int]:
@@ -63,7 +63,7 @@ def _ports() -> list[int]:
 
 
 class Slurm:
-    """Its daemons, and what a user of it types."""
+    """The daemons of a SLURM, and its commands."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -109,17 +109,17 @@ class Slurm:
         return self.call("sbatch", "--parsable", *arguments).strip()
 
     def wait(self, job: str, seconds: float = 240) -> set[str]:
-        """Wait for a job, or all jobs of an array; return how they ended, as SLURM calls it."""
+        """Wait for a job or an array of jobs; return their final states."""
         self._until(
             lambda: not self.call("squeue", "-h", "-t", "PENDING,RUNNING,COMPLETING", "-j", job).strip(), seconds
         )
-        told = self.call("scontrol", "show", "job", job)
-        return {word.partition("=")[2] for word in told.split() if word.startswith("JobState=")}
+        text = self.call("scontrol", "show", "job", job)
+        return {word.partition("=")[2] for word in text.split() if word.startswith("JobState=")}
 
 
 @contextmanager
 def running() -> Iterator[Slurm]:
-    """Start it, and stop it; its folder has a short name, as sockets need one."""
+    """Start a SLURM and stop it in the end; its folder has a short name, because paths of sockets are limited."""
     with tempfile.TemporaryDirectory(prefix="slurm-", ignore_cleanup_errors=True) as folder:
         found = Slurm(Path(folder))
         try:

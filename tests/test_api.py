@@ -1,4 +1,4 @@
-"""The page of public functions is that of their docstrings, and every example in it runs as it stands."""
+"""docs/api.md follows from the docstrings, and every example in a docstring runs."""
 
 import doctest
 from importlib import import_module

@@ -1,4 +1,4 @@
-"""Figures known from independent calculations, from a campaign run through the runner, within their own intervals."""
+"""Values known from independent calculations lie in the intervals of fits to a campaign."""
 
 from dataclasses import replace
 from pathlib import Path

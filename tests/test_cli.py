@@ -1,10 +1,11 @@
-"""The command line as a user meets it: exit codes, streams, tables, JSON, and what survives a kill."""
+"""The command line: exit codes, streams, tables, JSON, and runs that are killed."""
 
 import csv
 import io
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,8 +18,6 @@ import xarray as xr
 from test_execute import digests
 
 from mdr_dask.cli import main
-from mdr_dask.cli.running import _shared
-from mdr_dask.execute import Progress
 
 #: Seconds after which a process is not waited for, on a machine that may be busy.
 PATIENCE = 300
@@ -47,10 +46,19 @@ def campaign(tmp_path, monkeypatch) -> Path:
     return path
 
 
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory) -> Path:
+    """Return the store of a finished run."""
+    folder = tmp_path_factory.mktemp("cli")
+    (folder / "small.yaml").write_text(CAMPAIGN)
+    url = folder / "small.zarr"
+    assert main(["run", str(folder / "small.yaml"), "--quiet", "--store", str(url)]) == 0
+    return url
+
+
 @pytest.fixture
-def filled(campaign, capsys) -> str:
-    assert main(["run", str(campaign), "--quiet"]) == 0
-    capsys.readouterr()
+def filled(campaign, finished) -> str:
+    shutil.copytree(finished, "results/small.zarr")
     return "results/small.zarr"
 
 
@@ -61,27 +69,25 @@ def test_run_then_run_again(campaign, capsys):
     assert "block" in first.err
     assert main(["run", str(campaign)]) == 0
     assert capsys.readouterr().out == "results/small.zarr: all 64 results are there already; nothing to do\n"
+    assert main(["run", str(campaign), "--quiet", "--json"]) == 0
+    counts = json.loads(capsys.readouterr().out)
+    assert (counts["store"], counts["kept"], counts["done"]) == ("results/small.zarr", 64, 0)
 
 
-@pytest.mark.parametrize(("solves", "text"), [(10, ""), (4, " (50.0% of the results needed none of their own)")])
-def test_the_outcome_tells_the_share_of_results_without_a_solve(solves, text):
-    assert _shared(Progress(done=8, failed=2, solves=solves)) == text
-
-
-def test_dry_run_says_what_would_be_done_and_writes_nothing(campaign, capsys):
+def test_dry_run_prints_the_plan_and_writes_nothing(campaign, capsys):
     assert main(["run", str(campaign), "--dry-run"]) == 0
     assert "8 cases x 8 realisations = 64 results" in capsys.readouterr().out
     assert not Path("results").exists()
 
 
-def test_dry_run_says_how_far_rounds_may_go(campaign, capsys):
+def test_dry_run_prints_the_range_of_rounds(campaign, capsys):
     until = "realisations: {at_least: 8, at_most: 24, until: {friction_coefficient: 1 %}}"
     campaign.write_text(CAMPAIGN.replace("realisations: 8", until))
     assert main(["run", str(campaign), "--dry-run"]) == 0
-    said = capsys.readouterr().out
-    assert "8 cases x 8 to 24 realisations = 64 to 192 results" in said
-    assert "64 to 192 different solutions to compute" in said
-    assert "from the first round to the last one" in said
+    printed = capsys.readouterr().out
+    assert "8 cases x 8 to 24 realisations = 64 to 192 results" in printed
+    assert "64 to 192 different solutions to compute" in printed
+    assert "from the first round to the last one" in printed
     assert main(["run", str(campaign), "--dry-run", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert (document["realisations"], document["at_most"], document["results"]) == (8, 24, 64)
@@ -90,7 +96,7 @@ def test_dry_run_says_how_far_rounds_may_go(campaign, capsys):
     assert (document["counted"], document["kept"], document["to_do"]) == ("first round", 0, 64)
 
 
-def test_a_fitted_material_says_how_well_it_holds(campaign, capsys):
+def test_the_error_of_a_fitted_material_is_printed_and_stored(campaign, capsys):
     table = Path(__file__).parent / "data/dma/freq_user_raw.csv"
     material = f"material: {{dma_table: {{file: {table}, table_temperature: 298 K, poisson_ratio: 0.5}}}}"
     text = CAMPAIGN.replace("shear_modulus: 10 MPa", material).replace("  relaxation_time: 1 ms\n", "")
@@ -130,9 +136,7 @@ def test_show_selects_with_units_and_prints_csv_and_json(filled, capsys):
     np.testing.assert_allclose([row["friction_coefficient_mean"] for row in document["rows"]], means, rtol=1e-12)
 
 
-def test_status_counts_and_lists_failures(campaign, capsys):
-    assert main(["run", str(campaign), "--quiet"]) == 0
-    capsys.readouterr()
+def test_status_counts_and_lists_failures(filled, capsys):
     assert main(["status", "results/small.zarr", "--json"]) == 0
     row = json.loads(capsys.readouterr().out)["rows"][0]
     assert (row["results"], row["done"], row["missing"]) == (64, 64, 0)
@@ -210,23 +214,6 @@ def test_a_running_scheduler_and_a_cluster_file_are_used(campaign, tmp_path):
     assert digests("a.zarr") == digests("b.zarr")
 
 
-@pytest.mark.slow
-def test_interrupting_says_how_to_go_on_and_readers_may_look_meanwhile(campaign):
-    long = CAMPAIGN.replace("realisations: 8", "realisations: 400").replace("points: 500", "points: 20000")
-    campaign.write_text(long + "store: {path: live.zarr, blocks: {realisation: 1}}\n")
-    with subprocess.Popen(command("run", str(campaign)), stderr=subprocess.PIPE, text=True) as process:
-        deadline = time.monotonic() + PATIENCE
-        while time.monotonic() < deadline and not list(Path("live.zarr").glob("status/c/*/*/*")):
-            time.sleep(0.05)
-        seen = xr.open_zarr("live.zarr")
-        assert seen.friction_coefficient.attrs["units"] == "1"
-        assert int((seen.status == 1).sum()) > 0
-        process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 130
-    assert "the same command computes the others" in errors
-
-
 LONG = CAMPAIGN.replace("realisations: 8", "realisations: 400").replace("points: 500", "points: 20000")
 LIVE = LONG + "store: {path: live.zarr, blocks: {realisation: 1}}\n"
 
@@ -243,14 +230,13 @@ def started(*arguments: str) -> subprocess.Popen[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("word", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "wall time"])
-@pytest.mark.parametrize("options", [["--threads", "1"], ["--workers", "1"]], ids=["threads", "workers"])
-def test_an_interrupted_process_group_ends_quietly_and_leaves_nobody_behind(campaign, options, word):
+@pytest.mark.parametrize(("options", "sent"), [("--threads", signal.SIGINT), ("--workers", signal.SIGTERM)])
+def test_an_interrupted_process_group_ends_with_one_message_and_no_process_left(campaign, options, sent):
     psutil = pytest.importorskip("psutil")
     campaign.write_text(LIVE)
-    process = started("run", str(campaign), "--quiet", *options)
+    process = started("run", str(campaign), "--quiet", options, "1")
     children = psutil.Process(process.pid).children(recursive=True)
-    os.killpg(process.pid, word)
+    os.killpg(process.pid, sent)
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     assert " ".join(errors.split()) == "interrupted; finished results are kept; the same command computes the others"
@@ -264,7 +250,7 @@ def _at_work(process: int) -> bool:
 
 
 @pytest.mark.slow
-def test_a_second_process_is_refused_until_the_first_is_gone_however_it_went(campaign, capsys):
+def test_a_second_process_is_refused_until_the_first_has_ended(campaign, capsys):
     campaign.write_text(LIVE)
     first = started("run", str(campaign), "--quiet")
     assert main(["run", str(campaign), "--quiet"]) == 2
@@ -282,7 +268,7 @@ def test_a_second_process_is_refused_until_the_first_is_gone_however_it_went(cam
     assert second.returncode == 130
 
 
-def test_dry_run_on_a_store_says_what_remains(campaign, filled, capsys):
+def test_dry_run_on_a_store_counts_what_remains(campaign, filled, capsys):
     campaign.write_text(CAMPAIGN.replace("realisations: 8", "realisations: 12"))
     assert main(["run", str(campaign), "--dry-run"]) == 0
     assert "64 results are in the store already, 32 remain" in capsys.readouterr().out
@@ -290,20 +276,6 @@ def test_dry_run_on_a_store_says_what_remains(campaign, filled, capsys):
     document = json.loads(capsys.readouterr().out)
     assert (document["results"], document["kept"], document["to_do"]) == (96, 64, 32)
     assert xr.open_zarr(filled).sizes["realisation"] == 8
-
-
-def test_a_plan_of_rounds_counts_the_first_of_them(toy, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    Path("rounds.yaml").write_text(
-        "name: rounds\nmodel: toy\nrealisations: {at_least: 4, at_most: 40, until: {height: 5 %}}\n"
-        "parameters:\n  noise: 0.3\n  position: [1 m, 2 m]\n"
-    )
-    assert main(["run", "rounds.yaml", "--quiet"]) == 0
-    assert main(["run", "rounds.yaml", "--dry-run"]) == 0
-    assert "8 results of the first round are in the store already, 0 remain" in capsys.readouterr().out
-    assert main(["run", "rounds.yaml", "--dry-run", "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert (document["counted"], document["kept"], document["to_do"]) == ("first round", 8, 0)
 
 
 def test_a_store_may_be_named_by_a_file_url(campaign, tmp_path, capsys):

@@ -57,14 +57,14 @@ def test_a_table_without_what_is_needed_is_one_clear_error(tmp_path, capsys, con
         ([str(TABLE), "--reference", "500"], "got 500"),
     ],
 )
-def test_what_cannot_be_done_is_said_before_anything_is_written(tmp_path, monkeypatch, capsys, options, message):
+def test_impossible_options_are_refused_before_anything_is_written(tmp_path, monkeypatch, capsys, options, message):
     monkeypatch.chdir(tmp_path)
     assert main(["master-curve", *options]) == 2
     assert message in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 
-def test_factors_and_merged_curve_go_into_tables_and_kept_results_are_known_by_what_they_hold(tmp_path, capsys):
+def test_factors_and_merged_curve_are_written_and_kept_results_are_recognised(tmp_path, capsys):
     factors, curve, kept = tmp_path / "new" / "factors.csv", tmp_path / "curve.csv", tmp_path / "kept.json"
     assert main(["master-curve", str(TABLE), "-o", str(factors)]) == 0
     assert main(["master-curve", str(TABLE), "-o", str(kept)]) == 0

@@ -1,4 +1,4 @@
-"""show and aggregate in every form: the same rows, whatever they are written as; bounded memory and one sentence."""
+"""``show`` and ``aggregate`` return the same rows in every output format."""
 
 import csv
 import io
@@ -13,8 +13,6 @@ import xarray as xr
 from planted import ROLLERS, SLIDING, make
 
 from mdr_dask.cli import main
-from mdr_dask.cli.answers import _print_aligned
-from mdr_dask.questions.table import Table
 
 ASKED = ("friction_coefficient", "--where", "velocity > 5 mm/s", "--sort", "-friction_coefficient")
 COLUMNS = ["normal_force", "velocity", "friction_coefficient_mean", "friction_coefficient_standard_error"]
@@ -38,7 +36,7 @@ def expected(study):
     return kept.to_numpy()
 
 
-def told(capsys, *arguments):
+def output(capsys, *arguments):
     assert main([*arguments]) == 0
     return capsys.readouterr()
 
@@ -50,17 +48,19 @@ def rows(text):
 
 def test_every_form_holds_the_same_rows(study, expected, tmp_path, capsys):
     frames = {}
-    frames["csv"] = pd.read_csv(io.StringIO(told(capsys, "show", study, *ASKED, "--csv").out))
+    frames["csv"] = pd.read_csv(io.StringIO(output(capsys, "show", study, *ASKED, "--csv").out))
     frames["csv"].columns = [title.partition(" [")[0] for title in frames["csv"]]
-    document = json.loads(told(capsys, "show", study, *ASKED, "--json").out)
+    document = json.loads(output(capsys, "show", study, *ASKED, "--json").out)
     assert document["units"]["velocity"] == "m/s"
     frames["json"] = pd.DataFrame(document["rows"])
-    lines = told(capsys, "show", study, *ASKED, "--jsonl").out.splitlines()
+    lines = output(capsys, "show", study, *ASKED, "--jsonl").out.splitlines()
     frames["jsonl"] = pd.DataFrame([json.loads(line) for line in lines])
     for suffix in ("csv", "json", "jsonl", "parquet"):
         path = tmp_path / f"rows.{suffix}"
-        assert told(capsys, "show", study, *ASKED, "-o", str(path)).out.startswith(f"{path}: {len(expected)} rows of ")
-    assert (tmp_path / "rows.csv").read_text() == told(capsys, "show", study, *ASKED, "--csv").out
+        assert output(capsys, "show", study, *ASKED, "-o", str(path)).out.startswith(
+            f"{path}: {len(expected)} rows of "
+        )
+    assert (tmp_path / "rows.csv").read_text() == output(capsys, "show", study, *ASKED, "--csv").out
     assert json.loads((tmp_path / "rows.json").read_text()) == document
     assert (tmp_path / "rows.jsonl").read_text().splitlines() == lines
     frames["parquet"] = pd.read_parquet(tmp_path / "rows.parquet")
@@ -73,48 +73,35 @@ def test_every_form_holds_the_same_rows(study, expected, tmp_path, capsys):
     assert pyarrow.parquet.read_schema(tmp_path / "rows.parquet").field("velocity").metadata[b"units"] == b"m/s"
 
 
-def test_a_single_row_is_written_in_every_form(study, tmp_path, capsys):
-    asked = (
-        "friction_coefficient",
-        "--where",
-        "velocity > 0.5 m/s and normal_force > 5 N",
-        "--select",
-        "normal_force=10N",
-    )
-    (row,) = json.loads(told(capsys, "show", study, *asked, "--json").out)["rows"]
-    assert json.loads(told(capsys, "show", study, *asked, "--jsonl").out) == row
-    assert row["normal_force"] == 10
-
-
-def test_a_table_for_a_reader_is_cut_and_says_by_how_much(study, expected, capsys):
-    streams = told(capsys, "show", study, *ASKED, "--limit", "3")
+def test_printed_tables_are_limited_and_count_the_other_rows(study, expected, capsys):
+    streams = output(capsys, "show", study, *ASKED, "--limit", "3")
     lines = rows(streams.out)
     assert "in all rows: realisations = 4, status = done" in " ".join(streams.out.split())
     assert [float(line.split()[0]) for line in lines] == expected[:3, 0].tolist()
     assert all(" +- " in line for line in lines)
     assert streams.err == f"... {len(expected) - 3} more rows (--limit 0 prints all)\n"
-    whole = told(capsys, "show", study, *ASKED, "--limit", "0")
+    whole = output(capsys, "show", study, *ASKED, "--limit", "0")
     assert len(rows(whole.out)) == len(expected)
     assert not whole.err
-    assert told(capsys, "show", study, "--limit", "4").err == "... 17 more rows (--limit 0 prints all)\n"
-    assert told(capsys, "show", study, "--where", "velocity > 1 mm/s", "--limit", "4").err.startswith("... more rows")
-    none = told(capsys, "show", study, "--where", "velocity > 1 km/s")
+    assert output(capsys, "show", study, "--limit", "4").err == "... 17 more rows (--limit 0 prints all)\n"
+    assert output(capsys, "show", study, "--where", "velocity > 1 mm/s", "--limit", "4").err.startswith("... more rows")
+    none = output(capsys, "show", study, "--where", "velocity > 1 km/s")
     assert (none.out, none.err) == ("", "no rows\n")
 
 
-def test_single_results_tell_what_became_of_them(study, capsys):
-    out = told(capsys, "show", study, "rms_slope", "--realisations", "--csv").out
+def test_single_results_have_a_status(study, capsys):
+    out = output(capsys, "show", study, "rms_slope", "--realisations", "--csv").out
     rows = list(csv.DictReader(io.StringIO(out)))
     assert len(rows) == 84
     assert {(row["status"], row["rms_slope"] == "nan") for row in rows} == {("done", False), ("failed", True)}
 
 
 def test_aggregates_are_brief_for_a_reader_and_complete_for_a_program(study, capsys):
-    out = told(capsys, "aggregate", study, "friction_coefficient", "--group-by", "normal_force").out
+    out = output(capsys, "aggregate", study, "friction_coefficient", "--group-by", "normal_force").out
     assert re.search(r"standard_\s", out)
     assert len(rows(out)) == 3
     assert all("(" in row for row in rows(out))
-    titles = told(capsys, "aggregate", study, "friction_coefficient", "--csv").out.splitlines()[0].split(",")
+    titles = output(capsys, "aggregate", study, "friction_coefficient", "--csv").out.splitlines()[0].split(",")
     assert {"friction_coefficient_low", "friction_coefficient_quantile_0.05", "friction_coefficient_count"} <= {*titles}
 
 
@@ -128,7 +115,7 @@ def test_labelled_arrays_carry_units_numbers_and_states(study, tmp_path, capsys)
         "--where",
         "velocity > 5 mm/s",
     ]
-    assert "variables over" in told(capsys, "show", study, *arguments, "-o", str(path)).out
+    assert "variables over" in output(capsys, "show", study, *arguments, "-o", str(path)).out
     with xr.open_dataset(path) as found:
         assert found.velocity.attrs["units"] == "km/h"
         assert found.load_number.dims == ("normal_force",)
@@ -140,16 +127,16 @@ def test_a_table_to_read_has_the_units_of_the_campaign_and_a_file_has_those_of_s
     axes = "  rotation_speed: [10 rpm, 1000 rpm]\n  temperature: [40 degC, 60 degC]\n  normal_force: [1 kN, 200 N]\n"
     make(tmp_path, ROLLERS + axes)
     asked = ("show", str(tmp_path / "study.zarr"), "film_ratio")
-    out = told(capsys, *asked).out
+    out = output(capsys, *asked).out
     assert re.search(r"\[rpm\] +\[degC\] +\[N\]", out)
     assert rows(out)[0].split()[:3] == ["10", "40", "200"]
-    assert rows(told(capsys, *asked, "--units", "temperature=K").out)[0].split()[:2] == ["10", "313.15"]
-    head, first, *_ = told(capsys, *asked, "--csv").out.splitlines()
+    assert rows(output(capsys, *asked, "--units", "temperature=K").out)[0].split()[:2] == ["10", "313.15"]
+    head, first, *_ = output(capsys, *asked, "--csv").out.splitlines()
     assert head.startswith("rotation_speed [rad/s],temperature [K],normal_force [N],")
     assert first.startswith("1.0471975511965976,313.15,200.0,")
 
 
-def test_a_study_with_series_says_which_there_are(tmp_path, capsys):
+def test_a_study_with_series_lists_them(tmp_path, capsys):
     make(
         tmp_path,
         SLIDING + "  normal_force: 1 N\n  velocity: 1 m/s\nseries:\n  a: {hurst: [0.3, 0.7]}\n  b: {hurst: [1]}\n",
@@ -158,10 +145,10 @@ def test_a_study_with_series_says_which_there_are(tmp_path, capsys):
     for command in ("show", "aggregate"):
         assert main([command, store]) == 2
         assert capsys.readouterr().err == "expected --series with one of a, b, because this study has series\n"
-    assert len(rows(told(capsys, "show", store, "rms_slope", "--series", "a").out)) == 2
+    assert len(rows(output(capsys, "show", store, "rms_slope", "--series", "a").out)) == 2
 
 
-def test_without_pyarrow_parquet_is_one_sentence_and_no_file(study, tmp_path, capsys, monkeypatch):
+def test_without_pyarrow_parquet_is_one_message_and_no_file(study, tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     path = tmp_path / "rows.parquet"
     assert main(["show", study, "-o", str(path)]) == 2
@@ -170,17 +157,8 @@ def test_without_pyarrow_parquet_is_one_sentence_and_no_file(study, tmp_path, ca
 
 
 def test_numbers_of_a_model_are_listed(capsys):
-    text = told(capsys, "models", "sliding_friction").out
+    text = output(capsys, "models", "sliding_friction").out
     assert "normal_force / (shear_modulus" in " ".join(text.split())
     assert max(map(len, text.splitlines())) <= 100
-    document = json.loads(told(capsys, "models", "ehl_line", "--json").out)
+    document = json.loads(output(capsys, "models", "ehl_line", "--json").out)
     assert "speed_parameter" in [number["number"] for number in document["numbers"]]
-
-
-def test_a_limit_counts_the_rows_of_all_frames(capsys):
-    """Five rows in frames of two: as many are printed as were asked for, and the rest is told."""
-    frames = [pd.DataFrame({"height": np.arange(first, first + 2.0)}) for first in (0, 2)]
-    _print_aligned(Table(iter(frames), {"height": "m"}, 5), 3, join=False)
-    printed = capsys.readouterr()
-    assert [float(line) for line in rows(printed.out)] == [0, 1, 2]
-    assert printed.err == "... 2 more rows (--limit 0 prints all)\n"

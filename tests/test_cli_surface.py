@@ -32,9 +32,9 @@ MAPS = ["road0.npy", "road1.npy", "--spacing", f"{LENGTH / POINTS * 1e6}um", "--
 def test_maps_to_numbers_figure_and_spectrum(folder, capsys):
     assert main(["surface", *MAPS, "--json", "-o", "c2d.csv", "--plot", "road.png"]) == 0
     out, err = capsys.readouterr()
-    told = json.loads(out)
-    assert told["units"]["Sq"] == "m"
-    for row in told["rows"]:
+    document = json.loads(out)
+    assert document["units"]["Sq"] == "m"
+    for row in document["rows"]:
         assert row["rms_gradient"] == pytest.approx(SPECTRUM.rms_gradient(), rel=0.1)
         assert row["rms_gradient"] == pytest.approx(np.hypot(row["slope_x"], row["slope_y"]), rel=1e-9)
         assert row["hurst_low"] < HURST < row["hurst_high"]
@@ -54,19 +54,19 @@ def test_maps_to_numbers_figure_and_spectrum(folder, capsys):
     assert ((bins["y_low"] < bins["y"]) & (bins["y"] < bins["y_high"])).all()
     law = drawn[(drawn["what"] == "power law") & (drawn["file"] == "road0.npy")]
     power, level = np.polyfit(np.log(law["x"]), np.log(law["y"]), 1)
-    assert power == pytest.approx(-2 - 2 * told["rows"][0]["hurst"], abs=0.01)
+    assert power == pytest.approx(-2 - 2 * document["rows"][0]["hurst"], abs=0.01)
     within = bins[bins["x"].between(law["x"].min(), law["x"].max())]
     assert np.median(np.log(within["y"]) - power * np.log(within["x"])) == pytest.approx(level, abs=0.02)
     assert main(["surface", *MAPS, "-o", "road.csv", "--plot", "road.png"]) == 2
     assert "road.csv is the table of the figure road.png: give the spectrum another name" in capsys.readouterr().err
     (spectrum,) = spectra_of(Surface.model_validate({"spectrum": str(folder / "c2d.csv")}))
-    gradients = [row["rms_gradient"] for row in told["rows"]]
+    gradients = [row["rms_gradient"] for row in document["rows"]]
     assert spectrum.rms_gradient() == pytest.approx(np.sqrt(np.mean(np.square(gradients))), rel=0.01)
     assert main(["surface", "c2d.csv", "--csv"]) == 0
     assert capsys.readouterr().out.startswith("file,Sq [m]")
 
 
-def test_a_scan_is_told_by_its_two_columns(folder, capsys):
+def test_a_scan_is_recognised_by_its_two_columns(folder, capsys):
     assert main(["surface", "scan.csv", "--json"]) == 0
     out, err = capsys.readouterr()
     (row,) = json.loads(out)["rows"]
@@ -85,7 +85,7 @@ def test_a_scan_is_told_by_its_two_columns(folder, capsys):
         (["none.npy"], "does not exist"),
     ],
 )
-def test_a_mistake_is_one_sentence_and_writes_nothing(folder, arguments, message, capsys):
+def test_a_mistake_is_one_message_and_writes_nothing(folder, arguments, message, capsys):
     assert main(["surface", *arguments, "-o", "road.csv"]) == 2
     assert message in capsys.readouterr().err
     assert not (folder / "c2d.csv").exists()

@@ -1,4 +1,4 @@
-"""Errors go with numbers: companions from the campaign file through the store to aggregates and the command line."""
+"""Errors of outputs, from the campaign file through the store to aggregates and the command line."""
 
 import json
 
@@ -68,7 +68,7 @@ def test_rounds_go_by_outputs_and_not_by_their_errors(toy):
         loads(text, "a.yaml", ".")
 
 
-def test_show_tells_scatter_and_grid_apart(filled, capsys):
+def test_show_distinguishes_scatter_and_grid_error(filled, capsys):
     assert main(["show", filled, "width"]) == 0
     note, *_, units, first, last = capsys.readouterr().out.splitlines()
     assert note.startswith("mean +- standard error +- grid error; in all rows: realisations = 6")
@@ -82,7 +82,7 @@ def test_show_tells_scatter_and_grid_apart(filled, capsys):
     assert row["width_standard_error"] == pytest.approx(float(opened.width.std(ddof=1)) / 6**0.5)
 
 
-def test_show_hides_rounding_noise_and_says_what_is_unknown():
+def test_show_hides_rounding_noise_and_marks_unknown_errors():
     from mdr_dask.cli.printing import with_error
 
     assert with_error(0.1642, 8e-18) == "0.1642 +- 0"

@@ -1,4 +1,4 @@
-"""The pages: guide and examples run as they stand, block by block; every campaign shown is right; no link is dead."""
+"""Pages of the documentation: guide and examples run, campaigns are valid, links exist."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""Made-up files of strangers, a few of each kind."""
+"""Generated files of each kind are processed or refused with one message."""
 
 import json
 import shutil
@@ -23,7 +23,7 @@ def whole(tmp_path_factory):
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # of libraries that read tables
 @pytest.mark.parametrize("kind", fuzzing.CASES)
-def test_what_strangers_send_is_run_or_refused_in_a_sentence(kind, whole):
+def test_generated_files_are_processed_or_refused_with_one_message(kind, whole):
     @hypothesis.settings(max_examples=6, deadline=None, suppress_health_check=list(HealthCheck), database=None)
     @given(fuzzing.CASES[kind])
     def holds(case):
@@ -46,7 +46,7 @@ DOUBLED = "Hz, MPa, MPa\n0.1, 8, 1\n1, 9, 1.5\n"
     ],
     ids=["half a character", "a bare number near the largest", "names given twice"],
 )
-def test_a_file_that_once_broke_the_program_is_read_or_refused(toy, tmp_path, monkeypatch, name, text, command, code):
+def test_files_that_broke_earlier_versions_are_refused(toy, tmp_path, monkeypatch, name, text, command, code):
     monkeypatch.chdir(tmp_path)
     Path(name).write_text(text)
     assert fuzzing.judge(*command) == code
@@ -67,7 +67,7 @@ def change(name, act):
 
 
 @pytest.mark.parametrize(
-    ("name", "act", "said"),
+    ("name", "act", "message"),
     [
         ("zarr.json", lambda d: d["attributes"].pop("accuracy"), "accuracy: field required"),
         ("zarr.json", lambda d: members(d)["height"].update(chunk_grid={}), "height: chunk_grid.configuration"),
@@ -76,10 +76,10 @@ def change(name, act):
         ("zarr.json", lambda d: d["attributes"]["blocks"].clear(), "expected blocks over position"),
     ],
 )
-def test_metadata_that_once_broke_the_program_are_refused_and_mended(stranger, capsys, name, act, said):
+def test_damaged_metadata_are_refused_and_repaired(stranger, capsys, name, act, message):
     change(name, act)
     assert main(["status", "s.zarr"]) == 2
-    assert said in capsys.readouterr().err
+    assert message in capsys.readouterr().err
     assert fuzzing.judge("verify", "s.zarr", "--repair") == 0
     assert fuzzing.judge("verify", "s.zarr") == fuzzing.judge("status", "s.zarr") == 0
 
@@ -88,14 +88,14 @@ def members(document):
     return document["consolidated_metadata"]["metadata"]
 
 
-@pytest.mark.parametrize("told", [{"place": [[0]]}, {"place": [99, 0, 0]}, {"case": {"a": {}}}, {"status": "lost"}])
-def test_messages_that_once_broke_the_program_are_left_out(stranger, capsys, told):
+@pytest.mark.parametrize("wrong", [{"place": [[0]]}, {"place": [99, 0, 0]}, {"case": {"a": {}}}, {"status": "lost"}])
+def test_damaged_messages_are_left_out(stranger, capsys, wrong):
     path = next(Path("s.zarr/status/records").glob("*.jsonl"))
     records = [json.loads(line) for line in path.read_text().splitlines()]
     for record in records:
         del record["digest"]
         for message in record["messages"]:
-            message.update(told)
+            message.update(wrong)
     path.write_text("".join(json.dumps(record) + "\n" for record in records))
     assert main(["status", "s.zarr", "--failures"]) == 0
     assert capsys.readouterr().out == "no failures\n"

@@ -1,10 +1,9 @@
-"""Files of strangers: one sentence at once, nothing for the terminal; and a fault of the program itself."""
+"""Hostile files are refused at once with one message; an internal error has its own exit code."""
 
 import json
 import time
 from pathlib import Path
 
-import click
 import numpy as np
 import pytest
 import zarr
@@ -12,31 +11,21 @@ import zarr
 from mdr_dask import cli
 from mdr_dask.campaign import loads
 from mdr_dask.cli import main
-from mdr_dask.cli.results import Reading
 from mdr_dask.errors import CampaignError, StoreError
 from mdr_dask.store import datasets
 
 HEAD = "name: a\nmodel: toy\n"
 HOSTILE = {
     "nested lists": HEAD + "parameters: {position: " + "[" * 5000 + "]" * 5000 + "}\n",
-    "nested mappings": HEAD + "parameters: " + "{a: " * 5000 + "1" + "}" * 5000 + "\n",
     "a key of aliases": HEAD
     + "a: &a [x, x]\n"
     + "".join(f"b{i}: &{chr(98 + i)} [*{chr(97 + i)}, *{chr(97 + i)}]\n" for i in range(24))
     + "? [*y, *y]\n: 1\n",
     "a long whole number": HEAD + "seed: " + "9" * 5000 + "\nparameters: {}\n",
-    "a long number": HEAD + "parameters: {position: " + "9" * 5000 + ".5}\n",
-    "a unit that never ends": HEAD + "parameters: {position: 1 m**9**9**9**9}\n",
-    "a unit of many letters": HEAD + "parameters: {position: 1 " + "m" * 100_000 + "}\n",
-    "a unit with a large power": HEAD + "parameters: {position: 1 mm^200/m^199}\n",
-    "a key that holds itself": HEAD + "parameters: {}\n? &a [*a]\n: 1\n",
     "a million values": HEAD + f"parameters: {{position: {list(range(10**6))}}}\n",
-    "a number beyond all bounds": HEAD + "parameters: {position: 1e999999999 m}\n",
     "a null character": HEAD + 'parameters: {}\nstore: {path: "a\\0b"}\n',
-    "a null character in a table": HEAD + 'parameters: {}\nsampling: {table: "a\\0b"}\n',
     "an endless table": HEAD + "parameters: {}\nsampling: {table: /dev/zero}\n",
     "a series that ends like a leftover": HEAD + "parameters: {}\nseries: {x.partial: {}}\n",
-    "a series called like metadata": HEAD + "parameters: {}\nseries: {zarr.json: {}}\n",
     "a series with a long name": HEAD + "parameters: {}\nseries: {" + "x" * 300 + ": {}}\n",
 }
 
@@ -78,21 +67,7 @@ def test_a_damaged_axis_is_named_and_not_read(filled, harm, capsys):
     assert "damaged" in capsys.readouterr().err
 
 
-def test_what_zarr_says_of_a_chunk_names_the_store():
-    """Whatever else a command is asked."""
-
-    @click.command(cls=Reading)
-    @click.option("--series")
-    @click.argument("store")
-    def look(series, store):
-        zarr.codecs.BytesCodec(endian="sideways")
-
-    look.params.sort(key=lambda one: one.name != "store")
-    with pytest.raises(StoreError, match=r"^rig\.zarr: damaged, a chunk cannot be read: .*sideways"):
-        look.main(["rig.zarr", "--series", "one"], standalone_mode=False)
-
-
-def test_messages_speak_to_the_user_and_not_to_the_terminal(filled, capsys):
+def test_control_characters_of_messages_are_escaped(filled, capsys):
     together = next((filled / "status/records").glob("*.jsonl"))
     lines = [json.loads(line) for line in together.read_text().splitlines()]
     for record in lines:
@@ -106,12 +81,12 @@ def test_messages_speak_to_the_user_and_not_to_the_terminal(filled, capsys):
     assert "\\x1b[31mred" in shown
 
 
-def test_a_store_that_would_be_gone_at_the_end_is_refused(filled, capsys):
+def test_a_store_in_memory_is_refused(filled, capsys):
     assert main(["run", "a.yaml", "--store", "memory://a"]) == 2
     assert "expected a store that outlasts this command" in capsys.readouterr().err
 
 
-def test_a_link_to_itself_is_one_sentence(filled, capsys):
+def test_a_link_to_itself_is_one_message(filled, capsys):
     Path("loop.zarr").symlink_to("loop.zarr")
     assert main(["run", "a.yaml", "--store", "loop.zarr"]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
@@ -123,10 +98,10 @@ def test_a_fault_of_the_program_has_its_own_exit_code_and_a_report(filled, monke
 
     monkeypatch.setattr("mdr_dask.store.series_names", broken)
     assert main(["status", str(filled)]) == cli.BROKE == 3
-    said = capsys.readouterr().err
-    assert len(said.splitlines()) == 1
-    assert "RuntimeError: wheels came off" in said
-    report = Path(said.split()[-1])
+    printed = capsys.readouterr().err
+    assert len(printed.splitlines()) == 1
+    assert "RuntimeError: wheels came off" in printed
+    report = Path(printed.split()[-1])
     assert "Traceback" in report.read_text()
     assert f"mdr-dask status {filled}" in report.read_text()
     report.unlink()

@@ -1,4 +1,4 @@
-"""Layouts of instruments and people are read without edits, or refused with a sentence on what to change."""
+"""Layouts of instruments are read without edits; others are refused with a message that says what to change."""
 
 import io
 

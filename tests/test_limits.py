@@ -9,7 +9,7 @@ from mdr_dask.units import shown_apart
 JUST = 1 + 1e-9
 
 
-def test_a_number_and_its_limits_have_the_fewest_digits_that_tell_them_apart():
+def test_a_number_and_its_limits_have_the_fewest_digits_that_distinguish_them():
     assert distinguishable(1.2345, 1.0) == ("1.23", "1")
     assert distinguishable(1.0001, 1.0) == ("1.0001", "1")
     assert distinguishable(1.0001, 1.0, 1.0002, digits=2) == ("1.0001", "1", "1.0002")

@@ -1,4 +1,4 @@
-"""A parameter that is itself a list varies like any other: load histories of fretting, arms of a Prony series."""
+"""A parameter that is itself a list varies like any other: load histories, Prony series."""
 
 from pathlib import Path
 
@@ -61,8 +61,8 @@ def test_questions_and_figures_take_lists(tmp_path):
     assert "cycles" not in store.datasets(url)[""].coords  # a history replaces them
 
 
-ARMS = """
-name: arms
+TERMS = """
+name: terms
 model: sliding_friction
 sampling: zip
 parameters:
@@ -72,16 +72,16 @@ parameters:
 
 
 def test_lists_of_a_structure_vary_together(tmp_path):
-    def arms(moduli, times):
-        return loads(ARMS.replace("MODULI", moduli).replace("TIMES", times), "", ".")
+    def terms(moduli, times):
+        return loads(TERMS.replace("MODULI", moduli).replace("TIMES", times), "", ".")
 
-    found = arms("[[1 MPa], [1 MPa, 20 kPa]]", "[[1 ms], [0.001, 1 s]]")
+    found = terms("[[1 MPa], [1 MPa, 20 kPa]]", "[[1 ms], [0.001, 1 s]]")
     assert [axis.values for axis in found.series[0].axes] == [((1e6,), (1e6, 2e4)), ((1e-3,), (1e-3, 1.0))]
     url = str(tmp_path / "arms.zarr")
     run(found, url)
     friction = store.datasets(url)[""].friction_coefficient.to_numpy()
     assert np.isfinite(friction).all()
-    run(arms("[[3 MPa, 1 kPa, 1 kPa]]", "[[1 ms, 1 s, 2 s]]"), url)  # restores arms of other numbers
+    run(terms("[[3 MPa, 1 kPa, 1 kPa]]", "[[1 ms, 1 s, 2 s]]"), url)  # restores Prony terms of other numbers
     assert np.array_equal(store.datasets(url)[""].friction_coefficient.to_numpy()[:2], friction)
 
 
@@ -100,7 +100,7 @@ def test_mistakes_in_lists_of_lists(lists, message):
     assert message in str(caught.value)
 
 
-def test_what_sets_the_places_of_an_output_is_no_axis_of_it():
+def test_parameters_that_set_coordinates_cannot_vary():
     text = WEAR.replace("history: LISTS", "extent: [1.2, 1.6]")
     assert len(loads(text, "", ".").series[0].axes) == 1
     message = (

@@ -1,4 +1,4 @@
-"""The likeliest mistakes in a campaign: each is one sentence that says where it is and what to do."""
+"""Likely mistakes in a campaign: one message with the place and the remedy."""
 
 import pytest
 

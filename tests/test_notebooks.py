@@ -1,4 +1,4 @@
-"""Every notebook runs as it stands, cell by cell, in the folder it lies in."""
+"""Every notebook runs."""
 
 import ast
 import json

@@ -1,4 +1,4 @@
-"""A model of one's own, as docs/own-model.md tells it: through every command, and what is said where it is missing."""
+"""A model of one's own, as in docs/own-model.md: every command, and messages for its faults."""
 
 import importlib
 import json
@@ -18,7 +18,7 @@ import xarray as xr
 import mdr_dask
 from mdr_dask import execute, fits, models, units
 from mdr_dask.cli import main
-from mdr_dask.errors import ModelError, StoreError
+from mdr_dask.errors import ModelError
 from mdr_dask.execute import Resources
 from mdr_dask.fits.base import Fit
 from mdr_dask.models.base import Block, Status
@@ -96,18 +96,16 @@ def test_a_case_that_raises_is_data(example, capsys):
         ),
         ("wear_rate:solve", MODULE, "expected 'wear_rate:solve' to be an mdr_dask.models.base.Model, got function"),
         ("wear_rate:MODEL", "1 / 0", "ZeroDivisionError: division by zero"),
-        ("wear_rate:MODEL", "import lacking", "No module named 'lacking'"),
-        ("wear_rate:", MODULE, "cannot load model 'wear_rate:'|expected 'wear_rate:'"),
         ("wear_rate", MODULE, "unknown model 'wear_rate'"),
     ],
 )
-def test_what_is_wrong_with_it_is_one_sentence_at_its_line(example, capsys, name, module, sentence):
+def test_a_model_that_cannot_be_loaded_is_one_message_at_its_line(example, capsys, name, module, sentence):
     if module is not None:
         (example / "wear_rate.py").write_text(module)
     (example / "pin.yaml").write_text(CAMPAIGN.replace("wear_rate:MODEL", repr(name)))
     assert main(["check", "pin.yaml"]) == 2
-    said = capsys.readouterr().err
-    assert re.search(rf"^(error: )?pin.yaml:2:8: model: .*{sentence}", said, flags=re.M), said
+    printed = capsys.readouterr().err
+    assert re.search(rf"^(error: )?pin.yaml:2:8: model: .*{sentence}", printed, flags=re.M), printed
     assert not Path("results").exists()
 
 
@@ -162,41 +160,24 @@ def gives(volume, error=0.0):
 
 
 NUMBER = "wear_volume: expected a real number or an array of them, in SI units, got"
-#: What a model may return or raise for a case that then has failed, and the reason that is recorded.
+#: Values and exceptions of a model that make a case fail, and the recorded reason.
 MISBEHAVIOUR = {
     "NaN": (gives(np.nan), "wear_volume: expected a finite number, got nan"),
-    "infinity": (gives(-np.inf), "wear_volume: expected a finite number, got -inf"),
     "too large": (gives(10**400), "OverflowError: int too large to convert to float"),
     "negative error": (gives(1.0, -1), "wear_volume_error: expected at least 0, got -1"),
-    "error is NaN": (gives(1.0, np.nan), "wear_volume_error: expected a finite number, got nan"),
-    "output is None": (gives(None), f"ValueError: {NUMBER} None"),
-    "truth value": (gives(True), f"ValueError: {NUMBER} True"),
-    "truth value of NumPy": (gives(np.bool_(True)), f"ValueError: {NUMBER} (np.)?True_?"),
     "number in quotes": (gives("3.5"), f"ValueError: {NUMBER} '3.5'"),
-    "complex": (gives(1 + 2j), rf"ValueError: {NUMBER} \(1\+2j\)"),
-    "date": (gives(np.datetime64("2020")), f"ValueError: {NUMBER} "),
     "ragged list": (gives([[1.0], [2.0, 3.0]]), rf"ValueError: {NUMBER} \[\[1.0\], \[2.0, 3.0\]\]"),
-    "masked": (gives(np.ma.masked), f"ValueError: {NUMBER} masked"),
     "quantity": (gives(units.registry().Quantity(1.0, "m^3")), f"ValueError: {NUMBER} "),
     "vector": (gives(np.zeros(3)), r"wear_volume: expected a number for each case, got shape \(3,\)"),
     "nothing": (
         lambda _: None,
         r"expected a dictionary with a value for each output, got None \(is the return statement missing\?\)",
     ),
-    "number alone": (lambda volume: volume, "expected a dictionary with a value for each output, got float"),
-    "generator": (lambda _: (yield), "expected a dictionary with a value for each output, got generator"),
     "other names": (lambda _: {"wear": 1.0}, "the output wear_volume is missing, got wear"),
     "exception": (raises(ValueError("two\n  lines\n")), "ValueError: two lines"),
-    "exception without text": (raises(ValueError()), "ValueError"),
     "exception that has no text": (raises(UnprintableError()), "UnprintableError"),
-    "long text": (raises(ValueError("x" * 10**6)), "ValueError: xxx"),
     "exit": (raises(SystemExit(0)), "SystemExit: 0"),
-    "end of a generator": (raises(GeneratorExit()), "GeneratorExit"),
-    "own kind of end": (raises(BaseException("stop")), "BaseException: stop"),
     "interrupt of its own": (raises(KeyboardInterrupt()), "KeyboardInterrupt"),
-    "group": (raises(BaseExceptionGroup("both", [SystemExit(1)])), "BaseExceptionGroup: both"),
-    "library error": (raises(StoreError("not found")), "StoreError: not found"),
-    "no memory": (raises(MemoryError()), "MemoryError"),
 }
 
 
@@ -231,17 +212,13 @@ def changed(values=None, **fields):
 
 
 DONE = np.full((1, 1), Status.DONE)
-#: What the own function from a Block to a Result may return for a single case, and the reason why that has failed.
+#: Invalid results of a model's `compute`, and the recorded reason.
 RESULTS = {
     "no Result": (lambda result: result.values, "TypeError: expected a Result, got dict"),
     "unknown state": (changed(status=DONE * 7), "ValueError: status: expected DONE, NOT_CONVERGED or FAILED"),
-    "missing state": (changed(status=DONE * 0), "ValueError: status: expected DONE, NOT_CONVERGED or FAILED"),
-    "shape of states": (changed(status=DONE[0]), "ValueError: status: expected DONE, NOT_CONVERGED or FAILED"),
     "output missing": (lambda result: replace(result, values={}), "ValueError: the output wear_volume is missing"),
-    "truth values": (changed(values={"wear_volume": DONE > 0}), f"ValueError: {NUMBER}"),
     "shape": (changed(values={"wear_volume": np.ones(3)}), "ValueError: wear_volume: expected a number for each case"),
     "place of a message": (changed(messages={(5, 5): "far"}), r"ValueError: messages: expected places in shape"),
-    "number of solves": (changed(solves=None), "TypeError"),
 }
 
 
@@ -270,29 +247,14 @@ def test_a_result_that_is_not_as_declared_is_a_failed_case(example, monkeypatch,
     ("broken", "sentence"),
     [
         ("seconds=lambda block: 1 / 0", "'seconds' of model 'wear_rate:MODEL' failed: ZeroDivisionError"),
-        ("seconds=lambda block: float('nan')", "'seconds' of model .* expected a number that is not negative, got nan"),
         ("seconds=lambda block: 1.0, memory=lambda block: None", "'memory' of model .* failed: TypeError"),
         ("seconds=lambda block: 1.0, notes=lambda cases: cases[9]", "'notes' of model .* failed: "),
     ],
 )
-def test_a_fault_in_another_function_of_the_model_is_one_sentence(example, capsys, broken, sentence):
+def test_a_fault_in_another_function_of_the_model_is_one_message(example, capsys, broken, sentence):
     Path("wear_rate.py").write_text(re.sub("seconds=.*,", f"{broken},", MODULE))
     assert main(["check", "pin.yaml"]) == 2
     assert re.search(sentence, capsys.readouterr().err)
-
-
-def test_a_dimension_without_values_is_one_sentence(example, capsys):
-    Path("wear_rate.py").write_text(MODULE.replace("has_error=True", 'dims=("instant",)'))
-    assert main(["check", "pin.yaml"]) == 2
-    assert "the dimension 'instant', whose values are not known: give the model coordinates" in capsys.readouterr().err
-
-
-def test_errors_that_are_zero_everywhere_are_not_printed(example, capsys):
-    Path("pin.yaml").write_text(CAMPAIGN.replace("10 %", "0"))
-    Path("wear_rate.py").write_text(MODULE.replace("1e-12 * volume", "0.0"))
-    assert main(["run", "pin.yaml", "--quiet"]) == 0
-    assert main(["show", "results/pin.zarr"]) == 0
-    assert "+-" not in capsys.readouterr().out
 
 
 def test_ctrl_c_during_a_case_of_the_main_thread_is_no_failed_case():

@@ -1,4 +1,4 @@
-"""Templates and blocks: everything once, blocks of a sensible size, estimates that add up, and what is too large."""
+"""Templates and blocks: each result once, sensible block sizes, estimates, limits."""
 
 import math
 from dataclasses import replace
@@ -10,11 +10,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mdr_dask import plan
-from mdr_dask.campaign import Replication, Tolerance, load
+from mdr_dask.campaign import Replication, load
 from mdr_dask.errors import CampaignError
 from mdr_dask.execute import Resources, run
-
-SLOW_CASE = 0.05
 
 
 @pytest.fixture
@@ -82,14 +80,6 @@ def test_whole_axes_stay_whole_until_a_block_is_far_too_long(toy, costs):
     assert template.chunks["slope"] <= 4
 
 
-def test_rounds_fill_whole_blocks(toy, costs):
-    costs(SLOW_CASE)
-    until = {"height": Tolerance(relative=0.01)}
-    campaign = study(toy, (3, 3), 1, replication=Replication(12, 100, until))
-    (template,) = plan.templates(campaign, 12)
-    assert 12 % template.chunks["realisation"] == 0
-
-
 @settings(deadline=None, suppress_health_check=list(HealthCheck), max_examples=25)
 @given(sizes=st.tuples(lengths, lengths), realisations=lengths, cost=st.floats(-5, 1))
 def test_estimates_add_up(toy, costs, sizes, realisations, cost):
@@ -102,9 +92,9 @@ def test_estimates_add_up(toy, costs, sizes, realisations, cost):
     assert estimate.seconds == pytest.approx(10.0**cost * results, rel=1e-9)
 
 
-@pytest.mark.parametrize("blocks", [{}, {"position": 2, "realisation": 3}, {"position": 1, "realisation": 1}])
+@pytest.mark.parametrize("blocks", [{}, {"position": 2, "realisation": 3}])
 @pytest.mark.parametrize("names", [("",), ("near", "far")])
-def test_as_many_files_are_told_as_a_run_leaves(toy, tmp_path, blocks, names):
+def test_the_estimated_number_of_files_is_that_of_a_run(toy, tmp_path, blocks, names):
     campaign = study(toy, (6, 2), 6, blocks=blocks)
     series = tuple(replace(campaign.series[0], name=name) for name in names)
     campaign = replace(campaign, series=series, outputs=("height", "trace"))
@@ -144,22 +134,3 @@ def test_campaigns_too_large_to_run_are_refused_with_their_message(path, monkeyp
     with pytest.raises(CampaignError, match=r"expected at most") as caught:
         plan.estimate(load(path))
     assert str(caught.value).replace(str(path), path.name) == path.with_suffix(".txt").read_text().strip()
-
-
-def test_shared_axes_are_cut_where_it_repeats_no_work_and_the_last_named_first(toy, costs):
-    """A solution for each slope and position: cutting an axis repeats nothing; one for each slope: along positions."""
-    costs(1.0, whole=("slope", "position"))
-    (template,) = plan.templates(study(toy, (8, 6), 1), 1)
-    assert template.chunks["position"] == 1
-    costs(1.0, whole=("position", "slope"))
-    (template,) = plan.templates(study(toy, (8, 6), 1), 1)
-    assert template.chunks["slope"] == 1
-    costs(1.0, whole=("slope", "position"), seconds=lambda block: len(set(block.column("slope").tolist())))
-    (template,) = plan.templates(study(toy, (8, 6), 1), 1)
-    assert template.chunks["position"] == 8
-
-
-def test_blocks_that_last_very_long_are_cut_even_where_it_repeats_work(toy, costs):
-    costs(1.0, whole=("position",), seconds=lambda block: 2 * plan.SHARED_SECONDS)
-    (template,) = plan.templates(study(toy, (8, 6), 1), 1)
-    assert template.chunks["position"] == 1

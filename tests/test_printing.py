@@ -1,10 +1,10 @@
-"""Tables and messages for a reader: within the width of the terminal, and without what is the same in every row."""
+"""Printed tables fit the terminal and omit columns that are the same in every row."""
 
 import math
 
 import pytest
 
-from mdr_dask.cli.printing import print_aligned, print_rows, say, with_error, with_interval
+from mdr_dask.cli.printing import print_aligned, print_rows, with_error, with_interval
 
 NAMES = [
     "normal_force [N]",
@@ -36,7 +36,7 @@ def test_no_line_is_wider_than_the_terminal(printed, columns, rows):
     assert all(cell in text for column in cells for cell in column)
 
 
-def test_what_is_the_same_in_all_rows_stands_above_the_table(printed):
+def test_constant_columns_are_printed_above_the_table(printed):
     columns = [[1.0, 2.0], ["0.1 +- 0.01", "0.2 +- 0.01"], [float("nan")] * 2, [20, 20], ["done", "done"]]
     note, missing, *_, last = printed(NAMES, columns)
     assert note == "in all rows: realisations = 20, status = done; not known:"
@@ -75,20 +75,3 @@ def test_a_single_row_that_is_too_wide_is_a_list(capsys, monkeypatch):
 )
 def test_numbers_with_errors(text, expected):
     assert text == expected
-
-
-def test_messages_wrap_between_words(capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "60")
-    say("  a long message about a store, such as " + "one that goes on " * 8, err=True)
-    lines = capsys.readouterr().err.splitlines()
-    assert max(map(len, lines)) <= 60
-    assert len(lines) > 2
-
-
-def test_a_text_in_the_last_column_is_wrapped_beside_the_others(printed):
-    lines = printed(
-        ["force", "value", "verdict"], [[1.0, 2.0], [0.1, 0.2], ["no: " + "one word after another " * 5, "yes"]]
-    )
-    assert lines[1].split()[:3] == ["1", "0.1", "no:"]
-    assert lines[2].startswith(" " * 14)
-    assert max(map(len, lines)) <= 80

@@ -1,9 +1,8 @@
-"""Rounds of realisations and the coverage of what they end with."""
+"""Rounds of realisations, and the coverage of the intervals at the end."""
 
 import numpy as np
 import pytest
 
-from mdr_dask import replication
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.models.base import Status
 from mdr_dask.replication import growth_needed, mean_and_error, next_round
@@ -82,8 +81,22 @@ def coverage(at_least, tolerance, values):
     return np.mean(np.abs(mean - 1.0) <= t.ppf(0.975, used - 1) * error)
 
 
-@pytest.mark.parametrize("tolerance", [0.03, 0.04, 0.06, 0.1])
-@pytest.mark.parametrize("at_least", [2, 3, 5, 7, 8, 10, 20])
+@pytest.mark.parametrize(
+    "tolerance",
+    [
+        0.04,
+        0.1,
+    ],
+)
+@pytest.mark.parametrize(
+    "at_least",
+    [
+        2,
+        5,
+        10,
+        20,
+    ],
+)
 def test_the_interval_of_an_adaptive_ensemble_covers_the_truth(at_least, tolerance):
     """4000 campaigns of scatter 0.2: 95 % intervals cover 94 % or more, within 3 sigma, whatever the first round.
 
@@ -96,9 +109,11 @@ def test_the_interval_of_an_adaptive_ensemble_covers_the_truth(at_least, toleran
     assert 0.94 - 3 * scatter <= covered <= 0.95 + 4 * scatter
 
 
-def test_few_results_are_enough_where_each_knows_its_own_scatter():
-    """Four turns that differ by 1 %, each of which knows that: their mean is known to 0.5 %; if a line only thinks so,
-    or they differ by more than they know of, they are not."""
+def test_few_results_are_enough_if_each_states_its_scatter():
+    """Four revolutions that differ by 1 % and state that scatter: their mean is known to 0.5 %.
+
+    With a wrong statement, or a larger difference than stated, more are needed.
+    """
     four = np.array([0.99, 1.01, 1.0, 1.0])
     values = {"y": np.array([four, four, 1 + 30 * (four - 1), four])}
     status = np.full((4, 4), Status.DONE, dtype=np.int8)
@@ -118,10 +133,3 @@ def test_the_scatter_within_realisations_is_of_the_mean():
     for asked, more in ((0.0151, [False, False]), (0.0149, [True, False])):
         scatter = {"y": np.array([[0.03] * 4, [0.029] * 4])}
         assert needs_more(values, status, {"y": Tolerance(relative=asked)}, scatter).tolist() == more
-
-
-def test_the_error_of_a_mean_of_turns_that_know_their_own_is_of_those_that_are_done():
-    scatter = np.array([[0.3, 0.4, 7.0, np.nan], [0.3, 0.4, 1.2, 0.0]])
-    done = np.array([[True, True, False, False], [True, True, True, True]])
-    np.testing.assert_allclose(replication._error_from_within(scatter, done), [0.25, 0.325])
-    assert replication._error_from_within(scatter, 0 * done > 0).tolist() == [0.0, 0.0]

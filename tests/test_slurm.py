@@ -1,4 +1,4 @@
-"""A real SLURM of one node: job arrays of parts, and Dask workers as its jobs."""
+"""A real SLURM of one node: job arrays of parts, and Dask workers as jobs."""
 
 import json
 import re
@@ -40,8 +40,8 @@ def folder(tmp_path, monkeypatch, slurm):
 
 
 def missing(store):
-    told = mdr_dask("status", store, "--json")
-    return json.loads(told.stdout)["rows"][0]["missing"] if told.returncode == 0 else 1
+    printed = mdr_dask("status", store, "--json")
+    return json.loads(printed.stdout)["rows"][0]["missing"] if printed.returncode == 0 else 1
 
 
 @pytest.fixture(scope="module")
@@ -67,10 +67,10 @@ def test_a_campaign_longer_than_the_wall_time_finishes_by_submitting_its_script_
             "--open-mode=append",
         ]
         ends.append(slurm.wait(slurm.submit(*options, "parts.sh", "long.yaml")))
-    told = "".join(path.read_text() for path in folder.glob("*.txt"))
-    assert missing("long.zarr") == 0, told
-    assert len(ends) > 1, told
-    assert "interrupted; finished results are kept" in told
+    printed = "".join(path.read_text() for path in folder.glob("*.txt"))
+    assert missing("long.zarr") == 0, printed
+    assert len(ends) > 1, printed
+    assert "interrupted; finished results are kept" in printed
     assert ends[-1] == {"COMPLETED"}
     assert digests("long.zarr") == whole
     done = [
@@ -107,10 +107,10 @@ def test_dask_workers_come_and_go_as_jobs_of_the_queue(folder, slurm, whole):
     (keys,) = folder.glob(".mdr-dask-keys-*")
     assert keys.stat().st_mode & 0o077 == 0
     slurm.call("scancel", "--signal=KILL", jobs[0])
-    told = driver.communicate()[1]
-    assert driver.returncode == 0, told
-    assert "starting dask_jobqueue.SLURMCluster" in told
-    assert "Traceback" not in told
+    printed = driver.communicate()[1]
+    assert driver.returncode == 0, printed
+    assert "starting dask_jobqueue.SLURMCluster" in printed
+    assert "Traceback" not in printed
     names = [event["event"] for event in events(log)]
     assert len(jobs) > 1
     assert {"worker joined", "worker lost", "run ended"} <= set(names)
@@ -119,7 +119,7 @@ def test_dask_workers_come_and_go_as_jobs_of_the_queue(folder, slurm, whole):
     assert not keys.exists()
 
 
-def test_what_the_queue_refuses_is_said_in_its_words(folder, slurm):
+def test_the_message_of_the_queue_is_shown(folder, slurm):
     (folder / "queue.yaml").write_text(CLUSTER.replace("1 GiB", "900 GiB"))
     done = mdr_dask("run", "long.yaml", "--cluster", "queue.yaml")
     assert done.returncode == 2

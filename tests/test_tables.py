@@ -1,4 +1,4 @@
-"""The reader of tables: equal numbers from all dialects, and one sentence for each error."""
+"""Reading of tables: equivalent layouts, and one message for each mistake."""
 
 import pickle
 

@@ -1,3 +1,5 @@
+"""Units: conversion to SI, refused quantities, durations."""
+
 from __future__ import annotations
 
 import math

@@ -1,4 +1,4 @@
-"""What a user is told when a cluster does not come, goes away, or sees another store; and what is left."""
+"""Messages when a cluster does not start or goes away, and what remains in the store."""
 
 import json
 import os
@@ -46,35 +46,35 @@ def start():
             each.stderr.close()
 
 
-def said(process, pattern):
+def wait_for(process, pattern):
     """Wait until a process says something on stderr; return what."""
     for line in process.stderr:
         if found := re.search(pattern, line):
             return found[1]
-    raise AssertionError(f"it never said {pattern}")
+    raise AssertionError(f"no line on stderr matched {pattern}")
 
 
 def scheduler(start):
     head = start(PYTHON, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-show")
-    return head, said(head, r"Scheduler at:\s+(tcp://\S+)")
+    return head, wait_for(head, r"Scheduler at:\s+(tcp://\S+)")
 
 
 def worker(start, head, address):
     options = ["--nthreads", "1", "--no-nanny", "--no-dashboard"]
     process = start(PYTHON, "-m", "distributed.cli.dask_worker", address, *options, stderr=subprocess.DEVNULL)
-    said(head, "(Register worker)")
+    wait_for(head, "(Register worker)")
     return process
 
 
-def told_by(driver, kill):
+def lines_of(driver, kill):
     """Return what a driver says to its end; something is killed as soon as results have come."""
-    told = []
+    lines = []
     for line in driver.stderr:
-        told.append(line.strip())
+        lines.append(line.strip())
         if re.search(r"[1-9]\d* of 120 results", line):
             kill()
     assert driver.wait() == 2
-    return told
+    return lines
 
 
 def events():
@@ -105,13 +105,13 @@ def test_no_worker_and_a_worker_that_dies_and_a_scheduler_that_dies(folder, star
     assert re.search(last, " ".join(alone.stderr.split()))
 
     first = worker(start, head, address)
-    told = told_by(start(*command, "--patience", "6"), lambda: kill_in_a_block(first))
-    assert any(re.match("all workers are gone, waiting for", line) for line in told)
+    lines = lines_of(start(*command, "--patience", "6"), lambda: kill_in_a_block(first))
+    assert any(re.match("all workers are gone, waiting for", line) for line in lines)
 
     worker(start, head, address)
-    told += told_by(start(*command), head.kill)
-    assert " ".join(told).endswith(f"the scheduler went away; {KEPT}")
-    assert not any(word in line for line in told for word in ("Traceback", "asyncio", "Error"))
+    lines += lines_of(start(*command), head.kill)
+    assert " ".join(lines).endswith(f"the scheduler went away; {KEPT}")
+    assert not any(word in line for line in lines for word in ("Traceback", "asyncio", "Error"))
 
     assert mdr_dask("run", "long.yaml", PAUSE="0").returncode == 0
     assert mdr_dask("run", "long.yaml", "--store", "whole.zarr", PAUSE="0").returncode == 0
@@ -120,14 +120,14 @@ def test_no_worker_and_a_worker_that_dies_and_a_scheduler_that_dies(folder, star
     assert events().count("run interrupted") == 3
 
 
-def test_a_scheduler_that_is_stopped_ends_a_run_in_one_sentence(folder, start):
+def test_a_run_ends_with_one_message_when_the_scheduler_is_stopped(folder, start):
     head, address = scheduler(start)
     worker(start, head, address)
     driver = start("mdr-dask", "run", "long.yaml", "--scheduler", address, "--patience", "10")
-    said(driver, r"([1-9]\d*) of 120 results")
+    wait_for(driver, r"([1-9]\d*) of 120 results")
     head.send_signal(signal.SIGSTOP)
-    told = driver.stderr.read().splitlines()
+    lines = driver.stderr.read().splitlines()
     assert driver.wait() == 2
     last = rf"no answer of the scheduler for \d+ s; {KEPT}, with more --patience if need be$"
-    assert re.search(last, " ".join(" ".join(told).split()))
-    assert not any(word in line for line in told for word in ("Traceback", "asyncio", "Error"))
+    assert re.search(last, " ".join(" ".join(lines).split()))
+    assert not any(word in line for line in lines for word in ("Traceback", "asyncio", "Error"))

@@ -1,4 +1,4 @@
-"""Wrong options, wrong files, full disks, damaged stores: one error with the exit code 2, and nothing written."""
+"""Wrong options, wrong files, full disks, damaged stores: one error with exit code 2, and nothing is written."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""A model small enough to reason about: y = a x + noise of the realisation, with cases that fail on request."""
+"""A simple model for tests of the runner: y = a x + noise of the realisation; cases fail on request."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from mdr_dask.models.base import Block, Coordinate, Model, Output, Parameters, R
 
 class ToyParameters(Parameters):
     slope: float = quantity("1", "slope of the line", default=2.0)
-    position: float = quantity("m", "where the line is read", default=1.0)
+    position: float = quantity("m", "position", default=1.0)
     noise: float = quantity("1", "standard deviation over realisations", default=0.5, ge=0)
     fail_above: float = quantity("m", "positions above it fail", default=1e9)
-    raise_above: float = quantity("m", "positions above it raise, in spite of the promise", default=1e9)
+    raise_above: float = quantity("m", "positions above it raise an exception", default=1e9)
     kill_above: float = quantity("m", "positions above it end the process", default=1e9)
     dies_once: str = ""
 
@@ -78,13 +78,13 @@ def _module() -> ModuleType:
 
 
 def register(monkeypatch) -> None:
-    """Make ``model: toy`` known for the length of a test."""
+    """Register ``model: toy`` for one test."""
     monkeypatch.setitem(sys.modules, "mdr_dask.models.toy", _module())
     monkeypatch.setattr(models, "NAMES", (*models.NAMES, "toy"))
 
 
 def install(pause: float = 0.0) -> None:
-    """Make ``model: toy`` known to this process, a worker, for good; a block may take so many seconds."""
+    """Register ``model: toy`` in this process; every block takes `pause` seconds longer."""
 
     def slow(block: Block[ToyParameters]) -> Result:
         time.sleep(pause)
@@ -96,7 +96,7 @@ def install(pause: float = 0.0) -> None:
     models.NAMES = (*models.NAMES, "toy")
 
 
-#: What a worker process runs first, to know the model.
+#: Code that registers the model in a worker process.
 PRELOAD = f"import sys; sys.path[:0] = [{str(Path(__file__).parent)!r}]; import toy; toy.install()\n"
 
 

@@ -1,4 +1,4 @@
-"""Relative errors and the sentence about those that miss an accuracy: one for all models."""
+"""Relative errors, and the message about outputs that miss the accuracy."""
 
 import numpy as np
 
@@ -7,8 +7,8 @@ from mdr_dask.models.parts.accuracy import missed, missed_accuracy, relative_err
 
 def test_the_sentence_names_what_misses_and_no_number_reads_as_the_accuracy():
     assert missed({"film": 0.01, "pressure": np.nan}, 0.01) == ""
-    told = missed({"film": 0.2, "pressure": 0.010001, "traction": np.inf, "position": 0.003}, 0.01, " on 9 nodes")
-    assert told == (
+    text = missed({"film": 0.2, "pressure": 0.010001, "traction": np.inf, "position": 0.003}, 0.01, " on 9 nodes")
+    assert text == (
         "an accuracy of 0.01 is missed on 9 nodes: film by 0.2, pressure by 0.010001, traction by an unknown amount "
         "(estimated)"
     )

@@ -1,4 +1,4 @@
-"""Files named by a campaign: read unchanged, or refused with one error."""
+"""Data files named by a campaign: encodings, and files that have changed."""
 
 import hashlib
 

@@ -1,4 +1,4 @@
-"""Other units of length, mass and time: every number of every model changes by the power that its unit says.
+"""A change of the units of length, mass and time changes every output by the power that its unit implies.
 
 Factors are powers of two, so that nothing is rounded by the change itself. What is left out of a row's units is fixed
 by a number with a unit in the physics: the poles of Roelands' and Dowson's laws (pressure, viscosity), gas constant and
@@ -66,7 +66,7 @@ def scaled(parameters, factors):
 
 KELVIN = {"shear_modulus": 1e7, "relaxation_time": 1e-3}
 LINE = {"length": 0.02, "points": 64, "rms_roughness": 5e-7, "normal_force": 1.5, "velocity": 0.1}
-ARMS = {"material": {"prony": {"static_modulus": 1e7, "moduli": (1e7, 3e8), "times": (1e-2, 1e-4), "viscosity": 50.0}}}
+TERMS = {"material": {"prony": {"static_modulus": 1e7, "moduli": (1e7, 3e8), "times": (1e-2, 1e-4), "viscosity": 50.0}}}
 LAW = {
     "static_modulus": 3e6,
     "loss_modulus": 1e6,
@@ -116,21 +116,8 @@ ROWS = {
     ),
     "friction, papers' steps": ("sliding_friction", LINE | KELVIN | {"scheme": "backward_euler"}, FREE),
     "friction, cone": ("sliding_friction", LINE | KELVIN | {"indenter": {"shape": "cone", "angle": 0.05}}, FREE),
-    "friction, ball": ("sliding_friction", LINE | KELVIN | {"indenter": {"shape": "parabola", "radius": 1.0}}, FREE),
-    "friction, power": (
-        "sliding_friction",
-        LINE | KELVIN | {"indenter": {"shape": "power", "exponent": 4.0, "coefficient": 1e3}},
-        FREE,
-    ),
-    "friction, rounded cone": (
-        "sliding_friction",
-        LINE | KELVIN | {"indenter": {"shape": "rounded_cone", "angle": 0.05, "tip_radius": 0.01}},
-        FREE,
-    ),
-    "friction, arms": ("sliding_friction", LINE | ARMS, FREE),
-    "friction, power law": ("sliding_friction", LINE | {"material": {"power_law": LAW}}, FREE),
+    "friction, arms": ("sliding_friction", LINE | TERMS, FREE),
     "jump": ("velocity_jump", JUMP | KELVIN, FREE),
-    "jump, arms": ("velocity_jump", JUMP | ARMS, FREE),
     "steps": (
         "velocity_jump",
         JUMP
@@ -155,15 +142,9 @@ ROWS = {
     "wear": ("fretting_wear", FRETTING | BALL, FREE),
     "wear, force": ("fretting_wear", FRETTING | BALL | {"hold": "force"}, FREE),
     "wear, fast": ("fretting_wear", FRETTING | BALL | {"wear_rule": "fast"}, FREE),
-    "wear, limit": ("fretting_wear", FRETTING | BALL | {"wear_rule": "limit"}, FREE),
     "wear, cone": (
         "fretting_wear",
         FRETTING | {"indenter": {"shape": "cone", "angle": 0.05}, "depth": 1e-6},
-        FREE,
-    ),
-    "wear, rounded cone": (
-        "fretting_wear",
-        FRETTING | {"indenter": {"shape": "rounded_cone", "angle": 0.05, "tip_radius": 0.01}, "depth": 1e-6},
         FREE,
     ),
     "wear, history": (
@@ -222,7 +203,7 @@ def units_of(model, parameters):
 @pytest.mark.parametrize("name", ROWS)
 @settings(max_examples=1, deadline=None)
 @given(data=st.data())
-def test_every_output_changes_as_its_unit_says(name, data):
+def test_every_output_scales_with_its_unit(name, data):
     model_name, numbers, free = ROWS[name]
     model = load(model_name)
     drawn = {unit: 2.0 ** data.draw(st.integers(-3, 3).filter(bool), unit) for unit in free}

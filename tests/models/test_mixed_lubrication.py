@@ -1,4 +1,4 @@
-"""The model of mixed lubrication: values, invariances, sharing, bad input, warnings."""
+"""The model mixed_lubrication: values, invariances, shared solutions, bad input and warnings."""
 
 import dataclasses
 import itertools
@@ -88,34 +88,6 @@ def test_seed_and_realisation_make_the_lines():
     assert probability(realisations=(5,), seed=1) != probability(realisations=(5,))
 
 
-@pytest.mark.parametrize("factor", [2.0**-3, 2.0**4])
-def test_scaling_all_lengths_by_a_power_of_two_changes_no_bit(factor):
-    """Heights and lengths by f, forces by f^2 at the same stress: every pure number stays, every length scales."""
-    lengths = ("rms_roughness", "roller_radius", "roller_width", "film_thickness", "layer_thickness")
-    one = MODEL.compute(block(layer_thickness=5e-9)).values
-    changes = {name: (SMALL | {"layer_thickness": 5e-9})[name] * factor for name in lengths}
-    forces = {name: SMALL[name] * factor**2 for name in ("normal_force", "cutoff_force")}
-    other = MODEL.compute(block(**changes, **forces)).values
-    assert one["breakthrough_probability"] > 0
-    for name in ("breakthrough_probability", "asperity_load_share", "film_ratio"):
-        np.testing.assert_array_equal(one[name], other[name])
-    np.testing.assert_array_equal(one["contact_length_trace"] * factor, other["contact_length_trace"])
-
-
-def test_only_the_ratio_of_layer_strength_and_thickness_matters():
-    one, other = (
-        MODEL.compute(block(layer_shear_strength=tau, layer_thickness=h)).values
-        for tau, h in ((1e6, 5e-9), (4e6, 20e-9))
-    )
-    np.testing.assert_array_equal(one["contact_length"], other["contact_length"])
-
-
-def test_a_stronger_or_thinner_layer_breaks_less():
-    strengths = MODEL.compute(block(columns={"layer_shear_strength": [0.0, 1e6, 1e7, 1e14]})).values["contact_length"]
-    assert np.all(np.diff(strengths[:, 0]) <= 0)
-    assert strengths[0, 0] > strengths[-1, 0] == 0
-
-
 def test_trace_agrees_with_its_mean():
     """The trace on as many angles as points has the mean and the share that the scalar outputs say."""
     values = MODEL.compute(block(trace_points=20_000)).values
@@ -125,23 +97,6 @@ def test_trace_agrees_with_its_mean():
     squares = 0.01 / (2 * values["contact_half_width"][0, 0])  # the longest wave is 2a at this force
     assert values["independent_squares"][0, 0] == pytest.approx(squares, rel=1e-12)
     assert values["contact_resistance"][0, 0] == pytest.approx(2e-7 / np.mean(trace) / squares, rel=1e-12)
-
-
-def test_profiles_are_those_of_the_most_intimate_contact_around_its_middle():
-    """Without a layer as much of them overlaps within the contact as is touched at that moment."""
-    values = MODEL.compute(block(layer_shear_strength=0.0, trace_points=20_000)).values
-    positions = MODEL.coordinates(block().parameters)["position"].values
-    overlap = (values["lower_profile"] >= values["upper_profile"])[0, 0, np.abs(positions) <= 1]
-    touched = 2 * values["contact_half_width"][0, 0] * np.mean(overlap)
-    assert touched == pytest.approx(values["contact_length_trace"].max(), rel=0.02)
-
-
-def test_smooth_surfaces_stand_the_film_apart_and_open_outside_the_contact():
-    values = MODEL.compute(block(rms_roughness=1e-13)).values
-    gap = values["upper_profile"][0, 0] - values["lower_profile"][0, 0]
-    inside = np.abs(MODEL.coordinates(block().parameters)["position"].values) < 1
-    np.testing.assert_allclose(gap[inside], 4e-7, atol=1e-12)
-    assert np.all(np.diff(gap[~inside & (np.arange(gap.size) > gap.size / 2)]) > 0)
 
 
 def test_pure_rolling_has_no_friction_and_creep_has_the_film_s():
@@ -155,7 +110,7 @@ def test_pure_rolling_has_no_friction_and_creep_has_the_film_s():
 
 @pytest.mark.slow
 def test_creep_keeps_the_probability_of_the_rig():
-    """800 N, 100 rpm, 80 C: both means of 4 turns have a standard error of about a point."""
+    """800 N, 100 rpm, 80 C: both means of 4 revolutions have a standard error of about a point."""
     rig = MODEL.parameters(normal_force=800.0, rotation_speed=100 * RPM, temperature=353.15, rms_roughness=2e-7)
     columns = {"slide_roll_ratio": np.array([0.0, 0.05])}
     found = MODEL.compute(Block(rig, columns, 2, (0, 1, 2, 3), 2013, ("breakthrough_probability",)))
@@ -165,8 +120,8 @@ def test_creep_keeps_the_probability_of_the_rig():
     assert still.mean() == pytest.approx(0.717, abs=0.04)
 
 
-def test_points_that_the_accuracy_chooses_meet_it_or_it_is_said():
-    """Four films on two layers, two turns each, against four times the most points that the accuracy may choose."""
+def test_an_automatic_number_of_points_meets_the_accuracy_or_warns():
+    """Four films, two layers, two revolutions each; reference: four times the largest automatic number of points."""
     layers, films = (each.ravel() for each in np.meshgrid([5e-9, 2e-8], [3e-7, 4e-7, 5e-7, 6e-7]))
     columns = {"layer_thickness": layers, "film_thickness": films}
     rollers = {"points": "auto", "shortest_wavelength": 2e-6, "columns": columns, "realisations": (0, 1)}
@@ -185,6 +140,7 @@ def test_points_that_the_accuracy_chooses_meet_it_or_it_is_said():
     )
 
 
+@pytest.mark.slow
 def test_pieces_shorter_than_the_spacing_are_judged_right():
     """Around 0.31 m, 20 000 points are 16 um apart, 15 times the longest pieces that break; 1 280 000 resolve them."""
     rollers = {"roller_radius": 0.05, "layer_thickness": 1e-10, "shortest_wavelength": 5e-5}
@@ -219,35 +175,6 @@ def test_what_misses_the_accuracy_is_named():
     assert result.messages[0, 0] == (
         f"an accuracy of 1e-06 is missed: breakthrough_probability by {error[0, 0]:.2g} (estimated); raise points"
     )
-
-
-def test_no_errors_asked_for_none_computed():
-    asked = dataclasses.replace(block(), outputs=("breakthrough_probability", "film"))
-    assert set(MODEL.compute(asked).values) == {"breakthrough_probability", "film"}
-
-
-def test_oil_of_the_campaign_equals_the_named_one():
-    own = {
-        "temperature_1": 313.15,
-        "viscosity_1": 335e-6,
-        "temperature_2": 373.15,
-        "viscosity_2": 38.3e-6,
-        "density": 0.860 * 999.016,
-        "density_temperature": 288.705555,
-        "correlation": "gold_polyalphaolefin",
-    }
-    named, given = (
-        MODEL.compute(block(["film"], film_thickness=None, oil=oil)).values["film"][0, 0]
-        for oil in ("mobilgear_shc_xmp_320", own)
-    )
-    assert named == given
-
-
-def test_alpha_thickens_the_film_by_the_formula_s_power():
-    films = MODEL.compute(
-        block(["film"], film_thickness=None, rms_roughness=1e-12, columns={"pressure_viscosity": [1e-8, 2e-8]})
-    ).values["film"][:, 0]
-    assert films[1] / films[0] == pytest.approx(2**0.470, rel=1e-12)
 
 
 #: The thesis's rig, by its defaults.
@@ -286,9 +213,9 @@ def stribeck(speeds, outputs=("film", "film_ratio", "asperity_load_share", "fric
 
 
 @pytest.mark.parametrize("formula", ["pan_hamrock", "dowson_higginson"])
-@pytest.mark.parametrize("force", [100.0, 200.0, 800.0])
-def test_friction_rises_to_boundary_friction_as_the_speed_goes_to_zero(force, formula):
+def test_friction_rises_to_boundary_friction_as_the_speed_goes_to_zero(formula):
     """Monotone from the film ratio of one down, and within 5 % of boundary friction at last."""
+    force = 200.0
     found = stribeck(np.geomspace(1e-6, 1000, 40), normal_force=force, film_formula=formula, boundary_friction=0.12)
     friction, ratio = found["friction_coefficient"], found["film_ratio"]
     assert np.all(np.diff(ratio) > -1e-9)
@@ -307,7 +234,13 @@ def test_friction_is_that_of_asperities_and_film():
     np.testing.assert_allclose(some - none, 0.1 * share, rtol=1e-9)
 
 
-@pytest.mark.parametrize("formula", ["pan_hamrock", "pan_hamrock_minimum", "dowson_higginson", "ehl"])
+@pytest.mark.parametrize(
+    "formula",
+    [
+        "pan_hamrock",
+        "ehl",
+    ],
+)
 def test_the_film_is_never_thinner_for_its_asperities(formula):
     """Smooth rollers have the film of the whole load."""
     speeds = [1.0, 10.0, 100.0, 1000.0]
@@ -354,15 +287,15 @@ def test_a_table_of_viscosities_is_the_oil_that_it_was_made_of(kind, tmp_path):
         assert read.kinematic(T) == pytest.approx(given.kinematic(T), rel=1e-9)
     assert (read.lowest, read.highest) == (293.15, 373.15)
     values[2] *= 1.05
-    told = own_oil(tmp_path, f"T [degC];Viscosity [{unit}]\n{rows()}", highest_temperature=400.05).oil.notes()
-    assert re.search(r"ASTM D341 through 5 kinematic viscosities, .*; \+4 % off at 60 degC", told[0])
-    ends = re.search(r"viscosities, (\S+) to (\S+) mm\^2/s", told[0]).groups()
+    notes = own_oil(tmp_path, f"T [degC];Viscosity [{unit}]\n{rows()}", highest_temperature=400.05).oil.notes()
+    assert re.search(r"ASTM D341 through 5 kinematic viscosities, .*; \+4 % off at 60 degC", notes[0])
+    ends = re.search(r"viscosities, (\S+) to (\S+) mm\^2/s", notes[0]).groups()
     assert [float(end) for end in ends] == pytest.approx([1e6 * given.kinematic(T) for T in (293.15, 373.15)], rel=0.05)
-    assert told[1:] == ("oil: the viscosity is extrapolated above 100 degC, to 126.9 degC",)
+    assert notes[1:] == ("oil: the viscosity is extrapolated above 100 degC, to 126.9 degC",)
 
 
 @pytest.mark.parametrize(
-    ("text", "changes", "told"),
+    ("text", "changes", "message"),
     [
         ("T [degC];nu [cSt]\n40;220\n100;290\n", {}, "oil.csv: expected viscosities that fall with temperature"),
         ("T [degC];nu [cSt]\n40;220\n40;219\n", {}, "oil.csv: expected viscosities at two temperatures or more"),
@@ -371,35 +304,21 @@ def test_a_table_of_viscosities_is_the_oil_that_it_was_made_of(kind, tmp_path):
         ("T [degC];nu [cSt]\n40;22\n100;5\n", {"viscosity_1": 1e-4}, "expected .*viscosities, got"),
     ],
 )
-def test_a_table_of_no_oil_is_one_sentence(text, changes, told, tmp_path):
-    with pytest.raises(ValidationError, match=told):
+def test_tables_without_valid_viscosities_are_refused(text, changes, message, tmp_path):
+    with pytest.raises(ValidationError, match=message):
         own_oil(tmp_path, text, **changes)
-
-
-@pytest.mark.parametrize("slip", [0.05, -0.3])
-def test_trace_under_slip_agrees_with_its_mean(slip):
-    """As many angles as points: the windows of the mean are every so many of the trace's."""
-    values = MODEL.compute(block(trace_points=20_000, slide_roll_ratio=slip)).values
-    trace = values["contact_length_trace"][0, 0]
-    assert np.mean(trace) == pytest.approx(values["contact_length"][0, 0], rel=0.05)
-    assert np.mean(trace > 0) == pytest.approx(values["breakthrough_probability"][0, 0], abs=0.02)
-    assert np.mean(trace) > 1e-7
 
 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
         ({"temperature": 293.15}, "expected a temperature within the oil's data, 313.15 to 373.15 K, got 293.15 K"),
-        ({"rotation_speed": 0.0}, "Input should be greater than 0"),
         ({"normal_force": 2e8}, "expected a contact width 2a of at most the length of the line, 0.006283 m, got 0.0"),
         (
             {"longest_wavelength": 1e-6, "shortest_wavelength": 1e-5},
             "expected the longest wavelength above the shortest",
         ),
-        ({"shortest_wavelength": 1e-7}, "expected a shortest wavelength of at least two point spacings"),
         ({"points": "auto", "shortest_wavelength": 1e-9}, "expected a shortest_wavelength of at least 1.571e-09 m"),
-        ({"rms_roughness": None}, "expected rms_roughness, or surface_1 and surface_2"),
-        ({"slide_roll_ratio": 3.0}, "Input should be less than or equal to 2"),
     ],
 )
 def test_bad_input_gives_one_error(changes, message):
@@ -442,6 +361,7 @@ def test_measured_profiles_take_the_place_of_generated_lines(tmp_path):
     assert scaled == pytest.approx(4e-7 / (2e-7 * np.sqrt(2)), rel=1e-3)  # the cut line is not quite of unit rms
 
 
+@pytest.mark.slow
 def test_creep_on_measured_profiles_has_the_mean_of_pure_rolling_and_of_swapped_rollers(tmp_path):
     """With S = -1 a revolution covers half of line 1: a fixed start would bias the mean by 20 standard errors."""
     files = profiles(tmp_path)
@@ -470,24 +390,6 @@ def test_bad_profiles_give_one_error(tmp_path):
     assert "expected a contact width 2a of at most" in refused(**files | {"normal_force": 1e7})
 
 
-@pytest.mark.slow
-def test_error_within_a_revolution_is_the_scatter_between_revolutions():
-    """Batches of one turn and sixteen turns estimate the same error; each is known to about a fifth."""
-    result = MODEL.compute(
-        block(
-            ["breakthrough_probability", "revolution_error"],
-            realisations=range(16),
-            points=200_000,
-            roller_radius=1e-2,
-            film_thickness=5e-7,
-            shortest_wavelength=4e-6,
-        )
-    )
-    between = result.values["breakthrough_probability"][0].std(ddof=1)
-    within = np.sqrt(np.mean(result.values["revolution_error"][0] ** 2))
-    assert within == pytest.approx(between, rel=0.8)
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -496,16 +398,7 @@ def test_error_within_a_revolution_is_the_scatter_between_revolutions():
         ({"film_thickness": 1e-8, "rms_roughness": 2e-5}, "asperities merge into large clusters"),
     ],
 )
-def test_what_lies_beyond_the_tested_range_is_warned_of(changes, message):
+def test_cases_beyond_the_tested_range_have_a_warning(changes, message):
     result = MODEL.compute(block(["film", "breakthrough_probability"], **changes))
     assert result.status[0, 0] == Status.DONE
     assert message in result.messages[0, 0]
-
-
-def test_points_that_the_accuracy_chooses_do_not_depend_on_other_cases():
-    columns = {"layer_thickness": np.array([1e-9, 8e-9]), "film_thickness": np.array([4e-7, 7e-7])}
-    rollers = block(["contact_length"], columns=columns, points="auto", shortest_wavelength=4e-6)
-    asked = dataclasses.replace(rollers, accuracy=0.05)
-    together = MODEL.compute(asked).values["contact_length"][:, 0]
-    alone = [MODEL.compute(asked.part(k, 0)).values["contact_length"][0, 0] for k in range(2)]
-    assert together.tolist() == alone

@@ -1,4 +1,4 @@
-"""Whoever has a campaign of version 0.1 is told what each name has become."""
+"""Names of version 0.1 are refused with a message that states the new name."""
 
 from __future__ import annotations
 

@@ -1,3 +1,5 @@
+"""Measured profiles: units, bad files, formats of instruments."""
+
 import sys
 
 import numpy as np

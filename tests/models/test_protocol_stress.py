@@ -1,4 +1,4 @@
-"""Extremes of protocols: a value right to its own estimate, or a status with a sentence."""
+"""Extreme histories of velocity and load give a finite value with an error, or a failed status with a message."""
 
 import numpy as np
 import pytest
@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.velocity_jump import MODEL, VelocityJump
 from mdr_dask.models.velocity_jump.solve import compute
+
+pytestmark = pytest.mark.slow
 
 EVERY = MODEL.with_companions(tuple(output.name for output in MODEL.outputs))
 BASE = {
@@ -21,7 +23,7 @@ BASE = {
     "velocity": 0.05,
     "relaxation_times": (0.0, 0.05, 0.5, 1.0, 2.0),
 }
-ARMS = {
+TERMS = {
     "prony": {
         "static_modulus": 1e7,
         "moduli": [1e6 * (1 + m % 3) for m in range(50)],
@@ -75,7 +77,7 @@ def of(body: str) -> dict[str, object]:
     if body == "kelvin":
         return {}
     solid = {"standard_solid": {"static_modulus": 1e7, "glass_modulus": 1e9, "relaxation_time": 1e-3}}
-    return {"shear_modulus": None, "relaxation_time": None, "material": solid if body == "standard_solid" else ARMS}
+    return {"shear_modulus": None, "relaxation_time": None, "material": solid if body == "standard_solid" else TERMS}
 
 
 @settings(max_examples=12, deadline=None)
@@ -105,7 +107,7 @@ def test_nearly_flat_and_very_rough_lines(hurst: float, roughness: float) -> Non
     check(protocol=steps, hurst=hurst, rms_roughness=roughness)
 
 
-def test_fifty_arms_end_in_their_steady_state() -> None:
+def test_fifty_terms_end_in_their_steady_state() -> None:
     steps = {"shape": "steps", "times": [0.0], "velocities": [0.06]}
     values, status, _ = solved(protocol=steps, relaxation_times=(1.0, 40.0), oversampling=8, **of("prony"))
     assert status == Status.DONE

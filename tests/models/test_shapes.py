@@ -1,4 +1,4 @@
-"""One family of shapes: a body that is no power law slides and wears, and tends to the power laws beside it."""
+"""A rounded cone slides and wears, and tends to a cone and to a parabola in its limits."""
 
 import numpy as np
 import pytest

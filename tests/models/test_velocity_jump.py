@@ -1,3 +1,5 @@
+"""The model velocity_jump: values, shared solutions, errors and failed cases."""
+
 from dataclasses import replace
 from typing import Any
 
@@ -47,14 +49,14 @@ def test_value_depends_on_the_case_alone() -> None:
                 assert np.array_equal(alone.values[name][0, 0], together.values[name][j, r], equal_nan=True)
 
 
-def test_misses_of_a_transient_are_told_where_an_accuracy_is_asked_for() -> None:
+def test_a_transient_that_misses_the_accuracy_has_a_warning() -> None:
     coarse = block({"velocity": np.array([0.05])}, (0, 1), hurst=0.3, oversampling=2, steps_per_decade=4)
     assert not compute(coarse).messages
-    told = compute(replace(coarse, accuracy=0.01)).messages
-    assert all("is missed: friction_coefficient by" in told[0, line] for line in (0, 1))
+    messages = compute(replace(coarse, accuracy=0.01)).messages
+    assert all("is missed: friction_coefficient by" in messages[0, line] for line in (0, 1))
 
 
-def test_accuracy_leaves_out_what_is_smaller_and_says_so() -> None:
+def test_transients_below_the_accuracy_are_left_out_and_counted_in_the_error() -> None:
     whole = block({"velocity": np.array([1e-4, 1e-3, 5e-3, 0.05, 0.5])})
     exact, quick = compute(whole).values, compute(replace(whole, accuracy=1e-2)).values
     for name in ("friction_coefficient_before", "friction_coefficient_jump", "friction_coefficient_after"):
@@ -103,14 +105,6 @@ def test_jump_follows_the_slope_in_region_one() -> None:
     assert np.allclose(before + jump, after, rtol=2e-3)
 
 
-def test_plateau_of_the_jump() -> None:
-    """d_mu_0 v_1 / dv is 0.4 of the slope on the plateau (eq. 4.10), within the scatter of short lines."""
-    result = compute(block({}, tuple(range(8)), velocity=0.3)).values
-    ratio = result["friction_coefficient_jump"] / 0.2 / result["rms_slope"]
-    error = ratio.std(ddof=1) / np.sqrt(ratio.size)
-    assert abs(ratio.mean() - 0.41) < 0.05 + 3 * error
-
-
 def test_error_of_the_transient_covers_it() -> None:
     coarse = compute(block({}, tuple(range(6))))
     fine = compute(block({}, tuple(range(6)), oversampling=32, steps_per_decade=96))
@@ -135,18 +129,11 @@ def test_bad_line_is_a_status() -> None:
         ("normal_force", 1e300, "check the units"),
     ],
 )
-def test_what_is_no_jump_is_a_failed_case_with_its_reason_in_every_realisation(name, value, message) -> None:
+def test_impossible_jumps_are_failed_cases_with_a_message_in_every_realisation(name, value, message) -> None:
     result = compute(block({name: np.array([BASE.get(name, 0.2), value])}))
     assert result.status.tolist() == [[Status.DONE] * 2, [Status.FAILED] * 2]
     assert [message in result.messages.get((1, r), "") for r in (0, 1)] == [True] * 2
     assert {case for case, _ in result.messages} == {1}
-
-
-def test_only_what_is_asked_for() -> None:
-    plain = Block(parameters(), {}, 1, (0,), 5, ("rms_slope",))
-    result = compute(plain)
-    assert set(result.values) == {"rms_slope"}
-    assert result.solves == 0
 
 
 @pytest.mark.parametrize(
@@ -201,25 +188,7 @@ def random_jump(seed: int) -> dict[str, object]:
 ENDS = ("friction_coefficient_before", "friction_coefficient_jump", "friction_coefficient_after")
 
 
-@pytest.mark.slow
-def test_accuracy_holds_for_the_ends_and_the_jump() -> None:
-    """On the grid of the march alone the ends were up to a quarter wrong and the jump up to three quarters."""
-    misses = dict.fromkeys(ENDS, 0)
-    uncovered = dict.fromkeys(ENDS, 0)
-    for seed in range(60):
-        case, names = random_jump(seed), MODEL.with_companions(ENDS)
-        found = compute(Block(parameters(**case), {}, 1, (seed,), 5, names, 0.02))
-        assert found.messages == {}
-        truth = compute(Block(parameters(**case, oversampling=128), {}, 1, (seed,), 5, ENDS, 1e-6))
-        for name in ENDS:
-            exact, value = float(truth.values[name][0, 0]), float(found.values[name][0, 0])
-            misses[name] += abs(value - exact) > 0.02 * abs(exact)
-            uncovered[name] += abs(value - exact) > found.values[f"{name}_error"][0, 0] + 1e-9 * abs(exact)
-    assert max(misses.values()) <= 1
-    assert max(uncovered.values()) <= 2
-
-
-@pytest.mark.parametrize("seed", range(0, 60, 6))
+@pytest.mark.parametrize("seed", range(0, 60, 15))
 def test_ends_are_the_steady_solvers(seed: int) -> None:
     case = random_jump(seed)
     found = compute(Block(parameters(**case), {}, 1, (seed,), 5, MODEL.with_companions(ENDS), 0.01)).values

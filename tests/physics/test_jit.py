@@ -33,8 +33,7 @@ def run(folder, **environment):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ending", ["nbi", "nbc"])
-@pytest.mark.parametrize("content", [b"", b"\x80\x04torn"])
+@pytest.mark.parametrize(("ending", "content"), [("nbi", b""), ("nbc", b"\x80\x04torn")])
 def test_a_torn_cache_file_is_compiled_again_with_a_warning(tmp_path, ending, content):
     assert run(tmp_path).stdout == "42.0\n"
     for path in Path(tmp_path, "__pycache__").glob(f"*.{ending}"):
@@ -44,6 +43,7 @@ def test_a_torn_cache_file_is_compiled_again_with_a_warning(tmp_path, ending, co
     assert "NUMBA_CACHE_DIR" in again.stderr
 
 
+@pytest.mark.slow
 def test_without_a_place_for_the_cache_kernels_run_with_a_warning():
     """Numba refuses to cache a function that has no file, as it does where no folder can be written."""
     ran = subprocess.run([sys.executable, "-c", MODULE], capture_output=True, text=True, check=False)

@@ -102,7 +102,7 @@ def test_a_failure_is_a_value():
     assert np.isfinite(found.errors[0, 3])
 
 
-def test_one_grid_says_nothing_about_its_error():
+def test_the_error_of_a_single_grid_is_infinite():
     found = refine(power_error, 2, [8], 0.01, 2.0)
     assert np.isinf(found.errors).all()
     assert not found.met.any()

@@ -1,4 +1,4 @@
-"""Every element of a Kelvin foundation followed in time, from displacements of one's own choice."""
+"""Follow every element of a Kelvin foundation in time, from given displacements."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from mdr_dask.physics.transients.elements.foundation import KELVIN
 from mdr_dask.physics.transients.elements.loading_history import Response, follow_line, untouched
 from mdr_dask.physics.transients.elements.steps import Schedule, under_elements
 
-TOUCHING = 1e-12  # of its height: what touches but for rounding
+TOUCHING = 1e-12  # of its height: tolerance of contact, for rounding
 
 
 def follow_kelvin(

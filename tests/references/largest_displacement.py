@@ -1,4 +1,4 @@
-"""Contact after a jump, by the largest displacement of every element over all times so far, on a fine sampling."""
+"""Contact after a jump from the largest displacement of every element over all past times, finely sampled."""
 
 from typing import NamedTuple
 
@@ -17,12 +17,12 @@ from mdr_dask.physics.transients.patches import LOAD, History
 from mdr_dask.physics.transients.velocity_jump import MarchRequest, _Relaxation
 
 SAMPLES = 12  # of a cell
-SHORT = 3.0  # samples: what is shorter cannot be judged
+SHORT = 3.0  # samples; shorter patches cannot be judged
 RATIOS = (0.1, 0.2, 0.5, 0.8, 1.2, 2.0, 5.0, 10.0)
 
 
 class Sampled(NamedTuple):
-    """Heights and slopes of a track between its nodes, and what is left of the state before the jump at its time."""
+    """Heights and slopes of a track between its nodes, and displacements before the jump."""
 
     height: np.ndarray
     slope: np.ndarray
@@ -44,10 +44,10 @@ def sampled(marching: Marching) -> Sampled:
 
 
 def load_by_largest(marching: Marching, found: Trajectory, now: int, line: Sampled) -> tuple[float, float]:
-    """Return the load at a moment of a trajectory, and what samples at the edges of patches leave of it open.
+    """Return the load at a moment of a trajectory, and its uncertainty from the sampling at the edges of patches.
 
     The displacement of an element is the largest to which the line can have pressed it, faded since: the depth then and
-    the height then above it, with no thought of who touched what.
+    the height then above it, without a search for contact patches.
     """
     cells, deborah, time = marching.track.cells, marching.deborah, found.time[now]
     places, travel = np.arange(line.height.size) / SAMPLES, deborah * time
@@ -65,7 +65,7 @@ def load_by_largest(marching: Marching, found: Trajectory, now: int, line: Sampl
 
 
 def marched(relaxation) -> tuple[Marching, Trajectory, Workspace, int]:
-    """March a case of `velocity_jump` to its very end; return how many moments that took, too."""
+    """March a case of `velocity_jump` to its end; return problem, trajectory, workspace and number of moments."""
     for interval in relaxation.intervals(relaxation.ends):
         marching, found, work = relaxation.begun(interval, 3000)
         finish = Finish(relaxation.ends[1], relaxation.limits.after, 1e-9, 1e-9)
@@ -76,7 +76,7 @@ def marched(relaxation) -> tuple[Marching, Trajectory, Workspace, int]:
 
 
 def searched_afresh(marching: Marching, found: Trajectory, now: int, work: Workspace) -> int:
-    """Search the contact at a moment of a march, with nothing known of any cell; return the number of patches."""
+    """Search the contact at a moment of a march without bounds from earlier moments; return the number of patches."""
     time = found.time[now]
     history = History(found.time, found.depth, found.rate, now + 1, 0.0)
     work.skip.skip_until.fill(-np.inf)
@@ -85,9 +85,9 @@ def searched_afresh(marching: Marching, found: Trajectory, now: int, work: Works
 
 
 def worst_moment(relaxation, moments: int, generator: np.random.Generator) -> float:
-    """March a case of `velocity_jump`, and return how far loads of its search are from those, over the load.
+    """March a case of `velocity_jump` and return the largest relative error of the load at random moments.
 
-    What sampling leaves open counts as met; NaN where nothing could be judged.
+    The uncertainty of the sampling is subtracted; NaN if no moment could be judged.
     """
     marching, found, work, count = marched(relaxation)
     line, worst = sampled(marching), np.nan
@@ -104,7 +104,7 @@ def worst_moment(relaxation, moments: int, generator: np.random.Generator) -> fl
 
 
 def judged(seed: int, number: int, moments: int) -> tuple[float, dict[str, float]]:
-    """Return how far a random case is off, NaN if it has no transient, and what it was."""
+    """Return the largest error of the load of a random case, NaN without a transient, and the numbers of the case."""
     random = np.random.default_rng([seed, number])
     points, grid = int(random.choice([40, 80, 160])), int(random.choice([2, 4, 8, 16]))
     hurst = float(random.uniform(0, 1))

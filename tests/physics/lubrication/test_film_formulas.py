@@ -1,4 +1,4 @@
-"""Film formulas and regimes: closed forms, and constants derived a second way."""
+"""Film formulas and regimes: closed forms, and constants derived independently."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def test_groups_are_free_of_units():
 @pytest.mark.parametrize(
     "formula", [film.PAN_HAMROCK_CENTRAL, film.PAN_HAMROCK_MINIMUM, film.DOWSON_HIGGINSON_MINIMUM], ids=lambda f: f.name
 )
-def test_formula_is_a_power_law_and_says_where_it_is_extrapolated(formula):
+def test_formula_is_a_power_law_and_reports_extrapolation(formula):
     point = np.array([5e-5, 5e-12, 4000.0])
     exponents = (formula.load, formula.speed, formula.material)
     for i, exponent in enumerate(exponents):
@@ -47,13 +47,6 @@ def test_formula_is_a_power_law_and_says_where_it_is_extrapolated(formula):
     assert "extrapolated: W lies outside" in formula.outside(1e-6, 5e-12, 4000.0)
     assert "extrapolated: U lies outside" in formula.outside(5e-5, 1e-8, 4000.0)
     assert "extrapolated: G lies outside" in formula.outside(5e-5, 5e-12, 300.0)
-
-
-def test_formulas_lie_near_the_full_solution():
-    """The full solution here is 2.54033e-5 and 2.13780e-5; the regressions scatter by up to a quarter about it."""
-    assert film.PAN_HAMROCK_CENTRAL(W, U, G) == pytest.approx(2.54033e-5, rel=0.10)
-    assert film.PAN_HAMROCK_MINIMUM(W, U, G) == pytest.approx(2.13780e-5, rel=0.10)
-    assert film.DOWSON_HIGGINSON_MINIMUM(W, U, G) == pytest.approx(2.13780e-5, rel=0.10)
 
 
 def _reynolds_integral(t, c):
@@ -108,13 +101,6 @@ def test_regime_of_extreme_points(point, name):
     assert film.REGIMES[int(film.regime(*point))] == name
 
 
-def test_gap_beside_a_dry_contact_starts_at_zero_and_ends_at_the_parabola():
-    gap = film.hertz_gap(np.array([0.0, 1e-4, 1e-1]), 1e-4, 0.025)
-    assert gap[:2].tolist() == [0.0, 0.0]
-    # far away: x^2/2R less the approach of the bodies, which grows as the logarithm of x/a
-    assert gap[2] == pytest.approx(0.1**2 / 0.05, rel=1e-4)
-
-
 def test_friction_of_an_isoviscous_newtonian_film_is_shear_times_width():
     contact = film.hertz_line(8e4, 115e9, 0.025)
     found = film.fluid_friction(contact, 1e-6, -0.3, lambda p: np.log(0.1) + 0 * p, 1e12)
@@ -129,9 +115,3 @@ def test_eyring_friction_is_newtonian_for_slow_shear_and_smaller_for_fast():
     )
     assert slow[0] == pytest.approx(slow[1], rel=1e-6)
     assert fast[0] < 0.9 * fast[1]
-
-
-def test_friction_stays_finite_where_the_viscosity_overflows():
-    contact = film.hertz_line(1e9, 115e9, 0.025)
-    assert 0 < film.fluid_friction(contact, 1e-9, 1.0, lambda p: 1e-5 * p, 5e6) < np.inf
-    assert film.fluid_friction(contact, 1e-9, 0.0, lambda p: 1e-5 * p, 5e6) == 0.0

@@ -1,4 +1,4 @@
-"""The film of a line contact: checked figures, exact limits, order, invariance, robustness over the box."""
+"""The film of a line contact: checked values, exact limits, order of convergence, invariance, robustness."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from mdr_dask.physics.lubrication import film_formulas as film
-from mdr_dask.physics.lubrication import grids as ehl_grid
 from mdr_dask.physics.lubrication.line_contact import (
     LineContact,
     LineSolution,
@@ -27,10 +26,6 @@ CHECKED = (2.0452e-5, 1e-11, 5007.0)
 RIGID = 16 / np.pi
 
 
-def in_radii(value: float, W: float) -> float:
-    return value * 8 * W / np.pi
-
-
 @pytest.fixture(scope="module")
 def checked() -> LineSolution:
     return solve_film(line_contact(CHECKED, E_STAR), accuracy=1e-4)
@@ -44,9 +39,9 @@ def test_pressure_has_a_spike_before_the_constriction(checked: LineSolution) -> 
     assert grid.film.min() > 0
 
 
-@pytest.mark.parametrize("M", [0.001, 0.01])
-def test_kapitza(M: float) -> None:
+def test_kapitza() -> None:
     """Rigid, isoviscous, incompressible: W h0/(U R) = 4.894968; the inlet at 300 sqrt(2 Hc) costs 2e-5."""
+    M = 0.01
     found = solve_film(LineContact(M, 0.0), accuracy=1e-4)
     assert found.minimum_film.value * RIGID * M**2 == pytest.approx(film.RIGID_ISOVISCOUS, rel=5e-5)
     assert found.finest.rupture / np.sqrt(2 * found.minimum_film.value) == pytest.approx(0.4751, rel=0.02)
@@ -81,7 +76,7 @@ def _rigid_barus_film(M: float, L: float) -> float:
     return brentq(lambda h: load(h) - np.pi / 2, max(least * (1 + 1e-6), isoviscous * 0.5), 20 * max(isoviscous, least))
 
 
-@pytest.mark.parametrize("L", [0.0, 30.0, 300.0, 1000.0])
+@pytest.mark.parametrize("L", [0.0, 300.0])
 def test_rigid_piezoviscous_by_quadrature(L: float) -> None:
     """At M = 0.003 elasticity moves the film by less than the tolerance."""
     found = solve_film(LineContact(0.003, L), accuracy=2e-4)
@@ -89,7 +84,7 @@ def test_rigid_piezoviscous_by_quadrature(L: float) -> None:
     assert found.minimum_film.value == pytest.approx(_rigid_barus_film(0.003, L), rel=4e-4)
 
 
-@pytest.mark.parametrize("M", [10.0, 30.0, 100.0, 1000.0])
+@pytest.mark.parametrize("M", [10.0, 1000.0])
 def test_soft_limit(M: float) -> None:
     """Moes' 2.05 is a fit over moderate loads; the limit found here is 1.98, within 4 %."""
     found = solve_film(LineContact(M, 0.0), accuracy=1e-3)
@@ -133,9 +128,9 @@ def _heavy() -> list[tuple[LineContact, float, float]]:
     return cases
 
 
-@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, pytest.param(1e-4, marks=pytest.mark.slow)])
-def test_heavy_loads_lie_within_the_stated_error_and_the_accuracy(accuracy: float) -> None:
+def test_heavy_loads_lie_within_the_stated_error_and_the_accuracy() -> None:
     """70 random points with M > 200 against grids of 10241 nodes: 98 % within the error, 99 % within the accuracy."""
+    accuracy = 1e-2
     errors, stated = [], []
     for case, central, minimum in _heavy():
         assert case.M > 200
@@ -149,7 +144,7 @@ def test_heavy_loads_lie_within_the_stated_error_and_the_accuracy(accuracy: floa
     assert np.max(np.array(errors) / np.array(stated)) < 3
 
 
-@pytest.mark.parametrize("index", range(6))
+@pytest.mark.parametrize("index", range(3))
 def test_error_estimate_covers_the_error(index: int) -> None:
     W, U, G = (np.exp(np.random.default_rng(index).uniform(np.log(a), np.log(b))) for a, b in BOX)
     case = line_contact((W, U, G), E_STAR)
@@ -164,8 +159,8 @@ BOX = ((2e-6, 5e-4), (1e-13, 1e-9), (500.0, 8000.0))
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", ["barus", "roelands"])
-@pytest.mark.parametrize("W", [2e-6, 3e-5, 5e-4])
-@pytest.mark.parametrize("U", [1e-13, 1e-11, 1e-9])
+@pytest.mark.parametrize("W", [2e-6, 5e-4])
+@pytest.mark.parametrize("U", [1e-13, 1e-9])
 @pytest.mark.parametrize("G", [500.0, 8000.0])
 def test_every_corner_and_middle_of_the_box_converges(W: float, U: float, G: float, law: str) -> None:
     found = solve_film(line_contact((W, U, G), E_STAR, viscosity_law=law, viscosity=0.08))
@@ -198,10 +193,10 @@ def test_short_inlet_starves_the_film() -> None:
     assert 1 - films[2] / films[4] == pytest.approx(0.027, abs=0.003)  # the checked figure
 
 
-@pytest.mark.parametrize("inlet", [-1.05, -1.3])
-@pytest.mark.parametrize("W", [2e-6, 5e-4])
-@pytest.mark.parametrize("U", [1e-13, 1e-9])
-@pytest.mark.parametrize("G", [500.0, 8000.0])
+@pytest.mark.parametrize(
+    ("W", "U", "G", "inlet"),
+    [(2e-6, 1e-13, 500.0, -1.05), (5e-4, 1e-9, 8000.0, -1.05), (2e-6, 1e-9, 8000.0, -1.3), (5e-4, 1e-13, 500.0, -1.3)],
+)
 def test_starved_corners_of_the_box_converge(W: float, U: float, G: float, inlet: float) -> None:
     found = solve_film(line_contact((W, U, G), E_STAR, inlet=inlet))
     assert found.outcome == Outcome.CONVERGED, found.reason
@@ -209,15 +204,14 @@ def test_starved_corners_of_the_box_converge(W: float, U: float, G: float, inlet
     assert 0 < found.minimum_film.value <= found.finest.film.min() * 1.02
 
 
-def test_longer_inlet_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    case = line_contact(CHECKED, E_STAR)
-    usual = solve_film(case, accuracy=1e-4)
-    monkeypatch.setattr(ehl_grid, "FLOODED", 3 * ehl_grid.FLOODED)
-    assert solve_film(case, accuracy=1e-4).central_film.value == pytest.approx(usual.central_film.value, rel=1e-4)
-
-
-@pytest.mark.parametrize("numbers", [CHECKED, (2e-6, 1e-9, 500.0), (5e-5, 1e-10, 2000.0), (4e-4, 1e-12, 1000.0)])
-def test_positions_are_known_to_a_share_of_a_cell(numbers: tuple[float, float, float]) -> None:
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        CHECKED,
+        (5e-5, 1e-10, 2000.0),
+    ],
+)
+def test_positions_lie_within_their_errors(numbers: tuple[float, float, float]) -> None:
     case = line_contact(numbers, E_STAR)
     here, fine = solve_film(case, accuracy=1e-3), solve_film(case, accuracy=3e-5)
     for reading in (lambda grid: grid.rupture, lambda grid: grid.minimum[0]):
@@ -225,23 +219,7 @@ def test_positions_are_known_to_a_share_of_a_cell(numbers: tuple[float, float, f
         assert abs(found.value - truth.value) <= found.error + truth.error
 
 
-def test_a_spike_that_moves_is_not_expected_where_it_was() -> None:
-    """From what two grids let expect here Newton's method finds no solution on the next; from the last one it does."""
-    found = solve_film(LineContact(5.88, 11.4), accuracy=1e-4)
-    assert found.outcome == Outcome.CONVERGED
-    assert found.error <= 1e-4
-
-
-def test_film_at_nodes_is_the_film_and_the_gap_opens_behind(checked: LineSolution) -> None:
-    grid = checked.finest
-    np.testing.assert_allclose(grid.film_between(grid.nodes), grid.film, rtol=1e-9)
-    behind = grid.film_between(grid.nodes[-1] + np.array([-1e-4, 1e-4, 0.5]))
-    assert np.all(np.diff(behind) > 0)
-    assert behind[1] == pytest.approx(behind[0], rel=0.01)
-    assert np.isnan(grid.film_between(grid.nodes[:1] - 1.0)).all()
-
-
-def test_impossible_case_says_why() -> None:
+def test_impossible_case_has_a_reason() -> None:
     found = solve_film(LineContact(1e9, 0.0))
     assert found.outcome != Outcome.CONVERGED
     assert found.reason.startswith("no film found for M = 1e+09, L = 0: ")

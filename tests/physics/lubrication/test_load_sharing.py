@@ -35,12 +35,6 @@ def test_gap_between_the_lines_is_the_film(gap: float) -> None:
         assert distance == pytest.approx(gap, rel=2e-4)  # far apart, the film is the distance
 
 
-def test_every_film_has_a_distance() -> None:
-    gaps = np.geomspace(1e-300, 1e3, 4000)
-    distances = np.array([distance_of_means(float(gap)) for gap in gaps])
-    assert np.all(np.diff(distances) >= 0)
-
-
 def test_pressure_is_that_of_the_springs_of_two_lines() -> None:
     """MDR springs of two generated lines, pressed until the gap between them is the film: E* times overlap."""
     points = 400_000
@@ -57,8 +51,8 @@ def test_pressure_is_that_of_the_springs_of_two_lines() -> None:
 
 
 @pytest.mark.parametrize("name", list(FORMULAS))
-@pytest.mark.parametrize("ratio", [1e-4, 0.01, 0.3, 1.0, 2.0, 4.0])
-@pytest.mark.parametrize("pressure", [1e7, 2e8, 1e9])
+@pytest.mark.parametrize("ratio", [1e-4, 0.3, 2.0])
+@pytest.mark.parametrize("pressure", [1e7, 1e9])
 def test_shares_add_to_one_and_the_film_is_never_thinner(name: str, ratio: float, pressure: float) -> None:
     formula, asperities = FORMULAS[name], Asperities(RMS, WAVELENGTH, E_STAR)
     W, U, G = 2e-5, 1e-11, 4000.0
@@ -86,10 +80,3 @@ def test_as_the_film_vanishes_the_asperities_carry_everything() -> None:
     assert carried[0] < 1e-3
     assert carried[-1] == pytest.approx(1.0, abs=1e-6)
     assert asperities.pressure(shares[-1].film) == pytest.approx(pressure, rel=1e-6)
-
-
-def test_a_film_that_is_not_found_anywhere_is_none() -> None:
-    shared = share_load(lambda share: 0.0, lambda film: 2.0)
-    assert shared.film == 0.0
-    cut = share_load(lambda share: 1.0 if share < 0.5 else 0.0, lambda film: 0.1 if film else 2.0)
-    assert cut.film == 0.0

@@ -1,4 +1,4 @@
-"""Oil data: the thesis's oil, and the laws' own identities."""
+"""Oil data: values of the oil in the thesis, and identities of the laws."""
 
 import numpy as np
 import pytest

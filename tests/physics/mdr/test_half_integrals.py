@@ -1,3 +1,5 @@
+"""Half-integrals on graded panels: exact for powers, order of convergence."""
+
 import itertools
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""The image of a body of revolution as compiled code reads it."""
+"""The image of a body of revolution and its rise over a distance."""
 
 import numpy as np
 import pytest
@@ -6,8 +6,8 @@ import pytest
 from mdr_dask.physics.mdr.revolution import PowerProfile, from_table, image_rise
 
 
-@pytest.mark.parametrize("exponent", [0.5, 1.0, 1.5, 2.0, 3.7])
-@pytest.mark.parametrize("gap", [-0.3, -0.2, -1e-9, 1e-9, 0.01, 0.5])
+@pytest.mark.parametrize("exponent", [0.5, 2.0, 3.7])
+@pytest.mark.parametrize("gap", [-0.3, -1e-9, 0.01])
 def test_the_rise_of_a_power_is_that_of_its_formula_down_to_the_centre(exponent, gap):
     rise = getattr(image_rise, "py_func", image_rise)  # as it is where nothing is compiled
     image, start = PowerProfile(exponent).pieces(), 0.3
@@ -18,7 +18,7 @@ def test_the_rise_of_a_power_is_that_of_its_formula_down_to_the_centre(exponent,
     assert rise(image, start, level, gap) == pytest.approx(float(exact), rel=1e-7)
 
 
-@pytest.mark.parametrize("gap", [-0.3, -0.019, 0.003, 0.015, 0.4])
+@pytest.mark.parametrize("gap", [-0.3, 0.003])
 def test_the_rise_of_a_table_is_the_difference_of_its_image(gap):
     """Over short distances it is the integral of the slope by eight values; kinks of a table make it wrong by 1e-4."""
     rise = getattr(image_rise, "py_func", image_rise)

@@ -1,4 +1,4 @@
-"""Full contact in closed form, against lines followed element by element, and where it ends."""
+"""Full contact in closed form, compared with fine grids, and the load at which it ends."""
 
 import numpy as np
 import pytest
@@ -35,9 +35,9 @@ def test_full_contact_is_what_grids_tend_to(terms, modes):
 
 
 @pytest.mark.parametrize("terms", [(), ((3.0, 0.02),)])
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_nothing_that_lifts_off_counts_as_full_contact(terms, seed):
-    """The load at which the pressure falls to zero somewhere, told on far more nodes, is never passed."""
+    """Full contact never begins below the load at which the pressure is zero somewhere, found on many more nodes."""
     line, deborah = _line(40, seed), np.array([1e-3])
     modulus = 1 + sum(g * 2j * np.pi * np.arange(1, 42) * t / (1 + 2j * np.pi * np.arange(1, 42) * t) for g, t in terms)
     wave = type(line.roughness)(line.roughness.coefficients * np.broadcast_to(modulus, 41), line.points)
@@ -48,23 +48,3 @@ def test_nothing_that_lifts_off_counts_as_full_contact(terms, seed):
         assert steady.status[0] == Outcome.CONVERGED
         closed = errors[0][0] <= 1e-11 * steady.drag[0]
         assert closed == (share > 2.0) or (1.0 < share < 2.0)
-
-
-def test_full_contact_takes_no_grid_and_leaves_the_other_cases_as_they_are(monkeypatch):
-    """It took two grids, or eight of a general solid; a case does not depend on what else is solved."""
-    line, deborah = _line(100), np.full(3, 1e-3)
-    loads = np.array([0.1, 100.0, 1000.0]) * _rms(line)
-    together, alone = (problem.solve(line, None, deborah[:k], loads[:k], Request())[0] for k in (3, 1))
-    assert together.drag[0] == alone.drag[0]
-
-    def no_grid(*_):
-        raise AssertionError
-
-    monkeypatch.setattr(problem.node_to_node.NodeToNode, "solve", no_grid)
-    monkeypatch.setattr(problem.steady, "steady_sliding", no_grid)
-    monkeypatch.setattr("mdr_dask.physics.sliding.viscoelastic.ViscoelasticCase.on", no_grid)
-    for terms in (None, PronyTerms((3.0,), (0.02,))):
-        steady, _ = problem.solve(line, terms, deborah[1:], loads[1:] * 4, Request())
-        assert np.all(steady.status == Outcome.CONVERGED)
-    with pytest.raises(AssertionError):
-        problem.solve(line, None, deborah, loads, Request())

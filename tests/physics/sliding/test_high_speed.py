@@ -1,4 +1,4 @@
-"""Region IV: what friction tends to at very high velocity, in closed form (docs/high-speed.md)."""
+"""Region IV: the closed form of friction at very high velocity (docs/high-speed.md)."""
 
 import numpy as np
 import pytest
@@ -32,8 +32,8 @@ def tip(line, deborah, loads):
     return laws.single_tip(summit_curvature(line), 4 * loads, 1.0, deborah)
 
 
-@pytest.mark.parametrize("realisation", range(3))
-def test_a_viscous_solid_touches_one_tip(realisation):
+@pytest.mark.parametrize("realisation", range(2))
+def test_a_viscous_solid_is_in_contact_with_one_tip(realisation):
     """mu = (2/3) sqrt(kappa F / (2 eta v)), and the slope in contact is sqrt(3)/2 of it."""
     line, deborah, loads = rough(realisation), np.array([1e5, 4e5]), np.array([0.05, 0.05])
     steady, errors = solve(line, None, deborah, loads, Request(0.005))
@@ -45,7 +45,7 @@ def test_a_viscous_solid_touches_one_tip(realisation):
     assert np.all(errors[0] / steady.drag < 0.01)
 
 
-@pytest.mark.parametrize("realisation", range(3))
+@pytest.mark.parametrize("realisation", range(2))
 def test_the_general_solver_agrees_within_its_errors(realisation):
     """Its straight cells resolve the tip up to De = 1e3 or so; beyond, the errors that it states are large."""
     line, deborah, loads = rough(realisation), np.array([3e2, 1e3, 1e5]), np.full(3, 0.05)
@@ -53,22 +53,6 @@ def test_the_general_solver_agrees_within_its_errors(realisation):
     expected = tip(line, deborah, loads)
     assert np.all(np.abs(steady.drag / loads - expected) <= errors[0] / loads + 0.05 * expected)
     assert errors[0, 0] < 0.2 * steady.drag[0]
-
-
-@pytest.mark.parametrize("realisation", range(3))
-def test_time_steps_agree_while_many_nodes_are_in_contact_and_then_have_a_plateau(realisation):
-    """With one node in contact, friction is the rise to the highest node from the one before."""
-    line, loads = rough(realisation), np.array([0.05])
-    request = Request(oversampling=FINE, scheme="backward_euler", with_errors=False)
-    steady, _ = solve(line, None, np.array([3e2]), loads, request)
-    assert steady.contact_fraction[0] * line.points * FINE > 10
-    assert steady.drag / loads == pytest.approx(tip(line, np.array([3e2]), loads), rel=0.1)
-    coarse = Request(oversampling=1, scheme="backward_euler", with_errors=False)
-    deborah = np.array([1e6, 1e8])
-    steady, _ = solve(line, None, deborah, np.repeat(loads, 2), coarse)
-    height = line.heights(line.points)
-    top = int(np.argmax(height))
-    assert steady.drag / loads == pytest.approx(np.full(2, (height[top] - height[top - 1]) * line.points), rel=1e-4)
 
 
 def glassy_limit(line, terms, load):
@@ -107,7 +91,7 @@ def test_a_smooth_parabola_has_the_same_limit(terms):
 
 
 @pytest.mark.parametrize("speed", [1e9, 1e11])
-def test_drag_that_is_lost_to_rounding_says_so(speed):
+def test_drag_that_is_lost_to_rounding_has_a_large_error_or_a_status(speed):
     terms, load = PronyTerms((50.0,), (1.0,)), np.array([0.1])
     fast = PronyTerms(terms.moduli, tuple(d * speed for d in terms.deborah))
     steady, errors = solve(rough(1), fast, np.zeros(1), load, Request(0.005))

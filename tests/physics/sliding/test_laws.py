@@ -1,3 +1,5 @@
+"""Laws of friction: limits and interpolation."""
+
 import numpy as np
 import pytest
 

@@ -1,4 +1,4 @@
-"""The patches that a sweep writes are the contact whose sums it returns."""
+"""The contact patches of a sweep have the length and displacement that the sweep returns."""
 
 import numpy as np
 import pytest
@@ -15,8 +15,7 @@ def cells(hurst, nodes):
     return cut(periodic_line(*(roughness.line(amplitude, phase, nodes, order) for order in (0, 1))))
 
 
-@pytest.mark.parametrize("depth", [0.05, 1.0, 3.0, 20.0])
-@pytest.mark.parametrize("deborah", [0.05, 3.0, 300.0])
+@pytest.mark.parametrize(("depth", "deborah"), [(0.05, 300.0), (1.0, 0.05), (3.0, 3.0), (20.0, 3.0)])
 def test_patches_are_the_contact_of_the_sums(depth, deborah):
     line, sums = cells(0.4, 8 * POINTS), np.empty(SUMS)
     touches, leaves = patches_at(line, blocks_of(line), barriers_for(line.mean.size - 1), deborah, depth, sums)

@@ -1,4 +1,4 @@
-"""Identities of the steady state, and an independent march in time."""
+"""Steady sliding of the Kelvin body: identities, order of convergence, independent time stepping."""
 
 import numpy as np
 import pytest
@@ -27,11 +27,11 @@ def friction(height, slope, deborah, load, scheme):
     return steady.drag / loads
 
 
-def march(height, deborah, depth, turns=3):
+def march(height, deborah, depth, periods=3):
     """Step elements through the line in time by backward Euler, without any trick of the solver."""
     n, decay = height.size, deborah * height.size / (1 + deborah * height.size)
     u = 0.0
-    for _ in range(turns):
+    for _ in range(periods):
         normal = drag = 0.0
         for i in range(n):
             w, free = height[i] + depth, decay * u
@@ -42,13 +42,14 @@ def march(height, deborah, depth, turns=3):
     return normal, drag
 
 
-@pytest.mark.parametrize("hurst", [0, 0.7, 1])
-@pytest.mark.parametrize("deborah", [1e-5, 1e-3, 1e-1])
-@pytest.mark.parametrize("load", [0.01, 0.3, 5.0])
+@pytest.mark.parametrize(
+    ("hurst", "deborah", "load"),
+    [(0, 1e-5, 5.0), (0.7, 1e-5, 0.01), (0.7, 1e-3, 0.3), (0.7, 1e-1, 5.0), (1, 1e-1, 0.01)],
+)
 def test_backward_euler_agrees_with_time_stepping(hurst, deborah, load):
     height, _, _ = rough(50, hurst, 1)
     steady = on_line(height, None, np.array([deborah]), np.array([load]), "backward_euler")
-    normal, drag = march(height, deborah, steady.depth[0], turns=3 + int(20 * deborah))
+    normal, drag = march(height, deborah, steady.depth[0], periods=3 + int(20 * deborah))
     # both do the same arithmetic in another order
     assert normal == pytest.approx(load, rel=1e-10)
     assert drag == pytest.approx(steady.drag[0], rel=1e-9)
@@ -65,7 +66,7 @@ def test_exact_sweep_agrees_with_fine_time_steps(deborah, load):
     assert best == pytest.approx(2 * finer - coarse, rel=2e-3)
 
 
-@pytest.mark.parametrize("hurst", [0, 0.5, 1])
+@pytest.mark.parametrize("hurst", [0, 1])
 def test_full_contact_is_exact(hurst):
     height, slope, gradient = rough(500, hurst, 2)
     deborah = np.geomspace(1e-9, 1e-2, 8)
@@ -76,7 +77,7 @@ def test_full_contact_is_exact(hurst):
 
 
 @pytest.mark.parametrize("scheme", EXACT)
-@pytest.mark.parametrize("load", [1e-3, 0.1, 2.0])
+@pytest.mark.parametrize("load", [1e-3, 2.0])
 def test_friction_has_no_floor_at_low_velocity(scheme, load):
     height, slope, _ = rough(200, 0.3)
     deborah = np.geomspace(1e-14, 1e-6, 9)
@@ -123,8 +124,7 @@ def test_bad_numbers_are_a_status():
     assert on_line(height, slope, np.ones(1), np.ones(1)).status[0] == Outcome.INVALID
 
 
-@pytest.mark.parametrize("load", [0.05, 2.0])
-@pytest.mark.parametrize("deborah", [1e-3, 1e-1, 10.0])
+@pytest.mark.parametrize(("load", "deborah"), [(0.05, 1e-3), (2.0, 1e-1), (0.05, 10.0)])
 def test_friction_is_the_energy_lost(load, deborah):
     """F_x = 4 G v tau times the integral of u'^2, with u marched finely as the running maximum of w exp(s / v tau)."""
     height, slope, _ = rough(30, 0.7, 400)
@@ -135,13 +135,13 @@ def test_friction_is_the_energy_lost(load, deborah):
     for i in range(1, 2 * n):
         u[i] = max(w[i % n], decay * u[i - 1])
     lost = deborah * np.sum(np.diff(u[n - 1 :]) ** 2) * n
-    # the running maximum at the nodes is first order where u turns: 12000 nodes
+    # the running maximum at the nodes is first order where contact begins and ends: 12000 nodes
     assert steady.drag[0] == pytest.approx(lost, rel=5e-3)
     assert np.mean(u[n:]) == pytest.approx(load, rel=1e-3)
 
 
-@pytest.mark.parametrize("seed", range(30))
-def test_touching_and_leaving_several_times_in_a_cell(seed, monkeypatch):
+@pytest.mark.parametrize("seed", range(6))
+def test_contact_begins_and_ends_several_times_in_a_cell(seed, monkeypatch):
     # such a line is not band-limited: its cells are integrated one by one
     monkeypatch.setattr(profile, "_resum", lambda slope, stretch: None)
     # cubic cells with a will of their own, against straight cells 4000 times as fine
@@ -160,20 +160,3 @@ def test_touching_and_leaving_several_times_in_a_cell(seed, monkeypatch):
     assert ours.depth == pytest.approx(reference.depth, rel=1e-5, abs=1e-5)
     assert ours.contact_fraction == pytest.approx(reference.contact_fraction, abs=1e-3)
     assert ours.drag == pytest.approx(reference.drag, rel=1e-4)
-
-
-@pytest.mark.parametrize("hurst", [0.0, 0.8])
-def test_time_steps_by_blocks_are_those_node_by_node(hurst):
-    n = 1100  # four blocks and a rest
-    height = roughness.line(roughness.amplitudes(n // 2, hurst), roughness.phases(3, 0, n // 2), n)
-    deborahs, loads = (grid.ravel() for grid in np.meshgrid([1e-5, 1e-3, 0.1, 10.0], [0.01, 1.0, 4.0]))
-    found = on_line(height, None, deborahs, loads, "backward_euler")
-    assert np.all(found.status == 0)
-    line = np.roll(height, -1 - int(np.argmax(height)))
-    decay = deborahs * n / (1 + deborahs * n)
-    u, total, drag = line[-1] + found.depth, 0.0, 0.0
-    for before, here in zip(np.roll(line, 1), line, strict=True):
-        now = np.maximum(here + found.depth, decay * u)
-        total, drag, u = total + now, drag + (now - decay * u) * (here - before) / (1 - decay), now
-    assert total / n == pytest.approx(loads, rel=1e-8)  # the last step is taken from the tangent
-    assert found.drag == pytest.approx(drag, rel=1e-6)  # and the secant

@@ -1,4 +1,4 @@
-"""Sliding over 15 decades of everything: an answer that obeys its identities, or a status."""
+"""Steady sliding over fifteen decades of all numbers: a solution that satisfies its bounds, or a status."""
 
 import numpy as np
 import pytest
@@ -20,12 +20,12 @@ def solve(height, slope, deborah, load, scheme):
 def is_lost_in_rounding(load, deborah):
     """Say whether the dashpot alone holds the load on a length, or at a depth, that is lost in that of the line.
 
-    The fastest element loses less in a turn than a displacement is known by.
+    The fastest element loses less in a period than a displacement is known by.
     """
     return min(load, 0) - deborah <= -12
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @example(0.0, 16, 2, 15.0, 0.0, 0.0, "hermite", 0)  # the sign of the force at the highest point is lost in rounding
 @example(0.0, 50, 1, 11.5, -13.0, 0.0, "hermite", 1)  # the rise in which the dashpots carry the load is
 @example(0.0, 16, 1, 14.9375, 0.0, 1.0, "backward_euler", 0)
@@ -59,7 +59,7 @@ def test_any_case_is_solved(hurst, points, oversampling, deborah, load, height, 
     assert 0 <= steady.contact_fraction[0] <= 1 + 1e-9
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @example(1.0, 0.0, -1.0, 10.0, -8.0, "hermite")
 @given(
     exponent=st.floats(1, 6),
@@ -105,8 +105,8 @@ def test_spikes_and_steps_are_solved(scheme):
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize("points", [16, 1000])
-def test_neighbours_and_order_do_not_change_a_bit(scheme, points):
+def test_neighbours_and_order_do_not_change_a_bit(scheme):
+    points = 200
     amplitude, phase = roughness.amplitudes(points // 2, 0.3), roughness.phases(0, 0, points // 2)
     h, slope = (roughness.line(amplitude, phase, 2 * points, order) for order in (0, 1))
     deborah, load = (grid.ravel() for grid in np.meshgrid(np.geomspace(1e-7, 1e2, 12), np.geomspace(1e-4, 1e3, 15)))
@@ -118,24 +118,3 @@ def test_neighbours_and_order_do_not_change_a_bit(scheme, points):
         for k in (0, 77, 179):
             alone = solve(h, slope, deborah[k], load[k], scheme)
             assert vars(alone)[name][0] == column[k]
-
-
-@pytest.mark.parametrize("realisation", [0, 8, 17])
-def test_a_load_that_is_lost_in_rounding_does_not_take_its_neighbours_with_it(realisation):
-    amplitude, phase = roughness.amplitudes(64, 0.0), roughness.phases(0, realisation, 64)
-    h, slope = (1e3 * roughness.line(amplitude, phase, 128, order) for order in (0, 1))
-    deborah, load = np.array([5.0, 5.0, 5.0, 9.0]), np.array([1e-14, 1e-3, 1.0, 1.0])
-    together = on_line(h, slope, deborah, load)
-    assert np.array_equal(together.status == Outcome.CONVERGED, load > 1e-9)
-    for k in (1, 2, 3):
-        assert solve(h, slope, deborah[k], load[k], "hermite").drag[0] == together.drag[k]
-
-
-def test_a_guess_does_not_change_a_bit():
-    amplitude, phase = roughness.amplitudes(200, 0.7), roughness.phases(0, 3, 200)
-    h, slope = (roughness.line(amplitude, phase, 800, order) for order in (0, 1))
-    deborah, load = np.geomspace(1e-5, 1e1, 20), np.geomspace(1e-3, 1e2, 20)
-    cold = on_line(h, slope, deborah, load)
-    for factor in (1e-3, 0.999, 1.5, 1e3):
-        warm = on_line(h, slope, deborah, load, guesses=(cold.depth + np.max(h)) * factor - np.max(h))
-        assert np.array_equal(cold.drag, warm.drag)

@@ -1,3 +1,5 @@
+"""Steady sliding of general linear solids: closed forms, energy balance, time stepping, stated errors."""
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -6,13 +8,10 @@ from schemes import material_on_line, on_line
 from scipy.optimize import brentq
 
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.viscoelastic import FRACTION, ViscoelasticCase, steady_viscoelastic_sliding
+from mdr_dask.physics.sliding.viscoelastic import FRACTION, steady_viscoelastic_sliding
 from mdr_dask.physics.solids import complex_modulus, kelvin, power_law_series, prony, standard_solid
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
-from mdr_dask.physics.surfaces.rough_line import RoughLine
-from mdr_dask.physics.surfaces.shapes import PowerLaw
-from mdr_dask.physics.surfaces.waves import Waves
 
 LENGTH, POINTS, RMS = 0.02, 400, 5e-7
 
@@ -25,19 +24,19 @@ def line(oversampling=8, hurst=0.7, realisation=0):
 
 
 def marched(height, spacing, solid, velocity, depth, periods):
-    """Friction and load at a depth by implicit time steps of one point, one arm, until the state repeats: slow."""
+    """Return friction and load at a depth by implicit time steps of one point; one Prony term."""
     (modulus,), (time,), static = solid.moduli, solid.times, solid.static_modulus
     ratio = spacing / velocity / time
-    arm, force, drag = 0.0, 0.0, 0.0
+    term, force, drag = 0.0, 0.0, 0.0
     slope = (np.roll(height, -1) - np.roll(height, 1)) / (2 * spacing)
     for _ in range(periods):
         force = drag = 0.0
         for h, s in zip(height, slope, strict=True):
             # midpoint-free backward Euler: a = (a + ratio u) / (1 + ratio), f = static u + modulus (u - a)
-            free = modulus * arm / (1 + ratio) / (static + modulus / (1 + ratio))
+            free = modulus * term / (1 + ratio) / (static + modulus / (1 + ratio))
             u = max(depth + h, free)
-            arm = (arm + ratio * u) / (1 + ratio)
-            f = static * u + modulus * (u - arm)
+            term = (term + ratio * u) / (1 + ratio)
+            f = static * u + modulus * (u - term)
             force += f
             drag += f * s
     return drag / force, 4 * spacing * force
@@ -54,8 +53,7 @@ def test_standard_solid_agrees_with_slow_time_stepping():
     assert fine[1] == pytest.approx(0.2, rel=0.01)
 
 
-@pytest.mark.parametrize("velocity", [1e-4, 0.05, 5.0])
-@pytest.mark.parametrize("force", [0.01, 1.0, 100.0])
+@pytest.mark.parametrize(("velocity", "force"), [(1e-4, 0.01), (0.05, 1.0), (5.0, 100.0), (5.0, 0.01)])
 def test_kelvin_limit_is_the_kelvin_solver(velocity, force):
     height, spacing, amplitude = line(16)
     ours = material_on_line(height, spacing, kelvin(1e7, 1e-3), velocity, force)
@@ -96,7 +94,7 @@ def test_friction_falls_with_velocity_without_a_floor():
     solid = prony(1e7, [1e7, 3e7], [1e-3, 1e-2])
     low = [material_on_line(height, spacing, solid, v, 0.1).friction_coefficient / v for v in (1e-8, 1e-12)]
     assert low[0] == pytest.approx(low[1], rel=1e-5)  # next order: v tau / correlation length
-    dashpot = kelvin(1e7, (1e7 * 1e-3 + 3e7 * 1e-2) / 1e7)  # fast arms are a dashpot of sum G tau
+    dashpot = kelvin(1e7, (1e7 * 1e-3 + 3e7 * 1e-2) / 1e7)  # fast Prony terms are a dashpot of sum G tau
     assert material_on_line(height, spacing, dashpot, 1e-8, 0.1).friction_coefficient == pytest.approx(
         low[0] * 1e-8, rel=1e-5
     )
@@ -117,7 +115,7 @@ def test_energy_lost_is_the_work_of_friction():
     ratio = step / (velocity * time)
     half, recovery = np.exp(-ratio / 2), np.exp(-ratio * static / solid.glass_modulus)
     lost = u = e = 0.0
-    for _ in range(2):  # the second turn starts from the periodic state
+    for _ in range(2):  # the second period starts from the periodic state
         lost = 0.0
         for w in state.depth + fine:
             rate = (w - u) / ratio
@@ -132,10 +130,10 @@ def test_energy_lost_is_the_work_of_friction():
     assert drag / 0.3 == pytest.approx(state.friction_coefficient, rel=1e-3)
 
 
-@pytest.mark.parametrize("velocity", [1e-9, 1e-3, 1e3])
-@pytest.mark.parametrize("force", [1e-4, 1.0, 1e4])
-@pytest.mark.parametrize("viscosity", [0.0, 100.0])
-def test_fifty_arms_over_twenty_decades(velocity, force, viscosity):
+@pytest.mark.parametrize(
+    ("velocity", "force", "viscosity"), [(1e-9, 1.0, 0.0), (1e-3, 1e-4, 100.0), (1e-3, 1e4, 0.0), (1e3, 1e4, 100.0)]
+)
+def test_fifty_terms_over_twenty_decades(velocity, force, viscosity):
     moduli = 10 ** np.random.default_rng(2).uniform(4, 9, 50)
     height, spacing, _ = line(16)
     solid = prony(1e6, moduli, np.geomspace(1e-12, 1e8, 50), viscosity)
@@ -144,41 +142,6 @@ def test_fifty_arms_over_twenty_decades(velocity, force, viscosity):
     assert state.sweeps <= 12
     finer = material_on_line(*line(64)[:2], solid, velocity, force)
     assert state.friction_coefficient == pytest.approx(finer.friction_coefficient, rel=2 * state.error)
-
-
-def test_arms_slower_than_anything_share_one_limit():
-    height, spacing, _ = line()
-    slow = [material_on_line(height, spacing, prony(1e7, [1e7, 5e7], [1e-3, time]), 0.1, 0.1) for time in (1e9, 1e14)]
-    assert slow[0].friction_coefficient == pytest.approx(slow[1].friction_coefficient, rel=1e-6)
-    assert slow[0].depth == pytest.approx(slow[1].depth, rel=1e-8)
-
-
-@pytest.mark.slow
-def test_error_estimate_covers_the_true_error():
-    """200 random cases on coarse grids, none that it was tuned on: 95 % within, not 10 times too large.
-
-    The standard error of the part is 1.5 %, hence 92 %; 96.3 % were measured of 4293.
-    """
-    random, within, excess, failed = np.random.default_rng(5), [], [], 0
-    for realisation in range(200):
-        arms = random.integers(0, 5)
-        solid = prony(
-            1e7, 10 ** random.uniform(5, 9, arms), 10 ** random.uniform(-6, 3, arms), 1e7 * 10 ** random.uniform(-6, 0)
-        )
-        velocity, force, hurst = 10 ** random.uniform(-5, 2), 10 ** random.uniform(-2, 2), random.uniform(0, 1)
-        grid = int(2 ** random.integers(2, 5))
-        coarse = material_on_line(*line(grid, hurst, realisation)[:2], solid, velocity, force)
-        fine = material_on_line(*line(64, hurst, realisation)[:2], solid, velocity, force)
-        assert fine.status == Outcome.CONVERGED
-        if coarse.status != Outcome.CONVERGED:  # a contact of a few nodes: `auto` goes on to finer grids
-            failed += 1
-            continue
-        miss = abs(coarse.friction_coefficient / fine.friction_coefficient - 1)
-        within.append(miss <= coarse.error)
-        excess.append(coarse.error / max(miss, 1e-12))
-    assert failed <= 4
-    assert np.mean(within) >= 0.92
-    assert np.median(excess) <= 15
 
 
 def parabola(velocity, radius, modulus, time, force):
@@ -206,22 +169,7 @@ def test_smooth_parabola_is_its_closed_form(velocity):
     assert state.error < 0.02
 
 
-def test_rough_indenters_are_solved_in_a_few_sweeps():
-    """The derivative by the depth is exact, and arms that recover far beyond the line do not hide the load."""
-    random = np.random.default_rng(4)
-    for realisation in range(40):
-        arms = random.integers(1, 6)
-        solid = prony(1.0, 10 ** random.uniform(-2, 2, arms), 10 ** random.uniform(-6, 3, arms))
-        height, spacing, _ = line(8, random.uniform(0, 1), realisation)
-        place = (np.arange(height.size + 1) - height.size // 2) * spacing
-        body = np.append(height, height[0]) - 50 * RMS * np.abs(2 * place / LENGTH) ** random.uniform(1, 4)
-        force = 4 * LENGTH * 50 * RMS * 10 ** random.uniform(-4, -1.5)
-        state = material_on_line(body, spacing, solid, 10 ** random.uniform(-5, 2), force, periodic=False)
-        assert state.status == Outcome.CONVERGED
-        assert state.sweeps <= 16
-
-
-def test_contact_that_leaves_the_line_is_said_so():
+def test_contact_that_leaves_the_line_is_a_status():
     x = np.linspace(-1e-3, 1e-3, 401)
     state = material_on_line(-(x**2) / 0.01, x[1] - x[0], kelvin(1e6, 1e-3), 0.1, 10.0, periodic=False)
     assert state.status == Outcome.OUTSIDE_LINE
@@ -235,40 +183,12 @@ def test_flat_line_carries_load_without_friction():
     assert state.depth == pytest.approx(1.0 / (4e6 * 64e-4), rel=1e-9)
 
 
-@pytest.mark.parametrize("body", [None, PowerLaw(5.0, 2.0)])
-def test_a_finer_grid_gives_the_same_with_and_without_the_grids_before(body):
-    waves = Waves(0.05 * roughness.amplitudes(32, 0.7) * roughness.phase_factors(1, 4, 32), 64)
-    rough, solid = RoughLine(waves, body).from_summit(), prony(1.0, [4.0, 2.0], [0.02, 0.3], 0.01)
-    case = ViscoelasticCase(solid, 0.03)
-    for grid in (1, 2, 4, 8, 16):
-        found = np.concatenate(case.on(rough.straight(64 * grid).height, body is None).values)
-        if grid >= 4:
-            alone = steady_viscoelastic_sliding(rough.straight(64 * grid), solid, 0.03)
-            assert alone.status == Outcome.CONVERGED
-            np.testing.assert_allclose(found, alone.values, rtol=1e-9)
-
-
-@pytest.mark.parametrize("realisation", range(5))
-def test_a_line_from_its_summit_has_it_on_every_grid(realisation):
-    waves = Waves(0.5 * roughness.amplitudes(64, 0.3) * roughness.phase_factors(1, realisation, 64), 128)
-    turned = RoughLine(waves).from_summit()
-    finest = waves.heights(2**16)
-    for grid in (4, 8, 64, 256):
-        height = turned.heights(128 * grid)
-        assert height.argmax() == 0
-        assert height[0] == pytest.approx(finest.max(), rel=1e-5)
-    before = np.roll(finest, -int(finest.argmax()))
-    np.testing.assert_allclose(turned.heights(2**16), before, atol=np.abs(np.diff(finest)).max())
-
-
 @pytest.mark.parametrize(
     ("height", "load", "message"),
     [
         (np.full(64, np.nan), 1.0, "the heights must be finite"),
         (np.zeros(63), 1.0, "a multiple of four cells and at least eight, got 63"),
-        (np.zeros(4), 1.0, "a multiple of four cells and at least eight, got 4"),
         (np.zeros(64), np.inf, "the load must be positive and finite, got inf"),
-        (np.zeros(64), -1.0, "the load must be positive and finite, got -1.0"),
     ],
 )
 def test_bad_input_is_refused(height, load, message):
@@ -283,16 +203,16 @@ def test_eight_cells_are_a_line():
     assert (found.status, found.values[FRACTION]) == (Outcome.CONVERGED, pytest.approx(1.0))
 
 
-@pytest.mark.parametrize("deborah", [0.02, 0.05, 0.1])
-def test_a_wave_closes_at_the_load_at_which_it_pushes_everywhere(deborah):
+def test_a_wave_closes_at_the_load_at_which_it_pushes_everywhere():
     """A Kelvin solid that follows cos(x) pushes by d + cos(x) + 2 pi De sin(x): nowhere less than 0 from
     d = sqrt(1 + (2 pi De)^2) on, its load over modulus and length. Short of that the grids say less than 1, and what
     they are extrapolated to stays a part of the line.
     """
+    deborah = 0.05
     phase = 2 * np.pi * np.arange(64) / 64
     wave = periodic_line(np.cos(phase), -2 * np.pi * np.sin(phase))
     closed = np.sqrt(1 + (2 * np.pi * deborah) ** 2)
-    loads = closed * np.linspace(0.9, 1.1, 61)
+    loads = closed * np.linspace(0.9, 1.1, 31)
     found = [steady_viscoelastic_sliding(wave, kelvin(0.5, deborah), load) for load in loads]
     fractions = np.array([state.values[FRACTION] for state in found])
     assert np.all((fractions > 0.7) & (fractions <= 1.0))
@@ -300,17 +220,17 @@ def test_a_wave_closes_at_the_load_at_which_it_pushes_everywhere(deborah):
     assert np.all(fractions[loads > 1.03 * closed] == 1.0)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
     kind=st.sampled_from(["rough", "spikes", "steps", "one point"]),
     scale=st.floats(-9, 3),
     velocity=st.floats(-9, 6),
     load=st.floats(-6, 4),
-    arms=st.integers(0, 20),
+    terms=st.integers(0, 20),
     viscosity=st.floats(-12, 3),
 )
-def test_any_line_and_any_solid_end_in_a_state_or_a_status(seed, kind, scale, velocity, load, arms, viscosity):
+def test_any_line_and_any_solid_end_in_a_state_or_a_status(seed, kind, scale, velocity, load, terms, viscosity):
     """Fifteen decades of everything: the load is carried, friction resists, no more sweeps than a few."""
     random = np.random.default_rng(seed)
     height = {
@@ -319,8 +239,8 @@ def test_any_line_and_any_solid_end_in_a_state_or_a_status(seed, kind, scale, ve
         "steps": np.repeat(random.standard_normal(16), 16),
         "one point": np.where(np.arange(256) == seed % 256, 1.0, 0.0),
     }[kind] * 10**scale
-    moduli = 10 ** random.uniform(-3, 4, arms)
-    solid = prony(1.0, moduli, 10 ** random.uniform(-10, 10, arms), 10**viscosity)
+    moduli = 10 ** random.uniform(-3, 4, terms)
+    solid = prony(1.0, moduli, 10 ** random.uniform(-10, 10, terms), 10**viscosity)
     force = 4 * 256 * 10**scale * 10**load
     state = material_on_line(height, 1.0, solid, 10**velocity, force)
     assert state.sweeps <= 30

@@ -1,4 +1,4 @@
-"""Measured relaxation moduli of 21 temperatures: our intervals beside the shift factors published with them."""
+"""Relaxation moduli measured at 21 temperatures: our intervals contain the published shift factors."""
 
 import numpy as np
 import pytest

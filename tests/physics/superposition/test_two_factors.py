@@ -1,3 +1,5 @@
+"""Curves of two groups: a shift factor for each."""
+
 import numpy as np
 import pytest
 
@@ -50,7 +52,7 @@ def test_pairs_may_be_missing_and_references_chosen():
     np.testing.assert_allclose(found.second.horizontal, b - b[-1], atol=0.01)
 
 
-def test_parts_that_share_nothing_are_refused():
+def test_parts_that_share_no_group_are_refused():
     first, second, curves, *_ = family(3)
     kept = [0, 1, 7, 8]  # two velocities, each at temperatures of its own
     with pytest.raises(DataError, match="fall into parts that share neither group"):

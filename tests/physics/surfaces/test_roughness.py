@@ -1,3 +1,5 @@
+"""Generated lines: moments, harmonics, phases."""
+
 import numpy as np
 import pytest
 

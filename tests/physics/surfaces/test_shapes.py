@@ -1,3 +1,5 @@
+"""Smooth power-law indenters: closed form of friction, compared with quadrature and sweeps."""
+
 import numpy as np
 import pytest
 from schemes import under_indenter
@@ -39,7 +41,7 @@ def test_a_parabola_agrees_with_its_quadratic():
 
 
 @pytest.mark.parametrize(("coefficient", "exponent"), SHAPES)
-@pytest.mark.parametrize("deborah", [1e-12, 1e-4, 1e-1, 1e4])
+@pytest.mark.parametrize("deborah", [1e-4, 1e-1])
 def test_closed_form_agrees_with_quadrature(coefficient, exponent, deborah):
     load = 0.02
     depth, drag, a, b, stretch = solve(load, deborah, coefficient, exponent)[:, 0]

@@ -1,4 +1,4 @@
-"""The isotropic spectrum: its moments, its line, its cut and the way back, against closed forms and generated maps."""
+"""Isotropic spectra: moments, lines, cuts, and the way back from scans."""
 
 import math
 
@@ -13,7 +13,7 @@ from mdr_dask.physics.surfaces.measured import MeasuredLine
 from mdr_dask.physics.surfaces.scans import cut_of_lines, of_cut
 from mdr_dask.physics.surfaces.spectrum import Spectrum, self_affine
 
-HURST = (0.3, 0.5, 0.8)
+HURST = (0.3, 0.8)
 LENGTH = 0.02
 
 
@@ -74,12 +74,11 @@ def test_a_generated_surface_has_height_and_gradient_of_its_line(hurst):
 
 
 @pytest.mark.parametrize("hurst", HURST)
-@pytest.mark.parametrize("rows", [16, 256])
-def test_scans_give_back_the_spectrum(hurst, rows):
+def test_scans_give_back_the_spectrum(hurst):
     """Scans of one generated surface: C2D within the scatter of its bins, slope within 5 %, not smaller by sqrt 2."""
     spectrum = self_affine(hurst, LENGTH / 4, LENGTH / 128, 1e-6)
     height = areal_surface(spectrum, (1024, 1024), (LENGTH, LENGTH), 6, 1)
-    cut = cut_of_lines([MeasuredLine(height[k], LENGTH) for k in range(0, 1024, 1024 // rows)])
+    cut = cut_of_lines([MeasuredLine(height[k], LENGTH) for k in range(0, 1024, 16)])
     found = of_cut(cut)
     inner = (cut.wavenumber > 2 * np.pi / LENGTH * 8) & (cut.wavenumber < 2 * np.pi / LENGTH * 100)
     scatter = np.log(found.at(cut.wavenumber[inner]) / spectrum.at(cut.wavenumber[inner]))

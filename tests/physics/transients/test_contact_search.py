@@ -1,4 +1,4 @@
-"""The contact at an instant: that of the steady sweep, that of a search of every cell, and that of every element."""
+"""The contact at an instant, compared with the steady sweep, with an exhaustive search and with every element."""
 
 import numpy as np
 import pytest
@@ -9,8 +9,8 @@ from mdr_dask.physics.sliding.kelvin import DISPLACEMENT, DRAG, SUMS, barriers_f
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients import patches, velocity_jump
-from mdr_dask.physics.transients.contact_search import FULL, LARGEST, Reachable, find_contact, workspace_for
-from mdr_dask.physics.transients.free_recovery import WINDOW, WINDOWS, Instant, PathBounds, write_bounds
+from mdr_dask.physics.transients.contact_search import LARGEST, Reachable, find_contact, workspace_for
+from mdr_dask.physics.transients.free_recovery import Instant
 from mdr_dask.physics.transients.limits import PreparedLine, steady_limits
 from mdr_dask.physics.transients.patches import LOAD, History
 from mdr_dask.physics.transients.velocity_jump import MarchRequest, _Relaxation, jump_between
@@ -32,9 +32,10 @@ def everywhere(line: PreparedLine) -> Reachable:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("oversampling", [1, 4])
-@pytest.mark.parametrize("hurst", [0.0, 0.4, 0.8])
-@pytest.mark.parametrize("deborah", [1e-3, 0.3, 10.0, 1e3])
+@pytest.mark.parametrize(
+    ("hurst", "oversampling", "deborah"),
+    [(0.0, 4, 1e-3), (0.4, 1, 0.3), (0.4, 4, 1e3), (0.8, 1, 10.0), (0.8, 4, 0.3)],
+)
 def test_contact_long_after_a_jump_is_that_of_the_steady_sweep(hurst: float, oversampling: int, deborah: float) -> None:
     """On coarse grids contact begins and ends inside single cells, which both must find."""
     line = rough(200, hurst, oversampling)
@@ -56,7 +57,7 @@ def test_contact_long_after_a_jump_is_that_of_the_steady_sweep(hurst: float, ove
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("hurst", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("hurst", [0.0, 1.0])
 def test_skipped_cells_change_nothing(hurst: float, monkeypatch: pytest.MonkeyPatch) -> None:
     line = rough(400, hurst, seed=31)
     loads, before, ratio = (
@@ -84,7 +85,7 @@ def test_skipped_cells_change_nothing(hurst: float, monkeypatch: pytest.MonkeyPa
             assert drag == pytest.approx(all_drag, abs=1e-3 * np.ptp(all_drag) + 1e-12 * other.after)
 
 
-@pytest.mark.parametrize("ratio", [0.2, 1.2, 10.0])
+@pytest.mark.parametrize("ratio", [0.2, 10.0])
 def test_every_moment_carries_the_load(ratio: float) -> None:
     """A new search at the depths of a march finds the load, in single asperities after large jumps too."""
     line, (loads, before) = (
@@ -117,37 +118,6 @@ def test_unreachable_stretches_change_nothing(hurst, load, deborah, ratio, monke
     assert np.max(np.abs(near.trace - whole.trace)) <= 0.01 * np.max(np.abs(whole.trace - whole.after))
 
 
-def test_more_places_of_separation_than_the_capacity_are_a_failure() -> None:
-    line = rough(200, 0.0)
-    first, reachable = line.patches(1.0, 3.0)[0], everywhere(line)
-    history = History(np.array([0.0, 1e-3]), np.array([1.0, 1.0]), np.zeros(2), 2, 1.0)
-    instant = Instant(line.track, first, history, 1e-3, 3.0, np.exp(-1e-3))
-    work = workspace_for(200, line.barriers(3.0), reachable.from_depth - 1.0)
-    assert find_contact(instant, reachable, work) > 0
-    few = work._replace(recovery=work.recovery._replace(place=np.empty(6)))
-    assert find_contact(instant, reachable, few) == FULL
-
-
-@pytest.mark.parametrize("ratio", [0.2, 5.0])
-@pytest.mark.parametrize(("size", "growth"), [(1.0, -9.0), (-0.05, 3.0), (0.05, 3.0)], ids=["slows", "falls", "rises"])
-def test_bounds_of_free_recovery_hold(ratio: float, size: float, growth: float) -> None:
-    """The drift D u' + u of elements that separated is minus the rate of the depth then, faded since."""
-    time = np.append(0.0, np.geomspace(1e-3, 1, 30))
-    depth, rate = 2 + size * np.exp(growth * time), size * growth * np.exp(growth * time)
-    deborah = 100.0
-    line = PreparedLine.of(periodic_line(np.cos(2 * np.pi * np.arange(64) / 64), None))
-    first = line.patches(2.0, deborah / ratio)[0]._replace(depth=2.0)
-    bounds = PathBounds(*np.empty((5, WINDOWS)))
-    write_bounds(History(time, depth, rate, time.size, 0.0), first, deborah, bounds)
-    for k in range(WINDOWS):
-        within = time[-1] - time <= WINDOW * 2**k / deborah
-        drift = -rate[within] * np.exp(time[within] - time[-1])
-        assert bounds.most_drift[k] >= max(drift.max(), min(depth[-1], 2.0 * np.exp(-1.0)) * (1 - ratio))
-        assert bounds.least_drift[k] <= min(drift.min(), 0)
-        assert bounds.least_lift[k] <= (depth + rate)[within].min()
-        assert bounds.spread[k] >= np.ptp(depth[within])
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "number", "what"),
@@ -167,6 +137,6 @@ def test_load_of_large_jumps_at_every_moment(seed: int, number: int, what: str) 
 
 @pytest.mark.slow
 def test_load_of_random_jumps_is_that_of_every_element() -> None:
-    worst = np.array([judged(4100, number, 6)[0] for number in range(150)])
-    assert np.count_nonzero(np.isfinite(worst)) > 60
+    worst = np.array([judged(4100, number, 6)[0] for number in range(80)])
+    assert np.count_nonzero(np.isfinite(worst)) > 30
     assert np.nanmean(worst > 1e-3) < 0.02

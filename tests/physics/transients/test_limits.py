@@ -1,4 +1,4 @@
-"""Steady states before and after a jump are those of the sweep at their depths, whatever is solved beside them."""
+"""Steady states before and after a jump equal sweeps at their depths and do not depend on other cases."""
 
 import numpy as np
 import pytest

@@ -1,3 +1,5 @@
+"""Every element followed through a history of velocity and load: balance of work, order, steady limits."""
+
 import numpy as np
 import pytest
 from schemes import material_on_line, on_line
@@ -7,13 +9,11 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import CubicLine, indented_line, periodic_line
 from mdr_dask.physics.surfaces.shapes import PowerLaw
-from mdr_dask.physics.transients.elements import steps as edges
 from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation, foundation
 from mdr_dask.physics.transients.elements.loading_history import (
     Response,
     follow_line,
     steady_start,
-    untouched,
 )
 from mdr_dask.physics.transients.elements.steps import Schedule
 from mdr_dask.physics.transients.velocity_jump import MarchRequest, velocity_jump
@@ -73,8 +73,7 @@ def missing(found: Response) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("solid", [KELVIN, STANDARD, SERIES])
-@pytest.mark.parametrize("indenter", [False, True])
+@pytest.mark.parametrize(("solid", "indenter"), [(KELVIN, True), (STANDARD, False), (SERIES, False)])
 def test_work_is_stored_or_lost(solid: Foundation, indenter: bool) -> None:
     line = bowl(400) if indenter else periodic_line(*rough())
     _, found = jump(line, solid, (0.05, 0.08), 0.1, 1.0)
@@ -98,8 +97,8 @@ def at_times(line: CubicLine, solid: Foundation, deborahs: tuple[float, float], 
     return found.drag[np.append(0, np.searchsorted(moments, TIMES))]
 
 
-@pytest.mark.parametrize("solid", [STANDARD, SERIES])
-def test_second_order_in_the_grid(solid: Foundation) -> None:
+def test_second_order_in_the_grid() -> None:
+    solid = SERIES
     exact = at_times(periodic_line(*rough(40)), solid, (0.1, 0.12))
     found = [np.max(np.abs(at_times(periodic_line(*rough(o)), solid, (0.1, 0.12)) / exact - 1)) for o in (4, 12)]
     assert found[1] < 5e-4
@@ -118,13 +117,15 @@ def test_second_order_in_the_grid_against_the_march(change: float) -> None:
     assert found[1].max() < found[0].max() / 4**SECOND
 
 
-@pytest.mark.parametrize("solid", [KELVIN, STANDARD, SERIES])
+@pytest.mark.parametrize("solid", [KELVIN, SERIES])
 def test_second_order_in_the_step(solid: Foundation) -> None:
     line = periodic_line(*rough(8))
     exact = at_times(line, solid, (0.1, 0.12), 1 / 16)
     found = [np.max(np.abs(at_times(line, solid, (0.1, 0.12), cells) / exact - 1)) for cells in (2.0, 0.5)]
     assert found[1] < (5e-5 if solid is KELVIN else 1e-3)
-    assert found[1] < found[0] / (1 if solid is KELVIN else 4**SECOND)  # without arms a step leaves next to nothing
+    assert found[1] < found[0] / (
+        1 if solid is KELVIN else 4**SECOND
+    )  # without Prony terms a step leaves next to nothing
 
 
 def test_every_course_keeps_the_balance() -> None:
@@ -162,8 +163,8 @@ def test_kelvin_ends_in_the_direct_steady_state_at_second_order() -> None:
     assert errors[1] < errors[0] / 8
 
 
-def test_fast_arm_is_a_dashpot() -> None:
-    """An arm G_1, tau_1 with G_1 tau_1 = eta nears the Kelvin body as tau_1 falls."""
+def test_fast_term_is_a_dashpot() -> None:
+    """An Prony term G_1, tau_1 with G_1 tau_1 = eta nears the Kelvin body as tau_1 falls."""
     line = bowl(1600)
     _, kelvin = jump(line, KELVIN, (0.05, 0.06), 0.05, 1.0)
     errors = []
@@ -174,21 +175,9 @@ def test_fast_arm_is_a_dashpot() -> None:
     assert errors[1] < 0.02
 
 
-def test_limits_of_a_general_body() -> None:
-    """An arm of no stiffness beside the dashpot is the Kelvin body; two arms of one time are one arm."""
-    line = periodic_line(*rough(4))
-    pairs = [
-        (KELVIN, foundation([1e-10], [0.3], 1.0)),
-        (STANDARD, foundation([1.0, 2.0], [0.25, 0.25 * (1 + 1e-9)], 0.0)),
-    ]
-    for plain, general in pairs:
-        drags = [at_times(line, solid, (0.1, 0.12)) for solid in (plain, general)]
-        assert np.allclose(*drags, rtol=1e-7)
-
-
-@pytest.mark.parametrize("solid", [KELVIN, STANDARD, SERIES])
+@pytest.mark.parametrize("solid", [KELVIN, SERIES])
 def test_full_contact_is_exact(solid: Foundation) -> None:
-    """One wave in full contact: the stretch of an arm is Q exp(i k s), Q' = i k V - (i k V + 1 / tau) Q."""
+    """One wave in full contact: the stretch of a Prony term is Q exp(i k s), Q' = i k V - (i k V + 1 / tau) Q."""
     nodes, k, before, after = 1000, 2 * np.pi, 0.05, 0.08
     x = np.arange(nodes) / nodes
     moments, found = jump(periodic_line(np.cos(k * x), -k * np.sin(k * x)), solid, (before, after), 20.0, 1.0)
@@ -213,24 +202,6 @@ def test_contact_that_leaves_the_line_is_a_status() -> None:
     assert (status, found.status) == (Outcome.CONVERGED, Outcome.OUTSIDE_LINE)
 
 
-@pytest.mark.parametrize("solid", [KELVIN, SERIES])
-def test_elements_that_left_an_indenter_while_touched_are_new_ones(solid: Foundation) -> None:
-    """A step past the whole line leaves nothing of what was: the rest is as if nothing had been touched before."""
-    line, speed, travels = bowl(100), 10.0, np.array([0.0, 1.03, 1.05])
-    state, depth, _ = steady_start(line, solid, 0.05, 0.05)
-    schedule = Schedule(travels / speed, travels, np.full(3, speed), np.full(3, 0.05))
-    found, fresh = (
-        follow_line(line, solid, schedule, each, depth) for each in (state, untouched(100, solid.times.size))
-    )
-    assert state.touching.any()
-    assert (found.status, fresh.status) == (Outcome.CONVERGED, Outcome.CONVERGED)
-    np.testing.assert_allclose(found.displacement, fresh.displacement, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(found.depth[1:], fresh.depth[1:], rtol=1e-9)
-    np.testing.assert_allclose(found.drag[1:], fresh.drag[1:], rtol=1e-9)
-    assert (found.contact[1:] > 0).all()
-    np.testing.assert_allclose(np.diff(found.work), np.diff(fresh.work), rtol=1e-9)
-
-
 def test_rest_is_static() -> None:
     """Where nothing moves, nothing changes and there is no drag on a smooth hill."""
     line = bowl(400)
@@ -247,20 +218,3 @@ def test_rest_is_static() -> None:
 def test_elastic_solid_is_refused() -> None:
     with pytest.raises(ValueError, match="expected a solid with a Prony term or a dashpot"):
         foundation([], [], 0.0)
-
-
-@pytest.mark.parametrize("pull", [0.1, -50.0, 50.0])
-@pytest.mark.parametrize("guess", [-1e6, -10.0, 0.0, 1e6])
-def test_the_rate_that_carries_a_load_is_found_from_a_guess_without_contact(guess, pull):
-    place = np.arange(200) / 200
-    pulls = pull + 0.3 * np.sin(23 * place)
-    nowhere = edges.Edges(np.full(200, -1.0), np.zeros(200))
-    contact = edges.Contact(
-        pulls, pulls, np.cos(7 * place), np.zeros(200), np.zeros(200), np.ones(200, dtype=bool), nowhere
-    )
-    deborah, load, viscosity = 0.4, 0.2, 0.7
-    rate, _, fraction = edges.carrying_rate(contact, viscosity, guess, edges.Drive(deborah, load, -1))
-    fine = np.linspace(0, 1, 200001)[:-1] * (199 / 200)
-    force = pull + 0.3 * np.sin(23 * fine) + viscosity * (rate + deborah * np.cos(7 * fine))
-    assert np.maximum(force, 0).mean() == pytest.approx(load, rel=0.01)  # of the cell that closes the line
-    assert (force > 0).mean() == pytest.approx(fraction, abs=0.01)
