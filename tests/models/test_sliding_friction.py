@@ -32,7 +32,7 @@ def grid():
 
 @pytest.mark.parametrize(
     ("scheme", "oversampling"),
-    [("hermite", 1), ("hermite", "auto"), ("piecewise_linear", "auto"), ("backward_euler", 4)],
+    [("hermite", 1), ("hermite", "auto"), ("backward_euler", 4)],
 )
 def test_a_value_does_not_depend_on_its_neighbours(scheme, oversampling):
     block = make(grid(), scheme=scheme, oversampling=oversampling, accuracy=0.1)

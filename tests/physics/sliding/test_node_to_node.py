@@ -1,12 +1,15 @@
 """Node-to-node sweeps: convergence to the exact sweep, and stated errors."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mdr_dask.physics.sliding import steady as sliding
 from mdr_dask.physics.sliding.cases import Cases
-from mdr_dask.physics.sliding.kelvin_refinement import FLOORS, KelvinCases
 from mdr_dask.physics.sliding.node_to_node import NodeToNode
+from mdr_dask.physics.sliding.problem import FLOORS, Request
+from mdr_dask.physics.sliding.problem import solve as solve_problem
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.surfaces.rough_line import RoughLine
@@ -71,7 +74,7 @@ def test_full_contact_is_exact_on_any_grid():
     assert depth == pytest.approx(loads, rel=1e-11)
 
 
-@pytest.mark.parametrize("count", [1, 42])
+@pytest.mark.parametrize("count", [1, 5, 42])
 def test_a_case_is_the_same_among_any_others(count):
     height, _, _ = line(0.3)
     deborah, loads = cases()
@@ -155,9 +158,32 @@ def test_edges_of_the_contact_in_slow_sliding(points, hurst, force, velocity):
         assert np.all(errors <= allowed)
 
 
-@pytest.mark.parametrize("scheme", ["hermite", "piecewise_linear", "backward_euler"])
-def test_errors_on_a_given_grid(scheme):
-    oversampling = 8
+@pytest.mark.parametrize(
+    ("realisation", "points", "hurst", "load", "velocity"),
+    [
+        (27, 300, 0.6, 0.0031291346445318988, 1e-3),
+        (20, 100, 0.6, 0.030638870628004047, 1e-3),
+        (10, 300, 0.6, 0.009791483623609773, 0.1),
+        (18, 300, 0.6, 0.0031291346445318988, 0.01),
+        (28, 200, 0.5, 0.0031291346445318988, 1e-3),
+    ],
+)
+def test_a_small_patch_that_two_grids_miss_is_an_error_of_the_contact(realisation, points, hurst, load, velocity):
+    """On these lines two grids agree on a contact fraction that is 1.4 to 3.5 % too small."""
+    amplitude = roughness.amplitudes(points // 2, hurst)
+    surface = RoughLine(Waves(0.5 * amplitude * roughness.phase_factors(1, realisation, points // 2), points))
+    deborah, loads = np.array([velocity / roughness.spectral_slope(amplitude)]), np.array([load])
+    exact = truth(surface, deborah, loads)
+    steady, errors = solve_problem(surface, None, deborah, loads, Request(0.01))
+    for name, error in (("contact_fraction", errors[2]), ("contact_slope", errors[3])):
+        value = getattr(steady, name)
+        assert np.abs(value - getattr(exact, name)) <= error
+        assert error <= 0.01 * value
+
+
+@pytest.mark.parametrize("scheme", ["hermite", "backward_euler"])
+@pytest.mark.parametrize("oversampling", [1, 8])
+def test_errors_on_a_given_grid(scheme, oversampling):
     ratios = []
     for surface, deborah, loads in drawn(3, 8):
         steady, errors = solve_problem(surface, None, deborah, loads, Request(0.01, oversampling, scheme))
