@@ -7,7 +7,20 @@ import pytest
 import xarray as xr
 
 from mdr_dask.cli import main
+from mdr_dask.models.base import Block
+from mdr_dask.models.fretting_wear import MODEL, FrettingWear
+from mdr_dask.models.fretting_wear.declaration import Parabola
 
+SI = {
+    "indenter": Parabola(radius=0.01),
+    "contact_modulus": 115e9,
+    "effective_shear_modulus": 90e9,
+    "friction": 0.6,
+    "amplitude": 1e-6,
+    "normal_force": 50.0,
+    "hardness": 2e9,
+    "wear_coefficient": 1e-4,
+}
 STEEL = """\
   indenter: {shape: parabola, radius: 10 mm}
   contact_modulus: 115 GPa
@@ -64,6 +77,23 @@ def test_units_in_the_store(write, parameters, units):
     assert tuple(data[name].attrs["units"] for name in names) == units
     assert data.radius.attrs["units"] == "1"
     assert "path" not in data.coords or data["path"].attrs["units"] == "1"
+
+
+def test_profiles_over_a_length_are_those_over_the_contact_radius(write):
+    """They had no unit and could not be compared with measured profiles."""
+    forces = STEEL.replace("50 N", "[50 N, 100 N]") + "  points: 9\n"
+    outputs = "outputs: [worn_profile, worn_image]\n"
+    data = filled(write(forces + "  last_radius: 0.2 mm\n", outputs)).isel(realisation=0)
+    for name in ("radius", "position"):
+        assert data[name].attrs["units"] == "m"
+        np.testing.assert_allclose(data[name], np.linspace(0.0, 2e-4, 9))
+    for case, force in enumerate((50.0, 100.0)):
+        a0 = (0.75 * force * 0.01 / 115e9) ** (1 / 3)
+        parameters = FrettingWear(**SI | {"normal_force": force}, points=9, extent=2e-4 / a0)
+        names = ("worn_profile", "worn_image")
+        alone = MODEL.compute(Block(parameters, {}, 1, (0,), 0, names))
+        for name in names:
+            np.testing.assert_allclose(data[name][case], alone.values[name][0, 0], rtol=1e-9)
 
 
 def test_a_grid_over_friction_and_stiffness_is_solved_once_for_each_distinct_stick_radius(write, capsys):
@@ -139,6 +169,7 @@ def test_every_block_of_a_history_is_kept(write):
         ("  stick_radius: 0.5\n  path: 2\n  wear_rule: exact\n", "3:1", "stick_radius of an oscillation as well"),
         ("  path: 2\n  wear_rule: fast\n", "3:1", "wear_rule exact only, got 'fast'"),
         ("  indenter: {shape: power, exponent: -1}\n  stick_radius: 0.5\n", "4:38", "above 0.1, got -1"),
+        ("  stick_radius: 0.5\n  last_radius: 1 mm\n", "3:1", "write extent, over a0, in a dimensionless campaign"),
         ("  method: fast\n  stick_radius: 0.5\n", "4:3", "write wear_rule"),
         ("  wear_rule: literal\n  stick_radius: 0.5\n", "4:14", "expected 'exact', 'fast' or 'limit'"),
     ],
@@ -222,6 +253,8 @@ def test_a_column_of_one_shape_says_which_shape_the_file_lacks(write, capsys, sh
 def test_impossible_contacts_are_failed_cases_with_a_sentence(write, capsys, parameters, message):
     path = write(parameters)
     Path("profile.csv").write_text("radius [m],height [m]\n0,0\n1e-6,1e-10\n2e-6,4e-10\n3e-6,9e-10\n")
+    assert main(["check", str(path)]) == 0
+    assert message in " ".join(capsys.readouterr().out.split())
     assert main(["run", str(path), "--quiet"]) == 1
     assert "0 done, 1 failed" in capsys.readouterr().out
     main(["status", "wear.zarr", "--failures"])

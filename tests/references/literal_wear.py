@@ -10,7 +10,7 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.uniform_grid import UniformGrid, uniform_grid
-from mdr_dask.physics.wear.forced import farthest_contact
+from mdr_dask.physics.wear.exact import farthest_contact
 from mdr_dask.physics.wear.rules import limit_radius
 from mdr_dask.physics.wear.worn import Worn, check_stick_radius
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
@@ -14,47 +13,35 @@ from mdr_dask.errors import DataError
 from mdr_dask.headings import Column
 from mdr_dask.models.base import Alternatives, Coordinate, Model, Number, Output, Parameters, deferred, quantity
 from mdr_dask.models.data_file import NamedFile
-from mdr_dask.models.parts.indenter import Other
+from mdr_dask.models.parts import indenter
+from mdr_dask.models.parts.indenter import RoundedCone
 from mdr_dask.tables import read_table
 
 
-class Parabola(Parameters):
+class Parabola(indenter.Parabola):
     """A paraboloid, which approximates a sphere."""
 
     shape: Literal["parabola"] = "parabola"
-    radius: float | None = quantity("m", "radius of curvature R at the apex", usual="10 mm", gt=0, default=None)
-
-    @property
-    def power_law(self) -> tuple[float, float]:
-        """Coefficient c (NaN if it is not given) and exponent n of the body c r^n."""
-        return (math.nan if self.radius is None else 0.5 / self.radius), 2.0
+    radius: float | None = quantity(  # type: ignore[assignment]
+        "m", "radius of curvature R at the apex", usual="10 mm", gt=0, default=None
+    )
 
 
-class Cone(Parameters):
+class Cone(indenter.Cone):
     """A cone."""
 
-    shape: Literal["cone"]
-    angle: float | None = quantity(
+    angle: float | None = quantity(  # type: ignore[assignment]
         "rad", "angle between the cone's surface and the plane", usual="10 deg", gt=0, lt=np.pi / 2, default=None
     )
 
-    @property
-    def power_law(self) -> tuple[float, float]:
-        """Coefficient (NaN if it is not given) and exponent of the body c r^n."""
-        return (math.nan if self.angle is None else math.tan(self.angle)), 1.0
 
-
-class Power(Parameters):
+class Power(indenter.Power):
     """A body of revolution c r^n."""
 
-    shape: Literal["power"]
     exponent: float = quantity("1", "exponent n of the body c r^n", usual="2", gt=0.1, le=50)
-    coefficient: float | None = quantity("m^(1-n)", "coefficient c of the body c r^n, in metres", gt=0, default=None)
-
-    @property
-    def power_law(self) -> tuple[float, float]:
-        """Coefficient (NaN if it is not given) and exponent of the body c r^n."""
-        return (math.nan if self.coefficient is None else self.coefficient), self.exponent
+    coefficient: float | None = quantity(  # type: ignore[assignment]
+        "m^(1-n)", "coefficient c of the body c r^n, in metres", gt=0, default=None
+    )
 
 
 class Table(Parameters):
@@ -85,9 +72,9 @@ def profile_columns(file: NamedFile) -> tuple[FloatArray, FloatArray]:
     return table["radius"], table["height"]
 
 
-Indenter = Annotated[Parabola | Cone | Power | Other | Table, Field(discriminator="shape")]
+Indenter = Annotated[Parabola | Cone | Power | RoundedCone | Table, Field(discriminator="shape")]
 #: Bodies that are not power laws; each indentation depth needs its own image.
-Pressed = Other | Table
+Pressed = RoundedCone | Table
 
 #: The parameter that gives the size of a body in a dimensional campaign.
 _SIZES = {"parabola": "radius", "cone": "angle", "power": "coefficient"}
@@ -133,8 +120,8 @@ class FrettingWear(Parameters):
             ("stick_radius",),
         ),
     )
-    overrides: ClassVar[Mapping[str, str]] = {"history": "cycles", "path": "cycles"}
-    settings: ClassVar[frozenset[str]] = frozenset({"cells", "extent", "points"})
+    overrides: ClassVar[Mapping[str, str]] = {"history": "cycles", "path": "cycles", "last_radius": "extent"}
+    settings: ClassVar[frozenset[str]] = frozenset({"cells", "extent", "last_radius", "points"})
     requires: ClassVar[Mapping[str, tuple[str, str]]] = {"xi": ("wear_rule", "fast")}
     indenter: Indenter = Field(Parabola(), description="virgin body; its size is not needed without dimensions")
     wear_rule: Literal["exact", "fast", "limit"] = Field(
@@ -177,6 +164,9 @@ class FrettingWear(Parameters):
     wear_coefficient_scatter: float = quantity("1", "relative scatter of the wear coefficient", ge=0, le=2, default=0.0)
     history: Annotated[tuple[LoadStep, ...], Field(strict=False, description="blocks of load in place of cycles")] = ()
     extent: float = quantity("1", "last radius of the profiles, over a0", gt=0, le=10, default=1.6)
+    last_radius: float | None = quantity(
+        "m", "last radius of the profiles, in place of extent: radius and position are then lengths", gt=0, default=None
+    )
     points: int = quantity("1", "points of the profiles", ge=2, le=10000, default=161)
 
     @field_validator("history", mode="before")
@@ -225,6 +215,8 @@ class FrettingWear(Parameters):
         for other, name in self.inactive.items():
             if getattr(self, other) != type(self).model_fields[other].default:
                 raise ValueError(f"{name} replaces {other}: leave out one or the other")
+        if self.dimensionless and self.last_radius is not None:
+            raise ValueError("last_radius is a length: write extent, over a0, in a dimensionless campaign")
         return self
 
     @model_validator(mode="after")
@@ -286,17 +278,19 @@ OUTPUTS = (
 )
 
 
-def axis(parameters: FrettingWear) -> FloatArray:
-    """Return the radii or positions of the profiles, divided by a0."""
-    return np.linspace(0.0, parameters.extent, parameters.points)
-
-
 def coordinates(parameters: FrettingWear) -> dict[str, Coordinate]:
     """Return the coordinates of the outputs: radii, positions and block numbers."""
-    places = axis(parameters)
+    if parameters.last_radius is None:
+        places, unit, over = (
+            np.linspace(0.0, parameters.extent, parameters.points),
+            "1",
+            " over the first contact radius a0",
+        )
+    else:
+        places, unit, over = np.linspace(0.0, parameters.last_radius, parameters.points), "m", ""
     return {
-        "radius": Coordinate(places, "1", "radius over the first contact radius a0"),
-        "position": Coordinate(places, "1", "position over the first contact radius a0"),
+        "radius": Coordinate(places, unit, f"radius{over}"),
+        "position": Coordinate(places, unit, f"position{over}"),
         "block": Coordinate(np.arange(1.0, max(len(parameters.history), 1) + 1.0), "1", "block of the load history"),
     }
 
@@ -323,6 +317,7 @@ MODEL = Model(
     coordinates=coordinates,
     distinct=deferred(_SOLVE, "distinct"),
     units=units,
+    notes=deferred("mdr_dask.models.fretting_wear.reduction", "notes"),
     numbers=(
         Number("stick_share", "stick_border / contact_radius", "stick radius over the radius of the wear scar"),
         Number(

@@ -5,6 +5,7 @@ These numbers are the exponent n, the image g_c at the stick border, and the num
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -16,7 +17,7 @@ from mdr_dask.errors import distinguishable
 from mdr_dask.models.base import Block, canonical
 from mdr_dask.models.data_file import NamedFile
 from mdr_dask.models.fretting_wear.declaration import FrettingWear, Indenter, Pressed, Table, profile_columns
-from mdr_dask.models.parts.indenter import Other
+from mdr_dask.models.parts.indenter import RoundedCone
 
 if TYPE_CHECKING:
     from mdr_dask.physics.mdr.revolution import TableProfile
@@ -53,7 +54,7 @@ def _power_laws(block: Block[FrettingWear]) -> tuple[FloatArray, FloatArray]:
     """Return coefficient and exponent of every case; a number that is not given is NaN."""
     none = np.nan, np.nan
     coefficient, exponent = np.array(
-        [none if isinstance(one, Pressed) else one.power_law for one in indenters(block)]
+        [none if isinstance(one, Pressed) else one.power_law() for one in indenters(block)]
     ).T
     varied = {path.removeprefix("indenter."): np.asarray(column) for path, column in block.columns.items()}
     exponent = varied.get("exponent", exponent)
@@ -182,7 +183,7 @@ def _pressed_table(file: NamedFile, depth: float) -> TableProfile:
 
 
 @lru_cache(maxsize=64)
-def _pressed_body(indenter: Other, depth: float) -> TableProfile:
+def _pressed_body(indenter: RoundedCone, depth: float) -> TableProfile:
     from mdr_dask.physics.mdr.revolution import from_body
 
     return from_body(indenter.line(), depth)
@@ -199,3 +200,17 @@ def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: di
             f"the amplitude is in gross slip: it must stay below mu E* d0 / G*, got {times} times that; "
             "lower the amplitude or raise friction or load",
         )
+
+
+def notes(sets: Sequence[FrettingWear]) -> tuple[str, ...]:
+    """Return the reasons why cases of a study will fail, as far as they follow from the parameters without scatter."""
+    texts: list[str] = []
+    for parameters in sets:
+        scatter = dict.fromkeys(("friction_scatter", "amplitude_scatter", "wear_coefficient_scatter"), 0.0)
+        block = Block(parameters.model_copy(update=scatter), {}, 1, (0,), 0, ())
+        numbers, messages = reduce_block(block)
+        refuse_gross_slip(block, numbers, messages)
+        texts += messages.values()
+    if not texts:
+        return ()
+    return (f"{len(texts)} of the {len(sets)} tried parameter sets will fail: {texts[0]}",)

@@ -5,16 +5,15 @@ Each different combination of body, stick radius and rule is solved once for all
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.models.base import Block, Result, Status
-from mdr_dask.models.fretting_wear.declaration import FAST_AT_DEPTH, MODEL, FrettingWear, Indenter, Pressed, axis
+from mdr_dask.models.fretting_wear.declaration import FAST_AT_DEPTH, MODEL, FrettingWear, Indenter, Pressed
 from mdr_dask.models.fretting_wear.reduction import (
     Numbers,
     has_tables,
@@ -25,12 +24,10 @@ from mdr_dask.models.fretting_wear.reduction import (
 )
 from mdr_dask.models.parts.accuracy import missed_accuracy
 from mdr_dask.physics.mdr.revolution import PowerProfile, Profile
-from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear import rules
-from mdr_dask.physics.wear.exact import exact, limit_under_force
-from mdr_dask.physics.wear.forced import SETTINGS as FORCED
+from mdr_dask.physics.wear.exact import COARSEST_OF_MOVING, exact
 from mdr_dask.physics.wear.history import LoadBlock, history
-from mdr_dask.physics.wear.worn import Worn
+from mdr_dask.physics.wear.worn import Worn, virgin_load
 
 #: Outputs that have a closed form; the closed forms are computed for many cases at once.
 _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border")
@@ -39,7 +36,7 @@ _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border"
 _RENAMED = {"contact_force": "normal_force"}
 #: Error of the profile, divided by eta d0, for which the evolution is solved: `_USUAL` if the campaign states no
 #: accuracy; no solution uses a value below `_FINEST`.
-_USUAL, _FINEST = 1e-3, 1e-5
+_USUAL, _FINEST = 1e-3, 3e-6
 #: If the campaign states an accuracy, the first solution uses `_FIRST` times the accuracy as this error. If an output
 #: misses the accuracy, the next solution uses a smaller error, by the factor `_FINER`.
 _FIRST, _FINER = {"depth": 0.2, "force": 0.6}, 0.25
@@ -50,7 +47,10 @@ Places = list[tuple[int, int]]
 
 @dataclass(frozen=True)
 class Task:
-    """Input of a solution that several cases share: all data except the number of cycles and xi."""
+    """Input of a solution that several cases share: all data except the number of cycles and xi.
+
+    `extent` is the last radius of the profiles, divided by a0.
+    """
 
     table: Pressed | None
     depth: float
@@ -60,6 +60,7 @@ class Task:
     hold: str
     cells: int
     blocks: tuple[tuple[float, float, float], ...]
+    extent: float
 
     @property
     def profile(self) -> Profile:
@@ -109,7 +110,7 @@ def seconds(block: Block[FrettingWear]) -> float:
 def _followed(hold: str, accuracy: float) -> float:
     """Return the estimated time, in seconds, of one evolution and its errors, without the evaluation at single N."""
     if hold == "force":
-        return 0.09 * float(max(FORCED.coarsest / accuracy, 1.0) ** 1.1)
+        return 0.09 * float(max(COARSEST_OF_MOVING / accuracy, 1.0) ** 1.1)
     return 0.012 * float((_USUAL / accuracy) ** 0.6)
 
 
@@ -190,7 +191,7 @@ def _solve_plain(
     found = dict(zip(_CLOSED_FORMS, (*results, stick), strict=True))
     for name, array in values.items():
         plain, is_error = _plain_name(name)
-        array[good] = (rules.SETTINGS.error if is_error else 1.0) * found[plain][back]
+        array[good] = (rules.ERROR if is_error else 1.0) * found[plain][back]
     return int(rows.shape[1])
 
 
@@ -218,10 +219,11 @@ def _solve_each(
     messages: dict[tuple[int, int], str],
 ) -> int:
     """Solve the tasks one after another, each for all its numbers of cycles; return the number of solutions."""
-    solves, places = 0, axis(block.parameters)
+    solves = 0
     for task, wanted in _tasks(block, numbers, status).items():
+        places = np.linspace(0.0, task.extent, block.parameters.points)
         try:
-            contacts = _contacts(task, list(wanted), _Demand(block, places))
+            contacts = _contacts(task, list(wanted), block, places)
         except (ValueError, ArithmeticError) as problem:
             kind = Status.FAILED if isinstance(problem, ValueError) else Status.NOT_CONVERGED
             for position in (p for positions in wanted.values() for p in positions):
@@ -250,34 +252,19 @@ def _answer(records: Sequence[Worn], name: str, places: FloatArray) -> float | F
     return np.array(answers) if name.startswith("block_") else answers[0]
 
 
-def _judged(block: Block[FrettingWear]) -> list[str]:
-    """Return the outputs to which an accuracy applies."""
-    return [name for name in block.outputs if name in MODEL.companions]
+def _missed(records: Sequence[Worn], block: Block[FrettingWear], places: FloatArray) -> str:
+    """Return a message about the outputs that miss the accuracy, or an empty string if all outputs reach it."""
+    if block.accuracy is None:
+        return ""
 
-
-class _Demand:
-    """The accuracy and the outputs that a block requests."""
-
-    def __init__(self, block: Block[FrettingWear], places: FloatArray) -> None:
-        self.accuracy, self.places = block.accuracy, places
-        self.outputs = _judged(block)
-        self.errors = self.accuracy is not None or any(_plain_name(name)[1] for name in block.outputs)
-
-    def missed(self, records: Sequence[Worn]) -> str:
-        """Return a message about the outputs that miss the accuracy, or an empty string if all outputs reach it."""
-        if self.accuracy is None:
-            return ""
-        values = {name: self._finite(records, name) for name in self.outputs}
-        errors = {name: self._finite(records, MODEL.companions[name].name) for name in self.outputs}
-        return missed_accuracy(values, errors, self.accuracy).get(0, "")
-
-    def _finite(self, records: Sequence[Worn], name: str) -> FloatArray:
-        """Return an output with a first axis for the case.
-
-        Infinite values, such as the pressure at a sharp tip, become NaN.
-        """
-        answer = np.asarray(_answer(records, name, self.places))
+    def finite(name: str) -> FloatArray:
+        """Return an output with a first axis for the case; infinite values, as at a sharp tip, become NaN."""
+        answer = np.asarray(_answer(records, name, places))
         return np.where(np.isfinite(answer), answer, np.nan)[None]
+
+    errors = {name: error.name for name, error in MODEL.companions.items() if name in block.outputs}
+    values = {name: finite(name) for name in errors}
+    return missed_accuracy(values, {name: finite(error) for name, error in errors.items()}, block.accuracy).get(0, "")
 
 
 def _solves_of(task: Task, wanted: Collection[tuple[float, float]]) -> int:
@@ -327,6 +314,7 @@ def _task(parameters: FrettingWear, indenter: Indenter, numbers: Numbers, place:
         parameters.hold,
         parameters.cells if blocks else 0,
         blocks,
+        parameters.extent if parameters.last_radius is None else parameters.last_radius / float(numbers.length[place]),
     )
 
 
@@ -335,18 +323,21 @@ def _first_resolution(accuracy: float | None, hold: str) -> float:
     return _USUAL if accuracy is None else max(_FIRST[hold] * accuracy, _FINEST)
 
 
-def _contacts(task: Task, wanted: Sequence[tuple[float, float]], demand: _Demand) -> list[tuple[Sequence[Worn], str]]:
+def _contacts(
+    task: Task, wanted: Sequence[tuple[float, float]], block: Block[FrettingWear], places: FloatArray
+) -> list[tuple[Sequence[Worn], str]]:
     """Solve a task for all its pairs (N, xi), and repeat pairs whose outputs miss the accuracy at a finer resolution.
 
     Return the contacts, each with a message about the outputs that miss the accuracy at the last resolution. The final
     resolution of a result depends only on its own case. Results with the same resolution are solved together.
     """
-    resolution, left = _first_resolution(demand.accuracy, task.hold), list(range(len(wanted)))
+    resolution, left = _first_resolution(block.accuracy, task.hold), list(range(len(wanted)))
+    errors = block.accuracy is not None or any(_plain_name(name)[1] for name in block.outputs)
     found: dict[int, tuple[Sequence[Worn], str]] = {}
     while left:
-        contacts = _solved(task, [wanted[number] for number in left], resolution, errors=demand.errors)
+        contacts = _solved(task, [wanted[number] for number in left], resolution, errors=errors)
         for number, records in zip(left, contacts, strict=True):
-            found[number] = records, demand.missed(records)
+            found[number] = records, _missed(records, block, places)
         refinable = task.rule != "fast" and not task.blocks and resolution > _FINEST
         left = [number for number in left if found[number][1] and refinable]
         resolution = max(_FINER * resolution, _FINEST)
@@ -361,25 +352,18 @@ def _solved(
     if task.blocks:
         return [_loaded(task, profile, errors=errors)] * len(wanted)
     stick = profile.inside(task.level) if task.level > 0.0 else 0.0
-    amounts = [amount for amount, _ in wanted]
-    if task.rule in ("exact", "sliding"):
-        contacts = exact(profile, stick, amounts, accuracy, constant_force=force, errors=errors)
-    elif task.rule == "limit":
-        end: Callable[[], Worn] = partial(rules.limit, profile, stick)
+    if task.rule == "fast":
         if force:
-            end = partial(limit_under_force, profile, stick, accuracy, errors=errors)
-        contacts = [end()] * len(wanted)
-    elif force:
-        raise ValueError(FAST_AT_DEPTH)
-    else:
-        contacts = [rules.fast(profile, stick, cycles, xi) for cycles, xi in wanted]
+            raise ValueError(FAST_AT_DEPTH)
+        return [(rules.fast(profile, stick, cycles, xi),) for cycles, xi in wanted]
+    amounts = [np.inf if task.rule == "limit" else amount for amount, _ in wanted]
+    contacts = exact(profile, stick, amounts, accuracy, constant_force=force, errors=errors)
     return [(contact,) for contact in contacts]
 
 
 def _loaded(task: Task, profile: Profile, *, errors: bool) -> list[Worn]:
     """Return the contacts after every block of a history."""
-    abscissa, weight = gauss(64)
-    first = 2.0 * float((1.0 - profile.image(abscissa)) @ weight)
+    first = 2.0 * virgin_load(profile, 1.0)
     blocks = [
         LoadBlock(
             path,

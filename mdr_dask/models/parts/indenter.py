@@ -1,4 +1,4 @@
-"""Parameters of indenters."""
+"""Parameters of indenters. The model of fretting wear makes the sizes optional and adds measured profiles."""
 
 from __future__ import annotations
 
@@ -27,7 +27,10 @@ class _PowerLaw(Parameters):
     """A body of revolution whose height is a power of the distance from its axis."""
 
     def power_law(self) -> tuple[float, float]:
-        """Return coefficient and exponent of the body c r^n."""
+        """Return coefficient and exponent of the body c r^n.
+
+        The coefficient is NaN if the size of the body is not given, as in a dimensionless study of wear.
+        """
         raise NotImplementedError
 
     def line(self) -> Shape:
@@ -47,7 +50,7 @@ class Cone(_PowerLaw):
 
     def power_law(self) -> tuple[float, float]:
         """Return coefficient and exponent of the body c r^n."""
-        return math.tan(self.angle), 1.0
+        return (math.nan if self.angle is None else math.tan(self.angle)), 1.0
 
 
 class Parabola(_PowerLaw):
@@ -58,7 +61,7 @@ class Parabola(_PowerLaw):
 
     def power_law(self) -> tuple[float, float]:
         """Return coefficient and exponent of the body c r^n."""
-        return 1 / (2 * self.radius), 2.0
+        return (math.nan if self.radius is None else 1 / (2 * self.radius)), 2.0
 
 
 class Power(_PowerLaw):
@@ -72,7 +75,7 @@ class Power(_PowerLaw):
 
     def power_law(self) -> tuple[float, float]:
         """Return coefficient and exponent of the body c r^n."""
-        return self.coefficient, self.exponent
+        return (math.nan if self.coefficient is None else self.coefficient), self.exponent
 
 
 class RoundedCone(Parameters):
@@ -92,6 +95,4 @@ class RoundedCone(Parameters):
         return Line(steepness, self.tip_radius * steepness)
 
 
-#: Bodies of revolution other than power laws, for sliding and wear.
-Other = RoundedCone
-Indenter = Annotated[Plane | Cone | Parabola | Power | Other, Field(discriminator="shape")]
+Indenter = Annotated[Plane | Cone | Parabola | Power | RoundedCone, Field(discriminator="shape")]

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
 from mdr_dask.physics.linear import Factors, factorise
-from mdr_dask.physics.mdr.half_integrals import Panels, graded_panels
+from mdr_dask.physics.mdr.half_integrals import Panels
 from mdr_dask.physics.outcome import Outcome
 
 #: Local error of a BDF step of order 1, 2, 3, as a fraction of the difference between the step's result and the
@@ -24,124 +24,21 @@ from mdr_dask.physics.outcome import Outcome
 _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
 
 
-class Settings(NamedTuple):
-    """Tuned numbers of the time integration; `python -m benchmarks accuracy wear` measures their effect.
-
-    Parameters
-    ----------
-    most_steps, most_iterations : int
-        Number of steps after which a march fails, and number of Newton iterations after which a step fails.
-    growth : float
-        Largest ratio of a step to the previous step.
-    slow : float
-        Ratio of successive Newton corrections above which the Jacobian is renewed.
-    theta_ratio : float
-        A Jacobian is reused if the ratio of the present theta to the theta of the Jacobian, and the inverse of this
-        ratio, are at most this value.
-    difference : float
-        Step of the finite differences with respect to the edge and to the unknowns after the edge.
-    first : float
-        Longest first step, as a fraction of the time scale of the contact. With this value, the error of small amounts
-        of wear is at most 2 %.
-    shortest, beginning : float
-        The march fails if a step is shorter than `shortest` times the longest step so far (or times the first step, if
-        that is shorter), or than `beginning` times the first step. In marches that succeeded, no later step was
-        shorter than 0.13 times the longest step, but some first steps had to be reduced by a factor of 1e-5.
-    """
-
-    most_steps: int = 20000
-    most_iterations: int = 12
-    growth: float = 1.8
-    slow: float = 0.4
-    theta_ratio: float = 1.7
-    difference: float = 1e-7
-    first: float = 1e-3
-    shortest: float = 1e-4
-    beginning: float = 1e-9
-
-
-SETTINGS = Settings()
-
-
-class Resolution(NamedTuple):
-    """Resolution of an evolution: panels and steps for an accuracy of f, relative to eta d0.
-
-    Parameters
-    ----------
-    accuracy : float
-        The accuracy for which the panels are chosen.
-    wider : float
-        Factor on the allowed error of a step.
-    fewer : int
-        Number by which the nodes of each panel and the halvings at each end are reduced, in a rougher solution.
-    thinned : int
-        Largest number of nodes by which a panel is reduced in a rougher solution.
-    order : int, optional
-        Nodes of a panel; by default four, or six for accuracies of 3e-5 and below.
-    rough : tuple of float
-        Factors on the step tolerance in the two rougher solutions, from which the error is estimated.
-    slowness : float
-        Factor on the differences from the rougher solutions; above 1 if the error falls more slowly than usual.
-    second : float
-        Weight of the difference from the second rougher solution. It matters where the first rougher solution agrees by
-        chance.
-    newton : float
-        Tolerance of Newton's method as a fraction of the step tolerance; used only under constant force.
-    """
-
-    accuracy: float
-    wider: float = 1.0
-    fewer: int = 0
-    thinned: int = 2
-    order: int | None = None
-    rough: tuple[float, float] = (8.0, 64.0)
-    slowness: float = 1.0
-    second: float = 0.5
-    newton: float = 1e-3
-
-    @property
-    def step(self) -> float:
-        """The error allowed in a step."""
-        return 0.2 * self.accuracy * self.wider
-
-    @property
-    def first(self) -> float:
-        """The length of the first step, as a fraction of the time scale of the contact."""
-        return min(0.1 * self.accuracy, SETTINGS.first) * self.wider
-
-    def panels(self, near: int, fewest_digits: float = 2.0, sharpness: float = 1.0, coarser: float = 1.0) -> Panels:
-        """Return graded panels.
-
-        The panels at the inner border have `near` more halvings than the panels at the edge. The number of halvings at
-        the inner border is then multiplied by `sharpness`.
-        """
-        digits = max(-np.log10(coarser * self.accuracy), fewest_digits)
-        # with fewer halvings, the error of the panels at the moving edge would make the steps very short
-        levels = round(2.7 * digits - 3.3)
-        order = self.order or (4 if self.accuracy > 3e-5 else 6)
-        left, right = (max(halvings - self.fewer, 0) for halvings in (levels + near, levels))
-        return graded_panels(round(sharpness * left), right, order - min(self.fewer, self.thinned))
-
-    def panels_of_a_punch(self, sharpness: float) -> Panels:
-        """Return panels for a pressure that jumps at the edge in the end, and for a power-law profile at the axis."""
-        digits = max(-np.log10(self.accuracy), 2.0)
-        halvings = round(2.0 * digits) - self.fewer
-        # the error at the tip is the height in the innermost panel; under a cone, a halving divides it by sqrt(2)
-        tip = max(halvings + 1, 3.3 * digits - 2.2 - self.fewer)
-        return graded_panels(round(sharpness * tip), halvings + 4, 4 - min(self.fewer, self.thinned))
-
-    def finer(self, factor: float) -> Resolution:
-        """Return a finer resolution with a smaller tolerance of Newton's method, for use after a march has failed."""
-        return self._replace(accuracy=self.accuracy / factor, newton=0.01 * self.newton)
-
-    def halfway_to(self, finer: Resolution) -> Resolution:
-        """Return this resolution with the geometric mean of its step tolerance and the tolerance of `finer`."""
-        return self._replace(wider=float(np.sqrt(self.wider * finer.wider)))
-
-    def rougher(self) -> tuple[Resolution, Resolution]:
-        """Return the two rougher resolutions."""
-        first, second = self.rough
-        return self._replace(wider=first * self.wider, fewer=1), self._replace(wider=second * self.wider, fewer=2)
+MOST_STEPS = 20000
+"""Number of steps after which a march fails: about a hundred times more than usual."""
+MOST_ITERATIONS = 12
+"""Number of Newton iterations after which a step fails; a step that is short enough needs about three."""
+GROWTH = 1.8
+"""Largest ratio of a step to the previous step; formulas of order 3 need a bound to be stable."""
+SLOW = 0.4
+"""Ratio of successive Newton corrections above which the Jacobian is renewed."""
+DIFFERENCE = 1e-7
+"""Step of the finite differences with respect to the unknowns after the image; about the root of the rounding error."""
+SHORTEST = 1e-4
+"""A march fails if a step is shorter than this value times the longest step so far, or than this value times the first
+step if that is shorter. In marches that succeeded, no later step was shorter than 0.13 times the longest step."""
+NEWTON = 1e-3
+"""Tolerance of Newton's method as a fraction of the step tolerance, so that its error does not matter."""
 
 
 class NotConvergedError(ArithmeticError):
@@ -171,10 +68,6 @@ class Moment:
 
 class Problem(Protocol):
     """One kind of slip, given by the equations of one time step."""
-
-    @property
-    def newton(self) -> float:
-        """Return the tolerance of Newton's method as a fraction of the step tolerance."""
 
     @property
     def panels(self) -> Panels:
@@ -243,11 +136,10 @@ def march(
     history = [settled(problem) if start is None else start]
     step, longest = first, 0.0
     while history[-1].time < end and not stops(history[-1]):
-        if len(history) > SETTINGS.most_steps:
-            raise NotConvergedError(f"{Outcome.TOO_MANY_STEPS.sentence} of the wear law: {SETTINGS.most_steps}")
+        if len(history) > MOST_STEPS:
+            raise NotConvergedError(f"{Outcome.TOO_MANY_STEPS.sentence} of the wear law: {MOST_STEPS}")
         time = history[-1].time
-        least = max(SETTINGS.beginning * first, SETTINGS.shortest * min(longest, first))
-        if time + step == time or step < least:
+        if time + step == time or step < SHORTEST * min(longest, first):
             raise NotConvergedError(f"{Outcome.STEP_TOO_SMALL.sentence} in the wear law at {time:.6g}")
         moment, error = _try_step(problem, newton, history, time + step)
         power = 1.0 / (min(len(history), 3) + 1)
@@ -256,7 +148,7 @@ def march(
             continue
         history.append(moment)
         longest = max(longest, step)
-        growth = min(SETTINGS.growth, 0.85 * (tolerance / max(error, 1e-300)) ** power)
+        growth = min(GROWTH, 0.85 * (tolerance / max(error, 1e-300)) ** power)
         step *= growth if growth > 1.1 or growth < 0.9 else 1.0
     return history
 
@@ -272,43 +164,28 @@ def settled(problem: Problem) -> Any:
     return virgin if unknowns is None else problem.moment(0.0, unknowns, 0.0, known(unknowns), [virgin])
 
 
-class Dense:
-    """The results of a march as functions of time, interpolated with the polynomial of the step around the time."""
+def at(problem: Problem, history: Sequence[Any], time: float, tolerance: float) -> tuple[int, Any]:
+    """Return the number of steps before a time, and the moment at this time, which a step of its own reaches.
 
-    def __init__(self, history: Sequence[Any]) -> None:
-        self.history = history
-        self.times = np.array([moment.time for moment in history])
+    Parameters
+    ----------
+    problem, tolerance
+        As in :func:`march`, whose result is `history`.
+    time : float
+        A time within the history.
 
-    def steps(self, time: float) -> int:
-        """Return the number of steps up to and including the step that contains a time."""
-        return int(np.searchsorted(self.times, time))
-
-    def around(self, time: float) -> tuple[Any, Any]:
-        """Return the moments at the beginning and end of the step that contains a time."""
-        last = self.steps(time)
-        return self.history[max(last - 1, 0)], self.history[last]
-
-    def near(self, time: float) -> tuple[Sequence[Any], FloatArray]:
-        """Return the moment at or after a time and up to three earlier moments, with their interpolation weights."""
-        last = self.steps(time)
-        near = slice(max(last - 3, 0), last + 1)
-        return self.history[near], _lagrange(self.times[near], time)
-
-    def unknowns(self, time: float) -> FloatArray:
-        """Return the unknowns at a time."""
-        moments, weights = self.near(time)
-        return np.asarray(weights @ np.array([moment.unknowns for moment in moments]))
-
-    def accumulated(self, time: float) -> FloatArray:
-        """Return the accumulated quantity at the nodes, at a time."""
-        moments, weights = self.near(time)
-        return np.asarray(weights @ np.array([moment.accumulated for moment in moments]))
-
-    def number(self, time: float, numbers: FloatArray) -> float:
-        """Return a number at a time, interpolated between its values `numbers` at all moments."""
-        last = self.steps(time)
-        near = slice(max(last - 3, 0), last + 1)
-        return float(_lagrange(self.times[near], time) @ numbers[near])
+    Raises
+    ------
+    NotConvergedError
+        If the step fails.
+    """
+    before = int(np.searchsorted([moment.time for moment in history], time))
+    if history[before].time == time:
+        return before, history[before]
+    moment, _ = _try_step(problem, _Newton(problem, tolerance), history[:before], time)
+    if moment is None:
+        raise NotConvergedError(f"the wear law has no solution at {time:.6g}")
+    return before, moment
 
 
 def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatArray:
@@ -349,14 +226,12 @@ class _Newton:
     """Newton's method with a Jacobian that is reused from step to step while the iteration converges."""
 
     def __init__(self, problem: Problem, tolerance: float) -> None:
-        self.problem, self.enough = problem, problem.newton * tolerance
+        self.problem, self.enough = problem, NEWTON * tolerance
         self.factors: Factors | None = None
-        self.theta = np.nan
 
     def solve(self, guess: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray]) -> FloatArray | None:
         """Return the unknowns of one step, or None if the iteration fails."""
-        ratio = theta / self.theta if self.theta else np.nan
-        if self.factors is not None and 1.0 / SETTINGS.theta_ratio < ratio < SETTINGS.theta_ratio:
+        if self.factors is not None:
             found = self._iterate(guess, theta, known, fresh=False)
             if found is not None:
                 return found
@@ -370,7 +245,7 @@ class _Newton:
         Where convergence is slow, renew the Jacobian if `fresh`; otherwise return None.
         """
         unknowns, last, renew = guess.copy(), np.inf, fresh
-        for _ in range(SETTINGS.most_iterations):
+        for _ in range(MOST_ITERATIONS):
             residual = self.problem.residual(unknowns, theta, known(unknowns))
             if not np.isfinite(residual).all():
                 return None
@@ -387,7 +262,7 @@ class _Newton:
             left = size * rate / (1.0 - rate) if 0.0 < rate < 0.5 else size
             if left < self.enough:
                 return unknowns
-            renew = rate > SETTINGS.slow
+            renew = rate > SLOW
             if renew and not fresh:
                 return None
             last = size
@@ -400,10 +275,10 @@ class _Newton:
         matrix = self.problem.jacobian(unknowns, theta)
         for column in range(self.problem.panels.nodes.size - 1, unknowns.size):
             moved = unknowns.copy()
-            moved[column] += SETTINGS.difference
+            moved[column] += DIFFERENCE
             shifted = self.problem.residual(moved, theta, known(moved))
-            matrix[:, column] = (shifted - residual) / SETTINGS.difference
-        self.factors, self.theta = factorise(matrix), theta
+            matrix[:, column] = (shifted - residual) / DIFFERENCE
+        self.factors = factorise(matrix)
 
 
 @jit

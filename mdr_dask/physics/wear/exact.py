@@ -1,7 +1,7 @@
-"""Worn contacts by the exact evolution, with errors.
+"""Worn contacts by the exact evolution, with errors: fretting and sliding, at constant depth and under constant force.
 
-The conditions are fretting at constant depth, fretting at constant force, and sliding. Each contact is solved three
-times, with coarser panels and longer steps each time, and the error is estimated from the differences.
+Each contact is solved three times, with coarser panels and longer steps each time, and the error is estimated from the
+differences.
 """
 
 from __future__ import annotations
@@ -9,41 +9,100 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.mdr.half_integrals import interpolate
-from mdr_dask.physics.mdr.revolution import Profile
-from mdr_dask.physics.wear.approach import nearly_limit
-from mdr_dask.physics.wear.evolution import Dense, NotConvergedError, Resolution, integral_along, march
-from mdr_dask.physics.wear.forced import (
-    border_moves,
-    forced_contacts,
-    forced_end,
-    forced_resolution,
-    least_edge_error,
-)
+from mdr_dask.physics.mdr.half_integrals import Panels, graded_panels, interpolate
+from mdr_dask.physics.mdr.revolution import Profile, bisect
+from mdr_dask.physics.mdr.transforms import gauss
+from mdr_dask.physics.wear.evolution import NotConvergedError, at, integral_along, march
 from mdr_dask.physics.wear.rules import limit, limit_radius
-from mdr_dask.physics.wear.slip import FixedBorder, GrossSlip, PartialSlip, partial_slip
-from mdr_dask.physics.wear.worn import Scar, Worn, check_stick_radius, contact_pressure, virgin_load, worn_image
+from mdr_dask.physics.wear.slip import GrossSlip, PartialSlip, SlipMoment, partial_slip, rising
+from mdr_dask.physics.wear.worn import (
+    Scar,
+    Worn,
+    check_stick_radius,
+    contact_pressure,
+    virgin_load,
+    worn_by,
+    worn_height,
+    worn_image,
+)
 
-#: Accuracies above this value are replaced by this value.
 COARSEST = 1e-2
-#: For fretting at constant depth. `WIDER` has pairs of accuracy and factor on the step tolerance. `THIN` is the width
-#: 1 - c of the slip annulus below which this factor tends to 1. `SECOND` is the weight of the second rougher solution
-#: in the error. See ``python -m benchmarks accuracy wear``.
-WIDER, THIN, SECOND = ((1e-4, 1.0), (3e-4, 1.5), (1e-3, 4.0), (3e-3, 5.0), (1e-2, 3.0)), 0.1, 0.25
-#: For fretting at constant depth, panels are chosen for `COARSER` times the accuracy. The product is limited to
-#: `COARSER_UNTIL`, or to the accuracy if the accuracy is larger.
-COARSER, COARSER_UNTIL = 1.6, 5e-3
-#: The pairs of `WIDER` for gross slip at constant depth. If the panels are fine enough, only the error of the edge
-#: remains.
-SLID_WIDER = (1e-3, 1.0), (3e-3, 3.0), (1e-2, 1.0)
-#: For gross slip. `NEAR_AXIS` is the radius, in units of a0, at which the exponent of a body is evaluated. `SHARPEST`
-#: is the largest factor on the number of halvings of the panels at the tip of a sharp body.
-NEAR_AXIS, SHARPEST = 1e-5, 8.0
-Solver = Callable[[Profile, float, Sequence[float], Resolution], dict[float, Worn]]
+"""Accuracies above this value are replaced by this value: the panels are not coarser than that."""
+COARSEST_OF_MOVING = 3e-4
+"""The same for a moving border. Longer steps do not follow the border, so that more steps fail and the solution takes
+longer."""
+ENDED = 1e4
+"""N / sqrt(a^2 - c^2) from which on a contact is its limiting profile, where a is a bound of the contact radius. The
+difference decreases at least as fast as exp(-N / (5 sqrt(a^2 - c^2))), so it is below the rounding error."""
+JUMP = 0.1
+"""The border stops when y in the panel next to the border exceeds this value, because the image jumps there."""
+LOWEST = 1e-2
+"""A step that gives y below minus this value is rejected, and the border stops at the moment before this step."""
+ROUGHER = 4.0
+"""Factor on the step tolerance from each solution to the next rougher one."""
+EDGE = 0.2
+"""Least stated error of a radius, as a fraction of its change in the last time step. All solutions have this error in
+common, because a radius that the edge passes within a step wears from the end of this step on."""
+NEAR_AXIS = 1e-5
+"""Radius, in units of a0, at which the exponent of a body at its tip is evaluated."""
+SHARPEST = 8.0
+"""Largest factor on the number of halvings of the panels at the tip of a sharp body in gross slip."""
+
+
+class Resolution(NamedTuple):
+    """Panels and steps for an accuracy of f, relative to eta d0.
+
+    Parameters
+    ----------
+    accuracy : float
+        The accuracy.
+    rougher : int
+        0 for the solution, 1 and 2 for the two rougher solutions from which its error is estimated.
+    """
+
+    accuracy: float
+    rougher: int = 0
+
+    @property
+    def step(self) -> float:
+        """The error allowed in a step."""
+        return 0.2 * self.accuracy * ROUGHER**self.rougher
+
+    @property
+    def first(self) -> float:
+        """The length of the first step, as a fraction of the time scale of the contact.
+
+        The upper limit keeps the error of small amounts of wear below 2 %.
+        """
+        return min(0.1 * self.accuracy, 1e-3) * ROUGHER**self.rougher
+
+    def panels(self, near: int) -> Panels:
+        """Return panels of partial slip, with `near` more halvings at the inner border than at the edge."""
+        digits = -np.log10(self.accuracy)
+        # with fewer halvings, the error of the panels at the moving edge would make the steps very short
+        levels = max(round(2.7 * digits - 3.3), 2)
+        order = 4 if digits < 3.8 else 5 if digits < 4.5 else 6
+        left, right = (max(halvings - self.rougher, 0) for halvings in (levels + near, levels))
+        return graded_panels(left, right, order - min(self.rougher, 1))
+
+    def panels_in_gross_slip(self, sharpness: float) -> Panels:
+        """Return panels for a pressure that jumps at the edge in the end, and for a power-law profile at the axis.
+
+        `sharpness` is 2 / n for a tip of the power n < 2. The error at the tip is the height in the innermost panel.
+        """
+        digits = -np.log10(self.accuracy)
+        tip = max(round(2.0 * digits) + 1 - self.rougher, 3.3 * digits - 2.2 - self.rougher)
+        edge = round(2.0 * digits) + 4 - self.rougher
+        return graded_panels(round(sharpness * tip), edge, 4 - min(self.rougher, 2))
+
+
+#: Return the contacts after all wanted amounts of wear, from one solution at a resolution.
+Solver = Callable[[Resolution], dict[float, Worn]]
 
 
 def exact(
@@ -65,9 +124,10 @@ def exact(
         c of the virgin contact, between 0 and 1; 0 means gross slip in one direction, with df/ds = p in
         the whole contact.
     amounts : sequence of float
-        Cycles N >= 0 in units of N0, or sliding paths s = k E* l / (sigma0 a0); any order.
+        Cycles N >= 0 in units of N0, or sliding paths s = k E* l / (sigma0 a0); any order. Infinity gives the limiting
+        profile of partial slip.
     accuracy : float
-        Wanted error of f, divided by eta d0, which is the order of magnitude of the wear. Values below 1e-5 are not
+        Wanted error of f, divided by eta d0, which is the order of magnitude of the wear. Values below 3e-6 are not
         reached, because round-off accumulates over the steps.
     constant_force : bool
         Keep the force of the virgin contact instead of its depth.
@@ -82,7 +142,7 @@ def exact(
     Raises
     ------
     ValueError
-        If the scar would reach beyond the table of the profile.
+        If the contact reaches beyond the table of the profile.
     NotConvergedError
         If the evolution cannot be advanced.
 
@@ -93,73 +153,33 @@ def exact(
     >>> print(f"{few.wear_volume:.3f} {many.wear_volume:.3f}")
     0.131 0.759
     """
-    wanted = sorted({float(amount) for amount in amounts})
+    wanted, coarsest = sorted({float(amount) for amount in amounts}), COARSEST
     if stick_radius == 0.0:
-        solve: Solver = _slid_under_force if constant_force else _slid
-        done: dict[float, Worn] = {}
+        solve: Solver = partial(_slid, profile, wanted, constant_force)
     else:
         check_stick_radius(stick_radius)
-        solve = forced_contacts if constant_force and border_moves(stick_radius, accuracy) else _fretted
-        done = nearly_limit(profile, stick_radius, wanted, accuracy) if solve is _fretted else {}
-    least = least_edge_error(stick_radius, accuracy) if constant_force and stick_radius > 0.0 else 0.0
-    if left := [amount for amount in wanted if amount not in done]:
-        done |= _evolved(
-            partial(solve, profile, stick_radius, left),
-            _resolution(solve, stick_radius, accuracy),
-            least,
-            errors=errors,
-        )
-    return [done[float(amount)] for amount in amounts]
-
-
-def _evolved(
-    solve: Callable[[Resolution], dict[float, Worn]], resolution: Resolution, least: float, *, errors: bool
-) -> dict[float, Worn]:
-    """Return contacts together with the rougher solutions from which their errors are estimated."""
+        # near full stick the border hardly moves, and the two conditions agree within the accuracy
+        border_moves = constant_force and 0.5 * (1.0 - stick_radius) > accuracy**2
+        coarsest = COARSEST_OF_MOVING if border_moves else coarsest
+        solve = partial(_fretted, profile, stick_radius, wanted, border_moves)
+    resolution = Resolution(min(accuracy, coarsest))
     found, *rougher = _solutions(solve, resolution, errors)
-    return {
-        amount: replace(
-            one,
-            rougher=tuple(other[amount] for other in rougher),
-            slowness=resolution.slowness,
-            second=resolution.second,
-            least_edge_error=least,
-        )
+    contacts = {
+        amount: one if one.relative_error > 0.0 else replace(one, rougher=tuple(other[amount] for other in rougher))
         for amount, one in found.items()
     }
+    return [contacts[float(amount)] for amount in amounts]
 
 
-def limit_under_force(profile: Profile, stick_radius: float, accuracy: float = 1e-3, *, errors: bool = True) -> Worn:
-    """Return the limiting profile under constant force.
-
-    Once the image jumps at the stick border, the border no longer moves, and the shape inside the border no longer
-    changes. The limiting profile follows from this shape, so the evolution is computed only up to the jump. Parameters
-    and exceptions are those of `exact`.
-    """
-    check_stick_radius(stick_radius)
-    if not border_moves(stick_radius, accuracy):
-        return limit(profile, stick_radius)
-    return _evolved(
-        lambda resolution: {np.inf: forced_end(profile, stick_radius, resolution)},
-        forced_resolution(accuracy),
-        least_edge_error(stick_radius, accuracy),
-        errors=errors,
-    )[np.inf]
-
-
-def _solutions(
-    solve: Callable[[Resolution], dict[float, Worn]], resolution: Resolution, errors: bool
-) -> list[dict[float, Worn]]:
+def _solutions(solve: Solver, resolution: Resolution, errors: bool) -> list[dict[float, Worn]]:
     """Return the solutions at a resolution and, if `errors`, at two rougher resolutions.
 
     If one of the rougher solutions fails, it is left out; if both fail, NotConvergedError is raised.
     """
-    found = [_first_of(solve, (resolution, resolution.finer(2.0), resolution.finer(4.0)))]
-    reasons = []
-    for rough in resolution.rougher() if errors else ():
+    found, reasons = [_solved(solve, resolution)], []
+    for rougher in (1, 2) if errors else ():
         try:
-            between = rough.halfway_to(resolution)
-            found.append(_first_of(solve, (rough, between, between._replace(fewer=max(rough.fewer - 1, 0)))))
+            found.append(_solved(solve, resolution._replace(rougher=rougher)))
         except NotConvergedError as reason:
             reasons.append(reason)
     if len(reasons) > 1:
@@ -167,175 +187,275 @@ def _solutions(
     return found
 
 
-def _first_of(solve: Callable[[Resolution], dict[float, Worn]], resolutions: Sequence[Resolution]) -> dict[float, Worn]:
-    """Return the solution at the first resolution for which the evolution does not fail."""
-    for resolution in resolutions[:-1]:
+def _solved(solve: Solver, resolution: Resolution) -> dict[float, Worn]:
+    """Return the solution at a resolution; where the evolution fails, at the next finer resolution."""
+    for accuracy in (resolution.accuracy, 0.5 * resolution.accuracy):
         try:
-            return solve(resolution)
+            return solve(resolution._replace(accuracy=accuracy))
         except NotConvergedError:
             continue
-    return solve(resolutions[-1])
+    return solve(resolution._replace(accuracy=0.25 * resolution.accuracy))
 
 
-def _resolution(solve: Solver, stick_radius: float, accuracy: float) -> Resolution:
-    """Return the resolution with which a solver reaches an accuracy."""
-    at_most = min(accuracy, COARSEST)
-    if solve is forced_contacts:
-        return forced_resolution(at_most)
-    if solve is _slid:
-        return Resolution(at_most, wider=_wider(at_most, SLID_WIDER))
-    return fretted_resolution(stick_radius, at_most) if solve is _fretted else Resolution(at_most)
+class _Leg(NamedTuple):
+    """A part of an evolution: its problem, its moments, the tolerance of a step, and the dissipated energy before."""
+
+    problem: PartialSlip | GrossSlip
+    moments: Sequence[Any]
+    tolerance: float
+    before: float = 0.0
+
+    @property
+    def end(self) -> float:
+        """The time of the last moment."""
+        return float(self.moments[-1].time)
+
+    def at(self, time: float) -> tuple[Any, _Common]:
+        """Return the moment at a time, and what all kinds of slip have in common."""
+        number, moment = at(self.problem, self.moments, time, self.tolerance)
+        moments = [*self.moments[:number], moment]
+        energy = self.before + integral_along(moments, [self.problem.wear_rate(one.unknowns) for one in moments])[-1]
+        first, last = (self.problem.edge(self.moments[k].unknowns) for k in (max(number - 1, 0), number))
+        return moment, _Common(float(energy), number, EDGE * abs(last - first))
 
 
-def _wider(accuracy: float, table: tuple[tuple[float, float], ...], power: float = 1.0) -> float:
-    """Return the factor on the step tolerance at an accuracy, by linear interpolation of the logarithms of a table."""
-    return float(np.exp(power * np.interp(np.log(accuracy), *np.log(table).T)))
+class _Common(NamedTuple):
+    """Dissipated energy over mu, number of steps, and least error of the contact radius."""
+
+    energy: float
+    steps: int
+    edge_error: float
 
 
-def fretted_resolution(stick_radius: float, accuracy: float) -> Resolution:
-    """Return the resolution for an accuracy at constant depth.
+def _fretted(
+    profile: Profile, c: float, wanted: Sequence[float], constant_force: bool, resolution: Resolution
+) -> dict[float, Worn]:
+    """Return the contacts after all wanted numbers of cycles, from one solution."""
+    reach = profile.largest_radius
+    if np.isinf(reach):
+        reach = farthest_contact(profile, c) if constant_force else 1.05 * limit_radius(profile, c)
+    ended = ENDED * np.sqrt((reach - c) * (reach + c))
+    late = [time for time in wanted if time >= ended]
+    early = [time for time in wanted if time < ended]
+    if not (constant_force or early):
+        return dict.fromkeys(late, limit(profile, c))
+    panels = resolution.panels(round(-2.0 * np.log2(max(c, 0.1))) + 5 if constant_force else round(-2.0 * np.log2(c)))
+    problem = partial_slip(profile, c, panels, reach)
+    first = resolution.first * float(np.sqrt(problem.body.width))
 
-    The error of f is proportional to the square root of the step error. Steep bodies need more nodes per panel. A thin
-    slip annulus is worn off in few steps, so its step tolerance is increased less.
+    def is_rejected(moment: SlipMoment) -> bool:
+        return bool(np.min(moment.unknowns[: problem.size - 1]) < -LOWEST)
+
+    def stops(moment: SlipMoment) -> bool:
+        _refuse_beyond(problem.edge(moment.unknowns) <= profile.largest_radius, profile, c)
+        return problem.border is None and (moment.unknowns[panels.mesh.order - 1] > JUMP or is_rejected(moment))
+
+    legs, start, energy = [], None, 0.0
+    if constant_force:
+        problem, start = problem.under_force()
+        moments = march(problem, np.inf if late else early[-1], resolution.step, first, start, stops)
+        moments = moments[:-1] if is_rejected(moments[-1]) else moments
+        legs.append(_Leg(problem, moments, resolution.step))
+        energy = legs[0].at(moments[-1].time)[1].energy
+        problem, start = problem.stop(moments[-1])
+    if early and not (legs and legs[0].end >= early[-1]):
+        moments = march(problem, early[-1], resolution.step, first, start, stops)
+        legs.append(_Leg(problem, moments, resolution.step, energy))
+    contacts = {}
+    for time in early:
+        leg = legs[0] if time <= legs[0].end else legs[-1]
+        contacts[time] = _contact(leg, time)
+    if late:
+        contacts |= dict.fromkeys(late, _end(problem, start) if start else limit(profile, c))
+    return contacts
+
+
+def farthest_contact(profile: Profile, stick_radius: float) -> float:
+    """Return an upper bound of the contact radius under constant force.
+
+    The bound is the end of a table, or, for other bodies, the radius at the largest possible depth.
     """
-    order = 4 if accuracy > 2e-3 else 5 if accuracy > 5e-4 else 6
-    wider = _wider(accuracy, WIDER, min((1.0 - stick_radius) / THIN, 1.0))
-    return Resolution(accuracy, wider=wider, order=order, second=SECOND)
+    if np.isfinite(profile.largest_radius):
+        return profile.largest_radius
+    abscissa, weight = gauss(64)
+    x = stick_radius + (1.0 - stick_radius) * abscissa
+    slipping = (1.0 - stick_radius) * float((1.0 - profile.image(x)) @ weight)
+    deepest = 1.0 + slipping / stick_radius
+    radius = 1.0 + 4.0 * (1.0 - stick_radius)
+    while float(profile.height(np.array([radius]))[0]) < deepest:
+        radius *= 1.5
+    return radius
 
 
-def _fretted(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
-    """Return the contacts at all wanted times, from one solution of fretting at constant depth."""
-    reach = limit_radius(profile, c)
-    coarser = min(max(COARSER_UNTIL / resolution.accuracy, 1.0), COARSER)
-    panels = resolution.panels(round(-2.0 * np.log2(c)), coarser=coarser)
-    problem = partial_slip(profile, c, panels, 1.05 * reach if np.isinf(profile.largest_radius) else reach)
-    dense = Dense(march(problem, max(wanted), resolution.step, resolution.first * np.sqrt(problem.virgin_width)))
-    energy = integral_along(dense.history, [problem.wear_rate(moment.unknowns) for moment in dense.history])
-    return {time: _fretted_contact(problem, dense, time, dense.number(time, energy)) for time in wanted}
+def _refuse_beyond(inside: bool, profile: Profile, c: float) -> None:
+    """Raise ValueError unless a contact lies inside the table of its profile."""
+    if not inside:
+        raise ValueError(
+            f"the contact reaches beyond the table, which ends at r = {profile.largest_radius:.4g} contact radii; "
+            f"extend it, got stick radius {c!r}"
+        )
 
 
-def _fretted_contact(problem: PartialSlip, dense: Dense, time: float, energy: float) -> Worn:
-    """Turn the nodal values at one time into a worn contact.
+class _Frozen(NamedTuple):
+    """The image in the annulus that the border has passed.
 
-    The worn depth is eta s0 (exp(accumulated) - 1), a formula without cancellation. Where `accumulated` exceeds 1,
-    eta (s - s0) is used instead, because the long late steps accumulate a larger error than the slip has. The worn
-    depth divided by sqrt(r^2 - c^2) is interpolated: this quotient is smooth next to c, before and after the image
-    jumps at c.
+    It follows from pairs of values: a radius that the border reached, and the depth, divided by d0, at that moment.
     """
-    profile, panels, c, eta = problem.profile, problem.panels, problem.inner_radius, problem.eta
-    unknowns = dense.unknowns(time) if time > 0.0 else problem.start().unknowns
-    width, (y, factor), root = problem.width(unknowns), problem.image(unknowns), np.sqrt(panels.nodes)
-    a = float(np.sqrt(c * c + width))
-    virgin, accumulated = np.exp(problem.virgin_slip(width * panels.nodes)), dense.accumulated(time)
-    little = virgin * np.expm1(np.minimum(accumulated, 1.0))
-    rooted = eta * np.where(accumulated < 1.0, little, problem.slip(unknowns) - virgin) / root
-    slope = panels.slope @ y
 
-    def place(x: FloatArray) -> FloatArray:
-        return np.asarray((x - c) * (x + c) / width)
+    reached: FloatArray
+    depths: FloatArray
+
+    def slope(self, x: FloatArray) -> FloatArray:
+        """Return the slope of the image in the annulus at x."""
+        if self.reached.size == 1:
+            return np.zeros_like(x)
+        slopes = np.diff(self.depths) / np.diff(self.reached)
+        return np.asarray(slopes[np.clip(np.searchsorted(self.reached, x) - 1, 0, slopes.size - 1)])
+
+
+def _frozen(problem: PartialSlip, path: FloatArray) -> _Frozen:
+    places, depths = rising(path)
+    return _Frozen(np.sqrt(problem.body.square + problem.body.width * places), 1.0 + problem.eta * depths)
+
+
+def _end(problem: PartialSlip, moment: SlipMoment) -> Worn:
+    """Return the limiting profile of a contact whose stick border stops at `moment`.
+
+    In the limit the shape of the stick zone no longer changes, and this zone carries the whole force. So g = d beyond
+    the border b, where d = (F/2 + int_0^b g dx) / b is the depth. The radius of the scar follows from int_0^a (g - g0)
+    / sqrt(a^2 - x^2) dx = 0.
+    """
+    profile, c, eta = problem.profile, problem.inner_radius, problem.eta
+    border, frozen = problem.radius(moment.path[0, -1]), _frozen(problem, moment.path)
+    # the stick zone takes over the load of the virgin slip zone: b d = ... - int_c^b (d' - eta) db'
+    annulus = float(np.trapezoid((frozen.depths - 1.0) / eta - 1.0, frozen.reached))
+    load = float(problem.load or 0.0)
+    depth = 1.0 + eta * (load + annulus) / border
+
+    def change(x: FloatArray) -> FloatArray:
+        inside = np.interp(x, frozen.reached, frozen.depths) - 1.0 - profile.rise(x - c, c)
+        return np.asarray(np.where(x < border, inside, depth - 1.0 + eta - profile.rise(x - c, c)))
+
+    def slope(x: FloatArray) -> FloatArray:
+        return np.asarray(frozen.slope(x) * (x < border) - profile.image_slope(x))
+
+    virgin = Scar(c, border, change, slope, _breaks(c, border))
+
+    def excess(radius: float) -> float:
+        return -float(worn_height(virgin, np.array([radius]))[0])
+
+    high = min(border + 4.0 * (1.0 - c), profile.largest_radius)
+    while not excess(high) > 0.0:
+        _refuse_beyond(high < profile.largest_radius, profile, c)
+        high = min(1.5 * high, profile.largest_radius)
+    scar = virgin._replace(radius=bisect(excess, border, high))
+    force = 2.0 * (virgin_load(profile, c) + eta * load)
+    return worn_by(profile, scar, border, scar.radius, depth, force)
+
+
+def _contact(leg: _Leg, time: float) -> Worn:
+    """Turn the nodal values of partial slip at one time into a worn contact."""
+    problem, (moment, common) = leg.problem, leg.at(time)
+    assert isinstance(problem, PartialSlip)
+    profile, panels, eta, c = problem.profile, problem.panels, problem.eta, problem.inner_radius
+    square, unknowns, path = problem.body.width, moment.unknowns, moment.path
+    y, (place, width, deeper) = problem.image(unknowns), problem.place(unknowns)
+    frozen, slope = _frozen(problem, path), panels.slope @ y
+    last_border = problem.radius(path[0, -2:][0])
+    border, a, depth = problem.radius(max(place, 0.0)), problem.edge(unknowns), 1.0 + eta * deeper
 
     def height(radius: FloatArray) -> FloatArray:
-        result, z = profile.height(radius), place(radius)
-        scar = (z > 0.0) & (z < 1.0)
-        result[scar] += np.sqrt(z[scar]) * np.maximum(interpolate(panels.mesh, rooted, z[scar]), 0.0)
+        result, q = profile.height(radius), (radius - c) * (radius + c) / square
+        scar = (q > 0.0) & (q < place + width)
+        if time > 0.0:
+            result[scar] += np.maximum(eta * problem.worn_depth(moment, q[scar]), 0.0)
         return result
 
     def nodal(values: FloatArray, x: FloatArray) -> FloatArray:
-        return interpolate(panels.mesh, values, np.clip(place(x), 0.0, 1.0 - 1e-15).ravel()).reshape(x.shape)
+        z = np.clip((x - border) * (x + border) / (square * width), 0.0, 1.0 - 1e-15)
+        return interpolate(panels.mesh, values, z.ravel()).reshape(x.shape)
 
-    scar = Scar(
-        c,
-        a,
-        lambda x: np.asarray(eta * nodal(y, x) - profile.rise(x - c, c)),
-        lambda x: np.asarray(2.0 * eta * x / width * nodal(slope, x) - profile.image_slope(x)),
-        tuple(float(x) for x in np.sqrt(c * c + width * panels.mesh.edges[1:-1])),
-    )
-    sticking = 2.0 * virgin_load(profile, c)
-    slipping = float(np.sqrt(width) * eta * panels.weights @ ((1.0 - y) * factor))
-    fine = np.sqrt(c * c + width * np.linspace(0.0, 1.0, 200, endpoint=False))
+    def change(x: FloatArray) -> FloatArray:
+        slipping = depth - 1.0 + eta * nodal(y, x)
+        sticking = np.interp(x, frozen.reached, frozen.depths) - 1.0
+        return np.asarray(np.where(x < border, sticking, slipping) - profile.rise(x - c, c))
+
+    def change_slope(x: FloatArray) -> FloatArray:
+        slipping = 2.0 * eta * x / (square * width) * nodal(slope, x)
+        return np.asarray(np.where(x < border, frozen.slope(x), slipping) - profile.image_slope(x))
+
+    breaks = (*_breaks(c, border), *(float(x) for x in np.sqrt(border**2 + square * width * panels.mesh.edges[1:-1])))
+    scar = Scar(c, a, change, change_slope, breaks)
+    abscissa, weight = gauss(24)
+    annulus = max(place, 0.0) * eta * float(problem.worn_depth(moment, max(place, 0.0) * abscissa) @ weight)
+    fine = np.sqrt(c * c + square * (place + width) * np.linspace(0.0, 1.0, 200, endpoint=False))
+    load = problem.slipping_load(unknowns) if problem.load is None else problem.load
     return Worn(
         contact_radius=a,
-        stick_border=c,
-        depth=1.0,
-        normal_force=sticking + slipping,
-        wear_volume=float(np.pi * width * panels.weights @ (rooted * root)),
+        stick_border=border,
+        depth=depth,
+        normal_force=2.0 * (virgin_load(profile, c) + eta * load),
+        wear_volume=float(np.pi * square * (annulus + width * eta * panels.weights @ moment.accumulated)),
         worn_depth=float(np.max(height(fine) - profile.height(fine))),
         height=height,
         image=worn_image(profile, scar),
-        pressure=contact_pressure(profile, scar, a, 1.0, c),
-        energy_volume=energy,
-        steps=dense.steps(time),
-        edge_step=_edge_step(problem, dense, time),
+        pressure=contact_pressure(profile, scar, a, depth, border),
+        energy_volume=common.energy,
+        steps=common.steps,
+        least_errors={"contact_radius": common.edge_error, "stick_border": EDGE * (border - last_border)},
     )
 
 
-def _edge_step(problem: FixedBorder, dense: Dense, time: float) -> float:
-    """Return the distance by which the edge moved in the step that contains a time."""
-    before, after = (problem.radii(moment.unknowns)[-1] for moment in dense.around(time))
-    return float(abs(after - before))
+def _breaks(c: float, border: float) -> tuple[float, ...]:
+    """Return limits of integration that are dense inside the border, where the frozen image becomes steep."""
+    if not border > c * (1.0 + 1e-12):
+        return ()
+    return (*(border - (border - c) * 0.25**k for k in range(1, 8)), border)
 
 
-def _slid(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
-    """Return the contacts after all wanted sliding paths, at constant depth."""
-    panels = resolution.panels(3, sharpness=_sharpness(profile))
-    return _slid_contacts(GrossSlip(profile, panels), wanted, resolution.step, resolution.first)
+def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resolution: Resolution) -> dict[float, Worn]:
+    """Return the contacts after all wanted sliding paths, from one solution.
 
-
-def _slid_under_force(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
-    """Return the contacts after all wanted sliding paths, at constant force.
-
-    After a long path the pressure is uniform and jumps to zero at the edge.
-    """
-    panels = resolution.panels_of_a_punch(_sharpness(profile))
-    virgin = GrossSlip(profile, panels)
-    problem = GrossSlip(profile, panels, virgin.normal_force(virgin.start().unknowns))
-    return _slid_contacts(problem, wanted, resolution.step, resolution.first)
-
-
-def _sharpness(profile: Profile) -> float:
-    """Return the factor on the number of halvings at the axis, which is 1 for a parabola.
-
-    At the axis f is the power n/2 of r^2, so a body with a smaller exponent n needs smaller panels.
+    At the axis f is the power n/2 of r^2, so a body with an exponent n below 2 needs smaller panels there. After a long
+    path under constant force the pressure is uniform and jumps to zero at the edge.
     """
     near, far = profile.image(np.array([NEAR_AXIS, 2.0 * NEAR_AXIS]))
-    return float(np.clip(2.0 / np.log2(far / near), 1.0, SHARPEST)) if near > 0.0 else 1.0
+    sharpness = float(np.clip(2.0 / np.log2(far / near), 1.0, SHARPEST)) if near > 0.0 else 1.0
+    problem = GrossSlip(profile, resolution.panels_in_gross_slip(sharpness))
+    if constant_force:
+        problem = replace(problem, force=problem.wear_rate(problem.start().unknowns))
+    leg = _Leg(problem, march(problem, wanted[-1], resolution.step, resolution.first), resolution.step)
+    return {path: _slid_contact(leg, path) for path in wanted}
 
 
-def _slid_contacts(problem: GrossSlip, wanted: Sequence[float], step: float, first: float) -> dict[float, Worn]:
-    """Return the contacts after all wanted sliding paths, from one time integration."""
-    dense = Dense(march(problem, max(wanted), step, first))
-    energy = integral_along(dense.history, [problem.wear_rate(moment.unknowns) for moment in dense.history])
-    return {path: _slid_contact(problem, dense, path, dense.number(path, energy)) for path in wanted}
-
-
-def _slid_contact(problem: GrossSlip, dense: Dense, path: float, energy: float) -> Worn:
+def _slid_contact(leg: _Leg, path: float) -> Worn:
     """Turn the nodal values after one sliding path into a worn contact, whose image is NaN beyond the contact."""
-    profile, panels = problem.profile, problem.panels
-    unknowns, worn = problem.start().unknowns, np.zeros(panels.nodes.size)
-    if path > 0.0:
-        unknowns, worn = dense.unknowns(path), dense.accumulated(path)
-    (image, depth), width, radii = problem.image(unknowns), problem.width(unknowns), problem.radii(unknowns)
+    problem, (moment, common) = leg.problem, leg.at(path)
+    assert isinstance(problem, GrossSlip)
+    profile, panels, unknowns, worn = problem.profile, problem.panels, moment.unknowns, moment.accumulated
+    image, a = problem.image(unknowns), problem.edge(unknowns)
 
     def inside(values: FloatArray, beyond: float) -> Callable[[FloatArray], FloatArray]:
         def function(place: FloatArray) -> FloatArray:
-            share = place**2 / width
+            share = (place / a) ** 2
             within = interpolate(panels.mesh, values, np.minimum(share, 1.0 - 1e-15))
             return np.where(share < 1.0, within, beyond)
 
         return function
 
-    depths, changes = inside(worn, 0.0), inside(image - profile.image(radii), np.nan)
+    depths = inside(worn, 0.0)
+    changes = inside(image - profile.image(a * np.sqrt(panels.nodes)), np.nan)
     return Worn(
-        contact_radius=float(np.sqrt(width)),
+        contact_radius=a,
         stick_border=0.0,
-        depth=depth,
-        normal_force=problem.normal_force(unknowns),
-        wear_volume=energy,  # in gross slip V = int F ds exactly
+        depth=float(image[-1]),
+        normal_force=problem.wear_rate(unknowns),
+        wear_volume=common.energy,  # in gross slip V = int F ds exactly
         worn_depth=float(max(np.max(worn), depths(np.zeros(1))[0])),
         height=lambda r: np.asarray(profile.height(r) + depths(r)),
         image=lambda x: np.asarray(profile.image(np.abs(x)) + changes(np.abs(x))),
         pressure=inside(problem.rate(unknowns), 0.0),
-        energy_volume=energy,
-        steps=dense.steps(path),
-        edge_step=_edge_step(problem, dense, path),
+        energy_volume=common.energy,
+        steps=common.steps,
+        least_errors={"contact_radius": common.edge_error},
     )

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,28 +18,11 @@ from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.uniform_grid import UniformGrid, uniform_grid
 from mdr_dask.physics.wear.worn import Worn
 
-
-class Settings(NamedTuple):
-    """Tuned numbers of load histories; `tests/physics/wear/test_errors.py` checks the stated errors.
-
-    Parameters
-    ----------
-    step_share : float
-        Time step as a fraction of the largest stable explicit step, which is 1.7 grid spacings.
-    slowness : float
-        Factor on the differences from the solutions on coarser grids. It exceeds 1, because the error falls more slowly
-        with the grid spacing than usual.
-    least_edge_error : float
-        Least stated error of the radii, in cells of the grid. A border between two nodes is uncertain, and the results
-        of two grids may agree by chance.
-    """
-
-    step_share: float = 0.45
-    slowness: float = 2.0
-    least_edge_error: float = 0.5
-
-
-SETTINGS = Settings()
+STEP_SHARE = 0.45
+"""Time step as a fraction of the largest stable explicit step, which is 1.7 grid spacings."""
+LEAST_EDGE_ERROR = 0.5
+"""Least stated error of the radii, in cells of the grid. A border between two nodes is uncertain, and the results of
+two grids may agree by chance."""
 
 
 @dataclass(frozen=True)
@@ -109,11 +91,8 @@ def history(
         _run(profile, blocks, uniform_grid(number, length))
         for number in (cells, cells // 2, cells // 4)[: 3 if errors else 1]
     )
-    least = SETTINGS.least_edge_error * length / cells
-    return [
-        replace(one, rougher=tuple(others), slowness=SETTINGS.slowness, least_edge_error=least)
-        for one, *others in zip(fine, *rough, strict=True)
-    ]
+    least = dict.fromkeys(("contact_radius", "stick_border"), LEAST_EDGE_ERROR * length / cells)
+    return [replace(one, rougher=tuple(others), least_errors=least) for one, *others in zip(fine, *rough, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +120,7 @@ def _advance(grid: UniformGrid, image_0: FloatArray, worn: FloatArray, block: Lo
     """Step through a block with Heun's method; return the worn depth and the dissipated energy divided by mu."""
     done, energy = 0.0, 0.0
     while done < block.cycles:
-        step = min(SETTINGS.step_share * 1.7 * grid.spacing, block.cycles - done)
+        step = min(STEP_SHARE * 1.7 * grid.spacing, block.cycles - done)
         first = _state(grid, image_0 + grid.forward @ worn, block)
         rate = first.pressure * first.slip
         second = _state(grid, image_0 + grid.forward @ (worn + step * rate), block)

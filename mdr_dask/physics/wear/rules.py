@@ -33,34 +33,18 @@ from mdr_dask.physics.wear.worn import (
 THESIS_XI = 0.8
 
 
-class Settings(NamedTuple):
-    """Tuned numbers of the rules; `tests/physics/wear/test_rules.py` compares them with quadrature to 1e-12.
-
-    Parameters
-    ----------
-    nodes : int
-        Gauss nodes in each of four pieces.
-    layer_growth : float
-        Ratio of the widths of successive pieces of integration at the stick border. The piece next to the border is as
-        wide as the layer in which the fast rule has not yet flattened the image.
-    least : float
-        Smallest remaining fraction, so that the layer at the stick border does not become thinner than round-off.
-    scar, end : float
-        Tolerances of the integral that vanishes at the radius of the scar, divided by eta: `scar` for the fast rule,
-        `end` for the limiting profile.
-    error : float
-        Numerical error of every output divided by its largest value. The error of the fast rule itself is not included.
-    """
-
-    nodes: int = 16
-    layer_growth: float = 30.0
-    least: float = 1e-30
-    scar: float = 1e-10
-    end: float = 1e-13
-    error: float = 2e-6
-
-
-SETTINGS = Settings()
+NODES = 16
+"""Gauss nodes in each of the four pieces of integration; with them the results agree with quadrature to `ERROR`."""
+LAYER_GROWTH = 30.0
+"""Ratio of the widths of successive pieces of integration at the stick border. The piece next to the border is as wide
+as the layer in which the fast rule has not yet flattened the image."""
+LEAST = 1e-30
+"""Smallest remaining fraction, so that the layer at the stick border does not become thinner than round-off."""
+SCAR, END = 1e-10, 1e-13
+"""Tolerances of the integral that vanishes at the radius of the scar, divided by eta: for the fast rule, whose results
+have to be smooth to `ERROR` only, and for the limiting profile, about the rounding error."""
+ERROR = 2e-6
+"""Numerical error of every output divided by its largest value. The error of the fast rule itself is not included."""
 _NO_TABLE = PowerProfile(1.0).pieces()
 
 
@@ -142,7 +126,7 @@ def fast(profile: Profile, stick_radius: float, cycles: float, xi: float = THESI
         Factor xi in the exponent xi N / a(c) of the fast rule, of the order of one.
     """
     radius = limit_radius(profile, stick_radius)
-    rest = max(math.exp(-xi * cycles / radius), SETTINGS.least)
+    rest = max(math.exp(-xi * cycles / radius), LEAST)
     return _worn(profile, _rule(profile, stick_radius, rest), radius, 1.0)
 
 
@@ -190,7 +174,7 @@ def fast_cases(
 
 
 def _quadrature() -> Quadrature:
-    return Quadrature(*gauss(SETTINGS.nodes), np.empty(5))
+    return Quadrature(*gauss(NODES), np.empty(5))
 
 
 def _rule(profile: Profile, c: float, rest: float) -> Rule:
@@ -234,7 +218,8 @@ def _worn(profile: Profile, rule: Rule, radius: float, edge: float) -> Worn:
         height=height,
         image=worn_image(profile, scar),
         pressure=contact_pressure(profile, scar, edge, 1.0, c),
-        relative_error=SETTINGS.error,
+        energy_volume=volume if rest == 0.0 else np.nan,  # in the limit all dissipated energy has caused wear
+        relative_error=ERROR,
     )
 
 
@@ -293,7 +278,7 @@ def _put_cuts(rule: Rule, cuts: FloatArray) -> None:
                 high = middle
     cuts[0], cuts[1] = rule.c, min(rule.c + high, 1.0)
     for piece in range(2, 4):
-        cuts[piece] = min(rule.c + SETTINGS.layer_growth * (cuts[piece - 1] - rule.c), 1.0)
+        cuts[piece] = min(rule.c + LAYER_GROWTH * (cuts[piece - 1] - rule.c), 1.0)
     cuts[4] = 1.0
 
 
@@ -339,7 +324,7 @@ def _scar_radius(rule: Rule, bracket: Bracket, quadrature: Quadrature) -> float:
     """Return the radius in a bracket at which `_scar_integral` vanishes, or the upper end if there is none."""
     if not bracket.high_value < 0.0 < bracket.low_value:
         return bracket.high
-    error = SETTINGS.end if rule.rest == 0.0 else SETTINGS.scar
+    error = END if rule.rest == 0.0 else SCAR
     radius = _between(bracket)
     for _ in range(100):
         value = _scar_integral(rule, radius, 0, quadrature)
@@ -411,7 +396,7 @@ def _fasts(cases: FloatArray, no_table: Image, quadrature: Quadrature, result: F
     """Write radius, volume and force of the cases (n, c, N, xi, a(c)) to `result`."""
     for k in range(cases.shape[1]):
         n, c, cycles, xi, limit = cases[0, k], cases[1, k], cases[2, k], cases[3, k], cases[4, k]
-        rule = _power_rule(no_table, n, c, max(math.exp(-xi * cycles / limit), SETTINGS.least))
+        rule = _power_rule(no_table, n, c, max(math.exp(-xi * cycles / limit), LEAST))
         result[0, k], result[1, k], result[2, k] = _numbers(rule, limit, quadrature)
 
 

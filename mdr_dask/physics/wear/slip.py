@@ -1,16 +1,23 @@
-"""The equations of one time step of partial slip at constant depth and of gross slip, for `evolution.march`.
+"""The equations of one time step of partial slip and of gross slip, for `evolution.march`.
 
-Nodes lie at r^2 = c^2 + z (a^2 - c^2), where z is the position on the panels, from 0 to 1. The unknown for the edge is
-the width a^2 - c^2 divided by its value in the virgin contact. So the equations are well conditioned even near full
-stick.
+Partial slip at constant depth and under constant force differ in the unknowns only. At constant depth the stick border
+b stays at its first value c. Under constant force the depth d grows, and the border moves outwards until the image
+jumps there; then it no longer moves. Inside the border the image is frozen: g(b) = d - eta at the time when the border
+passed. The slip is s = (f - f_star) / eta, where f_star is the profile of the image that is g up to the border and the
+plateau d - eta beyond it. While the plateau rises, f_star changes by df_star = (2/pi) arccos(b / r) dd. So only the
+path (b, d) has to be stored for the annulus between c and b.
+
+The accumulated quantity is the worn depth divided by eta. Squared radii are counted from c^2 in units of 1 - c^2, the
+width of the virgin slip zone: q = (r^2 - c^2) / (1 - c^2). The depth is counted from 1 in units of eta. So all unknowns
+are of the order of one, even near full stick.
 """
 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -18,208 +25,457 @@ from scipy.interpolate import CubicSpline
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit, jit_inline
-from mdr_dask.physics.mdr.half_integrals import Panels, interpolate_weighted
+from mdr_dask.physics.mdr.half_integrals import Mesh, Panels, interpolate, interpolate_weighted, value_at
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import gauss
-from mdr_dask.physics.wear.evolution import Moment
+from mdr_dask.physics.wear.evolution import Moment, settled
+
+#: Weight of the border relative to the depth in the step error. It is large, because f rises like a square root beyond
+#: the border.
+BORDER_WEIGHT = 30.0
+#: Position on the panels up to which the rise of the plateau is stored; the border is at 0, the edge at 1.
+BEYOND = 1.25
+#: Lower limit of q, so that its logarithm is finite.
+SMALLEST = 1e-30
+#: `_mean_angle` uses a series if (r1 - r2) / (r1 + r2) is below this value, where r1 and r2 are the values of
+#: sqrt(r^2 - b^2) at the two ends of a straight piece of the path.
+SHORT = 0.02
+_ABSCISSA, _WEIGHT = gauss(3)
 
 
-class FixedBorder(ABC):
-    """Base of the problems in which the inner border of the slip zone does not move.
+class VirginBody(NamedTuple):
+    """The virgin body for compiled code.
 
-    Accumulated values are interpolated on the panels.
+    Parameters
+    ----------
+    square, width : float
+        c^2 and 1 - c^2.
+    first, step, coefficients : float, float, array of shape (4, k)
+        The slip of the virgin body, s0(r) = (2/pi) int_c^r (g0 - g_c) / (eta sqrt(r^2 - x^2)) dx: first knot, knot
+        spacing and coefficients of a cubic spline of ln s0 as a function of ln q.
     """
 
-    panels: Panels
-    inner_radius: float
-    newton = 1e-2
-
-    def holds(self, unknowns: FloatArray) -> bool:
-        """Return whether the unknowns describe a possible contact."""
-        return bool(unknowns[self.panels.nodes.size - 1] > 0.0)
-
-    @property
-    def virgin_width(self) -> float:
-        """The width a^2 - c^2 of the virgin contact."""
-        return (1.0 - self.inner_radius) * (1.0 + self.inner_radius)
-
-    def width(self, unknowns: FloatArray) -> float:
-        """Return a^2 - c^2."""
-        return float(self.virgin_width * unknowns[self.panels.nodes.size - 1])
-
-    def radii(self, unknowns: FloatArray) -> FloatArray:
-        """Return the radii of the nodes."""
-        return np.asarray(np.sqrt(self.inner_radius**2 + self.width(unknowns) * self.panels.nodes))
-
-    @abstractmethod
-    def rate(self, unknowns: FloatArray) -> FloatArray:
-        """Return the rate of the accumulated quantity at the nodes."""
-
-    def memory(self, past: Sequence[Moment], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """Return a function of the unknowns: the weighted sum of past accumulated values at the nodes."""
-        last = self.panels.nodes.size - 1
-        memories = np.array([moment.accumulated for moment in past])
-        widths = np.array([moment.unknowns[last] for moment in past])
-
-        def known(unknowns: FloatArray) -> FloatArray:
-            return interpolate_weighted(self.panels.mesh, memories, shares, unknowns[last] / widths)
-
-        return known
-
-    def moment(
-        self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Moment]
-    ) -> Moment:
-        """Return the moment at the end of a solved step; `known` is the contribution of the past moments."""
-        accumulated = known + theta * self.rate(unknowns)
-        accumulated[-1] = 0.0
-        return Moment(time, unknowns, accumulated)
-
-
-class LogTable(NamedTuple):
-    """The slip of the virgin body, ln s0 as a function of ln(r^2 - c^2).
-
-    s0(r) = (2/pi) int_c^r (g0 - g_c) / (eta sqrt(r^2 - x^2)) dx. The coefficients belong to a cubic spline in
-    ln(r^2 - c^2), whose first knot is `first` and whose knot spacing is `step`.
-    """
-
+    square: float
+    width: float
     first: float
     step: float
     coefficients: FloatArray
 
-    def __call__(self, squares: FloatArray) -> FloatArray:
-        """Return ln s0 where r^2 - c^2 > 0 has the values `squares`."""
-        result = np.empty(squares.size)
-        _look_up(self, squares.ravel(), result)
-        return result.reshape(squares.shape)
 
+class Place(NamedTuple):
+    """Border and width of the slip zone, and the depth, in the units of the module.
 
-@jit_inline
-def log_slip(table: LogTable, square: float) -> float:
-    """Return ln s0 for one value `square` of r^2 - c^2."""
-    place = math.log(square) - table.first
-    cell = min(max(int(place / table.step), 0), table.coefficients.shape[1] - 1)
-    local, k = place - cell * table.step, table.coefficients
-    return float(((k[0, cell] * local + k[1, cell]) * local + k[2, cell]) * local + k[3, cell])
-
-
-@jit
-def _look_up(table: LogTable, squares: FloatArray, result: FloatArray) -> None:
-    for i in range(squares.size):
-        result[i] = log_slip(table, squares[i])
-
-
-class _Step(NamedTuple):
-    """The data of one time step of `PartialSlip`.
-
-    `share` is theta divided by sqrt(a^2 - c^2), `squares` is r^2 - c^2 at the nodes, and `known` is the contribution of
-    the past moments at the nodes.
+    `border` is (b^2 - c^2) / (1 - c^2), `width` is (a^2 - b^2) / (1 - c^2), and `depth` is (d - 1) / eta.
     """
 
-    share: float
-    squares: FloatArray
-    known: FloatArray
+    border: float
+    width: float
+    depth: float
 
 
-@jit
-def _slip_rows(table: LogTable, step: _Step, stress: FloatArray, slip: FloatArray) -> None:
-    """Replace the slip by the residual of `PartialSlip`.
+class Past(NamedTuple):
+    """Past moments, with their weights in the formula of one step.
 
-    The last row is the condition that s is continuous at the edge.
+    Parameters
+    ----------
+    shares, borders, widths : array, shape (m,)
+        One entry for each moment: its weight, border and width.
+    worn : array, shape (m, n)
+        Worn depth divided by eta at the nodes. If the border does not move: this value minus `frozen`, divided by
+        sqrt(z), where z is the position on the panels.
+    frozen : float
+        The worn depth divided by eta at a border that does not move; NaN while the border moves.
+    moved : array, shape (n + order,)
+        The rise of the plateau along the path, at the nodes of the newest past moment and at those of one panel beyond
+        the edge.
+    path : array, shape (2, k)
+        The path of the newest past moment, see `SlipMoment`.
+    carried : float
+        int (1 - d) db along the path, where b is the radius of the border and d is counted as in `Place`.
     """
-    last = slip.size - 1
-    for i in range(slip.size):
-        slip[i] = math.log(max(slip[i], 1e-300)) - log_slip(table, step.squares[i])
-        if i < last:
-            slip[i] -= step.known[i] + step.share * stress[i]
+
+    shares: FloatArray
+    borders: FloatArray
+    widths: FloatArray
+    worn: FloatArray
+    frozen: float
+    moved: FloatArray
+    path: FloatArray
+    carried: float
 
 
 @dataclass(frozen=True, eq=False)
-class PartialSlip(FixedBorder):
-    """Slip outside the stick radius c at constant depth.
+class SlipMoment(Moment):
+    """A moment of partial slip.
 
-    The unknowns are y = (g - g_c) / eta at all nodes except the last, where y = 1, and the relative width of the slip
-    zone, which gives the edge. The slip is s = (f - f_star) / eta, where f_star is the profile whose image is the
-    plateau g = g_c beyond c. The accumulated quantity is ln(s / s0) = int p dN / eta, where s0 is the slip of the
-    virgin body.
+    Parameters
+    ----------
+    path : array, shape (2, k)
+        All pairs of border and depth while the border moved, joined by straight lines.
+    moved : array, shape (n + order,)
+        The rise of the plateau along the path, at the nodes and in one panel beyond the edge.
+    """
+
+    path: FloatArray
+    moved: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class PartialSlip:
+    """Slip outside the stick border.
+
+    The unknowns are y = 1 - (d - g) / eta at all nodes except the last, where y = 1, and the width of the slip zone.
+    Under constant force the depth follows, and then the border while it moves.
+
+    Parameters
+    ----------
+    profile : Profile
+        The virgin body.
+    inner_radius, eta : float
+        The virgin stick radius c, and eta = 1 - g0(c).
+    body : VirginBody
+        The virgin body for compiled code.
+    panels : Panels
+        The panels between the border and the edge.
+    load : float, optional
+        Half the force on the virgin slip zone divided by eta, which is kept; None at constant depth.
+    border : float, optional
+        The border if it does not move.
+    frozen : float
+        The worn depth divided by eta at a border that does not move.
     """
 
     profile: Profile
     inner_radius: float
-    panels: Panels
-    virgin_slip: LogTable
     eta: float
+    body: VirginBody
+    panels: Panels
+    load: float | None = None
+    border: float | None = 0.0
+    frozen: float = 0.0
 
-    def start(self) -> Moment:
-        """Return the virgin contact."""
-        y = np.ones(self.panels.nodes.size)
-        gap = self.width(y) * self.panels.nodes / (self.radii(y) + self.inner_radius)
-        y[:-1] = self.profile.rise(gap, self.inner_radius)[:-1] / self.eta
-        return Moment(0.0, y, np.zeros_like(y))
+    @cached_property
+    def size(self) -> int:
+        """The number of nodes."""
+        return self.panels.nodes.size
 
-    def image(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return y at all nodes, and the factor sqrt(a^2 - c^2) / r by which the half-integral multiplies it."""
-        y = unknowns.copy()
+    @cached_property
+    def mesh(self) -> Mesh:
+        """The panels between border and edge, and one more panel beyond the edge."""
+        return self.panels.mesh.extended(BEYOND)
+
+    def image(self, unknowns: FloatArray) -> FloatArray:
+        """Return y at all nodes."""
+        y = unknowns[: self.size].copy()
         y[-1] = 1.0
-        return y, 1.0 / np.sqrt(self.inner_radius**2 / self.width(unknowns) + self.panels.nodes)
+        return y
+
+    def place(self, unknowns: FloatArray) -> Place:
+        """Return border, width and depth of the contact."""
+        border = float(unknowns[-1]) if self.border is None else self.border
+        return Place(border, float(unknowns[self.size - 1]), 0.0 if self.load is None else float(unknowns[self.size]))
+
+    def holds(self, unknowns: FloatArray) -> bool:
+        """Return whether the unknowns describe a possible contact."""
+        place = self.place(unknowns)
+        return place.width > 0.0 and self.body.width * place.border > -0.5 * self.body.square
+
+    def radius(self, place: float) -> float:
+        """Return the radius that belongs to a value of q."""
+        return math.sqrt(self.body.square + self.body.width * place)
+
+    def edge(self, unknowns: FloatArray) -> float:
+        """Return the contact radius."""
+        place = self.place(unknowns)
+        return self.radius(place.border + place.width)
+
+    def start(self) -> SlipMoment:
+        """Return the virgin contact."""
+        y, c = np.ones(self.size), self.inner_radius
+        square = self.body.width * self.panels.nodes
+        gap = square / (np.sqrt(c * c + square) + c)
+        y[:-1] = self.profile.rise(gap, c)[:-1] / self.eta
+        return SlipMoment(0.0, y, np.zeros(self.size), np.zeros((2, 1)), np.zeros(self.mesh.nodes.size))
+
+    def under_force(self) -> tuple[PartialSlip, SlipMoment]:
+        """Return the problem under the constant force of the virgin contact, and its first moment."""
+        virgin = settled(self)
+        forced = replace(self, load=self.slipping_load(virgin.unknowns), border=None, frozen=np.nan)
+        return forced, replace(virgin, unknowns=np.append(virgin.unknowns, [0.0, 0.0]))
+
+    def stop(self, moment: SlipMoment) -> tuple[PartialSlip, SlipMoment]:
+        """Return the problem in which the border no longer moves, and its first moment."""
+        border = moment.path[0, -1:]
+        still = replace(self, border=float(border[0]), frozen=float(self.frozen_depth(moment.path, border)[0]))
+        return still, replace(moment, unknowns=moment.unknowns[:-1])
+
+    def memory(self, past: Sequence[SlipMoment], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
+        """Return a function of the unknowns that gives the part of the residual that follows from the past moments.
+
+        These are the past contributions to s and to the worn depth at the nodes, and the additional load of the stick
+        zone.
+        """
+        places = [self.place(moment.unknowns) for moment in past]
+        worn = np.array([moment.accumulated for moment in past])
+        earlier = Past(
+            shares,
+            np.array([place.border for place in places]),
+            np.array([place.width for place in places]),
+            worn if self.border is None else (worn - self.frozen) / np.sqrt(self.panels.nodes),
+            self.frozen,
+            past[0].moved,
+            past[0].path,
+            self.carried(past[0].path),
+        )
+
+        def known(unknowns: FloatArray) -> FloatArray:
+            result = np.empty(2 * self.size + 1)
+            _fill_known(self.mesh, self.body, earlier, self.place(unknowns), result)
+            return result
+
+        return known
+
+    def path_to(self, before: SlipMoment, place: Place) -> FloatArray:
+        """Return the path of the next moment after `before`."""
+        end = [[place.border], [place.depth]]
+        return before.path if self.border is not None else np.append(before.path, end, axis=1)
+
+    def frozen_depth(self, path: FloatArray, place: FloatArray) -> FloatArray:
+        """Return the worn depth divided by eta at values of q that the border has passed."""
+        result = np.empty_like(place)
+        _plateau_rise(self.body, np.stack(rising(path)), place, result)
+        slip = np.empty_like(place)
+        _virgin_slip(self.body, place, slip)
+        return np.where(place > 0.0, result - slip, 0.0)
+
+    def worn_depth(self, moment: SlipMoment, q: FloatArray) -> FloatArray:
+        """Return the worn depth divided by eta at values of q; 0 beyond the edge."""
+        place = self.place(moment.unknowns)
+        z = (q - place.border) / place.width
+        inside = np.clip(z, 0.0, 1.0)
+        if self.border is None:
+            slipping = interpolate(self.panels.mesh, moment.accumulated, inside)
+        else:
+            rooted = (moment.accumulated - self.frozen) / np.sqrt(self.panels.nodes)
+            slipping = self.frozen + np.sqrt(inside) * interpolate(self.panels.mesh, rooted, inside)
+        frozen = self.frozen_depth(moment.path, np.minimum(q, place.border))
+        return np.where(z < 0.0, frozen, np.where(z < 1.0, slipping, 0.0))
 
     def slip(self, unknowns: FloatArray) -> FloatArray:
         """Return s at the nodes."""
-        y, factor = self.image(unknowns)
-        return np.asarray(self.panels.inner @ (y * factor))
+        return np.asarray(self.panels.inner @ (self.image(unknowns) * self._factor(self.place(unknowns))))
 
     def rate(self, unknowns: FloatArray) -> FloatArray:
-        """Return p / eta at the nodes."""
-        y, _ = self.image(unknowns)
-        return np.asarray(self.panels.outer @ y / np.sqrt(self.width(unknowns)))
+        """Return p / eta at the nodes; zero at the edge, where nothing wears."""
+        result = self.panels.outer @ self.image(unknowns) / np.sqrt(self.body.width * self.place(unknowns).width)
+        result[-1] = 0.0
+        return np.asarray(result)
+
+    def _factor(self, place: Place) -> FloatArray:
+        """Return sqrt(a^2 - b^2) / r at the nodes."""
+        inner = (self.body.square + self.body.width * place.border) / (self.body.width * place.width)
+        return 1.0 / np.sqrt(inner + self.panels.nodes)
+
+    @cached_property
+    def at_border(self) -> FloatArray:
+        """The weights that extrapolate from the nodes of the first panel to the border."""
+        mesh = self.panels.mesh
+        weights = mesh.barycentric[0, -mesh.order :] / mesh.nodes[: mesh.order]
+        shares = np.zeros(mesh.nodes.size)
+        shares[: mesh.order] = weights / np.sum(weights)
+        return shares
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return ln s - ln s0 - known - theta p / eta; the last row makes s continuous at the edge."""
-        y, factor = self.image(unknowns)
-        slip, stress, width = self.panels.inner @ (y * factor), self.panels.outer @ y, self.width(unknowns)
-        _slip_rows(self.virgin_slip, _Step(theta / np.sqrt(width), width * self.panels.nodes, known), stress, slip)
-        return np.asarray(slip)
+        """Return s - known - theta (p / eta) s at the nodes, then the deviation of a constant force.
+
+        The row of the last node makes s continuous at the edge. If the border moves, the last row is y at the border,
+        which has to be zero.
+        """
+        size, y, place = self.size, self.image(unknowns), self.place(unknowns)
+        root, factor = math.sqrt(self.body.width * place.width), self._factor(place)
+        slip, rate = self.panels.inner @ (y * factor), self.panels.outer @ y
+        rate[-1] = 0.0
+        rows = np.empty(unknowns.size)
+        if self.border is not None and np.min(slip) <= 0.0:
+            rows[:] = np.nan  # the equations have another solution, in which s is negative
+            return rows
+        rows[:size] = slip * (1.0 - theta / root * rate) - known[:size]
+        if self.load is not None:
+            rows[size] = known[-1] + 0.5 * root * (self.panels.weights @ ((1.0 - y) * factor)) - self.load
+        if self.border is None:
+            rows[-1] = self.at_border @ y
+        return rows
 
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
         """Return the derivatives of the residual with respect to y."""
-        _, factor = self.image(unknowns)
-        result = self.panels.inner * (factor / self.slip(unknowns)[:, None])
-        result[:-1] -= theta / np.sqrt(self.width(unknowns)) * self.panels.outer[:-1]
+        place = self.place(unknowns)
+        size, root, factor = self.size, np.sqrt(self.body.width * place.width), self._factor(place)
+        slip, rate = self.slip(unknowns), self.rate(unknowns)
+        slip[-1] = 0.0
+        result = np.zeros((unknowns.size, unknowns.size))
+        result[:size, :size] = (1.0 - theta * rate)[:, None] * self.panels.inner * factor
+        result[:size, :size] -= theta / root * slip[:, None] * self.panels.outer
+        if self.load is not None:
+            result[size, :size] = -0.5 * root * self.panels.weights * factor
+        if self.border is None:
+            result[-1, :size] = self.at_border
         return result
 
+    def carried(self, path: FloatArray) -> float:
+        """Return int (1 - d) db along a path, where b is the radius of the border."""
+        radii = np.sqrt(self.body.square + self.body.width * path[0])
+        steps = self.body.width * np.diff(path[0]) / (radii[1:] + radii[:-1])
+        return float(steps @ (1.0 - 0.5 * (path[1, 1:] + path[1, :-1])))
+
+    def slipping_load(self, unknowns: FloatArray) -> float:
+        """Return int_b^a (d - g) dx / eta, the load of the slip zone."""
+        place = self.place(unknowns)
+        share = (1.0 - self.image(unknowns)) * self._factor(place)
+        return float(0.5 * np.sqrt(self.body.width * place.width) * self.panels.weights @ share)
+
     def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return the slip s = (f - f_star) / eta; wear changes f, but not f_star."""
-        return self.slip(unknowns)
+        """Return the quantities whose step error is controlled: s at the nodes, the depth, and a moving border."""
+        weight = BORDER_WEIGHT * (1.0 - self.inner_radius) / self.eta
+        tail = unknowns[self.size :] * ([1.0, weight] if self.border is None else 1.0)
+        return np.append(self.slip(unknowns), tail)
+
+    def moment(
+        self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[SlipMoment]
+    ) -> SlipMoment:
+        """Return the moment at the end of a solved step.
+
+        Its worn depth is the past contribution plus the wear in the step.
+        """
+        size, place = self.size, self.place(unknowns)
+        worn = known[size : 2 * size] + theta * self.rate(unknowns) * self.slip(unknowns)
+        path, moved = self.path_to(past[0], place), np.empty(self.mesh.nodes.size)
+        _plateau_rise(self.body, path, place.border + place.width * self.mesh.nodes, moved)
+        return SlipMoment(time, unknowns, worn, path, moved)
 
     def wear_rate(self, unknowns: FloatArray) -> float:
-        """Return dV/dN = 2 int_c^a (1 - g)(g - g_c) / eta dx, the energy dissipated per cycle, divided by mu."""
-        y, factor = self.image(unknowns)
-        return float(self.eta * np.sqrt(self.width(unknowns)) * self.panels.weights @ (y * (1.0 - y) * factor))
+        """Return dV/dN = 2 int_b^a (d - g) y dx, the energy dissipated per cycle, divided by mu."""
+        y, place = self.image(unknowns), self.place(unknowns)
+        root = np.sqrt(self.body.width * place.width)
+        return float(self.eta * root * self.panels.weights @ (y * (1.0 - y) * self._factor(place)))
 
 
 def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: float) -> PartialSlip:
-    """Return the problem of partial slip, with the virgin slip tabulated up to the radius `reach`.
+    """Return the problem at constant depth, with the virgin slip tabulated up to the radius `reach`.
 
     The table is computed without cancellation next to c.
     """
-    c = stick_radius
+    c, width = stick_radius, (1.0 - stick_radius) * (1.0 + stick_radius)
     eta = float(profile.rise(np.array(1.0 - c), c))
-    smallest = 0.5 * panels.nodes[0] * (1.0 - c) * (1.0 + c)
-    table = np.linspace(np.log(smallest), np.log((reach - c) * (reach + c)), 300)
-    step = table[1] - table[0]
-    r = np.sqrt(c * c + np.exp(table))
+    table = np.linspace(np.log(0.5 * panels.nodes[0]), np.log((reach - c) * (reach + c) / width), 300)
+    root = np.sqrt(width) * np.exp(0.5 * table)
+    r = np.hypot(c, root)
     abscissa, weight = gauss(40)
-    span = np.arctan2(np.exp(0.5 * table), c)
+    span = np.arctan2(root, c)
     angle = span[:, None] * abscissa
     # x - c = r (cos(angle) - cos(span)), written as a product to avoid cancellation
     gap = 2.0 * r[:, None] * np.sin(0.5 * (span[:, None] + angle)) * np.sin(0.5 * (span[:, None] - angle))
     slip = 2.0 / np.pi * span * (profile.rise(gap, c) @ weight) / eta
     coefficients = np.ascontiguousarray(CubicSpline(table, np.log(slip)).c)
-    return PartialSlip(profile, c, panels, LogTable(float(table[0]), float(step), coefficients), eta)
+    body = VirginBody(c * c, width, float(table[0]), float(table[1] - table[0]), coefficients)
+    return PartialSlip(profile, c, eta, body, panels)
+
+
+def rising(path: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the positions that the border reached for the first time, and the depths at these moments."""
+    furthest = np.maximum.accumulate(path[0])
+    new = np.append(True, np.diff(furthest) > 0.0)
+    return furthest[new], path[1, new]
+
+
+@jit
+def _fill_known(mesh: Mesh, body: VirginBody, past: Past, place: Place, result: FloatArray) -> None:
+    """Write the past contributions to s and to the worn depth at the nodes, and the sticking load, to `result`."""
+    nodes, path, is_still = result.size // 2, past.path, past.frozen == past.frozen
+    border, depth = path[0, -1], path[1, -1]
+    for i in range(nodes):
+        q = place.border + place.width * mesh.nodes[i]
+        worn = 0.0
+        for k in range(past.shares.size if i < nodes - 1 else 0):  # the worn depth at the edge is zero
+            z = (q - past.borders[k]) / past.widths[k]
+            if z < 1.0:
+                value = value_at(mesh, past.worn[k], z)
+                worn += past.shares[k] * (past.frozen + math.sqrt(z) * value if is_still else value)
+        z = (q - past.borders[0]) / past.widths[0]
+        rise = value_at(mesh, past.moved, z) if z < mesh.edges[-1] else _rise(body, path, q)
+        rise += _piece(body, _root(q, border), _root(q, place.border), place.depth - depth, q)
+        result[i] = _slip_at(body, q) - rise + worn
+        result[nodes + i] = worn
+    first, last = math.sqrt(body.square + body.width * border), math.sqrt(body.square + body.width * place.border)
+    step = body.width * (place.border - border) / (first + last)
+    # b d + int (1 - d) db, without the cancellation of b d and the first b d
+    result[2 * nodes] = first * place.depth + past.carried + step * (1.0 + 0.5 * (place.depth - depth))
+
+
+@jit_inline
+def _slip_at(body: VirginBody, q: float) -> float:
+    """Return the virgin slip s0 at q."""
+    place = math.log(max(q, SMALLEST)) - body.first
+    cell = min(max(int(place / body.step), 0), body.coefficients.shape[1] - 1)
+    local, k = place - cell * body.step, body.coefficients
+    return math.exp(((k[0, cell] * local + k[1, cell]) * local + k[2, cell]) * local + k[3, cell])
+
+
+@jit
+def _virgin_slip(body: VirginBody, places: FloatArray, result: FloatArray) -> None:
+    for i in range(places.size):
+        result[i] = _slip_at(body, places[i])
+
+
+@jit
+def _plateau_rise(body: VirginBody, path: FloatArray, places: FloatArray, result: FloatArray) -> None:
+    for i in range(places.size):
+        result[i] = _rise(body, path, places[i])
+
+
+@jit
+def _rise(body: VirginBody, path: FloatArray, q: float) -> float:
+    """Return the rise of the plateau at q, (2/pi) int arccos(b / r) dd, while the border b was below r."""
+    total, first = 0.0, _root(q, path[0, 0])
+    for k in range(1, path.shape[1]):
+        end = _root(q, path[0, k])
+        change = path[1, k] - path[1, k - 1]
+        if path[0, k] > q:
+            change *= (q - path[0, k - 1]) / (path[0, k] - path[0, k - 1])
+        total += _piece(body, first, end, change, q)
+        if path[0, k] > q:
+            break
+        first = end
+    return total
+
+
+@jit_inline
+def _root(q: float, border: float) -> float:
+    return math.sqrt(max(q - border, 0.0))
+
+
+@jit_inline
+def _piece(body: VirginBody, first: float, last: float, change: float, q: float) -> float:
+    """Return (2/pi) int arccos(b / r) dd over a straight piece of the path, along which the depth changes by `change`.
+
+    The integration variable is sqrt(r^2 - b^2), because the integrand is smooth in it; `first` and `last` are its
+    values at the ends of the piece.
+    """
+    scale = math.sqrt(body.width / (body.square + body.width * q))
+    whole = first + last
+    spread = (first - last) / whole if whole > 0.0 else 0.0
+    if abs(spread) < SHORT:
+        return 2.0 / math.pi * change * math.asin(min(0.5 * scale * whole, 1.0)) * (1.0 + spread * spread / 3.0)
+    mean, weights = 0.0, 0.0
+    for node in range(_ABSCISSA.size):
+        root = first + (last - first) * _ABSCISSA[node]
+        mean += _WEIGHT[node] * root * math.asin(min(scale * root, 1.0))
+        weights += _WEIGHT[node] * root
+    return 2.0 / math.pi * change * mean / weights
 
 
 @dataclass(frozen=True, eq=False)
-class GrossSlip(FixedBorder):
-    """Slip in the whole contact.
+class GrossSlip:
+    """Slip in the whole contact; nodes lie at r^2 = z a^2, where z is the position on the panels.
 
     The unknowns are the image g at all nodes except the last (at the edge, g equals the depth d), the relative width
     a^2 of the contact, and, if the force is given, the depth d. The accumulated quantity is the worn depth, int p ds.
@@ -228,7 +484,14 @@ class GrossSlip(FixedBorder):
     profile: Profile
     panels: Panels
     force: float | None = None
-    inner_radius: float = 0.0
+
+    def edge(self, unknowns: FloatArray) -> float:
+        """Return the contact radius a."""
+        return math.sqrt(unknowns[self.panels.nodes.size - 1])
+
+    def holds(self, unknowns: FloatArray) -> bool:
+        """Return whether the unknowns describe a possible contact."""
+        return bool(unknowns[self.panels.nodes.size - 1] > 0.0)
 
     def start(self) -> Moment:
         """Return the virgin contact."""
@@ -236,42 +499,55 @@ class GrossSlip(FixedBorder):
         unknowns[: self.panels.nodes.size - 1] = self.profile.image(np.sqrt(self.panels.nodes[:-1]))
         return Moment(0.0, unknowns, np.zeros(self.panels.nodes.size))
 
-    def image(self, unknowns: FloatArray) -> tuple[FloatArray, float]:
-        """Return g at all nodes, and the depth."""
+    def memory(self, past: Sequence[Moment], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
+        """Return a function of the unknowns: the weighted sum of past accumulated values at the nodes."""
         last = self.panels.nodes.size - 1
-        depth = 1.0 if self.force is None else float(unknowns[-1])
-        return np.append(unknowns[:last], depth), depth
+        memories = np.array([moment.accumulated for moment in past])
+        widths = np.array([moment.unknowns[last] for moment in past])
+        return lambda unknowns: interpolate_weighted(self.panels.mesh, memories, shares, unknowns[last] / widths)
+
+    def moment(
+        self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Moment]
+    ) -> Moment:
+        """Return the moment at the end of a solved step; `known` is the contribution of the past moments."""
+        return Moment(time, unknowns, self._accumulated(unknowns, theta, known))
+
+    def image(self, unknowns: FloatArray) -> FloatArray:
+        """Return g at all nodes; the last value is the depth."""
+        return np.append(unknowns[: self.panels.nodes.size - 1], 1.0 if self.force is None else unknowns[-1])
 
     def rate(self, unknowns: FloatArray) -> FloatArray:
         """Return p at the nodes."""
-        return np.asarray(self.panels.outer @ self.image(unknowns)[0] / np.sqrt(self.width(unknowns)))
+        return np.asarray(self.panels.outer @ self.image(unknowns) / self.edge(unknowns))
 
     def worn(self, unknowns: FloatArray) -> FloatArray:
         """Return f at the nodes."""
-        return np.asarray(self.panels.full @ self.image(unknowns)[0])
+        return np.asarray(self.panels.full @ self.image(unknowns))
 
-    def normal_force(self, unknowns: FloatArray) -> float:
-        """Return F_N = 2 int_0^a (d - g) dx."""
-        g, depth = self.image(unknowns)
+    def wear_rate(self, unknowns: FloatArray) -> float:
+        """Return dV/ds = F_N = 2 int_0^a (d - g) dx."""
+        image = self.image(unknowns)
         # int_0^1 u dz / sqrt(z) is the last row of the full half-integral of u sqrt(1 - z)
-        load = (depth - g) * np.sqrt(1.0 - self.panels.nodes)
-        return float(np.pi * np.sqrt(self.width(unknowns)) * self.panels.full[-1] @ load)
+        load = (image[-1] - image) * np.sqrt(1.0 - self.panels.nodes)
+        return float(np.pi * self.edge(unknowns) * self.panels.full[-1] @ load)
 
-    wear_rate = normal_force
+    def _accumulated(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
+        accumulated = known + theta * self.rate(unknowns)
+        accumulated[-1] = 0.0
+        return accumulated
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
         """Return f - f0 - known - theta p at the nodes, then the deviation of the force if the force is given.
 
         The row of the last node is the condition that f is continuous at the edge.
         """
-        accumulated = known + theta * self.rate(unknowns)
-        accumulated[-1] = 0.0
-        rows = self.worn(unknowns) - self.profile.height(self.radii(unknowns)) - accumulated
-        return rows if self.force is None else np.append(rows, self.normal_force(unknowns) - self.force)
+        virgin = self.profile.height(self.edge(unknowns) * np.sqrt(self.panels.nodes))
+        rows = self.worn(unknowns) - virgin - self._accumulated(unknowns, theta, known)
+        return rows if self.force is None else np.append(rows, self.wear_rate(unknowns) - self.force)
 
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
         """Return the derivatives of the residual with respect to g."""
-        a, nodes = np.sqrt(self.width(unknowns)), self.panels.nodes.size
+        a, nodes = self.edge(unknowns), self.panels.nodes.size
         result = np.zeros((unknowns.size, unknowns.size))
         result[:nodes, :nodes] = self.panels.full
         result[: nodes - 1, :nodes] -= theta / a * self.panels.outer[:-1]

@@ -6,9 +6,8 @@ belong to the virgin contact. Wear increases f, the profile height measured upwa
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -17,52 +16,19 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import gauss
+from mdr_dask.physics.refine import SAFETY
 
 Function = Callable[[FloatArray], FloatArray]
 
 #: Outputs that are functions of position, and the attributes of `Worn` that compute them; other outputs are numbers.
 FUNCTIONS = {"worn_profile": "height", "worn_image": "image", "pressure": "pressure"}
 
-VOLUMES = ("wear_volume", "energy_volume")
-#: `SHAPED` are outputs in which solutions of different shape may agree by chance if the depth is constant.
-#: `KEPT_DEPTH` is the depth of the virgin contact in units of d0.
-SHAPED, KEPT_DEPTH = ("normal_force", "worn_depth"), 1.0
-NOWHERE = np.zeros(0)
-#: Distance from a border, as a fraction of the border's radius, within which a change of the image counts as a jump.
 JUMP_WIDTH = 1e-9
-
-
-class Settings(NamedTuple):
-    """Tuned numbers of the error estimate; `python -m benchmarks accuracy wear` measures its coverage.
-
-    Parameters
-    ----------
-    safety : float
-        Ratio of the stated error to the difference from the rougher solutions.
-    step : float
-        Least stated error of the contact radius, as a fraction of the change of this radius in the last step.
-    shape : float
-        Least stated error of normal force and worn depth at constant depth, as a fraction of the largest error of the
-        profile. Lengths are in a0, heights in d0.
-    volumes : float
-        The error of a volume is the difference of wear volume and energy volume, plus this fraction of the differences
-        of both volumes from the rougher solutions.
-    reach : int
-        The difference of a function from the rougher solutions is replaced by the largest difference among this many
-        neighbouring positions on each side.
-    floor : float
-        Least stated error of a function at any position, as a fraction of the largest error of the function.
-    """
-
-    safety: float = 1.5
-    step: float = 0.2
-    shape: float = 0.15
-    volumes: float = 0.14
-    reach: int = 5
-    floor: float = 0.02
-
-
-SETTINGS = Settings()
+"""Distance from a border, as a fraction of the border's radius, within which a change of the image counts as a jump."""
+REACH = 5
+"""Number of neighbouring positions on each side among which the largest difference of a function is used, because the
+differences have zeros."""
+NOWHERE = np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,15 +54,8 @@ class Worn:
         Time steps taken.
     rougher : tuple of Worn
         Two rougher solutions of the same contact, from which its error is estimated.
-    slowness : float
-        Factor on the differences from the rougher solutions; above 1 if the error falls more slowly than usual.
-    second : float
-        Weight of the difference from the second rougher solution. It matters where the first rougher solution agrees by
-        chance.
-    least_edge_error : float
-        Least stated error of the radii of scar and stick zone, in which the rougher solutions may agree by chance.
-    edge_step : float
-        Change of the contact radius in the last time step. The error of the contact radius is of the same order.
+    least_errors : mapping of str to float
+        Least stated errors of numbers in which the rougher solutions may agree by chance, by the name of the output.
     relative_error : float
         Error of every output divided by the largest value of the output; used if there is no rougher solution.
     """
@@ -113,10 +72,7 @@ class Worn:
     energy_volume: float = np.nan
     steps: int = 0
     rougher: tuple[Worn, ...] = ()
-    slowness: float = 1.0
-    second: float = 0.5
-    least_edge_error: float = 0.0
-    edge_step: float = 0.0
+    least_errors: Mapping[str, float] = field(default_factory=dict)
     relative_error: float = np.nan
 
     def value(self, output: str, places: FloatArray) -> float | FloatArray:
@@ -137,50 +93,26 @@ class Worn:
             largest = np.max(np.abs(value), initial=0.0, where=np.isfinite(value))
             return np.asarray(np.where(np.isfinite(value), self.relative_error * largest, np.nan))
         if output not in FUNCTIONS:
-            return self._error_of_number(output)
+            return max(SAFETY * float(self._distance(output)), self.least_errors.get(output, 0.0))
         crowd = self._crowd(float(places[-1]))
         wide = _spread(self._distance(output, crowd))
-        near = SETTINGS.safety * np.maximum(self._distance(output, places), np.interp(places, crowd, wide))
-        floor = np.where(places < self._last_change, SETTINGS.floor * np.max(near), 0.0)
-        return np.asarray(np.maximum(near, floor))
-
-    @property
-    def _last_change(self) -> float:
-        """The radius beyond which no solution has any wear."""
-        return max(one.contact_radius for one in (self, *self.rougher))
-
-    def _error_of_number(self, output: str) -> float:
-        """Return the error of an output that is a number.
-
-        In partial slip, the wear volume follows from the shape and also from the dissipated energy. The difference of
-        these two volumes is a part of the error.
-        """
-        if output in VOLUMES and self.stick_border > 0.0:
-            apart = sum(float(self._distance(name)) for name in VOLUMES)
-            return self.slowness * abs(self.wear_volume - self.energy_volume) + SETTINGS.volumes * apart
-        error = SETTINGS.safety * float(self._distance(output))
-        if output in SHAPED and self.depth == KEPT_DEPTH:
-            return max(error, SETTINGS.shape * self._error_of_shape)
-        if output == "contact_radius":
-            return max(error, self.least_edge_error, SETTINGS.step * self.edge_step)
-        return max(error, self.least_edge_error) if output == "stick_border" else error
-
-    @cached_property
-    def _error_of_shape(self) -> float:
-        """The largest error of the profile."""
-        return SETTINGS.safety * float(np.max(self._distance("worn_profile", self._crowd(0.0))))
+        return SAFETY * np.maximum(self._distance(output, places), np.interp(places, crowd, wide))
 
     def _distance(self, output: str, places: FloatArray = NOWHERE) -> FloatArray:
-        """Return the largest weighted difference of an output from the rougher solutions."""
+        """Return the distance of an output from the rougher solutions.
+
+        This is the difference from the first rougher solution, or half the difference from the second one if that is
+        larger, because two solutions may agree by chance.
+        """
         value = self.value(output, places)
         with np.errstate(invalid="ignore"):
-            gaps = [np.abs(value - one.value(output, places)) for one in self.rougher]
-        weighted = [gap * (self.second if number else 1.0) for number, gap in enumerate(gaps)]
-        return np.asarray(self.slowness * np.max(weighted, axis=0))
+            gaps = [np.abs(value - one.value(output, places)) / (k + 1) for k, one in enumerate(self.rougher)]
+        return np.asarray(np.max(gaps, axis=0))
 
     def _crowd(self, last: float) -> FloatArray:
         """Return positions that are dense at the borders of stick zone and contact, up to at least `last`."""
-        cuts = sorted({0.0, self.stick_border, self.contact_radius, max(last, self._last_change)})
+        farthest = max(last, *(one.contact_radius for one in self.rougher))
+        cuts = sorted({0.0, self.stick_border, self.contact_radius, farthest})
         steps = np.sin(0.5 * np.pi * np.arange(1, 40) / 40.0) ** 2
         return np.concatenate([low + (high - low) * steps**1.5 for low, high in pairwise(cuts)])
 
@@ -188,8 +120,8 @@ class Worn:
 def _spread(distance: FloatArray) -> FloatArray:
     """Return the largest finite value among the neighbours of each entry."""
     finite = np.where(np.isfinite(distance), distance, 0.0)
-    padded = np.pad(finite, SETTINGS.reach, mode="edge")
-    return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 2 * SETTINGS.reach + 1).max(axis=1))
+    padded = np.pad(finite, REACH, mode="edge")
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 2 * REACH + 1).max(axis=1))
 
 
 class Scar(NamedTuple):

@@ -1,7 +1,6 @@
 """Fretting under constant force: the exact evolution, its end, the fast rule, and the literal simulation of it."""
 
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -12,8 +11,8 @@ from mdr_dask.physics.mdr.half_integrals import graded_panels
 from mdr_dask.physics.mdr.revolution import PowerProfile, from_table
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear import evolution
-from mdr_dask.physics.wear.exact import exact, limit_under_force
-from mdr_dask.physics.wear.forced_slip import forced_slip
+from mdr_dask.physics.wear.exact import exact
+from mdr_dask.physics.wear.slip import partial_slip
 
 PARABOLA = PowerProfile(2.0)
 exact_forced = partial(exact, constant_force=True)
@@ -55,61 +54,43 @@ def test_image_at_the_border_is_the_depth_less_eta(worn):
     np.testing.assert_allclose(worn[3].image(np.linspace(0.0, c * (1 - 1e-9), 50)), frozen, atol=1e-12)
 
 
-def test_pressure_carries_the_force(worn):
-    contact = worn[3]
-    cuts, total = [0.0, contact.stick_border, contact.contact_radius], 0.0
-    x, w = np.polynomial.legendre.leggauss(80)
-    for low, high in pairwise(cuts):
-        s = 0.5 * (1 + x)  # both ends may be singular like a root or a power
-        r = low + (high - low) * s**2 * (3 - 2 * s)
-        total += np.sum(0.5 * w * 6 * s * (1 - s) * (high - low) * 2 * np.pi * r * contact.pressure(r))
-    assert total == pytest.approx(4.0 / 3.0, rel=1e-3)
-
-
-def test_every_step_conserves_energy_while_the_border_moves():
+@pytest.mark.parametrize("constant_force", [False, True])
+def test_every_step_conserves_energy(constant_force):
     """Volume from the worn depths of slip zone and annulus, against int 2 (d - g) y dx."""
-    problem = forced_slip(PARABOLA, 0.455, graded_panels(12, 8, 4), 3.0)
-    moving, start = problem.move(evolution.settled(problem))
-    moments = evolution.march(moving, 2.0, 2e-5, 1e-5, start)
-    energy = evolution.integral_along(moments, [moving.wear_rate(m.unknowns) for m in moments])
-    volumes = []
+    problem, start = partial_slip(PARABOLA, 0.455, graded_panels(12, 8, 4), 3.0), None
+    if constant_force:
+        problem, start = problem.under_force()
+    moments = evolution.march(problem, 2.0, 2e-5, 1e-5, start)
+    energy = evolution.integral_along(moments, [problem.wear_rate(m.unknowns) for m in moments])
     abscissa, weight = gauss(40)
-    whole = np.pi * problem.virgin.virgin_width * problem.eta
+    whole = np.pi * problem.body.width * problem.eta
+    volumes = []
     for moment in moments:
-        border, width, _ = moving.place(moment.unknowns)
-        slipping = width * (moving.panels.weights @ moment.accumulated)
-        stuck = max(border, 0.0) * float(weight @ moving.frozen_depth(moment.path, max(border, 0.0) * abscissa))
+        border, width, _ = problem.place(moment.unknowns)
+        slipping = width * (problem.panels.weights @ moment.accumulated)
+        stuck = max(border, 0.0) * float(weight @ problem.frozen_depth(moment.path, max(border, 0.0) * abscissa))
         volumes.append(whole * (slipping + stuck))
     np.testing.assert_allclose(np.diff(volumes), np.diff(energy), atol=5e-6)  # of steps of 2e-5
     np.testing.assert_allclose(volumes, energy, atol=1e-5)  # accumulated over them
 
 
-def test_the_rise_of_the_plateau_is_the_integral_along_the_path():
-    """(2/pi) int arccos(b / r) dd over straight pieces of b^2, short ones and one that ends at the place."""
-    problem = forced_slip(PARABOLA, 0.455, graded_panels(4, 4, 4), 3.0)
+def test_the_frozen_depth_is_the_integral_along_the_path():
+    """(2/pi) int arccos(b / r) dd over straight pieces of b^2 up to the moment at which the border passes r."""
+    problem = partial_slip(PARABOLA, 0.455, graded_panels(16, 4, 4), 3.0)
     rng = np.random.default_rng(3)
     path = np.cumsum(np.append([[0.0], [0.0]], rng.uniform(0.0, 0.02, (2, 12)) ** 2, axis=1), axis=1)
-    places = path[0, -1] + np.array([0.0, 1e-6, 1e-3, 0.1, 2.0])
-    found = problem.plateau_rise(path, places)
+    square, width = problem.body.square, problem.body.width
+    places = np.append(path[0, [3, 8, 12]], 0.5 * (path[0, 5] + path[0, 6]))
+    for q, found in zip(places, problem.frozen_depth(path, places), strict=True):
+        depth = np.interp(q, *path)
 
-    def angle(q, border):
-        return np.arccos(
-            np.sqrt(
-                (problem.body.square + problem.body.width * border) / (problem.body.square + problem.body.width * q)
-            )
-        )
+        def angle(d, q=q):
+            return np.arccos(np.sqrt((square + width * np.interp(d, *path[::-1])) / (square + width * q)))
 
-    for q, rise in zip(places, found, strict=True):
-        pieces = [
-            (d1 - d0) * quad(lambda t, a=b0, b=b1, q=q: angle(q, a + (b - a) * t), 0.0, 1.0, epsabs=1e-14)[0]
-            for (b0, d0), (b1, d1) in pairwise(path.T)
-        ]
-        assert rise == pytest.approx(2.0 / np.pi * sum(pieces), rel=2e-5)
-    cut = 0.5 * (path[0, 5] + path[0, 6])
-    part = np.append(path[:, :6], [[cut], [0.5 * (path[1, 5] + path[1, 6])]], axis=1)
-    rise = problem.plateau_rise(part, np.array([cut]))[0]
-    virgin = np.exp(problem.virgin.virgin_slip(problem.body.width * np.array([cut])))[0]
-    assert problem.frozen_depth(path, np.array([cut]))[0] == pytest.approx(rise - virgin, rel=1e-12)
+        rise = 2.0 / np.pi * quad(angle, 0.0, depth, points=path[1][path[1] < depth], epsabs=1e-14)[0]
+        r = np.sqrt(square + width * q)
+        virgin = quad(lambda t, r=r: PARABOLA.rise(r * np.cos(t) - 0.455, 0.455), 0.0, np.arccos(0.455 / r))[0]
+        assert found == pytest.approx(rise - 2.0 / np.pi * virgin / problem.eta, abs=2e-5 * rise)
 
 
 def test_the_image_is_at_the_depth_at_the_edge(worn):
@@ -142,7 +123,7 @@ def test_error_estimate_covers_the_error(worn):
 @pytest.mark.parametrize(("exponent", "c"), [(2.0, 0.455), (1.0, 0.368), (2.0, 0.9), (0.5, 0.3)])
 def test_the_end_is_the_limit(exponent, c):
     profile = PowerProfile(exponent)
-    last, limit = exact_forced(profile, c, [1000.0], 1e-3)[0], limit_under_force(profile, c, 1e-3)
+    last, limit = exact_forced(profile, c, [1000.0], 1e-3)[0], exact_forced(profile, c, [np.inf])[0]
     assert last.depth == pytest.approx(limit.depth, rel=2e-4)
     assert last.contact_radius == pytest.approx(limit.contact_radius, rel=3e-4)
     assert last.wear_volume == pytest.approx(limit.wear_volume, rel=2e-3)
@@ -151,7 +132,7 @@ def test_the_end_is_the_limit(exponent, c):
 
 
 def test_the_limit_has_no_pressure_outside_its_stick_zone():
-    limit = limit_under_force(PARABOLA, 0.455)
+    limit = exact_forced(PARABOLA, 0.455, [np.inf])[0]
     outside = np.linspace(limit.stick_border * 1.001, limit.contact_radius * 0.999, 20)
     np.testing.assert_allclose(limit.pressure(outside), 0.0, atol=1e-9)
     np.testing.assert_allclose(limit.image(outside), limit.depth, atol=1e-12)
@@ -186,10 +167,11 @@ def test_table_of_a_parabola(worn):
 def test_a_table_that_ends_before_the_last_contact_is_refused():
     r = np.linspace(0, 1.35, 136)
     body = from_table(r, r**2 / 2, 0.9)
+    assert exact_forced(body, 0.455, [0.1], accuracy=1e-3)[0].contact_radius < body.largest_radius
     with pytest.raises(ValueError, match="the contact reaches beyond the table"):
-        exact_forced(body, 0.455, [0.1], accuracy=1e-3)
+        exact_forced(body, 0.455, [20.0], accuracy=1e-3)
     with pytest.raises(ValueError, match="the contact reaches beyond the table"):
-        limit_under_force(body, 0.455, 1e-3)
+        exact_forced(body, 0.455, [np.inf])[0]
 
 
 def test_a_result_does_not_depend_on_what_else_was_asked_for():

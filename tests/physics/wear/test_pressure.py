@@ -5,7 +5,7 @@ import pytest
 
 from mdr_dask.physics.mdr.revolution import PowerProfile
 from mdr_dask.physics.mdr.transforms import gauss
-from mdr_dask.physics.wear.exact import exact, limit_under_force
+from mdr_dask.physics.wear.exact import exact
 from mdr_dask.physics.wear.rules import fast, limit
 
 
@@ -30,7 +30,7 @@ CONTACTS = {
     "exact": lambda body, c: exact(body, c, [4.0], errors=False)[0],
     "exact, late": lambda body, c: exact(body, c, [200.0], errors=False)[0],
     "exact under force": lambda body, c: exact(body, c, [4.0], constant_force=True, errors=False)[0],
-    "limit under force": lambda body, c: limit_under_force(body, c, errors=False),
+    "limit under force": lambda body, c: exact(body, c, [np.inf], constant_force=True, errors=False)[0],
     "gross slip": lambda body, c: exact(body, 0.0, [2.0], errors=False)[0],
     "gross slip under force": lambda body, c: exact(body, 0.0, [2.0], constant_force=True, errors=False)[0],
 }

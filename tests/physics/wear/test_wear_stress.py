@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from mdr_dask.physics.mdr.revolution import PowerProfile, from_table
 from mdr_dask.physics.wear import rules as wear
-from mdr_dask.physics.wear.exact import exact, limit_under_force
+from mdr_dask.physics.wear.exact import exact
 
 pytestmark = pytest.mark.slow
 
@@ -107,7 +107,7 @@ def test_sliding(exponent, constant_force):
 def test_constant_force(exponent, c):
     """Force and energy are kept, f rises only, depth and border stay below those of the end; c^n >= 0.0025."""
     profile, eta = PowerProfile(exponent), 1.0 - c**exponent
-    limit = limit_under_force(profile, c, 1e-3)
+    limit = exact(profile, c, [np.inf], 1e-3, constant_force=True)[0]
     for worn in exact(profile, c, [1e-3, 3.0, 100.0], 1e-3, constant_force=True):
         assert worn.normal_force == pytest.approx(limit.normal_force, rel=2e-4)
         assert worn.wear_volume == pytest.approx(worn.energy_volume, rel=0.01, abs=1e-3 * eta)
