@@ -39,11 +39,12 @@ def writing(path: Path) -> Iterator[None]:
 
 def require_outside(path: Path) -> None:
     """Raise UsageError for a file inside a store, because the store would then count as damaged."""
-    from mdr_dask.store import is_study
+    groups = [folder for folder in path.absolute().parents if (folder / "zarr.json").is_file()]
+    if groups:
+        from mdr_dask.store import is_study  # late, because it imports Zarr
 
-    for folder in path.absolute().parents:
-        if (folder / "zarr.json").is_file() and is_study(str(folder)):
-            raise click.UsageError(f"expected a file outside every store, got {str(path)!r} in the store {folder.name}")
+        for folder in filter(is_study, map(str, groups)):
+            raise click.UsageError(f"expected a file outside every store, got {str(path)!r} in the store {folder}")
 
 
 def require_suffix(path: Path | None, known: tuple[str, ...]) -> None:
