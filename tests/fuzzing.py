@@ -1,4 +1,4 @@
-"""Files of strangers, made up: campaigns, tables, cluster files, metadata and stores, with something wrong in them.
+"""Files of strangers, made up: campaigns, metadata, stores and records, with something wrong in them.
 
 `examine` gives one to the commands that read it. Each has to end with an exit code that the command line knows, in
 seconds, with a sentence for what it refuses, and with nothing for the terminal.
@@ -22,11 +22,7 @@ from typing import Any
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
-from mdr_dask.campaign import cluster
 from mdr_dask.cli import BROKE, main
-from mdr_dask.cli.printing import printable
-from mdr_dask.errors import CampaignError, ClusterError
-from mdr_dask.execute import Resources, executors
 
 ROOT = Path(__file__).parents[1]
 #: Processor seconds that a command may take.
@@ -155,26 +151,6 @@ store: {blocks: {position: 1}}
 SLIDING = "name: a\nmodel: sliding_friction\nparameters:\n  normal_force: 1 N\n  velocity: [1 mm/s, 1 m/s]\n"
 SOFT = "  shear_modulus: 10 MPa\n  relaxation_time: 1 ms\n"
 ROUGH = "  length: 20 mm\n  points: 500\n  hurst: 0.7\n  rms_roughness: 1 um\n"
-#: A table of each kind, and a campaign that reads it.
-TABLES = {
-    "sampling": (
-        "position [m]; slope\n1,0; 2,0\n2,0; 3,0\n4; 5\n",
-        "name: a\nmodel: toy\nparameters: {}\nsampling: {table: t.csv}\n",
-    ),
-    "moduli": (
-        "f, G', G''\nHz, MPa, MPa\n0.1, 8, 1\n1, 9, 1.5\n10, 12, 2\n100, 30, 5\n",
-        SLIDING + ROUGH + "  material: {dma_table: {file: t.csv, table_temperature: 298 K, poisson_ratio: 0.5}}\n",
-    ),
-    "spectrum": (
-        "wavenumber [rad/m],C2D [m^4]\n1000,1e-16\n2000,3e-17\n4000,1e-17\n8000,2e-18\n",
-        SLIDING + SOFT + "  length: 20 mm\n  points: 500\n  surface: {spectrum: t.csv}\n",
-    ),
-    "profile": (
-        "x [mm], z [um]\n" + "".join(f"{0.1 * i:.1f}, {i * (7 * i % 5)}\n" for i in range(20)),
-        SLIDING + SOFT + "  surface: {profile: t.csv}\n",
-    ),
-}
-CLUSTER = {"class": "dask_jobqueue.SLURMCluster", "arguments": {"cores": 4, "memory": "8 GiB"}, "adapt": {"maximum": 3}}
 METADATA = (
     "zarr.json",
     "height/zarr.json",
@@ -192,8 +168,6 @@ CASES = {
     "campaign": _cases("campaign", bases(), edits),
     "text of a campaign": _cases("text of a campaign", bases(), scribbles),
     "run": _cases("run", ["toy"], edits),
-    "table": _cases("table", TABLES, st.one_of(scribbles, st.binary(max_size=80))),
-    "cluster file": _cases("cluster file", [""], edits),
     "metadata": _cases("metadata", METADATA, edits),
     "store": _cases("store", ["zarr.json"], edits),
     "record": _cases("record", [""], edits),
@@ -294,32 +268,6 @@ def _is_small() -> bool:
     return study.model == "toy" and costs.results * costs.rounds < 500 and costs.blocks < 100
 
 
-def _table(case: Case, _: Path) -> None:
-    table, campaign = TABLES[case.base]
-    content = (
-        case.content
-        if isinstance(case.content, bytes)
-        else scribbled(table, case.content).encode(errors="surrogatepass")
-    )
-    Path("t.csv").write_bytes(content)
-    Path("a.yaml").write_text(campaign)
-    judge("check", "a.yaml")
-    if case.base == "moduli":
-        judge("master-curve", "t.csv", "--over", "f", "--of", "G'", "--by", "G''")
-    if case.base in ("spectrum", "profile"):
-        judge("surface", "t.csv")
-
-
-def _cluster_file(case: Case, _: Path) -> None:
-    Path("c.yaml").write_bytes(written(edited(CLUSTER, case.content)).encode(errors="surrogatepass"))
-    with in_time("cluster file"):
-        try:
-            executors.check(Resources(cluster=cluster.load_cluster(Path("c.yaml"))))
-        except (CampaignError, ClusterError) as error:
-            if CONTROL.search(printable(str(error))):
-                raise FaultError(f"cluster file: something for the terminal: {error}") from None
-
-
 def _metadata(case: Case, whole: Path) -> None:
     """Change a document of a store; of kind "store" without the record that would give it away."""
     shutil.copytree(whole, "s.zarr")
@@ -374,8 +322,6 @@ ACTS: dict[str, Callable[[Case, Path], None]] = {
     "campaign": _campaign,
     "text of a campaign": _campaign,
     "run": _run,
-    "table": _table,
-    "cluster file": _cluster_file,
     "metadata": _metadata,
     "store": _metadata,
     "record": _record,

@@ -141,17 +141,6 @@ def test_a_study_in_a_bucket_is_run_grown_verified_and_mended_like_one_on_a_disk
     assert chunks(bucket) == chunks(url)
 
 
-def test_requests_that_are_dropped_or_slow_lose_nothing(toy, link, bucket, url):
-    run(small(toy), bucket)
-    run(small(toy, 9), url)
-    link.delay, link.cut_after, link.drops = 0.02, 7, 6
-    assert run(small(toy, 9), bucket).done == 6
-    assert link.drops < 6
-    link.delay = 0.0
-    assert chunks(bucket) == chunks(url)
-    assert store.verify(bucket).findings == []
-
-
 def test_a_network_that_is_gone_ends_a_run_in_one_sentence_and_the_next_one_goes_on(
     toy, link, bucket, url, monkeypatch
 ):

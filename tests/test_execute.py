@@ -158,12 +158,6 @@ def test_a_store_of_another_campaign_is_refused_and_untouched(toy, url):
     assert (digests(url), (Path(url) / "zarr.json").read_bytes()) == before
 
 
-def test_a_foreign_group_is_refused(toy, url):
-    xr.Dataset({"a": ("x", [1.0])}).to_zarr(url, consolidated=False)
-    with pytest.raises(StoreError, match="but not a study of mdr_dask"):
-        run(toy.campaign(toy.axis("position", [1.0])), url)
-
-
 def test_readers_see_the_old_shape_until_a_grown_one_is_published(toy, url, monkeypatch):
     run(toy.campaign(toy.axis("position", [1.0, 2.0])), url)
     grown = toy.campaign(toy.axis("position", [1.0, 2.0, 3.0]))

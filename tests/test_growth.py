@@ -50,14 +50,6 @@ def test_named_values_grow_and_those_left_out_stay(toy, url):
     assert values(url).position.to_numpy().tolist() == ["near", "far", "middle", "2.5"]
 
 
-def test_axes_in_another_order_are_the_same_study(toy, url):
-    one, other = toy.axis("position", [1.0, 2.0]), toy.axis("slope", [3.0, 5.0])
-    run(toy.campaign(one, other), url)
-    before = digests(url)
-    assert run(toy.campaign(other, one), url).kept == 24
-    assert digests(url) == before
-
-
 def test_fewer_values_and_realisations_keep_what_is_there_and_run_only_what_is_asked(toy, url):
     campaign = replace(toy.campaign(toy.axis("position", [1.0, 2.0, 3.0])), blocks={"position": 1, "realisation": 1})
 
@@ -130,14 +122,6 @@ def test_a_series_named_like_an_array_at_the_root_and_a_study_beside_series_are_
     run(series, url + "2")
     with pytest.raises(StoreError, match="series: height in the store, none in the campaign: name this one as well"):
         run(plain, url + "2")
-
-
-def test_a_renamed_campaign_goes_on_and_a_changed_accuracy_does_not(toy, url):
-    campaign = toy.campaign(toy.axis("position", [1.0]))
-    run(campaign, url)
-    assert run(replace(campaign, name="renamed", text="# more"), url).kept == 6
-    with pytest.raises(StoreError, match=r"accuracy: None in the store, 0\.01 in the campaign"):
-        run(replace(campaign, accuracy=0.01), url)
 
 
 def test_another_campaign_takes_the_place_of_one_that_was_never_laid_out(toy, url, monkeypatch):

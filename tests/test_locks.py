@@ -61,31 +61,6 @@ def test_a_lock_that_fails_otherwise_is_said_to_fail(toy, url, monkeypatch):
         run(small(toy), url)
 
 
-def test_a_file_that_its_holder_takes_away_at_that_moment_is_no_lock(url, monkeypatch):
-    file, left = locks._lock_file(url), []
-
-    def taken_away(descriptor, shared=False):
-        if not left:
-            left.append(file.unlink())
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-
-    monkeypatch.setattr(locks, "_flock", taken_away)
-    with locks.acquire(url), pytest.raises(StoreBusyError), locks.acquire(url):
-        pass
-
-
-def test_who_is_refused_keeps_no_file_open(url):
-    def count():
-        return len([*Path("/proc/self/fd").iterdir()])
-
-    with locks.acquire(url):
-        before = count()
-        for _ in range(5):
-            with pytest.raises(StoreBusyError), locks.acquire(url):
-                pass
-        assert count() == before
-
-
 def test_at_a_url_the_second_runner_is_refused_and_the_claim_goes_with_the_first(toy, bucket, caplog):
     with locks.acquire(bucket), pytest.raises(StoreBusyError, match=rf"process {os.getpid()} on .* is running"):
         run(small(toy), bucket)

@@ -1,7 +1,6 @@
 """Parts of a campaign: each block is computed once; parts and a single runner exclude each other."""
 
 import json
-import re
 import threading
 from contextlib import ExitStack
 from dataclasses import replace
@@ -139,7 +138,7 @@ def test_parts_killed_at_random_end_with_the_bytes_of_an_undisturbed_run(toy, tm
     assert sum(attempt - 1 for attempt in store.attempts(parts, "").values()) <= kills
 
 
-def test_log_and_watch_of_parts(toy, campaign_file, capsys):
+def test_log_and_status_of_parts(toy, campaign_file, capsys):
     for part in ("1/2", "2/2"):
         assert main(["run", "toy.yaml", "--part", part, "--quiet", "--log", "log.jsonl"]) == 1
         assert capsys.readouterr().out == f"toy.zarr, part {part}: 2 done, 2 failed\n"
@@ -158,16 +157,6 @@ def test_log_and_watch_of_parts(toy, campaign_file, capsys):
         assert capsys.readouterr().out.endswith("\nat work: 2 of 8 parts (2-3)\n")
         assert main(["status", "toy.zarr", "--json"]) == 0
         assert json.loads(capsys.readouterr().out)["at_work"] == ["2 of 8 parts (2-3)"]
-    leaving = ExitStack()
-    leaving.enter_context(store.exclusive("toy.zarr"))
-    timer = threading.Timer(0.3, leaving.close)
-    timer.start()
-    assert main(["status", "toy.zarr", "--watch"]) == 0
-    timer.join()
-    lines = [line.partition(" ")[2] for line in capsys.readouterr().out.splitlines()]
-    assert lines[0] == "8 of 8 results (100%): 4 done, 4 failed"
-    assert re.fullmatch(r"at work: process \d+ on .*", lines[1])
-    assert lines[2:] == ["at work: no run"]
 
 
 @pytest.mark.slow

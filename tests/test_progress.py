@@ -56,17 +56,6 @@ def test_a_line_tells_share_time_and_time_left_first(monkeypatch):
     assert describe(progress, 12.0) == "0 %, 12 s, compiling ..., 0 of 1000 results, 0 failed"
 
 
-def test_compilations_beside_each_other_count_once(monkeypatch):
-    now = [0.0]
-    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
-    clock = clocks.CompileClock()
-    for moment, call in ((0, "end"), (1, "begin"), (2, "begin"), (4, "end"), (5, "end"), (9, "begin"), (10, "end")):
-        now[0] = float(moment)
-        getattr(clock, call)()
-    assert clock.seconds == 5.0
-    assert not clock.is_running
-
-
 def test_the_clock_hears_numba():
     import numba
 
@@ -101,18 +90,6 @@ def _wait_for(capsys, line):
             return
         time.sleep(0.01)
     raise AssertionError(line)
-
-
-def test_every_kind_of_result_counts_once():
-    """A block of each status, in the order of the statuses: missing, done, not converged, failed, not needed."""
-    outcome = Outcome((0, 40, 3, 2, 7), 5, 1.5, 4.0, 0.5, 9.0, warned=6)
-    once = Progress(total=200, kept=10, estimated=6.0).after(outcome, 2.0)
-    assert (once.done, once.failed, once.not_needed, once.solves, once.blocks) == (40, 5, 7, 5, 1)
-    assert once.to_do == 200 - 10 - 40 - 5 - 7
-    assert (once.compute_seconds, once.compile_seconds, once.write_seconds) == (4.0, 4.0, 0.5)  # never more than all
-    twice = once.after(outcome, 3.0)
-    assert twice.warned == 12
-    assert (twice.not_needed, twice.to_do, twice.finished, twice.wall_seconds) == (14, 86, 3.0, 3.0)
 
 
 def test_what_is_left_at_the_end_of_a_round_is_nothing(toy, url):

@@ -83,7 +83,7 @@ def test_a_store_at_which_a_run_is_at_work_is_not_verified(url, toy, capsys):
     with store.exclusive(url):
         assert main(["verify", url]) == 2
         assert main(["verify", url, "--repair"]) == 2
-    assert capsys.readouterr().err.count("is running on this store") == 2
+    assert capsys.readouterr().err.count("running on this store") == 2
 
 
 def test_a_run_that_was_killed_leaves_nothing_to_find_fault_with(toy, url, monkeypatch):

@@ -19,7 +19,6 @@ WRONG = [
     ("run small.yaml --threads 0", "0", "1"),
     ("run small.yaml --threads 2 --workers 2", "--threads, --workers"),
     ("run small.yaml --part 4/3", "K/N", "'4/3'"),
-    ("status STORE --watch --json", "--watch", "--json"),
     ("show STORE -o x.csv --json", "--json and --output"),
     ("show STORE -o x.nc --sort velocity", ".csv", "--sort"),
     ("plot STORE friction_coefficient", "--over"),

@@ -8,7 +8,6 @@ from typing import Any
 
 import click
 
-from mdr_dask.cli import watching
 from mdr_dask.cli.answers import check_target, print_answer, write_answer
 from mdr_dask.cli.options import (
     json_option,
@@ -41,28 +40,21 @@ store_argument = click.argument("store")
     "--failures", is_flag=True, help="List failed results with their reasons and the ranges of their parameters."
 )
 @click.option("--messages", is_flag=True, help="List also the warnings of finished results.")
-@click.option("--watch", is_flag=True, help="Refresh until no run is active.")
 @json_option
-def status(store: str, failures: bool, messages: bool, watch: bool, form: str | None) -> None:
+def status(store: str, failures: bool, messages: bool, form: str | None) -> None:
     """Show the progress of a study and its active runs, also during a run.
 
     \b
     mdr-dask status results/quickstart.zarr
-    mdr-dask status results/quickstart.zarr --watch
     mdr-dask status results/quickstart.zarr --failures
     """
     from mdr_dask import store as stores
     from mdr_dask.questions import progress
 
-    if watch:
-        if failures or messages or form:
-            raise click.UsageError("expected --watch alone, without --failures, --messages and --json")
-        watching.watch(store, lambda: progress.counts(store))
-        return
     if not (failures or messages):
         of_store = stores.attributes(store)
         study = {"study": of_store["title"], "model": of_store["model"], "model_version": of_store["model_version"]}
-        _print_counts(study, progress.counts(store), watching.at_work(store), form)
+        _print_counts(study, progress.counts(store), stores.active_runs(store), form)
         stores.require_sound(store, stores.series_names(store))
         return
     studies = stores.datasets(store)

@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask import aggregation, fits, plots, store
-from mdr_dask.errors import DataError, FitError, StoreError
+from mdr_dask.errors import DataError, FitError
 from mdr_dask.plots import curves, labels, page
 from mdr_dask.plots.base import provenance
 from mdr_dask.questions import progress
@@ -167,22 +167,13 @@ def _study(
         subject=subject_of(model),
         digests=_digests(url, held, records),
         rerun=_rerun(url, held),
-        at_work=who_is_at_work(url),
+        at_work=", ".join(store.active_runs(url)),
     )
 
 
 def _shows_no_errors(figure: Json) -> bool:
     """Return whether a figure shows no errors; the page shows these figures last."""
     return not any("y_low" in trace or "value_low" in trace for trace in figure["traces"])
-
-
-def who_is_at_work(url: str) -> str:
-    """Return a text with the processes that are working on a study; empty if no process is."""
-    try:
-        runner, parts = store.at_work(url)
-    except StoreError as error:
-        return str(error)
-    return ", ".join([*([runner] if runner else []), *(f"part {part}" for part in parts)])
 
 
 def _summary(model: str) -> str:

@@ -12,7 +12,7 @@ from mdr_dask.store.files import absolute
 from mdr_dask.store.identity import Stored, reconcile
 from mdr_dask.store.layout import Finding, is_laid_out, lay_out
 from mdr_dask.store.ledgers import ledger, require_sound
-from mdr_dask.store.locks import Lock, Part, at_work, exclusive, gate, note_begun, shared, while_locked
+from mdr_dask.store.locks import Lock, Part, active_runs, at_work, exclusive, gate, note_begun, shared, while_locked
 from mdr_dask.store.packing import contents, verify_packed
 from mdr_dask.store.reading import datasets, is_damage, readable, save
 from mdr_dask.store.records import attempts, kinds, merge_records, record, records
@@ -29,6 +29,7 @@ __all__ = [
     "Place",
     "Stored",
     "absolute",
+    "active_runs",
     "at_work",
     "attempts",
     "attributes",

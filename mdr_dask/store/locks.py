@@ -11,6 +11,7 @@ active. So a part and an exclusive run never start together, and one part lays o
 from __future__ import annotations
 
 import errno
+import itertools
 import json
 import logging
 import os
@@ -194,6 +195,23 @@ def at_work(url: str) -> tuple[str | None, list[Part]]:
     Nothing is written.
     """
     return (_holder(url) if _is_held(url) else None), _parts(url)
+
+
+def active_runs(url: str) -> list[str]:
+    """Return the active runs of a study as texts: the exclusive run, and the number and the numbers of active parts."""
+    runner, parts = at_work(url)
+    found = [runner] if runner else []
+    for count, alike in itertools.groupby(parts, key=lambda part: part.count):
+        numbers = [part.number for part in alike]
+        found.append(f"{len(numbers)} of {count} parts ({_ranges(numbers)})")
+    return found
+
+
+def _ranges(numbers: list[int]) -> str:
+    """Return ascending numbers as ranges: ``1-3, 7``."""
+    runs = itertools.groupby(enumerate(numbers), key=lambda pair: pair[1] - pair[0])
+    ends = [[number for _, number in run] for _, run in runs]
+    return ", ".join(f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in ends)
 
 
 @contextmanager

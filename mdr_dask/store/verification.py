@@ -36,7 +36,7 @@ from mdr_dask.store.layout import (
     read_record,
 )
 from mdr_dask.store.ledgers import Blocks
-from mdr_dask.store.locks import at_work, exclusive
+from mdr_dask.store.locks import active_runs, exclusive
 from mdr_dask.store.records import decoded, folder, lines, name_of
 from mdr_dask.store.study import attributes, document, group_document_of, refuse_file
 
@@ -94,10 +94,8 @@ def verify(url: str) -> Inspection:
         If a run is active in the store.
     """
     refuse_file(url)
-    runner, parts = at_work(url)
-    if runner or parts:
-        who = runner or f"part {', '.join(map(str, parts))}"
-        raise StoreBusyError(f"{url}: {who} is running on this store; wait for it, or stop it")
+    if who := ", ".join(active_runs(url)):
+        raise StoreBusyError(f"{url}: running on this store: {who}; wait until it ends, or stop it")
     return _inspect(url)
 
 
