@@ -119,25 +119,21 @@ def _disagreements(attributes: Mapping[str, Any], arrays: Mapping[str, Any]) -> 
         return
     sizes: dict[str, int] = {}
     for name, array in arrays.items():
-        shape, dims, chunk = (
-            array["shape"],
-            array.get("dimension_names") or [],
-            array["chunk_grid"]["configuration"]["chunk_shape"],
-        )
-        if (
-            not len(shape) == len(dims) == len(chunk)
-            or math.prod(chunk) > MOST_CASES
-            or math.prod(shape) > MOST_CASES**2
-        ):
+        shape, dims, chunk = _dimensions(array)
+        is_odd = not len(shape) == len(dims) == len(chunk)
+        if is_odd or math.prod(chunk) > MOST_CASES or math.prod(shape) > MOST_CASES**2:
             yield f"{name}: expected a length, a name and a chunk for each dimension, got {shape!r:.60}, {dims!r:.60}"
         elif any(sizes.setdefault(dim, length) != length for dim, length in zip(dims, shape, strict=True)):
             yield f"{name}: expected the lengths of the other arrays, got {dict(zip(dims, shape, strict=True))!r:.60}"
-    status = arrays["status"]
-    blocks = dict(
-        zip(status.get("dimension_names") or [], status["chunk_grid"]["configuration"]["chunk_shape"], strict=False)
-    )
-    dims = [*dict.fromkeys(axis["dim"] for axis in attributes["axes"]), "realisation"]
-    if sorted(blocks) != sorted(dims) or attributes["blocks"] != blocks:
-        yield f"status: expected blocks over {', '.join(dims)!s:.80}, got {blocks!r:.60}"
-    elif math.prod(status["shape"]) > MOST_CASES:
-        yield f"status: expected at most {MOST_CASES:.0e} results, got {status['shape']!r:.60}"
+    shape, names, chunk = _dimensions(arrays["status"])
+    blocks = dict(zip(names, chunk, strict=False))
+    wanted = [*dict.fromkeys(axis["dim"] for axis in attributes["axes"]), "realisation"]
+    if sorted(blocks) != sorted(wanted) or attributes["blocks"] != blocks:
+        yield f"status: expected blocks over {', '.join(wanted)!s:.80}, got {blocks!r:.60}"
+    elif math.prod(shape) > MOST_CASES:
+        yield f"status: expected at most {MOST_CASES:.0e} results, got {shape!r:.60}"
+
+
+def _dimensions(array: Mapping[str, Any]) -> tuple[list[int], list[str], list[int]]:
+    """Return the lengths and names of the dimensions of an array, and the lengths of its chunks."""
+    return array["shape"], array.get("dimension_names") or [], array["chunk_grid"]["configuration"]["chunk_shape"]
