@@ -60,33 +60,24 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     axes = [str(dim) for dim in mean.dims if _is_numeric(mean, str(dim))]
     if not axes:
         raise FitError(f"expected an axis of at least {FEWEST} numbers, got none")
-    values = mean.transpose(..., *axes).to_numpy()
-    half = half.transpose(*mean.transpose(..., *axes).dims)
-    grids = [dense(mean[axis].to_numpy(), _pieces(mean, axes)) for axis in axes]
-    table, error = scale.of_values(values), half.to_numpy()
-    error = error + sum(
-        left_out_error(scale, table, mean[axis].to_numpy(), k - len(axes)) for k, axis in enumerate(axes)
-    )
-    for k, (axis, grid) in enumerate(zip(axes, grids, strict=True)):
-        place = mean[axis].to_numpy()
-        table = cubic(place, table, grid, k - len(axes))
-        error = linear(place, error, grid, k - len(axes))
+    mean, half = (array.transpose(..., *axes) for array in (mean, half))
+    grids = {axis: dense(mean[axis].to_numpy(), _pieces(mean, axes)) for axis in axes}
+    places = {k - len(axes): mean[axis].to_numpy() for k, axis in enumerate(axes)}
+    table = scale.of_values(mean.to_numpy())
+    error = half.to_numpy() + sum(left_out_error(scale, table, place, k) for k, place in places.items())
+    for (k, place), grid in zip(places.items(), grids.values(), strict=True):
+        table, error = cubic(place, table, grid, k), linear(place, error, grid, k)
     table = scale.back(table)
-    error = error + sum(chord_error(table, grid, k - len(axes)) for k, grid in enumerate(grids))
-    found = mean.transpose(..., *axes)
-    coords: dict[str, Any] = {
-        str(dim): found[dim] for dim in found.dims if str(dim) not in axes and dim in found.coords
-    }
-    coords |= {axis: ((axis,), grid, found[axis].attrs) for axis, grid in zip(axes, grids, strict=True)}
-    coords |= {str(name): coord for name, coord in found.coords.items() if coord.ndim == 0}
+    error = error + sum(chord_error(table, grid, k) for k, grid in zip(places, grids.values(), strict=True))
+    dense_axes = {axis: (axis, grid, mean[axis].attrs) for axis, grid in grids.items()}
     attributes = dataset[output].attrs
     named = {"units": attributes.get("units", "1"), "long_name": attributes.get("long_name", output)}
     about = {**named, "ancillary_variables": f"{output}_error"}
     beside = {**named, "long_name": f"95 % error of {named['long_name']}: scatter, grid and interpolation"}
     return xr.Dataset(
-        {output: (found.dims, table, about), f"{output}_error": (found.dims, error, beside)},
-        coords=coords,
-        attrs={**_provenance(dataset), "measured_on": ", ".join(f"{found.sizes[axis]} {axis}" for axis in axes)},
+        {output: (mean.dims, table, about), f"{output}_error": (mean.dims, error, beside)},
+        coords={**mean.drop_vars(axes).coords, **dense_axes},
+        attrs={**_provenance(dataset), "measured_on": ", ".join(f"{mean.sizes[axis]} {axis}" for axis in axes)},
     )
 
 
@@ -203,10 +194,9 @@ class Law:
         DataError
             If an axis is missing or unknown, or if a place lies outside the range of an axis.
         """
-        points = np.broadcast_arrays(*self._checked(places).values())
-        found = self._interpolate(np.stack([point.ravel() for point in points], axis=-1))
-        shape = points[0].shape
-        return found[:, 0].reshape(shape), found[:, 1].reshape(shape)
+        points = np.stack(np.broadcast_arrays(*self._checked(places).values()), axis=-1)
+        found = self._interpolate(points).reshape(*points.shape[:-1], 2)
+        return found[..., 0], found[..., 1]
 
     def _checked(self, places: Mapping[str, ArrayLike]) -> dict[str, NDArray[Any]]:
         if set(places) != set(self.axes):

@@ -170,8 +170,6 @@ class Figure:
         Texts about results that are not drawn.
     warnings : list of str
         Warnings about the results of the study.
-    columns : int, optional
-        Largest number of panels in a row.
     stack : int
         Number of successive panels that are drawn one above the other in a column.
     ratio : float
@@ -186,7 +184,6 @@ class Figure:
     bars: str = ""
     left_out: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
-    columns: int | None = None
     stack: int = 1
     ratio: float = 0.7
     share_y: bool = False

@@ -115,8 +115,7 @@ def _columns(description: Figure) -> int:
     asked, count = page.current(), len(description.panels)
     free = MOST_COLUMNS if asked.width is None else max(1, min(MOST_COLUMNS, int(asked.width / LEAST_PANEL)))
     stacks = -(-count // description.stack)
-    wanted = description.columns or (2 if stacks == 4 else free)
-    return max(1, min(wanted, free, stacks))
+    return min(2 if stacks == 4 else free, free, stacks)
 
 
 def _axes(figure: Drawn, description: Figure, rows: int, columns: int) -> list[Axes]:
@@ -133,16 +132,18 @@ def _axes(figure: Drawn, description: Figure, rows: int, columns: int) -> list[A
 
 
 def _share_labels(places: list[Axes], panels: list[Panel]) -> None:
-    """Remove the label of a horizontal axis if the panel below has the same axis."""
+    """Remove the label of an axis if the panel below (horizontal axis) or on the left (vertical axis) has the same."""
     at = {}
     for axes, panel in zip(places, panels, strict=True):
         place = axes.get_subplotspec()
         assert place is not None
         at[place.rowspan.start, place.colspan.start] = axes, panel
     for (row, column), (axes, panel) in at.items():
-        below = at.get((row + 1, column))
+        below, left = at.get((row + 1, column)), at.get((row, column - 1))
         if below and below[1].x == panel.x:
             axes.set_xlabel("")
+        if left and left[1].y == panel.y:
+            axes.set_ylabel("")
 
 
 def _draw_panel(axes: Axes, panel: Panel) -> None:

@@ -56,7 +56,7 @@ def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...])
         for values in zip(*((used.rms_height(), used.rms_gradient()) for used in spectra), strict=True)
     )
     fixed = f"used by a campaign: rms height {rms:.4g} m, rms gradient {gradient:.4g}"
-    return Figure([areal, line], "spectrum of a measured surface", fixed, columns=2, ratio=0.85)
+    return Figure([areal, line], "spectrum of a measured surface", fixed, ratio=0.85)
 
 
 def _areal(report: FileReport, used: Spectrum, colour: str, file: xr.Dataset) -> list[Trace]:

@@ -162,14 +162,19 @@ def test_a_figure_with_a_fault_says_so(tmp_path, monkeypatch):
         available("sliding_friction")["velocity"].describe(groups)
 
 
-@pytest.mark.parametrize(("text", "name"), [(planted.SLIDING + F + V, "master_curve"), (JUMP, "calibration")])
-def test_other_figures_are_drawn_or_say_why_not(text, name, tmp_path):
-    groups = planted.make(tmp_path, text)
-    plot = available(groups[""].attrs["model"])[name]
-    if name == "calibration":
-        with pytest.raises(FitError, match="no table of measurements"):
-            plot.describe(groups)
-        return
-    figure = plot.figure(groups)
-    assert all(panel.traces for panel in figure.description.panels)
+def test_a_master_curve_has_the_units_of_the_other_figures(stores):
+    groups = stores(planted.SLIDING + F.replace("10 mN, 1 N, 100 N", "10 mN, 1000 mN, 100000 mN") + V)
+    known = available("sliding_friction")
+    figure = known["master_curve"].figure(groups)
     assert isinstance(figure, Figure)
+    measured, merged, factors = figure.description.panels
+    assert all(panel.traces for panel in (measured, merged, factors))
+    assert measured.x.label == known["force"].describe(groups).panels[0].x.label == "normal force $F_N$ [mN]"
+    assert factors.x.label == known["velocity"].describe(groups).panels[0].x.label
+    drawn = np.unique(np.concatenate([trace.column("x") for trace in measured.traces]))
+    np.testing.assert_allclose(drawn, [10, 1000, 100000])
+
+
+def test_a_calibration_without_a_table_says_so(stores):
+    with pytest.raises(FitError, match="no table of measurements"):
+        available("velocity_jump")["calibration"].describe(stores(JUMP))
