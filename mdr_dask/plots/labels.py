@@ -155,9 +155,14 @@ def printed_unit(unit: str) -> str:
 def named(name: str, value: xr.DataArray) -> str:
     """Return one value as text for legends and titles: ``$F_N$ = 1.5 N``."""
     how, number = quantity(name, value), shown(name, value)
-    text = f"{float(number):.4g}" if value.dtype.kind in "fiu" else str(number[()])
+    text = short(float(number)) if value.dtype.kind in "fiu" else str(number[()])
     symbol = how.symbol[how.symbol.index("$") :] if "$" in how.symbol else how.symbol
     return f"{symbol} = {text} {printed_unit(how.unit)}".strip()
+
+
+def short(number: float) -> str:
+    """Return a number with four digits, such as ``12340``; only numbers of more than ten places have an exponent."""
+    return f"{float(f'{number:.4g}'):.10g}"
 
 
 def plain(text: str) -> str:

@@ -68,7 +68,7 @@ def _label(name: str, values: xr.DataArray) -> str:
 
 
 def _text(value: float, values: xr.DataArray) -> str:
-    return f"{value:.4g} {labels.printed_unit(values.attrs['units'])}".strip()
+    return f"{labels.short(value)} {labels.printed_unit(values.attrs['units'])}".strip()
 
 
 def _curves(curve: xr.Dataset) -> tuple[Panel, Panel]:

@@ -74,7 +74,7 @@ def of_each_store(data: xr.Dataset) -> xr.Dataset:
 
 @LINES
 def test_jump_and_rate_and_state_terms(lines: int) -> None:
-    data = studies(np.array([0.01]), 100, lines)
+    data = studies(np.array([0.01]), 200, lines)
     found, lengths = (FIT[name].compute({"": data}) for name in ("kinetics", "relaxation"))
     truths = {
         "jump_over_slope": JUMP / CHANGE,

@@ -16,6 +16,7 @@ from mdr_dask.campaign import loads
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Status
 from mdr_dask.plots import curves, page
+from mdr_dask.plots.labels import short
 from mdr_dask.plots.render import render
 from mdr_dask.plots.view import View, draw, figure_of
 from mdr_dask.store import datasets
@@ -79,6 +80,13 @@ def test_units_have_readable_prefixes(tmp_path):
     figure = described(planted.make(tmp_path, text), "contact_fraction", "rms_roughness")
     assert figure.panels[0].x.label == "rms height $h$ [nm]"
     np.testing.assert_allclose(np.unique(rows(figure).x), [200, 500])
+
+
+@pytest.mark.parametrize(
+    ("number", "text"), [(10000, "10000"), (0.00012345, "0.0001234"), (1e-5, "1e-05"), (1e12, "1e+12")]
+)
+def test_numbers_in_legends_are_short(number, text):
+    assert short(number) == text
 
 
 def test_many_curves_have_a_colour_bar(groups):
