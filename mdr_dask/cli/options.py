@@ -32,14 +32,14 @@ select_option = click.option(
     "selections",
     multiple=True,
     metavar="NAME=VALUES",
-    help="Values or ranges of an axis: 'velocity=1 mm/s..1 m/s', hurst=0.3,0.7; may be repeated.",
+    help="Keep only these values or ranges of an axis: 'velocity=1 mm/s..1 m/s', hurst=0.3,0.7; may be repeated.",
 )
 units_option = click.option(
     "--units",
     multiple=True,
     callback=_units,
     metavar="NAME=UNIT,...",
-    help="Units of columns: velocity=km/h,temperature=degC; may be repeated.",
+    help="Units in which columns are given: velocity=km/h,temperature=degC; may be repeated.",
 )
 where_option = click.option(
     "--where",
@@ -54,7 +54,7 @@ limit_option = click.option(
     type=click.IntRange(min=0),
     default=40,
     show_default=True,
-    help="Largest number of printed rows; 0 for all.",
+    help="Largest number of rows to print; 0 for all.",
 )
 _QUESTION = (
     series_option,
@@ -88,7 +88,7 @@ _QUESTION = (
         "--jsonl",
         "form",
         flag_value="jsonl",
-        help="Print a line of JSON for each row.",
+        help="Print one JSON object in each line.",
     ),
     click.option(
         "--output",
