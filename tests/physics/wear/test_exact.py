@@ -1,69 +1,168 @@
+"""The exact evolution against published figures, identities, its limits and the simulation of every cycle."""
+
 import numpy as np
 import pytest
+from references.literal_wear import literal
+from scipy.integrate import quad
 
 from mdr_dask.physics.mdr.half_integrals import graded_panels
 from mdr_dask.physics.mdr.revolution import PowerProfile, from_table
-from mdr_dask.physics.mdr.transforms import power_factor
-from mdr_dask.physics.wear import evolution as wear_evolution
-from mdr_dask.physics.wear import rules as wear
+from mdr_dask.physics.mdr.transforms import gauss, power_factor
+from mdr_dask.physics.wear import evolution, rules
 from mdr_dask.physics.wear.exact import exact
 from mdr_dask.physics.wear.slip import partial_slip
 
 PARABOLA = PowerProfile(2.0)
 RADII = np.array([0.5, 0.7, 0.9, 1.0, 1.1])
-SLID = 3.0 * (np.arange(2000) + 0.5) / 2000
+EVERYWHERE = np.linspace(0.0, 1.6, 300)
+CYCLES = [0.0, 0.5, 2.0, 8.0, 60.0]
+#: d, c and V under constant force at N = 8 by tolerance 1e-5 (half a minute).
+CONVERGED = np.array([1.2772430, 0.5038731, 1.2728999])
 
 
-@pytest.fixture(scope="module")
-def checked():
-    return exact(PARABOLA, 0.455, [2.0, 8.0, 18.0], accuracy=1e-5)
+@pytest.fixture(scope="module", params=["depth", "force"])
+def worn(request):
+    return request.param == "force", exact(PARABOLA, 0.455, CYCLES, 1e-4, constant_force=request.param == "force")
 
 
-def test_checked_figures(checked):
+def test_checked_figures_at_constant_depth():
     """Figures on which independent solvers agree: 5e-6 in f, 1e-6 in a, 4e-6 in V."""
-    first, second, last = checked
+    first, second = exact(PARABOLA, 0.455, [2.0, 8.0], accuracy=1e-5, errors=False)
     np.testing.assert_allclose(first.height(RADII), [0.157822, 0.381394, 0.525578, 0.579692, 0.626711], atol=2e-6)
-    assert first.contact_radius == pytest.approx(
-        1.133353, abs=2e-5
-    )  # the edge is the least determined quantity; the next test goes on
+    assert first.contact_radius == pytest.approx(1.133353, abs=2e-5)  # converged in the next test
     assert first.wear_volume == pytest.approx(0.310754, abs=4e-6)
     assert second.contact_radius == pytest.approx(1.240150, abs=2e-6)
     assert second.wear_volume == pytest.approx(0.872404, abs=4e-6)
     beyond = second.contact_radius * np.array([1.0 + 1e-9, 1.01, 1.1, 3.0])
     np.testing.assert_array_equal(second.height(beyond), PARABOLA.height(beyond))
-    limit = wear.limit(PARABOLA, 0.455)
-    assert np.max(np.abs(last.height(RADII) - limit.height(RADII))) < 1.5e-4
 
 
+@pytest.mark.slow
 def test_the_edge_converges_to_the_checked_figure():
     """The edge is the least determined quantity: shorter steps on panels graded deep into the edge, a table with -s."""
     edges = []
-    for step_error in (4e-5, 4e-6, 4e-7):
+    for tolerance in (4e-5, 4e-6, 4e-7):
         problem = partial_slip(PARABOLA, 0.455, graded_panels(6, 14, 5), 1.4)
-        moments = wear_evolution.march(problem, 2.0, step_error / problem.eta, 1e-4)
-        unknowns = wear_evolution.at(problem, moments, 2.0, step_error / problem.eta)[1].unknowns
-        edges.append(problem.edge(unknowns))
-        print(f"{step_error:g} {len(moments)} {edges[-1]:.7f}")
+        moments = evolution.march(problem, 2.0, tolerance, 1e-4)
+        edges.append(problem.edge(evolution.at(problem, moments, 2.0, tolerance)[1].unknowns))
+        print(f"{tolerance:g} {len(moments)} {edges[-1]:.7f}")
     gaps = np.abs(np.array(edges) - 1.133353)
     assert np.all(np.diff(gaps) < 0.0)
     assert gaps[-1] < 2e-6  # 1e-6 of the checked figure, 1e-6 of the steps
 
 
-def test_energy_is_volume_and_force_falls(checked):
-    for worn in checked:
-        assert worn.energy_volume == pytest.approx(worn.wear_volume, abs=2e-5)
-    forces = [worn.normal_force for worn in checked]
-    assert forces == sorted(forces, reverse=True)
-    assert checked[2].normal_force == pytest.approx(wear.limit(PARABOLA, 0.455).normal_force, abs=1e-3)
+@pytest.mark.slow
+def test_convergence_under_constant_force():
+    """Depth, border and volume at N = 8; a table with -s."""
+    gaps = []
+    for tolerance in (1e-3, 1e-4):
+        contact = exact(PARABOLA, 0.455, [8.0], tolerance, constant_force=True, errors=False)[0]
+        gaps.append(np.abs(np.array([contact.depth, contact.stick_border, contact.wear_volume]) - CONVERGED))
+        print(f"{tolerance:g} {gaps[-1]}")
+    assert np.all(gaps[0] > gaps[1])
+    assert np.all(gaps[1] < [6e-6, 6e-6, 3e-5])
 
 
-def test_error_estimate_covers_the_error(checked):
-    coarse = exact(PARABOLA, 0.455, [2.0, 8.0], accuracy=1e-3)
-    for rough, fine in zip(coarse, checked, strict=False):
-        everywhere = np.linspace(0.3, 1.3, 300)
-        error = rough.error("worn_profile", everywhere)
-        assert np.all(np.abs(rough.height(everywhere) - fine.height(everywhere)) <= error)
-        assert np.max(error) < 5e-3
+def test_volume_is_energy_and_what_is_held_stays(worn):
+    under_force, contacts = worn
+    for contact in contacts:
+        assert contact.wear_volume == pytest.approx(contact.energy_volume, rel=1e-4, abs=1e-6)
+    forces, depths, borders = (
+        [getattr(contact, name) for contact in contacts] for name in ("normal_force", "depth", "stick_border")
+    )
+    if under_force:
+        np.testing.assert_allclose(forces, 4.0 / 3.0, rtol=1e-5)
+        assert depths == sorted(depths)
+        assert borders == sorted(borders)
+        assert borders[3] == borders[4]  # the image jumps there
+    else:
+        assert set(depths) == {1.0}
+        assert set(borders) == {0.455}
+        assert forces == sorted(forces, reverse=True)
+    for name in ("contact_radius", "wear_volume"):
+        values = [getattr(contact, name) for contact in contacts]
+        assert values == sorted(values)
+    assert contacts[0].wear_volume == 0.0
+
+
+def test_image_at_border_and_edge(worn):
+    """While the border moves g is continuous there; afterwards it is frozen within and jumps. At the edge g = d."""
+    under_force, contacts = worn
+    eta, near = 1.0 - 0.455**2, np.array([1 - 1e-9, 1 + 1e-9])
+    for contact in contacts[1:]:
+        edge = contact.contact_radius
+        np.testing.assert_allclose(contact.image(np.array([edge, np.nextafter(edge, 0.0)])), contact.depth, rtol=1e-9)
+    for contact in contacts[1:3] if under_force else ():
+        inside, outside = contact.image(contact.stick_border * near)
+        assert inside == pytest.approx(contact.depth - eta, abs=1e-6)
+        assert outside == pytest.approx(inside, abs=1e-4)
+    inside, outside = contacts[3].image(contacts[3].stick_border * near)
+    assert outside - inside > 0.5
+    frozen = np.linspace(0.0, contacts[3].stick_border * near[0], 50)
+    np.testing.assert_allclose(contacts[3].image(frozen), contacts[4].image(frozen), atol=1e-12)
+
+
+def test_stated_errors_cover_the_distance_from_a_finer_solution(worn):
+    under_force, contacts = worn
+    rough = exact(PARABOLA, 0.455, CYCLES[1:4], 1e-3, constant_force=under_force)
+    for contact, fine in zip(rough, contacts[1:4], strict=True):
+        error = contact.error("worn_profile", EVERYWHERE)
+        assert np.all(np.abs(contact.height(EVERYWHERE) - fine.height(EVERYWHERE)) <= error)
+        assert np.max(error) < 2e-2
+
+
+@pytest.mark.parametrize("constant_force", [False, True])
+def test_every_step_conserves_energy(constant_force):
+    """Volume from the worn depths of slip zone and annulus, against int 2 (d - g) y dx."""
+    problem, start = partial_slip(PARABOLA, 0.455, graded_panels(12, 8, 4), 3.0), None
+    if constant_force:
+        problem, start = problem.under_force()
+    moments = evolution.march(problem, 2.0, 2e-5, 1e-5, start)
+    energy = evolution.integral_along(moments, [problem.wear_rate(m.unknowns) for m in moments])
+    abscissa, weight = gauss(40)
+    whole = np.pi * problem.body.width * problem.eta
+    volumes = []
+    for moment in moments:
+        border, width, _ = problem.place(moment.unknowns)
+        slipping = width * (problem.panels.weights @ moment.accumulated)
+        stuck = max(border, 0.0) * float(weight @ problem.frozen_depth(moment.path, max(border, 0.0) * abscissa))
+        volumes.append(whole * (slipping + stuck))
+    np.testing.assert_allclose(np.diff(volumes), np.diff(energy), atol=5e-6)  # of steps of 2e-5
+    np.testing.assert_allclose(volumes, energy, atol=1e-5)  # accumulated over them
+
+
+def test_the_frozen_depth_is_the_integral_along_the_path():
+    """(2/pi) int arccos(b / r) dd over straight pieces of b^2 up to the moment at which the border passes r."""
+    problem = partial_slip(PARABOLA, 0.455, graded_panels(16, 4, 4), 3.0)
+    rng = np.random.default_rng(3)
+    path = np.cumsum(np.append([[0.0], [0.0]], rng.uniform(0.0, 0.02, (2, 12)) ** 2, axis=1), axis=1)
+    square, width = problem.body.square, problem.body.width
+    places = np.append(path[0, [3, 8, 12]], 0.5 * (path[0, 5] + path[0, 6]))
+    for q, found in zip(places, problem.frozen_depth(path, places), strict=True):
+        depth = np.interp(q, *path)
+
+        def angle(d, q=q):
+            return np.arccos(np.sqrt((square + width * np.interp(d, *path[::-1])) / (square + width * q)))
+
+        rise = 2.0 / np.pi * quad(angle, 0.0, depth, points=path[1][path[1] < depth], epsabs=1e-14)[0]
+        r = np.sqrt(square + width * q)
+        virgin = quad(lambda t, r=r: PARABOLA.rise(r * np.cos(t) - 0.455, 0.455), 0.0, np.arccos(0.455 / r))[0]
+        assert found == pytest.approx(rise - 2.0 / np.pi * virgin / problem.eta, abs=2e-5 * rise)
+
+
+@pytest.mark.parametrize(
+    ("exponent", "c", "constant_force"),
+    [(2.0, 0.455, True), (1.0, 0.368, True), (0.5, 0.3, True), (2.0, 0.455, False), (0.5, 0.3, False)],
+)
+def test_after_many_cycles_the_contact_is_the_limit(exponent, c, constant_force):
+    profile = PowerProfile(exponent)
+    last, limit, end = exact(profile, c, [1e3, np.inf, 1e12], 1e-3, constant_force=constant_force, errors=False)
+    assert end.wear_volume == limit.wear_volume
+    assert last.depth == pytest.approx(limit.depth, rel=2e-4)
+    assert last.contact_radius == pytest.approx(limit.contact_radius, rel=3e-4)
+    assert last.wear_volume == pytest.approx(limit.wear_volume, rel=2e-3)
+    inside = np.linspace(0.0, limit.contact_radius, 200)[1:-1]
+    assert np.max(np.abs(last.height(inside) - limit.height(inside))) < 2e-3
 
 
 @pytest.mark.slow
@@ -72,31 +171,60 @@ def test_error_estimate_covers_the_error(checked):
     [(1.0, 0.05), (1.0, 0.21), (0.5, 0.3), (3.0, 0.1), (2.0, 0.98), (8.0, 0.5), (0.3, 0.01), (2.0, 0.999)],
 )
 def test_extremes_reach_the_limit(exponent, c):
-    profile = PowerProfile(exponent)
-    worn = exact(profile, c, [60.0], accuracy=1e-3)[0]
-    limit = wear.limit(profile, c)
+    worn, limit = exact(PowerProfile(exponent), c, [60.0], accuracy=1e-3)[0], rules.limit(PowerProfile(exponent), c)
     assert worn.contact_radius == pytest.approx(limit.contact_radius, abs=1e-3)
     assert worn.wear_volume == pytest.approx(limit.wear_volume, rel=2e-3)
     assert worn.energy_volume == pytest.approx(limit.wear_volume, rel=1.5e-2)
 
 
-def test_table_of_a_parabola():
+def test_the_limit_under_force_has_no_pressure_outside_its_stick_zone():
+    limit = exact(PARABOLA, 0.455, [np.inf], constant_force=True, errors=False)[0]
+    outside = np.linspace(limit.stick_border * 1.001, limit.contact_radius * 0.999, 20)
+    np.testing.assert_allclose(limit.pressure(outside), 0.0, atol=1e-9)
+    np.testing.assert_allclose(limit.image(outside), limit.depth, atol=1e-12)
+    abscissa, weight = gauss(64)
+    load = [
+        (high - low) * weight @ (limit.depth - limit.image(low + (high - low) * abscissa))
+        for low, high in ((0, 0.455), (0.455, limit.stick_border))
+    ]
+    assert 2.0 * sum(load) == pytest.approx(4.0 / 3.0, rel=1e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("constant_force", "most"), [(False, 2e-3), (True, 3.5e-3)])
+def test_the_literal_simulation_tends_to_the_exact_evolution(constant_force, most):
+    reference = exact(PARABOLA, 0.455, [2.0], 1e-4, constant_force=constant_force, errors=False)[0]
+    errors = []
+    for cells in (50, 100, 200):
+        simulated = literal(PARABOLA, 0.455, 2.0, cells=cells, substeps=16, constant_force=constant_force)
+        errors.append(np.max(np.abs(simulated.height(EVERYWHERE) - reference.height(EVERYWHERE))))
+    assert errors[0] > errors[1] > errors[2]
+    assert errors[2] < most
+    assert simulated.depth == pytest.approx(reference.depth, abs=1e-3)
+
+
+@pytest.mark.parametrize("constant_force", [False, True])
+def test_table_of_a_parabola(constant_force):
     r = np.linspace(0, 3, 301)
-    measured = exact(from_table(r, r**2 / 2, 1.0), 0.455, [2.0], accuracy=1e-4)[0]
-    np.testing.assert_allclose(measured.height(RADII), [0.157822, 0.381394, 0.525578, 0.579692, 0.626711], atol=5e-5)
+    measured, formula = (
+        exact(body, 0.455, [2.0], 1e-3, constant_force=constant_force, errors=False)[0]
+        for body in (from_table(r, r**2 / 2, 1.0), PARABOLA)
+    )
+    np.testing.assert_allclose(measured.height(RADII), formula.height(RADII), atol=1e-4)
+    assert measured.stick_border == pytest.approx(formula.stick_border, abs=1e-4)
 
 
 @pytest.mark.parametrize(
     "wears",
     [
-        lambda body: wear.limit(body, 0.4),
-        lambda body: wear.fast(body, 0.4, 1.0),
+        lambda body: rules.limit(body, 0.4),
+        lambda body: rules.fast(body, 0.4, 1.0),
         lambda body: exact(body, 0.4, [1.0])[0],
         lambda body: exact(body, 0.0, [0.3])[0],
     ],
     ids=["limit", "fast", "exact", "gross slip"],
 )
-def test_nothing_is_told_of_a_measured_body_beyond_its_table(wears):
+def test_a_measured_body_has_no_values_beyond_its_table(wears):
     r = np.linspace(0, 2, 101)
     table = from_table(r, r**2, 1.0)
     worn = wears(table)
@@ -107,38 +235,36 @@ def test_nothing_is_told_of_a_measured_body_beyond_its_table(wears):
     assert np.all(np.isfinite(worn.value("worn_profile", table.largest_radius * np.linspace(0.5, 1, 9))))
 
 
-def test_zero_cycles_and_order_of_request():
-    worn = exact(PARABOLA, 0.5, [2.0, 0.0, 1.0], accuracy=1e-3)
-    assert [w.wear_volume == 0.0 for w in worn] == [False, True, False]
-    assert worn[0].wear_volume > worn[2].wear_volume
-    assert worn[1].normal_force == pytest.approx(4 / 3, rel=1e-3)
+def test_a_contact_that_grows_beyond_its_table_is_refused():
+    r = np.linspace(0, 1.35, 136)
+    body = from_table(r, r**2 / 2, 0.9)
+    assert exact(body, 0.455, [0.1], constant_force=True, errors=False)[0].contact_radius < body.largest_radius
+    for cycles in (20.0, np.inf):
+        with pytest.raises(ValueError, match="the contact reaches beyond the table"):
+            exact(body, 0.455, [cycles], constant_force=True, errors=False)
 
 
-def test_a_result_does_not_depend_on_what_else_was_asked_for():
-    alone = exact(PARABOLA, 0.5, [1.3], accuracy=1e-3)[0]
-    among = exact(PARABOLA, 0.5, [9.0, 1.3, 0.2], accuracy=1e-3)[1]
-    assert alone.wear_volume == among.wear_volume
+@pytest.mark.parametrize("constant_force", [False, True])
+def test_a_result_does_not_depend_on_the_other_amounts(constant_force):
+    alone = exact(PARABOLA, 0.5, [1.3], constant_force=constant_force)[0]
+    among = exact(PARABOLA, 0.5, [9.0, 1.3, np.inf, 0.2], constant_force=constant_force)[1]
+    assert (alone.wear_volume, alone.depth) == (among.wear_volume, among.depth)
     assert alone.error("wear_volume", RADII) == among.error("wear_volume", RADII)
     np.testing.assert_array_equal(alone.height(RADII), among.height(RADII))
 
 
 @pytest.mark.parametrize(("exponent", "radius", "volume"), [(2.0, np.sqrt(2), np.pi), (1.0, np.pi / 2, np.pi**3 / 12)])
 def test_gross_slip_at_constant_depth_ends_in_the_free_body(exponent, radius, volume):
-    early, late = exact(PowerProfile(exponent), 0.0, [1.0, 30.0], accuracy=1e-4)
+    early, late = exact(PowerProfile(exponent), 0.0, [1.0, 30.0], accuracy=1e-4, errors=False)
     assert late.contact_radius == pytest.approx(radius, abs=1e-4)
     assert late.wear_volume == pytest.approx(volume, abs=1e-4)
-    shape = (
-        2.0
-        * np.pi
-        * 3.0
-        * (early.height(SLID) - SLID**exponent / power_factor(exponent))
-        @ (SLID * np.full(2000, 1.0 / 2000))
-    )
-    assert early.wear_volume == pytest.approx(shape, abs=2e-4)  # the midpoint rule
+    slid = 3.0 * (np.arange(2000) + 0.5) / 2000
+    worn = early.height(slid) - slid**exponent / power_factor(exponent)
+    assert early.wear_volume == pytest.approx(2.0 * np.pi * worn @ slid * 3.0 / 2000, abs=2e-4)  # the midpoint rule
 
 
 def test_gross_slip_at_constant_force_wears_force_times_path():
-    slid = exact(PARABOLA, 0.0, [3.0], constant_force=True, accuracy=1e-3)[0]
+    slid = exact(PARABOLA, 0.0, [3.0], constant_force=True, errors=False)[0]
     assert slid.normal_force == pytest.approx(4 / 3, rel=1e-5)
     assert slid.wear_volume == pytest.approx(4.0, rel=1e-3)
     assert slid.depth > 1.0

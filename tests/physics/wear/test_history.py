@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from references.literal_wear import literal
 
 from mdr_dask.physics.mdr.revolution import PowerProfile
 from mdr_dask.physics.mdr.uniform_grid import uniform_grid
@@ -36,14 +35,6 @@ def test_orders_of_the_uniform_grid():
     assert np.max(inside[x > 0.9]) < 1e-4  # an edge within a cell: 0.01 if it stood at the next node
     narrow = uniform_grid(4, 4.0).pressure(np.array([0.0, 1.0, 2.0, 3.0, 4.0]), 0.5)  # the edge is at x = 0.5
     np.testing.assert_allclose(narrow[0], 2 / np.pi)
-
-
-def test_literal_simulation_agrees_with_the_evolution_and_converges():
-    r = np.linspace(0.2, 1.3, 200)
-    f = exact(PARABOLA, 0.455, [1.0], accuracy=1e-4)[0].height(r)
-    errors = [np.max(np.abs(literal(PARABOLA, 0.455, 1.0, cells=n, substeps=16).height(r) - f)) for n in (60, 120)]
-    assert errors[1] < 2e-3
-    assert errors[1] < 0.75 * errors[0]
 
 
 def test_one_block_at_constant_depth_is_fretting():

@@ -147,21 +147,6 @@ def test_table_of_a_parabola_wears_as_the_parabola():
     )
 
 
-@pytest.mark.parametrize(
-    ("radius", "height", "message"),
-    [
-        ([0, 1, 2, 3], [0, 1, 0.5, 2], "must rise with the radius"),
-        ([0, 1, 2, 3], [0, 1, np.nan, 2], "must be finite"),
-        ([1, 2, 3, 4], [0, 1, 2, 3], "must start at 0"),
-        ([0, 1, 2, 3], [0, 1, 2, 3], "beyond the table"),
-        ([0, 1], [0, 1], "at least 4 rows"),
-    ],
-)
-def test_bad_tables(radius, height, message):
-    with pytest.raises(ValueError, match=message):
-        from_table(radius, height, 100.0)
-
-
 def test_scar_beyond_the_table():
     r = np.linspace(0, 1.1, 60)
     with pytest.raises(ValueError, match="beyond the table"):
