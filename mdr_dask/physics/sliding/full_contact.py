@@ -2,9 +2,9 @@
 
 The displacement is u = d + h, with the depth d and the height h. The pressure of wave k, with the amplitude c_k and the
 wave number q_k, is G*(q_k v) c_k (thesis eq. 3.14 for the Kelvin solid). The drag is therefore a sum over the spectrum
-and does not depend on the phases. This is valid if the pressure is positive everywhere. The pressure is computed at m
-nodes. Between the nodes, a sum of waves with up to k periods on the line is at most 1 / cos(pi k / m) times its largest
-value at the nodes (Ehlich and Zeller, Z. Angew. Math. Mech. 44, T22, 1964).
+and does not depend on the phases. This is valid if the pressure is positive everywhere. The pressure is computed at two
+nodes per Nyquist point, m in total. Between the nodes, a sum of waves with up to k periods on the line is at most
+1 / cos(pi k / m) times its largest value at the nodes (Ehlich and Zeller, Z. Angew. Math. Mech. 44, T22, 1964).
 """
 
 from __future__ import annotations
@@ -15,18 +15,17 @@ import numpy as np
 
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.cases import Cases, Steady
-from mdr_dask.physics.surfaces.waves import Waves, series
+from mdr_dask.physics.surfaces.rough_line import RoughLine
+from mdr_dask.physics.surfaces.waves import series
 
-OVERSAMPLING = 2  # nodes per Nyquist point: the pressure between nodes is at most 41 % larger than at the nodes
 
-
-def steady_full_contact(waves: Waves, terms: Sequence[tuple[float, float]], cases: Cases) -> Steady:
+def steady_full_contact(line: RoughLine, terms: Sequence[tuple[float, float]], cases: Cases) -> Steady:
     """Return the steady states of the cases in full contact; the status of all other cases is `Outcome.INVALID`.
 
     Parameters
     ----------
-    waves : Waves
-        Spectrum of the line, whose length is 1.
+    line : RoughLine
+        A plane.
     terms : sequence of (float, float)
         G_m / G_inf and tau_m v / L of the Prony terms; empty for a Kelvin solid.
     cases : Cases
@@ -34,23 +33,28 @@ def steady_full_contact(waves: Waves, terms: Sequence[tuple[float, float]], case
 
     Examples
     --------
-    >>> wave = Waves(np.array([0.5 + 0j]), 2)
-    >>> found = steady_full_contact(wave, [], Cases(np.array([0.1]), np.array([5.0])))
+    >>> from mdr_dask.physics.surfaces.waves import Waves
+    >>> line = RoughLine(Waves(np.array([0.5 + 0j]), 2))
+    >>> found = steady_full_contact(line, [], Cases(np.array([0.1]), np.array([5.0])))
     >>> print((found.drag / 0.1).round(4), found.depth)  # De <h'^2>
     [19.7392] [5.]
     """
     deborah, loads = cases
-    nodes = OVERSAMPLING * waves.points
-    wave = 2j * np.pi * np.arange(1, waves.coefficients.size + 1)
-    relaxing = sum((stiffness * (1 - 1 / (1 + wave * time)) for stiffness, time in terms), np.zeros(wave.size))
-    pressure, slope = series(waves.coefficients * (1 + relaxing), nodes), waves.slopes(nodes)
-    # sums over nodes are equal to sums over the spectrum
-    elastic, lost, stretch = pressure @ pressure / nodes, pressure @ slope / nodes, slope @ slope / nodes
+    pressure, slope = line.nodes
+    nodes, waves = slope.size, line.roughness.coefficients
+    wave = 2j * np.pi * np.arange(1, waves.size + 1)
+    if terms:
+        relaxing = sum((stiffness * (1 - 1 / (1 + wave * time)) for stiffness, time in terms), np.zeros(wave.size))
+        pressure = pressure + series(waves * relaxing, nodes)
+    # sums over nodes are equal to sums over the spectrum; height and slope are orthogonal
+    lost, stretch = pressure @ slope / nodes if terms else 0.0, slope @ slope / nodes
+    bound = np.cos(np.pi * waves.size / nodes)
+    worst = [np.abs(pressure).argmax(), np.abs(slope).argmax()]  # two nodes already exclude most cases
     with np.errstate(over="ignore", invalid="ignore"):
         drag = lost + deborah * stretch
+        pull = np.abs(pressure[worst] + np.multiply.outer(deborah, slope[worst])).max(axis=1)
         full = np.isfinite(deborah) & (deborah >= 0 if terms else deborah > 0) & np.isfinite(loads)
-        full &= loads > np.sqrt(elastic + deborah * (lost + drag))  # the largest pressure is above the rms pressure
-    bound = np.cos(np.pi * wave.size / nodes)
+        full &= loads * bound > pull
     for speed in np.unique(deborah[full]):
         total = np.abs(pressure + speed * slope)
         full[(deborah == speed) & (loads * bound <= total.max())] = False

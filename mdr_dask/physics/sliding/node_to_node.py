@@ -112,28 +112,39 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
         The corrections of `ends_of`. If the array is empty, integrals over cells are computed from neighbouring nodes.
     """
     n = height.size // stride
-    place = (first + stride * (np.arange(-BEFORE, n + AFTER) % n)) % height.size  # n * stride may be below height.size
-    h = height[place] - height[first]
+
+    def periodic(values: FloatArray) -> FloatArray:
+        period = np.roll(values, -first)[::stride][:n]
+        return np.concatenate([period[-BEFORE:], period, period[:AFTER]])
+
+    h = periodic(height) - height[first]
     if resolved:
-        s = slope[place] / n
+        s = periodic(slope) / n
     else:
         s = 0.5 * (np.roll(h, -1) - np.roll(h, 1))
         s[0], s[-1] = s[n], s[-1 - n]
-    terms = np.take(ends, place, axis=1) if ends.size else ends
+    terms = np.array([periodic(one) for one in ends]) if ends.size else ends
     cells = n // BLOCK * BLOCK
     mean, square = np.empty(cells), np.empty(cells + 1)
     _integrals(h[BEFORE - 1 :], s[BEFORE - 1 :], terms[0, BEFORE - 1 :], terms[1, BEFORE - 1 :], cells, mean, square)
-    here, after = slice(BEFORE, BEFORE + cells), slice(BEFORE + 1, BEFORE + 1 + cells)
-    above = np.maximum(h[here], h[after]) + ABOVE * (np.maximum(s[here], 0.0) + np.maximum(-s[after], 0.0))
-    low, flat = np.minimum(h[here], h[after]), np.minimum(s[here], s[after])
-    peak, lowest, steepest = (
-        above.reshape(-1, BLOCK).max(1),
-        low.reshape(-1, BLOCK).min(1),
-        flat.reshape(-1, BLOCK).min(1),
-    )
-    heights, squares = mean.reshape(-1, BLOCK).sum(1), square[:-1].reshape(-1, BLOCK).sum(1)
-    blocks = np.array([peak, lowest, steepest, heights, squares]).T.copy()
+    blocks = np.empty((n // BLOCK, 5))
+    _write_blocks(h[BEFORE:], s[BEFORE:], mean, square, blocks)
     return Nodes(h, s, terms, blocks, float(height[first]), 0.0)
+
+
+@jit
+def _write_blocks(h: FloatArray, s: FloatArray, mean: FloatArray, square: FloatArray, blocks: FloatArray) -> None:
+    """Write bounds and sums of every block; all arrays begin at the first cell."""
+    for j in range(blocks.shape[0]):
+        peak, lowest, steepest, heights, squares = -np.inf, np.inf, np.inf, 0.0, 0.0
+        for i in range(j * BLOCK, (j + 1) * BLOCK):
+            above = max(h[i], h[i + 1]) + ABOVE * (max(s[i], 0.0) + max(-s[i + 1], 0.0))
+            peak, lowest = max(peak, above), min(lowest, min(h[i], h[i + 1]))
+            steepest = min(steepest, min(s[i], s[i + 1]))
+            heights += mean[i]
+            squares += square[i]
+        blocks[j, PEAK], blocks[j, LOWEST], blocks[j, STEEPEST] = peak, lowest, steepest
+        blocks[j, HEIGHTS], blocks[j, SQUARES] = heights, squares
 
 
 @jit
@@ -643,7 +654,7 @@ class NodeToNode:
     """
 
     def __init__(self, line: RoughLine, cases: Cases, error: float, contact: bool) -> None:
-        self._height, self._slope = line.heights(2 * line.points), line.slopes(2 * line.points)
+        self._height, self._slope = line.nodes
         self._cases, self._error, self._contact = cases, error, contact
         loads = cases.loads
         self._rates = np.full((loads.size, SECANTS), np.nan)

@@ -180,7 +180,7 @@ def _in_full_contact(
 ) -> tuple[FloatArray, FloatArray, NDArray[np.int8]]:
     """Return results, errors and status of cases on a plane; the status is `Outcome.INVALID` if contact is not full."""
     pairs = tuple(zip(terms.moduli, terms.deborah, strict=True))
-    full = steady_full_contact(line.roughness, pairs, cases)
+    full = steady_full_contact(line, pairs, cases)
     errors = ROUNDING * np.abs(full.columns)
     return full.columns, np.where(np.isnan(errors), np.inf, errors), full.status
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.surfaces.cubic_line import CubicLine, highest_point, indented_line, periodic_line
@@ -39,6 +40,11 @@ class RoughLine:
     def slopes(self, nodes: int) -> FloatArray:
         """Return the derivative of the roughness with respect to x / L."""
         return self.roughness.slopes(nodes)
+
+    @cached_property
+    def nodes(self) -> tuple[FloatArray, FloatArray]:
+        """Heights and slopes of the roughness at two nodes per Nyquist point."""
+        return self.heights(2 * self.points), self.slopes(2 * self.points)
 
     def through(self, height: FloatArray, slope: FloatArray | None) -> CubicLine:
         """Return the line of cubic cells through heights and slopes, or of straight cells if no slopes are given."""
