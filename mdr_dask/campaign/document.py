@@ -86,14 +86,9 @@ def read_text(path: str | FilePath) -> str:
 
 
 def parse(text: str, source: str) -> Document:
-    """Return the document in a YAML 1.2 text.
+    """Return the document in a YAML 1.2 text; `source` is the name of the text in messages.
 
-    Its `problems` are syntax errors, duplicate keys, keys that are not strings, and unknown tags.
-
-    Parameters
-    ----------
-    text, source : str
-        The text, and its name in messages.
+    The problems of the document are syntax errors, duplicate keys, keys that are not strings, and unknown tags.
     """
     document = Document(source, text)
     problems = document.problems

@@ -43,14 +43,7 @@ _BOUNDS = ("gt", "ge", "lt", "le")
 def draft(name: str, model: Model[Any], file: str) -> str:
     """Return the text of a campaign that passes every check, unless the model needs a file.
 
-    Parameters
-    ----------
-    name : str
-        Name of the model in a campaign.
-    model : Model
-        The model.
-    file : str
-        Name of the campaign file, for its comments.
+    `name` is the name of the model in a campaign, and `file` the name of the campaign file, for its comments.
     """
     short = name.partition(":")[2].lower() if ":" in name else name
     summary = f"{model.summary[:1].upper()}{model.summary[1:].rstrip('.')}."

@@ -35,20 +35,8 @@ def expand(
 ) -> tuple[tuple[Series, ...], tuple[str, ...]]:
     """Return the series of a campaign without problems, and questions about numbers without a unit.
 
-    Every problem of parameters, ranges and tables is added to the problems of the document.
-
-    Parameters
-    ----------
-    document : Document
-        The campaign file.
-    model : Model
-        The model of the campaign.
-    spec : CampaignSpec
-        The checked keys of the campaign file.
-    directory : str
-        Folder to which the names of files in the campaign are relative.
-    outputs : sequence of str
-        Names of the requested outputs.
+    `directory` is the folder to which the names of files are relative, and `outputs` are the names of the requested
+    outputs. Every problem of parameters, ranges and tables is added to the problems of the document.
     """
     found = []
     asked: dict[str, None] = {}

@@ -16,19 +16,11 @@ from mdr_dask.errors import CampaignError
 
 
 def of_keys(source: Mapping[str, Any]) -> Campaign:
-    """Read a campaign from the keys of a campaign file.
+    """Read a campaign from the keys of a campaign file; raise CampaignError with every problem.
 
-    Parameters
-    ----------
-    source : mapping
-        Values as in a file, or numpy, pandas or xarray arrays and numbers, ranges, paths, or pint quantities. Numbers
-        of numpy are rounded to 14 digits as in a range, so that ``np.linspace`` gives the same values as
-        ``{linear: [a, b, n]}``.
-
-    Raises
-    ------
-    CampaignError
-        With every problem.
+    Values are written as in a file, or are arrays and numbers of numpy, pandas or xarray, ranges, paths, or pint
+    quantities. Numbers of numpy are rounded to 14 digits as in a range, so that ``np.linspace`` gives the same values as
+    ``{linear: [a, b, n]}``.
     """
     text = json.dumps({"name": "study", **{str(key): _plain(value) for key, value in source.items()}}, indent=1)
     try:

@@ -37,19 +37,7 @@ _KINDS = {
 
 
 def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, report: Report) -> None:
-    """Report every error of a validation; the errors of all branches of a union become one message.
-
-    Parameters
-    ----------
-    error : ValidationError
-        The exception that ``kind.model_validate(data)`` raised.
-    kind : type
-        The parameter set.
-    data : object
-        The plain data that were validated.
-    report : callable
-        Receives each problem.
-    """
+    """Report every error of ``kind.model_validate(data)``; the errors of all branches of a union become one message."""
     groups: dict[Path, list[ErrorDetails]] = {}
     for details in error.errors(include_url=False):
         if _is_of_another_branch(details, kind, data):

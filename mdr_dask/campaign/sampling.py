@@ -24,21 +24,9 @@ _NOT_A_HEADING = "expected the name of a parameter, perhaps with a unit in brack
 
 
 def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Variation, ...]:
-    """Draw values for parameters that vary over intervals.
+    """Return the parameters with one value for each point of a design, drawn from their intervals.
 
-    Parameters
-    ----------
-    design : SobolSpec, LatinHypercubeSpec or SaltelliSpec
-        The design and its number of points. A longer Sobol sequence begins with the points of a shorter one.
-    seed : int
-        Seed of the scrambling.
-    variations : sequence of Variation
-        The varied parameters, each with an interval.
-
-    Returns
-    -------
-    tuple of Variation
-        The same parameters, with one value for each point.
+    `seed` is the seed of the scrambling. A longer Sobol sequence begins with the points of a shorter one.
     """
     import numpy as np
     from scipy.stats import qmc
@@ -82,20 +70,9 @@ def tabled(
 ) -> tuple[Variation, ...] | None:
     """Return the parameters that a CSV file varies line by line, or None if there is a problem.
 
-    Parameters
-    ----------
-    name, directory : str
-        Name of the file, and the folder to which it is relative.
-    origin : Origin
-        Position of the file name in the campaign.
-    parameters : type
-        The parameter set of the model.
-    data : mapping
-        Values of the other parameters, as read from the campaign file.
-    problems : Problems
-        Receives misspelt columns, units and missing cells.
-    remarks : list of str
-        Receives a sentence about the columns that are not parameters.
+    `name` is the name of the file, relative to `directory`, and `origin` its place in the campaign. `data` are the
+    values of the other parameters as read from the campaign file. `problems` receives misspelt columns, units and
+    missing cells; `remarks` receives a sentence about the columns that are not parameters.
     """
     path = Path(directory, name)
     try:

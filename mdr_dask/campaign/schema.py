@@ -43,12 +43,7 @@ def json_schema() -> Schema:
 def parameters_schema(parameters: type[Parameters], references: str = "#/$defs/{model}") -> Schema:
     """Return the schema of the ``parameters`` of a model: each is a value, a list or a range.
 
-    Parameters
-    ----------
-    parameters : type
-        The parameter set.
-    references : str
-        JSON reference to the schemas of nested parameter sets, with ``{model}`` for the name of the set.
+    `references` is the JSON reference to schemas of nested parameter sets, with ``{model}`` for the name of the set.
     """
     own: Schema = _readable(parameters.model_json_schema(ref_template=references))
     own.pop("required", None)

@@ -26,20 +26,10 @@ def tolerances(
     model: Model[Any],
     outputs: Sequence[str],
 ) -> dict[str, Tolerance]:
-    """Return the tolerance of every output named at a path of a document; report unknown names and wrong tolerances.
+    """Return the tolerance of every output named at a path of a document, in SI.
 
-    Parameters
-    ----------
-    document : Document
-        The file.
-    path : path
-        Path of the mapping.
-    given : mapping
-        Tolerances as written, by output.
-    model : Model
-        The model, with the units of its outputs.
-    outputs : sequence of str
-        The outputs of the campaign.
+    `given` are the tolerances as written, by output, and `outputs` the outputs of the campaign. Unknown names and wrong
+    tolerances are reported.
     """
     known = [output.name for output in model.outputs if output.name in outputs]
     found = {}

@@ -76,20 +76,9 @@ def find(
 ) -> tuple[Variation, ...]:
     """Return the varied parameters, in the order of the data, and report wrong ranges and empty lists.
 
-    The variation of a parameter with a problem has neither values nor an interval.
-
-    Parameters
-    ----------
-    document : Document
-        The campaign file.
-    parameters : type
-        The parameter set of the model.
-    data : mapping
-        Values of the parameters as read from the file, by name.
-    paths : mapping of str to path
-        Path of each parameter in the document.
-    drawn : bool
-        Whether values are drawn from the ranges, which then have no number of values.
+    `data` are the values of the parameters as read from the file, and `paths` their paths in the document. If `drawn`
+    is true, values are drawn from the ranges, which then have no number of values. The variation of a parameter with a
+    problem has neither values nor an interval.
     """
     search = _Search(document, parameters, data, drawn)
     return tuple(found for name, value in data.items() for found in search.below((name,), value, paths[name]))
@@ -242,14 +231,9 @@ class _Search:
 
 
 def spaced(spread: Spread, count: int) -> list[float]:
-    """Return values from one end of an interval to the other; the ends are exact, inner values have 14 digits.
+    """Return `count` values from one end of an interval to the other; the ends are exact, inner values have 14 digits.
 
-    Parameters
-    ----------
-    spread : Spread
-        The interval. If its values are whole numbers, each appears once, and there may be fewer than `count`.
-    count : int
-        Number of values, at least 2.
+    In an interval of whole numbers each value appears once, so that there may be fewer than `count`.
     """
     inner = spread.at(np.arange(1, count - 1) / (count - 1))
     ends = [tidy(end, spread.whole, exact=True) for end in (spread.low, spread.high)]

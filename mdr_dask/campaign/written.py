@@ -49,18 +49,8 @@ def questions(
 ) -> Iterator[str]:
     """Yield a question for each parameter with a number without a unit that may have been meant in another unit.
 
-    Parameters
-    ----------
-    document : Document
-        The campaign file.
-    parameters : type
-        The parameter set of the model.
-    data : mapping
-        Values of the parameters as read from the file, by name.
-    paths : mapping of str to path
-        Path of each parameter in the document.
-    units : mapping of str to str
-        Units that differ from the declared units of parameters, as in a dimensionless campaign.
+    `data` are the values of the parameters as read from the file, and `paths` their paths in the document. `units` are
+    the units that differ from the declared units of parameters, as in a dimensionless campaign.
     """
     asked: set[Path] = set()
     for name, given in data.items():

@@ -24,16 +24,9 @@ if TYPE_CHECKING:
 
 @contextmanager
 def telling(quiet: bool, log: Path | None, **about: Any) -> Iterator[Tell]:
-    """Yield the function that writes the events of a run to its log, and their messages to stderr.
+    """Yield the function that writes the events of a run to its log, and their messages to stderr unless `quiet`.
 
-    Parameters
-    ----------
-    quiet : bool
-        Whether to print nothing on stderr.
-    log : Path or None
-        File to which the log is appended.
-    about
-        Contents of the first line of the log.
+    The log is appended to the file `log`, if it is given; `about` are the contents of its first line.
     """
     if log is None:
         yield _printer(quiet)

@@ -55,18 +55,9 @@ def _filled(line: str) -> str:
 
 
 def print_rows(rows: Sequence[Row], units: dict[str, str], form: str, limit: int | None = None) -> None:
-    """Print rows as an aligned table, as CSV, or as one JSON document with units.
+    """Print rows with the same keys as an aligned ``table``, as ``csv``, or as one ``json`` document with units.
 
-    Parameters
-    ----------
-    rows : sequence of dict
-        Rows with the same keys.
-    units : dict of str to str
-        Unit of each column that has one.
-    form : str
-        ``table``, ``csv`` or ``json``.
-    limit : int, optional
-        Largest number of rows of an aligned table; the number of further rows is printed on stderr.
+    `limit` is the largest number of rows of an aligned table; the number of further rows is printed on stderr.
     """
     if form == "json":
         print_json({"units": units, "rows": [{key: _finite(value) for key, value in row.items()} for row in rows]})
@@ -93,19 +84,9 @@ def titled(name: str, unit: str) -> str:
 def print_aligned(titles: Sequence[str], columns: Sequence[Sequence[Any]], keys: int = 1, note: str = "") -> None:
     """Print columns side by side, within the width of the terminal.
 
-    A column with the same value in all rows is printed above the table, and a column without any value is named there.
-    A single row that is too wide is printed as a list; a table that is too wide is printed in parts.
-
-    Parameters
-    ----------
-    titles : sequence of str
-        Headings, ``name`` or ``name [unit]``.
-    columns : sequence of sequence
-        The values of each column.
-    keys : int
-        Number of leading columns that identify a row; each part of a wide table begins with them.
-    note : str
-        A line that is printed above the table.
+    A column with the same value in all rows is printed above the table, after `note`, and a column without any value is
+    named there. A single row that is too wide is printed as a list. A table that is too wide is printed in parts; each
+    part begins with the first `keys` columns, which identify a row.
     """
     rows = len(columns[0]) if columns else 0
     cells = [[short(value) for value in column] for column in columns]

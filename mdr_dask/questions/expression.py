@@ -103,19 +103,13 @@ def parse(text: str) -> Expression:
 def evaluate(expression: Expression, find: Find, known: Sequence[str] = ()) -> Value:
     """Return the value of an expression.
 
-    Parameters
-    ----------
-    expression : Expression
-        The return value of `parse`.
-    find : callable, str -> DataArray or None
-        Returns the values of a name, in the SI unit ``attrs["units"]``; None if there is no such name.
-    known : sequence of str
-        All names, for the hint in the message about an unknown name.
+    `find` returns the values of a name in the SI unit ``attrs["units"]``, or None if there is no such name. `known` are
+    all names, for the hint in the message about an unknown name.
 
     Raises
     ------
     DataError
-        If a name is unknown, or numbers of different dimensions are added or compared.
+        If a name is unknown, or quantities of different kinds are added or compared.
     """
     with np.errstate(all="ignore"):
         return _Evaluation(expression, find, known).value(expression.tree)

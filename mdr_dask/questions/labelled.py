@@ -24,17 +24,9 @@ PIECE = 2**20
 
 
 def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn) -> xr.Dataset:
-    """Answer a question with arrays; cases that do not meet the condition are NaN.
+    """Answer a question with lazy arrays; cases that do not meet the condition are NaN.
 
-    Parameters
-    ----------
-    dataset, question, tell
-        As in `mdr_dask.questions.table.table`.
-
-    Returns
-    -------
-    Dataset
-        Lazy arrays: statistics and the counts of states along ``state``, or single results and their ``status``.
+    The arrays are statistics and the counts of states along ``state``, or single results and their ``status``.
 
     Raises
     ------

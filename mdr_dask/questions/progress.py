@@ -65,12 +65,7 @@ def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]
 def grouped(found: Sequence[dict[str, Any]], studies: Mapping[str, xr.Dataset]) -> list[Group]:
     """Group messages that differ only in their numbers, in the order of their first appearance.
 
-    Parameters
-    ----------
-    found : sequence of dict
-        Messages as returned by `messages`.
-    studies : mapping of str to Dataset
-        The groups of the study by series, for the units of its axes.
+    `studies` are the groups of the study by series, for the units of its axes.
     """
     groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
     for message in found:

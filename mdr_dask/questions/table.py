@@ -82,23 +82,10 @@ class Table:
 
 
 def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = warnings.warn) -> Table:
-    """Answer a question with rows.
+    """Answer a question about a group of a study with rows.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        A group of a study, as returned by :func:`mdr_dask.store.datasets`.
-    question : Question
-        The question.
-    limit : int
-        Number of rows that are needed, 0 for all.
-    tell : callable, str -> object
-        As in `mdr_dask.questions.selection.select`.
-
-    Returns
-    -------
-    Table
-        Rows are computed when their frame is read, in constant memory unless they are sorted.
+    Rows are computed when their frame is read, in constant memory unless they are sorted. `limit` is the number of rows
+    that are needed, 0 for all. `tell` receives messages about the selection.
 
     Raises
     ------
@@ -263,16 +250,10 @@ def _flattened(array: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
 
 
 def boxes(sizes: Mapping[str, int], most: int, chunks: Sequence[int] = ()) -> Iterator[dict[str, slice]]:
-    """Divide a grid into boxes in the order of its rows.
+    """Divide a grid into boxes of at most `most` points, in the order of its rows.
 
-    Parameters
-    ----------
-    sizes : mapping of str to int
-        Lengths of the dimensions; the index of the last dimension varies fastest.
-    most : int
-        Largest number of points of a box.
-    chunks : sequence of int
-        Lengths of the chunks; boxes longer than a chunk end at the end of a chunk.
+    The index of the last dimension in `sizes` varies fastest. `chunks` are the lengths of chunks of the store; boxes
+    longer than a chunk end at the end of a chunk.
     """
     dims, inner = list(sizes), 1
     cut = len(dims)

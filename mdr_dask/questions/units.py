@@ -45,12 +45,7 @@ def as_written(study: xr.Dataset) -> dict[str, str]:
 def in_units(dataset: xr.Dataset, wanted: Mapping[str, str]) -> xr.Dataset:
     """Convert variables and coordinates; an output is converted together with its statistics and errors.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Its variables have their unit in ``attrs["units"]``.
-    wanted : mapping of str to str
-        Units by the name of an axis, a parameter or an output, in any spelling that a campaign file may use.
+    `wanted` are units by the name of an axis, a parameter or an output, in any spelling of a campaign file.
 
     Raises
     ------
