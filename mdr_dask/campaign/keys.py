@@ -19,8 +19,8 @@ def of_keys(source: Mapping[str, Any]) -> Campaign:
     """Read a campaign from the keys of a campaign file; raise CampaignError with every problem.
 
     Values are written as in a file, or are arrays and numbers of numpy, pandas or xarray, ranges, paths, or pint
-    quantities. Numbers of numpy are rounded to 14 digits as in a range, so that ``np.linspace`` gives the same values as
-    ``{linear: [a, b, n]}``.
+    quantities. Numbers of numpy are rounded to 14 digits as in a range, so that ``np.linspace`` gives the same values
+    as ``{linear: [a, b, n]}``.
     """
     text = json.dumps({"name": "study", **{str(key): _plain(value) for key, value in source.items()}}, indent=1)
     try:
