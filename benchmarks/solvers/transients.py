@@ -19,7 +19,7 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.waves import Waves
-from mdr_dask.physics.transients.accuracy import JumpProblem, JumpRequest, solve_jumps
+from mdr_dask.physics.transients.accuracy import solve_jumps
 from mdr_dask.physics.transients.elements.steps import Schedule
 from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
@@ -37,9 +37,9 @@ class JumpCase(NamedTuple):
 
     def jumped(self, accuracy: float | None, oversampling: int, per_decade: float | None):
         """Return the solution to an accuracy; with a march if `per_decade` steps are given."""
-        problem = JumpProblem(RoughLine(self.waves), np.array([self.load]), np.array([[self.before, self.after]]))
-        march = per_decade and MarchRequest(TIMES, np.pi * POINTS, per_decade)
-        return solve_jumps(problem, JumpRequest(accuracy, oversampling, march or None, bool(march)))
+        loads, deborah = np.array([self.load]), np.array([[self.before, self.after]])
+        march = MarchRequest(TIMES, np.pi * POINTS, per_decade) if per_decade else None
+        return solve_jumps(RoughLine(self.waves), loads, deborah, accuracy, oversampling, march, bool(march))
 
     def marched(self, oversampling: int, per_decade: float) -> Found | None:
         """Return the transient by the march of the models, over the steady friction after the jump."""

@@ -66,8 +66,8 @@ def load_by_largest(marching: Marching, found: Trajectory, now: int, line: Sampl
 
 def marched(relaxation) -> tuple[Marching, Trajectory, Workspace, int]:
     """March a case of `velocity_jump` to its end; return problem, trajectory, workspace and number of moments."""
-    for interval in relaxation.intervals(relaxation.ends):
-        marching, found, work = relaxation.begun(interval, 3000)
+    for interval in relaxation.intervals:
+        marching, found, work = relaxation.begun(interval)
         finish = Finish(relaxation.ends[1], relaxation.limits.after, 1e-9, 1e-9)
         count, outcome = march_depth(marching, relaxation.stepping, finish, found, work)
         if outcome >= 0:

@@ -32,16 +32,15 @@ from mdr_dask.physics.refine import Solution, refine
 from mdr_dask.physics.surfaces.cubic_line import without_kinks
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.waves import Waves
-from mdr_dask.physics.transients.accuracy import JumpProblem, JumpRequest, Jumps, solve_jumps
+from mdr_dask.physics.transients.accuracy import Jumps, solve_jumps
 from mdr_dask.physics.transients.elements.foundation import foundation
 from mdr_dask.physics.transients.elements.loading_history import Trace, trace
 from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
 ACCURACY = 0.01  # relative accuracy of steady friction and of the jump, if the campaign does not give an accuracy
-# computing time of a jump, seconds: steady states per node of the line; march per node and per moment
-SECONDS_NODE, SECONDS_MOMENT = 6.2e-8, 3.3e-9
-MOMENTS = 4  # typical number of moments of a march, divided by the number of steps per decade
-SECONDS_STEPPED = 3.5e-8  # computing time, seconds per square of the number of nodes, for a travel of a few lines
+# computing time in seconds, order of magnitude: of a jump, per node and step per decade; of a history, per square of
+# the number of nodes
+SECONDS_MARCHED, SECONDS_FOLLOWED = 2e-8, 3.5e-8
 FLAT = 1e-12  # a line is flat if its rms height is at most this fraction of its largest absolute height
 HISTORY_ORDER = 2  # order of convergence of the results of a history in cell size and time step
 
@@ -194,13 +193,15 @@ class _Marched(_Group):
         times, wavenumber = np.array(self.block.parameters.relaxation_times), np.pi * waves.points
         transient = MarchRequest(times, wavenumber, self.steps, self.block.accuracy or 0.0) if is_wanted else None
         with_errors = any(f"{name}_error" in self.block.outputs for name in WITH_ERROR)
-        request = JumpRequest(
+        jumps = solve_jumps(
+            RoughLine(waves),
+            loads,
+            deborah,
             self.block.accuracy or (ACCURACY if with_errors else None),
             self.oversampling,
             transient,
             any(f"{name}_error" in self.block.outputs for name in TRANSIENT),
         )
-        jumps = solve_jumps(JumpProblem(RoughLine(waves), loads, deborah), request)
         return self._of(jumps, loads, which), loads.size
 
     @cached_property
@@ -299,9 +300,8 @@ def seconds(block: Block[VelocityJump]) -> float:
     for group in _groups(block, sliding_problems(block)):
         nodes = group.setting.roughness.points * group.oversampling
         if isinstance(group, _Marched):
-            errors = any(f"{name}_error" in block.outputs for name in TRANSIENT)
-            per_case = nodes * (SECONDS_NODE + SECONDS_MOMENT * MOMENTS * group.steps) * (1.7 if errors else 1.0)
+            per_case = nodes * group.steps * SECONDS_MARCHED
             total += group.different[0].size * per_case * len(block.realisations)
         else:
-            total += nodes**2 * SECONDS_STEPPED * len(block.realisations)
+            total += nodes**2 * SECONDS_FOLLOWED * len(block.realisations)
     return total

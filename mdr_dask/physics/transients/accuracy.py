@@ -18,52 +18,12 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import SAFETY, Solution, refine
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits, steady_limits
-from mdr_dask.physics.transients.velocity_jump import Jump, MarchRequest, Path, jump_between, retraced
+from mdr_dask.physics.transients.velocity_jump import Jump, MarchRequest, Path, jump_between
 
 FINEST = 64  # largest number of nodes per Nyquist point in steady states
 ORDER = 2  # lower bound of the order of convergence of the steady states
 CAUTION = 2 * SAFETY  # safety factor of steady states: contacts of a few nodes change irregularly from grid to grid
-TRANSIENT = SAFETY  # safety factor of a transient: first order, because single asperities enter and leave contact
-
-
-class JumpProblem(NamedTuple):
-    """Velocity jumps on one line, in dimensionless numbers.
-
-    Parameters
-    ----------
-    line : RoughLine
-    loads : array, shape (cases,)
-        F_N / (4 G L h).
-    deborah : array, shape (cases, 2)
-        v_1 tau / L and v_2 tau / L.
-    """
-
-    line: RoughLine
-    loads: FloatArray
-    deborah: FloatArray
-
-
-class JumpRequest(NamedTuple):
-    """Requested accuracy, grid and outputs for the velocity jumps on a line.
-
-    Parameters
-    ----------
-    accuracy : float or None
-        Allowed relative error of the quantities in `Levels`. The error of a depth that is smaller than h is relative to
-        h. If neither an accuracy nor errors are requested, this is None, and the steady states are solved on the grid
-        of the march.
-    oversampling : int
-        Nodes per Nyquist point in the march, an even number; the steady states use at least as many nodes.
-    march : MarchRequest or None
-        Times and accuracy of the march; None if the transient is not requested.
-    with_errors : bool
-        Whether the error of the transient is requested. This requires an accuracy.
-    """
-
-    accuracy: float | None
-    oversampling: int
-    march: MarchRequest | None
-    with_errors: bool
+TRANSIENT = SAFETY  # safety factor of a transient, which converges at first order: single asperities enter contact
 
 
 class Levels(NamedTuple):
@@ -110,50 +70,76 @@ class Jumps(NamedTuple):
     outcome: NDArray[np.int8]
 
 
-def solve_jumps(problem: JumpProblem, request: JumpRequest) -> Jumps:
+def solve_jumps(
+    line: RoughLine,
+    loads: FloatArray,
+    deborah: FloatArray,
+    accuracy: float | None,
+    oversampling: int,
+    march: MarchRequest | None,
+    with_errors: bool,
+) -> Jumps:
     """Return the velocity jumps on a line.
 
     The steady limits have the requested accuracy; the transient is computed on the grid of the march.
+
+    Parameters
+    ----------
+    line : RoughLine
+    loads : array, shape (cases,)
+        F_N / (4 G L h).
+    deborah : array, shape (cases, 2)
+        v_1 tau / L and v_2 tau / L.
+    accuracy : float or None
+        Allowed relative error of the quantities in `Levels`. The error of a depth that is smaller than h is relative to
+        h. If neither an accuracy nor errors are requested, this is None, and the steady states are solved on the grid
+        of the march.
+    oversampling : int
+        Nodes per Nyquist point in the march, an even number; the steady states use at least as many nodes.
+    march : MarchRequest or None
+        Times and accuracy of the march; None if the transient is not requested.
+    with_errors : bool
+        Whether the error of the transient is requested. This requires an accuracy.
     """
-    cases, grid = problem.loads.size, request.oversampling
+    cases, grid = loads.size, oversampling
     guesses = np.full((cases, 2), np.nan)
     lines: dict[int, PreparedLine] = {}
     limits: dict[tuple[int, int], SteadyLimits] = {}
 
     def solve(oversampling: int, which: IntArray) -> Solution:
-        line = PreparedLine.of(problem.line.cubic(problem.line.points * oversampling))
-        found = steady_limits(line, problem.loads[which], problem.deborah[which], guesses[which])
+        prepared = PreparedLine.of(line.cubic(line.points * oversampling))
+        found = steady_limits(prepared, loads[which], deborah[which], guesses[which])
         guesses[which] = [each.depth for each in found]
         if oversampling <= grid:
-            lines[oversampling] = line
+            lines[oversampling] = prepared
             limits.update({(oversampling, int(k)): each for k, each in zip(which, found, strict=True)})
         return Solution(Levels.of(found), np.array([each.outcome for each in found], np.int8))
 
-    grids = [grid] if request.accuracy is None else [grid // 2]
-    while request.accuracy is not None and (grids[-1] < grid or 2 * grids[-1] <= FINEST):
+    grids = [grid] if accuracy is None else [grid // 2]
+    while accuracy is not None and (grids[-1] < grid or 2 * grids[-1] <= FINEST):
         grids.append(2 * grids[-1])
     floors = [0.0, 0.0, 0.0, 1.0]
-    refined = refine(solve, cases, grids, request.accuracy or np.inf, ORDER, safety=CAUTION, floors=floors)
+    refined = refine(solve, cases, grids, accuracy or np.inf, ORDER, safety=CAUTION, floors=floors)
     levels = Levels(*refined.values)
-    errors = Levels(*refined.errors if request.accuracy is not None else np.full((4, cases), np.nan))
-    march = request.march
+    errors = Levels(*refined.errors if accuracy is not None else np.full((4, cases), np.nan))
     shape = cases, march.times.size if march else 0
     trace, depth, trace_error, depth_error = (np.full(shape, np.nan) for _ in range(4))
     contact = np.array([limits[grid, k].contact.max() for k in range(cases)])
     jumps = Jumps(levels, errors, trace, depth, trace_error, depth_error, contact, refined.outcome)
     if march is None:
         return jumps
+    half = march._replace(per_decade=march.per_decade / 2, accuracy=0.0)
     for k in np.flatnonzero(refined.outcome == Outcome.CONVERGED):
-        fine, load, deborah = limits[grid, int(k)], problem.loads[k], problem.deborah[k]
-        jump = jump_between(lines[grid], load, deborah, fine, march)
+        fine = limits[grid, int(k)]
+        jump = jump_between(lines[grid], loads[k], deborah[k], fine, march)
         jumps.outcome[k] = jump.outcome
         trace[k] = levels.after[k] + (jump.trace - jump.after)
         depth[k] = levels.depth[k] + (jump.depth - fine.depth[1])
-        if request.with_errors and jump.outcome == Outcome.CONVERGED:
+        if with_errors and jump.outcome == Outcome.CONVERGED:
             error = _left_out(jump, fine, march)
             if jump.path is not None:
                 coarse = limits[grid // 2, int(k)]
-                other = retraced(lines[grid // 2], load, deborah, coarse, jump.path, march)
+                other = jump_between(lines[grid // 2], loads[k], deborah[k], coarse, half).path
                 error = TRANSIENT * _change(jump.path, fine, other, coarse, march.times)
             trace_error[k], depth_error[k] = error + np.array([[errors.after[k]], [errors.depth[k]]])
     return jumps

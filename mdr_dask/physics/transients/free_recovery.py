@@ -17,13 +17,14 @@ the depth at the time of separation, reduced by the decay since then. The extrem
 
 from __future__ import annotations
 
+from math import frexp
 from typing import NamedTuple
 
 import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted, last_until
-from mdr_dask.physics.transients.patches import History, Patches, Track, height_at, patch_before
+from mdr_dask.physics.transients.patches import History, Patches, Track, height_at
 
 ITERATIONS = 60  # largest number of iterations of Newton's method with bisection
 NEAR = 0.02  # cells: last Newton step towards a place of separation; the error is about the cube of this step
@@ -33,7 +34,6 @@ CREST = 1e-3  # cells: resolution of the place in a cell where the gap between l
 FARTHEST = 200  # cells before x in which the place of separation is searched for in a stretch
 MARGIN = 64.0  # cells added to twice a distance when the window of a bound is chosen
 WINDOW, WINDOWS = 8.0, 16  # cells travelled in the shortest window; number of windows, each twice as long as the last
-_DOUBLINGS = np.frexp(np.arange(1024))[1]  # index of the window that covers a given number of shortest windows
 
 
 class Instant(NamedTuple):
@@ -140,8 +140,7 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
 @jit_inline_uncounted
 def window(distance: float) -> int:
     """Return the index of the window whose bounds are valid over a distance in cells."""
-    windows = max(distance * (1 / WINDOW), 0.0)
-    return int(_DOUBLINGS[np.uintp(windows)]) if windows < _DOUBLINGS.size else WINDOWS - 1
+    return min(max(frexp(distance / WINDOW)[1], 0), WINDOWS - 1)
 
 
 @jit_inline_uncounted
@@ -150,10 +149,7 @@ def _depth_at(history: History, t: float) -> tuple[float, float, float]:
     last = history.count - 1
     if last <= 0 or t >= history.time[last]:
         return history.depth[last], history.rate[last], 0.0
-    low, high, back = last - 1, last, 1
-    while history.time[low] > t and low > 0:
-        high, low, back = low, max(low - back, 0), 2 * back
-    low = last_until(history.time, t, low, high)
+    low = last_until(history.time, t, 0, last)
     high = low + 1
     step = history.time[high] - history.time[low]
     y = (t - history.time[low]) / step
@@ -263,7 +259,7 @@ def from_before(now: Instant, x: float, least: float) -> tuple[float, float]:
     If the displacement is at most `least`, both returned values may be 0.
     """
     first, s = now.first, _in_period(now, x - now.deborah * now.time)
-    low = patch_before(first, s)
+    low = last_until(first.start, s, 0, first.count)
     if s <= first.end[low]:
         h, slope, _ = height_at(now.track, s)
         return (first.depth + h) * now.left, slope * now.left
@@ -351,7 +347,10 @@ def nearest_approach(now: Instant, recovery: FreeRecovery, low: float, high: flo
 
 @jit_inline_uncounted
 def prune(now: Instant, recovery: FreeRecovery, x: float, pressed: float, deepest: float) -> None:
-    """Remove places of separation whose elements can no longer exceed the displacement `pressed` at x."""
+    """Remove places of separation whose elements can no longer exceed the displacement `pressed` at x.
+
+    `deepest` is the largest depth since the jump.
+    """
     kept = 0
     for k in range(recovery.count[0]):
         place, farthest = recovery.place[k], recovery.farthest[k]

@@ -62,7 +62,7 @@ class PreparedLine(NamedTuple):
         sums = np.empty(SWEEP_SUMS)
         start, end = patches_at(self.cells, self.blocks, self.barriers(deborah), deborah, depth, sums)
         pressed = _pressed(self.track, end, depth)
-        return Patches(start, end, pressed, start.size, depth, deborah, np.zeros(1, np.int64)), sums
+        return Patches(start, end, pressed, start.size, depth, deborah), sums
 
 
 class SteadyLimits(NamedTuple):

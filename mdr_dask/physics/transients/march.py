@@ -29,7 +29,7 @@ TRIALS = 80  # largest number of Newton steps for the depth at one moment
 ORDER = 3  # order of the backward differentiation
 EXACT = 1e-11  # relative error of the load below which no Newton step is needed
 NEWTON_LOAD = 0.03  # largest relative error of the load before the last Newton step
-SETTLED = 1.5  # a march ends when depth and drag meet `Finish` during an interval of time with this ratio of its ends
+SETTLED = 1.5  # a march ends when depth and drag meet `Finish` from some time until this factor times that time
 LEFT_LIMITS = -1  # outcome of a march whose depth leaves the interval for which the reachable cells are known
 
 
@@ -236,13 +236,14 @@ def march_depth(
         depth[now] = min(max(expected, marching.low), marching.high)
         history = History(time, depth, rate, now + 1, weights[0])
         outcome, drag[now], drag_rate[now] = _balance(marching, history, weights, pace.close, work)
-        miss = abs(depth[now] - expected) if outcome == Outcome.CONVERGED else 8 * pace.miss
-        if miss > 2 * pace.miss or outcome != Outcome.CONVERGED:
+        miss = abs(depth[now] - expected) if outcome == Outcome.CONVERGED else np.inf
+        ratio = 0.9 * (pace.miss / max(miss, 1e-300)) ** (1 / 3)  # the error of the extrapolation is of third order
+        if miss > 2 * pace.miss:
             if step < 1e-3 * pace.first or (outcome == LEFT_LIMITS and step < 1e-2 * time[now - 1]):
                 return now, outcome if outcome != Outcome.CONVERGED else Outcome.DEPTH_NOT_FOUND
-            step = taken * max(0.25, 0.8 * (pace.miss / miss) ** (1 / 3))
+            step = taken * max(0.25, ratio)
             continue
-        step = taken * min(pace.growth, 0.9 * (pace.miss / max(miss, 1e-300)) ** (1 / 3))
+        step = taken * min(pace.growth, ratio)
         farthest = max(farthest, abs(drag[now] - finish.drag))
         settled = (
             abs(drag[now] - finish.drag) <= finish.drag_distance * farthest
@@ -253,34 +254,3 @@ def march_depth(
         if settled and time[now - 1] > SETTLED * near:
             break
     return now, Outcome.CONVERGED
-
-
-@jit_uncounted
-def retrace(marching: Marching, depths: FloatArray, found: Trajectory, work: Workspace) -> int:
-    """March through given moments with approximately known depths; each depth is corrected by one Newton step.
-
-    Parameters
-    ----------
-    marching, work
-        As in `march_depth`.
-    depths : array, shape (moments,)
-        Depths at these moments on another grid.
-    found : Trajectory
-        Contains t and log(1 + t / onset) of every moment; the other columns are written from the second entry on.
-
-    Returns
-    -------
-    outcome : int
-        An `Outcome`, or `LEFT_LIMITS`.
-    """
-    time, _, depth, rate, drag, drag_rate = found
-    for now in range(1, time.size):
-        depth[now] = depths[now] + (depth[now - 1] - depths[now - 1])
-        if not marching.low <= depth[now] <= marching.high:
-            return LEFT_LIMITS
-        weights = _weights(found, now, marching.onset)
-        history = History(time, depth, rate, now + 1, weights[0])
-        outcome, drag[now], drag_rate[now] = _balance(marching, history, weights, np.inf, work)
-        if outcome != Outcome.CONVERGED:
-            return outcome
-    return Outcome.CONVERGED

@@ -11,14 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted, last_until
+from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, contact_end, write_barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
 ROOT_STEPS = 60
 CLOSE = 1e-2  # cells: last step towards a zero of the force; the error is about the cube of this step
-NEARBY = 8  # number of patches that are tried one after the other before bisection
 LOAD, DRAG, LENGTH, TILT, STIFFNESS, DRAG_STIFFNESS, GROWTH, DRAG_GROWTH = range(8)
 SUMS = 8
 
@@ -61,8 +60,7 @@ def track_of(cells: Cells) -> Track:
 class Patches(NamedTuple):
     """Patches of a steady state: patch k extends from ``start[k]`` to ``end[k]``.
 
-    ``pressed`` is the displacement of elements at the end of each patch. ``cursor`` is the index of the patch found by
-    the last search.
+    ``pressed`` is the displacement of elements at the end of each patch.
     """
 
     start: FloatArray
@@ -71,7 +69,6 @@ class Patches(NamedTuple):
     count: int  # type: ignore[assignment]
     depth: float
     deborah: float
-    cursor: IntArray
 
 
 class History(NamedTuple):
@@ -98,28 +95,6 @@ def height_at(track: Track, x: float) -> tuple[float, float, float]:
         c1 + y * (2 * c2 + y * 3 * c3),
         2 * c2 + 6 * y * c3,
     )
-
-
-@jit_inline_uncounted
-def patch_before(patches: Patches, s: float) -> int:
-    """Return the index of the last patch that begins at or before s, or 0 if every patch begins later.
-
-    The search starts from the patch found by the previous search.
-    """
-    low, high = int(patches.cursor[0]), patches.count
-    if patches.start[low] <= s:
-        for _ in range(NEARBY):
-            if low + 1 >= high or patches.start[low + 1] > s:
-                patches.cursor[0] = low
-                return low
-            low += 1
-    else:
-        high, low = low, max(low - NEARBY, 0)
-        if patches.start[low] > s:
-            high, low = low, 0
-    low = last_until(patches.start, s, low, high)
-    patches.cursor[0] = low
-    return low
 
 
 @jit_inline_uncounted

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit
@@ -19,16 +20,15 @@ from mdr_dask.physics.sliding.kelvin import DRAG_RATE
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 from mdr_dask.physics.transients.contact_search import Reachable, Workspace, workspace_for
 from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits, steady_limits
-from mdr_dask.physics.transients.march import LEFT_LIMITS, Finish, Marching, Stepping, Trajectory, march_depth, retrace
+from mdr_dask.physics.transients.march import LEFT_LIMITS, Finish, Marching, Stepping, Trajectory, march_depth
 from mdr_dask.physics.transients.patches import Patches, Track
 
-ONSET = 0.5  # times the duration of a travel of 1 / q_max: time after which the steps grow in a constant ratio
+ONSET = 0.5  # time after which the steps grow in a constant ratio, divided by the duration of a travel of 1 / q_max
 ROOT = 10.0  # the first step is smaller by this factor if the velocity falls, because contact then grows as sqrt(t)
-# MISS, NEWTON and SETTLED are divided by the number of steps per decade
-MISS = 1.0  # allowed error of the extrapolated depth, divided by the change of depth; otherwise the step is shortened
+# NEWTON and SETTLED are divided by the number of steps per decade
 NEWTON = 0.2  # largest last Newton step, divided by the change of depth; the error is about the square of the step
 SETTLED = 0.04  # distances of depth and drag from the steady values at the end of a march, divided by their changes
-OF_ACCURACY = 0.1  # or distance of the drag divided by the accuracy times the steady drag, if this distance is larger
+OF_ACCURACY = 0.1  # distance of the drag from its steady value that is always near enough, divided by its allowed error
 NEGLIGIBLE = 1e-5  # smallest change of depth that is used in these ratios, divided by the mean displacement
 # the march has failed if, after LONG relaxation times, the drag differs from the steady drag by more than
 # NOT_STEADY[0] times the range of the drag plus NOT_STEADY[1] times the steady drag
@@ -39,7 +39,6 @@ MARGIN, WIDENINGS = 0.25, 3
 SHALLOW = 0.01  # least depth of a march, divided by the smaller steady depth
 MOMENTS = 3000  # largest number of moments of a march
 STEEPEST = 3.0  # largest ratio of a tangent to the flatter of the two adjacent secants; a steeper cubic may overshoot
-EVERY = 2  # a path is repeated on another grid at every second moment and at the last moment
 
 
 class MarchRequest(NamedTuple):
@@ -99,26 +98,16 @@ class Path(NamedTuple):
 def _limited_cubic(x: FloatArray, rows: FloatArray, slopes: FloatArray, places: FloatArray) -> FloatArray:
     """Return the values at `places` of piecewise cubics through rows of points with given slopes.
 
-    If the first slope is NaN, the first piece is a parabola.
-
-    A slope that is much steeper than the secants at its point is due to a single asperity that enters or leaves
-    contact. Such a slope is reduced, so that the cubic does not overshoot. (Splines of scipy would take a tenth of the
-    computing time of a jump.)
+    If the first slope of a row is NaN, the first piece of this row is a parabola. A slope that is much steeper than the
+    secants at its point is due to a single asperity that enters or leaves contact. Such a slope is reduced, so that the
+    cubic does not overshoot.
     """
-    step, rise = np.diff(x), np.diff(rows)
-    sizes = np.abs(rise / step)[:, [0, *range(step.size), -1]]
-    most = STEEPEST * np.minimum(sizes[:, :-1], sizes[:, 1:])
-    tangents = np.minimum(np.maximum(slopes, -most), most)
-    begins = 2 * rise[:, 0] / step[0] - tangents[:, 1]
-    tangents[:, 0] = np.where(np.isnan(slopes[:, 0]), begins, tangents[:, 0])
-    i = np.clip(np.searchsorted(x, places, "right") - 1, 0, step.size - 1)
-    t, enter, leave, rise = (
-        (places - x[i]) / step[i],
-        tangents[:, i] * step[i],
-        tangents[:, i + 1] * step[i],
-        rise[:, i],
-    )
-    curve: FloatArray = rows[:, i] + t * (enter + t * (3 * rise - 2 * enter - leave + t * (enter + leave - 2 * rise)))
+    secants = np.diff(rows) / np.diff(x)
+    beside = np.abs(secants)[:, [0, *range(x.size - 1), -1]]
+    most = STEEPEST * np.minimum(beside[:, :-1], beside[:, 1:])
+    tangents = np.clip(slopes, -most, most)
+    tangents[:, 0] = np.where(np.isnan(slopes[:, 0]), 2 * secants[:, 0] - tangents[:, 1], tangents[:, 0])
+    curve: FloatArray = CubicHermiteSpline(x, rows, tangents, axis=1)(places)
     return curve
 
 
@@ -175,7 +164,7 @@ def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], re
 def jump_between(
     line: PreparedLine, load: float, deborah: FloatArray, limits: SteadyLimits, request: MarchRequest
 ) -> Jump:
-    """Return one jump between known steady states; the other parameters are as in :func:`velocity_jump`."""
+    """Return one jump between known steady states; the other parameters are those of :func:`velocity_jump`."""
     times = request.times
     if limits.outcome != Outcome.CONVERGED:
         return _failed(times, limits.outcome)
@@ -195,18 +184,6 @@ def jump_between(
         return _failed(times, outcome)
     trace, depth = path.at(times, np.array([limits.after, limits.depth[1]]))
     return settled._replace(trace=trace, depth=depth, path=path)
-
-
-def retraced(
-    line: PreparedLine, load: float, deborah: FloatArray, limits: SteadyLimits, path: Path, request: MarchRequest
-) -> Path | None:
-    """Return the march of `path` repeated on another grid, at every second moment, or None if there is no solution.
-
-    The other parameters are as in :func:`jump_between`, on the other grid.
-    """
-    if limits.outcome != Outcome.CONVERGED:
-        return None
-    return _Relaxation(line, load * line.track.cells, deborah * line.track.cells, limits, request).retrace(path)
 
 
 def _failed(times: FloatArray, outcome: Outcome) -> Jump:
@@ -248,7 +225,7 @@ class _Relaxation(NamedTuple):
         if after < before:
             onset = min(onset / ROOT, float(times[times > 0][0]) / (growth - 1))
         part = self.change / self.request.per_decade
-        return Stepping(onset * (growth - 1), growth, MISS * part, NEWTON * part, float(times[-1]))
+        return Stepping(onset * (growth - 1), growth, part, NEWTON * part, float(times[-1]))
 
     def transient(self) -> float:
         """Estimate the size of the transient, with a safety factor of two.
@@ -262,9 +239,10 @@ class _Relaxation(NamedTuple):
         limits = self.limits
         return float(2 * (abs(limits.at - limits.after) + abs(limits.rate * limits.tilt) + by_depth))
 
-    def intervals(self, depths: FloatArray) -> Iterator[tuple[float, float]]:
-        """Yield wider and wider intervals around the given depths."""
-        low, high = float(depths.min()), float(depths.max())
+    @property
+    def intervals(self) -> Iterator[tuple[float, float]]:
+        """Wider and wider intervals around the steady depths."""
+        low, high = float(self.ends.min()), float(self.ends.max())
         margin = MARGIN * (high - low) + NEGLIGIBLE * self.load / self.line.track.cells
         for _ in range(WIDENINGS):
             yield max(low - margin, SHALLOW * low), high + margin
@@ -275,14 +253,17 @@ class _Relaxation(NamedTuple):
         after, request = self.limits.after, self.request
         near = max(SETTLED / request.per_decade, OF_ACCURACY * request.accuracy * after / max(transient, 1e-300))
         finish = Finish(float(self.ends[1]), after, near * self.change, near)
-        for interval in self.intervals(self.ends):
-            marching, found, work = self.begun(interval, MOMENTS)
+        for interval in self.intervals:
+            marching, found, work = self.begun(interval)
             count, outcome = march_depth(marching, self.stepping, finish, found, work)
             if outcome != LEFT_LIMITS:
                 break
         else:
             return None, Outcome.DEPTH_NOT_FOUND
-        path = self.path(Trajectory(*(column[:count] for column in found)))
+        found = Trajectory(*(column[:count] for column in found))
+        values = np.stack([found.drag, found.depth - self.line.cells.top])  # depth relative to the mean line
+        falls = bool(self.deborah[1] < self.deborah[0])
+        path = Path(found.time, values, np.stack([found.drag_rate, found.rate]), falls)
         if outcome != Outcome.CONVERGED:
             return None, Outcome(outcome)
         drag = path.values[0]
@@ -290,67 +271,45 @@ class _Relaxation(NamedTuple):
             return None, Outcome.NOT_STEADY
         return path, Outcome.CONVERGED
 
-    def begun(self, interval: tuple[float, float], moments: int) -> tuple[Marching, Trajectory, Workspace]:
+    def begun(self, interval: tuple[float, float]) -> tuple[Marching, Trajectory, Workspace]:
         """Return a march whose depth stays in an interval, its trajectory with the first moment, and its workspace."""
         line, limits, stepping = self.line, self.limits, self.stepping
         assert limits.first is not None
         assert limits.slower is not None
-        found = Trajectory(*np.empty((6, moments)))
+        found = Trajectory(*np.empty((6, MOMENTS)))
         for column, value in zip(found, (0.0, 0.0, self.ends[0], limits.rate, limits.at, np.nan), strict=True):
             column[0] = value
-        reachable = _reachable(line.track, limits.slower, interval)
+        runs, bound = _runs(line.track, limits.slower, *interval)
+        begin, end = int(np.ceil(limits.slower.end[0])), int(limits.slower.start[-1])
+        reachable = Reachable(runs, float(np.max(line.track.peak[begin:end], initial=-np.inf)))
         onset = stepping.first / (stepping.growth - 1)
         marching = Marching(line.track, limits.first, reachable, self.deborah[1], self.load, *interval, onset)
-        below = reachable.from_depth - self.ends[0]
-        return marching, found, workspace_for(limits.first.count, line.barriers(self.deborah[1]), below)
-
-    def path(self, found: Trajectory) -> Path:
-        """Return the path of a trajectory, with depths relative to the mean line."""
-        values = np.stack([found.drag, found.depth - self.line.cells.top])
-        falls = bool(self.deborah[1] < self.deborah[0])
-        return Path(found.time, values, np.stack([found.drag_rate, found.rate]), falls)
-
-    def retrace(self, path: Path) -> Path | None:
-        """Return the march of `path` repeated on this grid at every second moment, or None if there is no solution."""
-        moments = np.unique(np.append(np.arange(0, path.time.size, EVERY), path.time.size - 1))
-        time, depths = path.time[moments], path.values[1, moments] + self.line.cells.top
-        for interval in self.intervals(np.append(depths + (self.ends[0] - depths[0]), self.ends)):
-            marching, found, work = self.begun(interval, time.size)
-            found.time[:], found.place[:] = time, np.log1p(time / marching.onset)
-            if retrace(marching, depths, found, work) == Outcome.CONVERGED:
-                return self.path(found)
-        return None
-
-
-def _reachable(track: Track, slower: Patches, interval: tuple[float, float]) -> Reachable:
-    """Return the cells where elements can be in contact at depths in an interval."""
-    begin, end = int(np.ceil(slower.end[0])), int(slower.start[-1])
-    return Reachable(*_runs(track, slower, interval), float(np.max(track.peak[begin:end], initial=-np.inf)))
+        return marching, found, workspace_for(limits.first.count, line.barriers(self.deborah[1]), bound - self.ends[0])
 
 
 @jit
-def _runs(track: Track, slower: Patches, interval: tuple[float, float]) -> tuple[IntArray, FloatArray]:
-    """Return the runs of cells where contact is possible at depths in an interval, and a bound for each cell.
+def _runs(track: Track, slower: Patches, low: float, high: float) -> tuple[IntArray, FloatArray]:
+    """Return the runs of cells where contact is possible at depths from `low` to `high`, and a bound for each cell.
 
     The bound is the largest depth at which the cell is certainly out of contact. It follows from the steady state at
     the lower velocity: if the depth is smaller by some length, displacements are smaller by at most this length.
     """
-    (low, high), cells, decay = interval, track.peak.size, np.exp(-1 / slower.deborah)
-    from_depth = np.full(cells + 1, -np.inf)
+    cells, decay = track.peak.size, np.exp(-1 / slower.deborah)
+    bound = np.full(cells + 1, -np.inf)
     for k in range(slower.count):
         first = int(slower.end[k]) + 1  # first node behind the patch
         last = int(np.ceil(slower.start[k + 1])) - 1 if k + 1 < slower.count else cells
         free = slower.pressed[k] * np.exp(-(first - slower.end[k]) / slower.deborah)
         for i in range(first, last):
             free *= decay
-            from_depth[i] = free - (slower.depth - low) - track.peak[i]
+            bound[i] = free - (slower.depth - low) - track.peak[i]
     runs, count = np.empty((cells // 2 + 1, 2), np.int64), 0
     for i in range(cells):
-        if high > from_depth[i]:
+        if high > bound[i]:
             begin, end = max(i - 1, 0), min(i + 2, cells)
             if count > 0 and begin <= runs[count - 1, 1]:
                 runs[count - 1, 1] = end
             else:
                 runs[count, 0], runs[count, 1] = begin, end
                 count += 1
-    return runs[:count], from_depth
+    return runs[:count], bound

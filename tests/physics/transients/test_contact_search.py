@@ -26,9 +26,10 @@ def rough(points: int, hurst: float, oversampling: int = 4, seed: int = 7) -> Pr
     return PreparedLine.of(periodic_line(*(roughness.line(amplitude, phase, nodes, order) for order in (0, 1))))
 
 
-def everywhere(line: PreparedLine) -> Reachable:
+def everywhere(line: PreparedLine) -> tuple[Reachable, np.ndarray]:
+    """Return the whole line as one run, and no bound for any cell."""
     nodes = line.track.height.size
-    return Reachable(np.array([[0, nodes - 1]]), np.full(nodes, -np.inf), 0.0)
+    return Reachable(np.array([[0, nodes - 1]]), 0.0), np.full(nodes, -np.inf)
 
 
 @pytest.mark.slow
@@ -42,8 +43,8 @@ def test_contact_long_after_a_jump_is_that_of_the_steady_sweep(hurst: float, ove
     for depth in (0.01, 0.1, 0.5, 2.0, 6.0):
         first, barriers = line.patches(0.5 * depth, 2 * deborah)[0], line.barriers(deborah)
         history = History(np.array([0.0, LONG]), np.array([depth, depth]), np.zeros(2), 2, 1.0)
-        reachable = everywhere(line)
-        work = workspace_for(int(line.track.cells), barriers, reachable.from_depth - depth)
+        reachable, nothing = everywhere(line)
+        work = workspace_for(int(line.track.cells), barriers, nothing)
         found = find_contact(Instant(line.track, first, history, LONG, deborah, 0.0), reachable, work)
         sums = np.empty(SUMS)
         start, end = patches_at(line.cells, line.blocks, barriers_for(int(line.track.cells)), deborah, depth, sums)
@@ -112,7 +113,8 @@ def test_unreachable_stretches_change_nothing(hurst, load, deborah, ratio, monke
     line, both = rough(1000, hurst, 4, 2014), np.array([[deborah, ratio * deborah]])
     limits, request = steady_limits(line, np.array([load]), both)[0], MarchRequest(TIMES, 1000 * np.pi, 6)
     near = jump_between(line, load, both[0], limits, request)
-    monkeypatch.setattr(velocity_jump, "_reachable", lambda *_: everywhere(line))
+    reachable, nothing = everywhere(line)
+    monkeypatch.setattr(velocity_jump, "_runs", lambda *_: (reachable.runs, nothing))
     whole = jump_between(line, load, both[0], limits, request)
     assert near.outcome == whole.outcome == Outcome.CONVERGED
     assert np.max(np.abs(near.trace - whole.trace)) <= 0.01 * np.max(np.abs(whole.trace - whole.after))

@@ -84,7 +84,7 @@ def reference(change: float, elements: int, last: float) -> tuple[np.ndarray, np
         height,
         slope,
         Schedule(moments, travels, np.full(moments.size, deborah), np.full(moments.size, LOAD)),
-        state.displacement,
+        state.state.displacement,
         float(state.depth[-1]),
     )
     assert after.status == Outcome.CONVERGED

@@ -19,7 +19,7 @@ from mdr_dask.physics.solids import recovery_times
 
 
 class Foundation(NamedTuple):
-    """A solid whose static modulus is 1, and the modes in which its elements recover without force.
+    """A solid with the static modulus 1, and the modes in which its elements recover without force.
 
     Parameters
     ----------
@@ -30,8 +30,8 @@ class Foundation(NamedTuple):
     rates : array, shape (modes,)
         Decay rates of the modes, positive. There is one mode for each Prony term, and one more for a dashpot.
     outward, inward : array, shape (modes, modes)
-        Transformation from the modes to the state, and back. The state is (u, a_1, ...) with a dashpot, otherwise
-        (a_1, ...).
+        Transformation from the modes to the state, and back. The state consists of the displacement u, if there is a
+        dashpot, and of the strains a_m of the dashpots of the Prony terms.
     push : array, shape (modes,)
         Growth rates of the modes of the mean state of all elements under a unit load.
     """
@@ -78,50 +78,38 @@ def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundat
 KELVIN = foundation([], [], 1.0)
 
 
-class ElementWorkspace(NamedTuple):
-    """Work arrays of one element: modes, decay of modes and terms during a part of a step, strains of the terms."""
-
-    modes: FloatArray
-    decay: FloatArray
-    fades: FloatArray
-    terms: FloatArray
-
-
-@jit
-def element_workspace(solid: Foundation) -> ElementWorkspace:
-    """Return the workspace of one element."""
-    modes, terms = solid.rates.size, solid.times.size
-    return ElementWorkspace(np.empty(modes), np.empty(modes), np.empty(terms), np.empty((1, terms)))
-
-
 class Lapse(NamedTuple):
-    """A duration, the decay of modes and terms during it, and the workspace of one element."""
+    """A duration, the decay during it, and work arrays for one element.
+
+    Parameters
+    ----------
+    time : float
+    decay, fades : array, shape (modes,) and (terms,)
+        Factors by which the modes and the strains of the Prony terms decay during the duration.
+    part_decay, part_fades : array, shape (modes,) and (terms,)
+        The same factors for a part of the duration; overwritten.
+    modes, strains : array, shape (modes,) and (1, terms)
+        Amplitudes of the modes, and strains of the terms, of one element; overwritten.
+    """
 
     time: float
     decay: FloatArray
     fades: FloatArray
-    workspace: ElementWorkspace
+    part_decay: FloatArray
+    part_fades: FloatArray
+    modes: FloatArray
+    strains: FloatArray
 
 
-class Rise(NamedTuple):
-    """Height of the line at one element at the start and at the end of a duration, and the rates of this height."""
-
-    w0: float
-    w1: float
-    rise0: float
-    rise1: float
-
-
-class Release(NamedTuple):
-    """Separation of an element in a step.
-
-    `part` is the time until the separation as a fraction of the step, or 1 if the element does not separate. `leaves`
-    is the displacement at the separation, and `after` the displacement at the end of the step.
-    """
-
-    part: float
-    leaves: float
-    after: float
+@jit
+def lapse_of(solid: Foundation, time: float) -> Lapse:
+    """Return a duration with the decay of a solid during it."""
+    modes, terms = solid.rates.size, solid.times.size
+    lapse = Lapse(
+        time, np.empty(modes), np.empty(terms), np.empty(modes), np.empty(terms), np.empty(modes), np.empty((1, terms))
+    )
+    fading(solid, time, lapse.decay, lapse.fades)
+    return lapse
 
 
 @jit
@@ -169,36 +157,16 @@ def at_rest(solid: Foundation, terms: FloatArray, i: int) -> float:
 
 
 @jit
-def press(
-    solid: Foundation, u0: float, u1: float, terms: FloatArray, i: int, step: float, fades: FloatArray
-) -> tuple[float, float]:
-    """Move an element from u0 to u1 at constant speed; return work and dissipation.
+def press(solid: Foundation, u0: float, u1: float, terms: FloatArray, i: int, step: float, fades: FloatArray) -> None:
+    """Move an element from u0 to u1 at constant speed; its `terms` are overwritten.
 
-    The difference of work and dissipation is stored. The stretch q = u - a of a term is A + B exp(-t / tau) with A =
-    tau du/dt. Work is the integral of f du, dissipation the integral of G q^2 / tau and of eta (du/dt)^2 over time.
+    The stretch u - a of a Prony term with the strain a is then A + B exp(-t / tau), with A = tau du/dt.
     """
     if step <= 0:
-        return 0.0, 0.0
-    speed = (u1 - u0) / step
-    work = 0.5 * (u1 * u1 - u0 * u0) + solid.viscosity * speed * speed * step
-    dissipated = solid.viscosity * speed * speed * step
+        return
     for m in range(solid.times.size):
-        tau, fade = solid.times[m], fades[m]
-        a = speed * tau
-        b = (u0 - terms[i, m]) - a
-        work += solid.moduli[m] * speed * (a * step + b * tau * (1 - fade))
-        dissipated += solid.moduli[m] * (a * a * step / tau + 2 * a * b * (1 - fade) + 0.5 * b * b * (1 - fade * fade))
-        terms[i, m] = u1 - (a + b * fade)
-    return work, dissipated
-
-
-@jit
-def stored(solid: Foundation, u: float, terms: FloatArray, i: int) -> float:
-    """Return the energy stored in an element."""
-    energy = 0.5 * u * u
-    for m in range(solid.times.size):
-        energy += 0.5 * solid.moduli[m] * (u - terms[i, m]) ** 2
-    return energy
+        steady = (u1 - u0) / step * solid.times[m]
+        terms[i, m] = u1 - (steady + ((u0 - terms[i, m]) - steady) * fades[m])
 
 
 @jit
@@ -211,79 +179,87 @@ def pull(solid: Foundation, u: float, terms: FloatArray, i: int) -> float:
 
 
 @jit_inline
-def release(solid: Foundation, lapse: Lapse, rise: Rise, terms: FloatArray, i: int) -> tuple[float, float]:
+def release(
+    solid: Foundation, lapse: Lapse, w0: float, w1: float, rise0: float, rise1: float, terms: FloatArray, i: int
+) -> tuple[float, float]:
     """Return the fraction of a duration after which an element in contact separates, and its displacement at that time.
 
-    The fraction is 1 if the element does not separate. The force is taken as linear in time, the height of the line as
-    cubic.
+    The element follows the line, from the height w0 (above the undeformed surface) to w1, with the rates `rise0` and
+    `rise1`. The fraction is 1 if the element does not separate. The force is taken as linear in time, the height of the
+    line as cubic.
     """
-    begin = pull(solid, rise.w0, terms, i) + solid.viscosity * rise.rise0
+    begin = pull(solid, w0, terms, i) + solid.viscosity * rise0
     if begin <= 0:
-        return 0.0, rise.w0
-    strains = lapse.workspace.terms
+        return 0.0, w0
+    strains = lapse.strains
     for m in range(solid.times.size):
         strains[0, m] = terms[i, m]
-    press(solid, rise.w0, rise.w1, strains, 0, lapse.time, lapse.fades)
-    end = pull(solid, rise.w1, strains, 0) + solid.viscosity * rise.rise1
+    press(solid, w0, w1, strains, 0, lapse.time, lapse.fades)
+    end = pull(solid, w1, strains, 0) + solid.viscosity * rise1
     if end >= 0:
-        return 1.0, rise.w1
-    part, change = begin / (begin - end), rise.w1 - rise.w0
-    bend = (1 - part) * (rise.rise0 * lapse.time - change) - part * (rise.rise1 * lapse.time - change)
-    return part, rise.w0 + part * change + part * (1 - part) * bend
+        return 1.0, w1
+    part, change = begin / (begin - end), w1 - w0
+    bend = (1 - part) * (rise0 * lapse.time - change) - part * (rise1 * lapse.time - change)
+    return part, w0 + part * change + part * (1 - part) * bend
 
 
 @jit_inline
 def free_after(
     solid: Foundation, lapse: Lapse, u0: float, part: float, leaves: float, terms: FloatArray, i: int
 ) -> float:
-    """Return the final displacement of an element that is pressed to `leaves` for a part of a duration, then free."""
-    workspace = lapse.workspace
+    """Return the displacement after a duration of an element that is pressed to `leaves` for a part of it, then free.
+
+    The strains of the element after the duration are written to `lapse.strains`; `terms` is not changed.
+    """
+    strains, decay, fades = lapse.strains, lapse.part_decay, lapse.part_fades
     for m in range(solid.times.size):
-        workspace.terms[0, m] = terms[i, m]
+        strains[0, m] = terms[i, m]
     if part <= 0:
-        return recover(solid, u0, workspace.terms, 0, lapse.decay, workspace.modes)
-    fading(solid, part * lapse.time, workspace.decay, workspace.fades)
-    press(solid, u0, leaves, workspace.terms, 0, part * lapse.time, workspace.fades)
-    fading(solid, (1 - part) * lapse.time, workspace.decay, workspace.fades)
-    return recover(solid, leaves, workspace.terms, 0, workspace.decay, workspace.modes)
+        return recover(solid, u0, strains, 0, lapse.decay, lapse.modes)
+    fading(solid, part * lapse.time, decay, fades)
+    press(solid, u0, leaves, strains, 0, part * lapse.time, fades)
+    fading(solid, (1 - part) * lapse.time, decay, fades)
+    return recover(solid, leaves, strains, 0, decay, lapse.modes)
 
 
 @jit_inline
 def advance(
     solid: Foundation,
     lapse: Lapse,
-    w: tuple[float, float],
-    element: tuple[float, bool],
-    separation: Release,
+    w0: float,
+    w1: float,
+    u0: float,
+    touching: bool,
+    part: float,
+    leaves: float,
+    after: float,
     terms: FloatArray,
     i: int,
-) -> tuple[float, bool, float, float]:
-    """Move one element through a duration; return displacement, contact, work and dissipation; overwrite its `terms`.
+) -> tuple[float, bool]:
+    """Move one element through a duration; return displacement and contact at its end; overwrite the `terms`.
 
-    `w` is the displacement at the line (depth plus height) at the start and at the end. `element` contains displacement
-    and contact at the start.
+    Parameters
+    ----------
+    w0, w1 : float
+        Displacement at the line (depth plus height) at the start and at the end.
+    u0, touching
+        Displacement and contact of the element at the start.
+    part, leaves : float
+        Results of :func:`release` for an element in contact.
+    after : float
+        Displacement at the end of the element if it separates as :func:`release` states, or recovers freely.
     """
-    (w0, w1), (u0, touching), step, workspace = w, element, lapse.time, lapse.workspace
-    before = stored(solid, u0, terms, i)
-    if w1 > separation.after:
-        if touching:
-            work, dissipated = press(solid, u0, w1, terms, i, step, lapse.fades)
-            return w1, True, work, dissipated
-        part = (u0 - w0) / ((u0 - w0) + (w1 - separation.after)) if u0 > w0 else 0.0
-        fading(solid, part * step, workspace.decay, workspace.fades)
-        u = recover(solid, u0, terms, i, workspace.decay, workspace.modes) if part > 0 else u0
-        loss = before - stored(solid, u, terms, i) if part > 0 else 0.0
-        rest = (1 - part) * step
-        fading(solid, rest, workspace.decay, workspace.fades)
-        work, dissipated = press(solid, u, w1, terms, i, rest, workspace.fades)
-        return w1, True, work, dissipated + loss
-    part, leaves = separation.part, separation.leaves
-    if not touching or part <= 0:
-        u = recover(solid, u0, terms, i, lapse.decay, workspace.modes)
-        return u, False, 0.0, before - stored(solid, u, terms, i)
-    fading(solid, part * step, workspace.decay, workspace.fades)
-    work, dissipated = press(solid, u0, leaves, terms, i, part * step, workspace.fades)
-    fading(solid, (1 - part) * step, workspace.decay, workspace.fades)
-    before = stored(solid, leaves, terms, i)
-    u = recover(solid, leaves, terms, i, workspace.decay, workspace.modes)
-    return u, False, work, dissipated + before - stored(solid, u, terms, i)
+    if w1 > after:
+        rest, fades = lapse.time, lapse.fades
+        if not touching:  # contact begins where the line, relative to the free element, reaches zero
+            part = (u0 - w0) / ((u0 - w0) + (w1 - after)) if u0 > w0 else 0.0
+            fading(solid, part * lapse.time, lapse.part_decay, lapse.part_fades)
+            u0 = recover(solid, u0, terms, i, lapse.part_decay, lapse.modes) if part > 0 else u0
+            rest, fades = (1 - part) * lapse.time, lapse.part_fades
+            fading(solid, rest, lapse.part_decay, fades)
+        press(solid, u0, w1, terms, i, rest, fades)
+        return w1, True
+    u = free_after(solid, lapse, u0, part if touching else 0.0, leaves, terms, i)
+    for m in range(solid.times.size):
+        terms[i, m] = lapse.strains[0, m]
+    return u, False

@@ -7,6 +7,7 @@ A single velocity jump of a Kelvin solid on a periodic line is solved much faste
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -19,25 +20,13 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 from mdr_dask.physics.transients.elements.foundation import (
     Foundation,
-    Lapse,
-    Release,
-    Rise,
     advance,
-    element_workspace,
-    fading,
     free_after,
+    lapse_of,
     recover,
     release,
 )
-from mdr_dask.physics.transients.elements.steps import (
-    ROWS,
-    Edges,
-    Schedule,
-    State,
-    follow_elements,
-    mean_after,
-    note_edges,
-)
+from mdr_dask.physics.transients.elements.steps import Edges, Schedule, State, follow_elements, mean_after, note_edges
 
 PERIODS = 3000  # largest number of periods of the line until the state of an element repeats
 STEADY = 1e-14  # tolerance of the depth of the steady state at the start, as a fraction of the depth
@@ -45,21 +34,16 @@ LOAD_MISSED = 1e-6  # largest relative error of the load in the steady state at 
 
 
 class Response(NamedTuple):
-    """State at every moment of a loading history, energies in height squared.
+    """Forces and depth at every moment of a loading history, and the state of the elements at the end.
 
     Parameters
     ----------
-    drag, depth, rate, contact : array, shape (moments,)
-        F_x / (4 G L), in the unit of height squared divided by the unit of length; depth; derivative of the depth with
-        respect to time; fraction of the line in contact.
-    stored : array, shape (moments,)
-        Stored energy, divided by 4 G L.
-    work, dissipated : array, shape (moments,)
-        Work done on the elements and energy dissipated since the first moment, both divided by 4 G L. Their difference
-        is the increase of the stored energy, within rounding. All energy stored in an element that leaves the end of a
-        line that is not periodic counts as dissipated.
-    displacement : array, shape (n,)
-        Displacement of every element at the end.
+    drag : array, shape (moments,)
+        F_x / (4 G L), in the unit of height squared divided by the unit of length.
+    depth, rate : array, shape (moments,)
+        Depth, and its derivative with respect to time.
+    contact : array, shape (moments,)
+        Fraction of the line in contact.
     status : Outcome
     state : State
         State of every element at the end, from which another history can continue.
@@ -69,10 +53,6 @@ class Response(NamedTuple):
     depth: FloatArray
     rate: FloatArray
     contact: FloatArray
-    stored: FloatArray
-    work: FloatArray
-    dissipated: FloatArray
-    displacement: FloatArray
     status: Outcome
     state: State
 
@@ -83,18 +63,6 @@ def untouched(elements: int, terms: int) -> State:
     strains = np.zeros((2, elements, terms))
     touching = np.zeros(elements, np.bool_)
     return State(np.zeros(elements), strains[0], np.zeros(elements), strains[1], touching, edges)
-
-
-def _copy(state: State) -> State:
-    """Return a copy of a state."""
-    return State(
-        state.displacement.copy(),
-        state.terms.copy(),
-        state.free.copy(),
-        state.free_terms.copy(),
-        state.touching.copy(),
-        Edges(state.edges.place.copy(), state.edges.gap.copy()),
-    )
 
 
 def steady_start(line: CubicLine, solid: Foundation, deborah: float, load: float) -> tuple[State, float, Outcome]:
@@ -179,17 +147,11 @@ def _orbit(
     """
     n = line.height.size - 1
     every, step = n // state.displacement.size, 1 / (n * deborah)
-    lapse = Lapse(step, np.empty(solid.rates.size), np.empty(solid.times.size), element_workspace(solid))
-    fading(solid, step, lapse.decay, lapse.fades)
-    terms, free_terms, last = (
-        np.zeros((1, solid.times.size)),
-        np.zeros((1, solid.times.size)),
-        np.zeros(solid.times.size),
-    )
+    lapse, last = lapse_of(solid, step), np.zeros(solid.times.size)
+    terms, free_terms = np.zeros((1, last.size)), np.zeros((1, last.size))
     top = int(np.argmax(line.height[:n])) if line.periodic else 0
-    w0 = depth + line.height[top]
-    u, touching = max(w0, 0.0), w0 > 0
-    free = 0.0
+    u, free = max(depth + line.height[top], 0.0), 0.0
+    touching = u > 0
     for _ in range(periods if line.periodic else 1):
         last[:] = terms[0]
         before = u
@@ -206,11 +168,11 @@ def _orbit(
             w0, w1 = depth + line.height[i], depth + line.height[i + 1]
             part, leaves = 0.0, u
             if touching:
-                rise = Rise(w0, w1, deborah * n * line.enter[i], deborah * n * line.leave[i])
-                part, leaves = release(solid, lapse, rise, terms, 0)
+                rates = deborah * n * line.enter[i], deborah * n * line.leave[i]
+                part, leaves = release(solid, lapse, w0, w1, rates[0], rates[1], terms, 0)
             after = free_after(solid, lapse, u, part if part < 1 else 0.0, leaves, terms, 0)
-            free = recover(solid, free, free_terms, 0, lapse.decay, lapse.workspace.modes)
-            u, touching, _, _ = advance(solid, lapse, (w0, w1), (u, touching), Release(part, leaves, after), terms, 0)
+            free = recover(solid, free, free_terms, 0, lapse.decay, lapse.modes)
+            u, touching = advance(solid, lapse, w0, w1, u, touching, part, leaves, after, terms, 0)
         change = abs(u - before)
         for m in range(terms.size):
             change = max(change, abs(terms[0, m] - last[m]))
@@ -247,20 +209,18 @@ def follow_line(
     -------
     Response
     """
-    now = _copy(state)
-    out = np.full((ROWS, schedule.moments.size), np.nan)
+    now, out = deepcopy(state), np.full((4, schedule.moments.size), np.nan)
     status = follow_elements(solid, line, schedule, now, depth, out)
-    drag, depths, rate, contact, stored, work, dissipated = out
-    return Response(drag, depths, rate, contact, stored, work, dissipated, now.displacement, Outcome(status), now)
+    drag, depths, rate, contact = out
+    return Response(drag, depths, rate, contact, Outcome(status), now)
 
 
 MOST_STEPS = 400_000  # largest number of steps in one piece of a history
-# CELLS, PART and FIRST are valid for 12 steps per decade; with more steps per decade they are smaller in proportion
-CELLS = 0.5  # largest travel in a step, cells
-PART = 0.01  # largest step, as a fraction of the duration of a ramp or of the period of an oscillation
-FIRST = 1e-3  # first step, as a fraction of the longest step or of the unit of time, whichever is smaller
-STEPS_PER_DECADE = 12.0
-NEARLY = 1e-2  # a moment that is nearer to a requested time than this fraction of a step is replaced by that time
+# CELLS, PART and FIRST are divided by the number of steps per decade
+CELLS = 6.0  # largest travel in a step, cells
+PART = 0.12  # largest step, as a fraction of the duration of a ramp or of the period of an oscillation
+FIRST = 0.012  # first step, as a fraction of the longest step or of the unit of time, whichever is smaller
+NEARLY = 1e-2  # a moment that is nearer to a requested time than this fraction of a step is left out
 ROUNDING = 1e-12  # relative difference of times that counts as a rounding error
 
 
@@ -307,27 +267,26 @@ class Piece:
         same = self.velocity[0] == self.velocity[1] and self.force[0] == self.force[1]
         return np.inf if same else self.end - self.start
 
-    def moments(self, begin: float, end: float, nodes: int, per_decade: float) -> FloatArray | None:
-        """Return moments whose steps start small and grow in a constant ratio up to the longest step.
+    def moments(self, end: float, nodes: int, per_decade: float) -> FloatArray | None:
+        """Return the moments from the start of the piece to `end`, or None if there would be too many moments.
 
-        Return None if there would be too many moments.
+        The steps begin small and grow in a constant ratio up to the longest step.
         """
-        finer = STEPS_PER_DECADE / per_decade
+        span = end - self.start
+        if span <= 0:
+            return np.array([self.start])
         fastest = max(abs(self.velocity[0]), abs(self.velocity[1])) + self.swing[0]
-        most = CELLS * finer / (nodes * fastest) if fastest else np.inf
-        most = min(most, PART * finer * self.changes_in, max(end - begin, 1e-300))
-        first, ratio = FIRST * finer * min(most, 1.0), 10 ** (1 / per_decade)
-        if (end - begin) / most > MOST_STEPS:
+        most = CELLS / (nodes * fastest) if fastest else np.inf
+        most = min(min(most, PART * self.changes_in) / per_decade, span)
+        if span / most > MOST_STEPS:
             return None
+        first, ratio = FIRST / per_decade * min(most, 1.0), 10 ** (1 / per_decade)
         grown = first * ratio ** np.arange(int(np.ceil(np.log(most / (first * (ratio - 1)) + 1) / np.log(ratio))) + 1)
-        grown = grown[np.diff(grown, append=np.inf) < most] if grown.size > 1 else grown
-        grown = grown[grown < end - begin]
+        grown = grown[(grown < span) & (np.diff(grown, append=np.inf) < most)]
         late = grown[-1] if grown.size else 0.0
-        count = max(int(np.ceil((end - begin - late) / most)), 1)
-        rest = late + (end - begin - late) * np.arange(1, count + 1) / count
-        if end <= begin:
-            return np.array([begin])
-        moments: FloatArray = begin + np.concatenate([[0.0], grown, rest])
+        count = max(int(np.ceil((span - late) / most)), 1)
+        rest = late + (span - late) * np.arange(1, count + 1) / count
+        moments: FloatArray = self.start + np.concatenate([[0.0], grown, rest])
         moments[-1] = end  # exactly, because the next piece begins here, and this time may be requested
         return moments
 
@@ -359,14 +318,6 @@ class Trace(NamedTuple):
     outcome: Outcome
 
 
-class _Junction(NamedTuple):
-    """State of all elements, depth and travel between two pieces."""
-
-    state: State
-    depth: float
-    travel: float
-
-
 def trace(
     line: CubicLine,
     solid: Foundation,
@@ -396,27 +347,24 @@ def trace(
     state, depth, status = steady_start(line, solid, abs(velocity), load_before)
     if status != Outcome.CONVERGED:
         return _failed(times, Outcome(status))
-    first = _still(line, solid, velocity, load_before, state, depth)
-    junction = _Junction(state, depth, 0.0)
+    first, travel = _steady_friction(line, solid, velocity, load_before, state, depth), 0.0
     found: list[tuple[FloatArray, FloatArray, FloatArray, FloatArray]] = []
     for piece in pieces:
-        begin, end = piece.start, min(piece.end, float(times[-1]))
-        if begin > times[-1]:
+        if piece.start > times[-1]:
             break
-        moments = piece.moments(begin, end, line.height.size - 1, per_decade)
+        moments = piece.moments(min(piece.end, float(times[-1])), line.height.size - 1, per_decade)
         if moments is None:
             return _failed(times, Outcome.TOO_MANY_STEPS)
         moments = _with_times(moments, times)
         way, speed, load = piece.at(moments)
-        travels = junction.travel + way
-        part = follow_line(line, solid, Schedule(moments, travels, speed, load), junction.state, junction.depth)
+        part = follow_line(line, solid, Schedule(moments, travel + way, speed, load), state, depth)
         if part.status != Outcome.CONVERGED:
             return _failed(times, Outcome(part.status))
         found.append((moments, part.drag / load, part.depth, part.contact))
-        junction = _Junction(part.state, float(part.depth[-1]), float(travels[-1]))
+        state, depth, travel = part.state, float(part.depth[-1]), float(travel + way[-1])
     moment, friction, depths, contact = (np.concatenate(column) for column in zip(*found, strict=True))
     return Trace(
-        float(first.drag[0]) / load_before,
+        first,
         float(friction[0]),
         _end(line, solid, pieces[-1]),
         _at(times, moment, friction),
@@ -431,10 +379,12 @@ def _failed(times: FloatArray, outcome: Outcome) -> Trace:
     return Trace(np.nan, np.nan, np.nan, nothing, nothing, np.nan, outcome)
 
 
-def _still(line: CubicLine, solid: Foundation, velocity: float, load: float, state: State, depth: float) -> Response:
-    """Return the response at one moment of steady sliding."""
-    one = np.ones(1)
-    return follow_line(line, solid, Schedule(0 * one, 0 * one, velocity * one, load * one), state, depth)
+def _steady_friction(
+    line: CubicLine, solid: Foundation, velocity: float, load: float, state: State, depth: float
+) -> float:
+    """Return the friction in a steady state."""
+    now = Schedule(np.zeros(1), np.zeros(1), np.array([velocity]), np.array([load]))
+    return float(follow_line(line, solid, now, state, depth).drag[0]) / load
 
 
 def _end(line: CubicLine, solid: Foundation, piece: Piece) -> float:
@@ -445,7 +395,7 @@ def _end(line: CubicLine, solid: Foundation, piece: Piece) -> float:
     state, depth, status = steady_start(line, solid, velocity, load)
     if status != Outcome.CONVERGED:
         return np.nan
-    return float(_still(line, solid, velocity, load, state, depth).drag[0]) / load
+    return _steady_friction(line, solid, velocity, load, state, depth)
 
 
 def _snapped(times: FloatArray, starts: FloatArray) -> FloatArray:
@@ -458,13 +408,10 @@ def _snapped(times: FloatArray, starts: FloatArray) -> FloatArray:
 def _with_times(moments: FloatArray, times: FloatArray) -> FloatArray:
     """Return the moments and the requested times, without moments that are very near to a requested time."""
     inside = times[(times > moments[0]) & (times < moments[-1])]
-    if inside.size == 0:
-        return moments
-    gaps = np.diff(moments)
-    near = inside[np.clip(np.searchsorted(inside, moments), 0, inside.size - 1)]
-    before = inside[np.clip(np.searchsorted(inside, moments) - 1, 0, inside.size - 1)]
-    close = NEARLY * np.append(gaps[0], gaps)
-    apart = (np.abs(moments - near) > close) & (np.abs(moments - before) > close)
+    around = np.concatenate([[-np.inf], inside, [np.inf]])
+    after = np.searchsorted(around, moments)
+    distance = np.minimum(around[after] - moments, moments - around[after - 1])
+    apart = distance > NEARLY * np.diff(moments, prepend=moments[0])
     apart[[0, -1]] = True
     return np.union1d(moments[apart], inside)
 

@@ -14,20 +14,16 @@ from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 from mdr_dask.physics.transients.elements.foundation import (
-    ElementWorkspace,
     Foundation,
     Lapse,
-    Release,
-    Rise,
     advance,
     at_rest,
-    element_workspace,
     fading,
     free_after,
+    lapse_of,
     pull,
     recover,
     release,
-    stored,
 )
 
 
@@ -237,8 +233,7 @@ def carrying_rate(contact: Contact, weight: float, rate: float, drive: Drive) ->
     return rate, drag, length
 
 
-DRAG, DEPTH, RATE, CONTACT, STORED, WORK, DISSIPATED = range(7)
-ROWS = 7
+DRAG, DEPTH, RATE, CONTACT = range(4)
 CORRECTIONS = 2  # number of corrections of the times of separation and of the depth in a step
 
 
@@ -297,37 +292,31 @@ def mean_after(solid: Foundation, state: State, load: float, next_load: float, s
 
 
 @jit
-def _instant(
+def _load_instantly(
     solid: Foundation, state: State, under: FloatArray, load: float, depth: float
-) -> tuple[float, float, bool]:
-    """Load elements without a dashpot instantly; return the depth, the work and success. All of the work is stored."""
-    n = under.size
-    mean, work, glass = 0.0, 0.0, 1.0 + solid.moduli.sum()
+) -> tuple[float, bool]:
+    """Load elements without a dashpot instantly; return the depth and success."""
+    n, mean = under.size, 0.0
     for j in range(n):
         state.free[j] = at_rest(solid, state.terms, j)
         mean += state.free[j] / n
-    depth, good = depth_for(under, state.free, mean + load / glass, depth)
+    depth, good = depth_for(under, state.free, mean + load / (1.0 + solid.moduli.sum()), depth)
     for j in range(n):
-        before = stored(solid, state.displacement[j], state.terms, j)
-        w = depth + under[j]
-        state.touching[j] = w > state.free[j]
-        state.displacement[j] = max(w, state.free[j])
-        work += stored(solid, state.displacement[j], state.terms, j) - before
-    return depth, work / n, good
+        state.touching[j] = depth + under[j] > state.free[j]
+        state.displacement[j] = max(depth + under[j], state.free[j])
+    return depth, good
 
 
 @jit
-def _forget(solid: Foundation, state: State, old: int, new: int) -> float:
-    """Replace elements that have left the line by undeformed elements; return the energy of the removed elements."""
-    n, dissipated = state.displacement.size, 0.0
+def _renew(state: State, old: int, new: int) -> None:
+    """Replace elements that have left the line by undeformed elements."""
+    n = state.displacement.size
     for j in range(n):
         if (j + old) // n != (j + new) // n:
-            dissipated += stored(solid, state.displacement[j], state.terms, j)
             state.displacement[j] = state.free[j] = 0.0
             state.terms[j, :] = 0.0
             state.edges.place[j] = -1.0
             state.touching[j] = False
-    return dissipated / n
 
 
 class Schedule(NamedTuple):
@@ -349,21 +338,19 @@ class Schedule(NamedTuple):
     loads: FloatArray
 
 
-class Step(NamedTuple):
-    """Duration of a step, the depth at its start, and v tau / L at its start and end."""
-
-    time: float
-    depth: float
-    deborah: float
-    next_deborah: float
-
-
 class StepWorkspace(NamedTuple):
-    """Work arrays of one step.
+    """Work arrays of one step, shape (n,) each, except `after_terms` with the shape (n, terms).
 
-    The arrays contain: heights and slopes of the line at the elements, at the start and at the end of the step;
-    displacements without contact at the end; times and displacements of separation; gaps and forces; and the decay
-    during the whole step.
+    Parameters
+    ----------
+    under, slope, old_under, old_slope : array
+        Height and slope of the line at the elements, at the end and at the start of the step.
+    after, after_terms : array
+        Displacements without contact, and strains of the Prony terms, at the end of the step.
+    parts, leaves : array
+        Time of separation, as a fraction of the step, and displacement at this time; see :func:`release`.
+    gaps, pulls, force, power : array
+        As in `Contact`.
     """
 
     under: FloatArray
@@ -378,91 +365,60 @@ class StepWorkspace(NamedTuple):
     pulls: FloatArray
     force: FloatArray
     power: FloatArray
-    decay: FloatArray
-    fades: FloatArray
-    element: ElementWorkspace
 
 
 @jit
 def _workspace_for(solid: Foundation, n: int) -> StepWorkspace:
-    rows = np.empty((11, n))
-    return StepWorkspace(
-        rows[0],
-        rows[1],
-        rows[2],
-        rows[3],
-        rows[4],
-        np.empty((n, solid.times.size)),
-        rows[5],
-        rows[6],
-        rows[7],
-        rows[8],
-        rows[9],
-        rows[10],
-        np.empty(solid.rates.size),
-        np.empty(solid.times.size),
-        element_workspace(solid),
-    )
+    a, terms = np.empty((11, n)), np.empty((n, solid.times.size))
+    return StepWorkspace(a[0], a[1], a[2], a[3], a[4], terms, a[5], a[6], a[7], a[8], a[9], a[10])
 
 
 @jit
-def _separate(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> None:
+def _separate(
+    solid: Foundation,
+    state: State,
+    workspace: StepWorkspace,
+    lapse: Lapse,
+    old_depth: float,
+    depth: float,
+    deborah: tuple[float, float],
+) -> None:
     """Write which elements separate during a step to a given depth, and their displacements at the end of the step."""
-    plain, damping, fall = solid.times.size == 0, solid.viscosity, (depth - step.depth) / step.time
-    lapse = Lapse(step.time, workspace.decay, workspace.fades, workspace.element)
+    parts, leaves, fall = workspace.parts, workspace.leaves, (depth - old_depth) / lapse.time
     for j in range(workspace.under.size):
-        if not state.touching[j]:
-            continue
-        u, w1 = state.displacement[j], depth + workspace.under[j]
-        rise0, rise1 = fall + step.deborah * workspace.old_slope[j], fall + step.next_deborah * workspace.slope[j]
-        if plain and u + damping * rise0 > 0 and w1 + damping * rise1 >= 0:
-            workspace.parts[j], workspace.leaves[j], workspace.after[j] = 1.0, w1, u * workspace.decay[0]
-            continue
-        part, leaves = release(solid, lapse, Rise(u, w1, rise0, rise1), state.terms, j)
-        if part < 1 or workspace.parts[j] < 1:
-            workspace.after[j] = free_after(solid, lapse, u, part if part < 1 else 0.0, leaves, state.terms, j)
-        workspace.parts[j], workspace.leaves[j] = part, leaves
+        if state.touching[j]:
+            u, before, w = state.displacement[j], parts[j], depth + workspace.under[j]
+            rise0 = fall + deborah[0] * workspace.old_slope[j]
+            rise1 = fall + deborah[1] * workspace.slope[j]
+            parts[j], leaves[j] = release(solid, lapse, u, w, rise0, rise1, state.terms, j)
+            if parts[j] < 1 or before < 1:
+                part = parts[j] if parts[j] < 1 else 0.0
+                workspace.after[j] = free_after(solid, lapse, u, part, leaves[j], state.terms, j)
 
 
 @jit
-def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> tuple[float, float]:
-    """Move all elements through a step; return mean work and mean dissipation."""
-    n, plain, damping = workspace.under.size, solid.times.size == 0, solid.viscosity
+def _move(
+    solid: Foundation, state: State, workspace: StepWorkspace, lapse: Lapse, old_depth: float, depth: float
+) -> None:
+    """Move all elements through a step."""
     u, touching, after = state.displacement, state.touching, workspace.after
-    lapse = Lapse(step.time, workspace.decay, workspace.fades, workspace.element)
-    work, dissipated = 0.0, 0.0
-    for j in range(n):
-        w0, w1, was = step.depth + workspace.old_under[j], depth + workspace.under[j], touching[j]
+    for j in range(workspace.under.size):
+        was = touching[j]
         if not was:
             state.free[j] = after[j]
             for m in range(solid.times.size):
                 state.free_terms[j, m] = workspace.after_terms[j, m]
-        elif plain:
-            state.free[j] *= workspace.decay[0]
-        elif damping > 0:
-            state.free[j] = recover(solid, state.free[j], state.free_terms, j, workspace.decay, workspace.element.modes)
-        if not was and w1 <= after[j]:
-            if plain:
-                dissipated += 0.5 * (u[j] * u[j] - after[j] * after[j])
-            else:
-                dissipated += stored(solid, u[j], state.terms, j) - stored(solid, after[j], workspace.after_terms, j)
-            u[j] = after[j]
-            for m in range(solid.times.size):
-                state.terms[j, m] = workspace.after_terms[j, m]
-            continue
-        if was and plain and w1 > after[j]:
-            gone = damping * (w1 - u[j]) ** 2 / step.time
-            work += 0.5 * (w1 * w1 - u[j] * u[j]) + gone
-            dissipated += gone
-            u[j] = w1
-            continue
-        separation = Release(workspace.parts[j], workspace.leaves[j], after[j])
-        u[j], touching[j], done, gone = advance(solid, lapse, (w0, w1), (u[j], was), separation, state.terms, j)
+        elif solid.viscosity > 0:
+            state.free[j] = recover(solid, state.free[j], state.free_terms, j, lapse.decay, lapse.modes)
+        w0, w1, part, leaves = (
+            old_depth + workspace.old_under[j],
+            depth + workspace.under[j],
+            workspace.parts[j],
+            workspace.leaves[j],
+        )
+        u[j], touching[j] = advance(solid, lapse, w0, w1, u[j], was, part, leaves, after[j], state.terms, j)
         if not touching[j]:
             state.free[j] = u[j]
-        work += done
-        dissipated += gone
-    return work / n, dissipated / n
 
 
 @jit
@@ -470,45 +426,29 @@ def _step(
     solid: Foundation,
     state: State,
     workspace: StepWorkspace,
-    step: Step,
+    lapse: Lapse,
     mean: float,
+    old_depth: float,
     guess: float,
-) -> tuple[float, float, float, bool]:
-    """Move all elements through a step to a mean displacement; return depth, work, dissipation and success."""
-    plain = solid.times.size == 0
+    deborah: tuple[float, float],
+) -> tuple[float, bool]:
+    """Move all elements through a step to a mean displacement; return the depth and success.
+
+    `deborah` has v tau / L at the start and at the end of the step.
+    """
     for j in range(workspace.under.size):
         workspace.parts[j] = 1.0 if state.touching[j] else 0.0
-        if plain:
-            workspace.after[j] = state.displacement[j] * workspace.decay[0]
-            continue
         for m in range(solid.times.size):
             workspace.after_terms[j, m] = state.terms[j, m]
-        workspace.after[j] = recover(
-            solid, state.displacement[j], workspace.after_terms, j, workspace.decay, workspace.element.modes
-        )
-    depth = guess
+        workspace.after[j] = recover(solid, state.displacement[j], workspace.after_terms, j, lapse.decay, lapse.modes)
+    depth, good = depth_for(workspace.under, workspace.after, mean, guess)
     for _ in range(CORRECTIONS):
-        depth, good = depth_for(workspace.under, workspace.after, mean, depth)
-        if not good:
-            return depth, 0.0, 0.0, False
-        _separate(solid, state, workspace, step, depth)
-    depth, good = depth_for(workspace.under, workspace.after, mean, depth)
-    if not good:
-        return depth, 0.0, 0.0, False
-    work, dissipated = _move(solid, state, workspace, step, depth)
-    return depth, work, dissipated, True
-
-
-@jit
-def _state_energy(solid: Foundation, state: State) -> float:
-    energy, n = 0.0, state.displacement.size
-    if solid.times.size == 0:
-        for j in range(n):
-            energy += 0.5 * state.displacement[j] * state.displacement[j] / n
-        return energy
-    for j in range(n):
-        energy += stored(solid, state.displacement[j], state.terms, j) / n
-    return energy
+        if good:
+            _separate(solid, state, workspace, lapse, old_depth, depth, deborah)
+            depth, good = depth_for(workspace.under, workspace.after, mean, depth)
+    if good:
+        _move(solid, state, workspace, lapse, old_depth, depth)
+    return depth, good
 
 
 @jit
@@ -522,20 +462,12 @@ def forces_now(
     Without a dashpot the depth is corrected so that the load is met. The depth from the mean displacement is less
     accurate, because it follows from a sum over the elements.
     """
-    plain = solid.times.size == 0
+    gaps, pulls = workspace.gaps, workspace.pulls
     for j in range(workspace.under.size):
         w = depth + workspace.under[j]
-        workspace.pulls[j] = w if plain else pull(solid, w, state.terms, j)
-        workspace.gaps[j] = w - state.free[j] if solid.viscosity > 0 else workspace.pulls[j]
-    contact = Contact(
-        workspace.gaps,
-        workspace.pulls,
-        workspace.slope,
-        workspace.force,
-        workspace.power,
-        state.touching,
-        state.edges,
-    )
+        pulls[j] = pull(solid, w, state.terms, j)
+        gaps[j] = w - state.free[j] if solid.viscosity > 0 else pulls[j]
+    contact = Contact(gaps, pulls, workspace.slope, workspace.force, workspace.power, state.touching, state.edges)
     if solid.viscosity > 0:
         rate, drag, length = carrying_rate(contact, solid.viscosity, rate, drive)
         return depth, rate, drag, length
@@ -546,21 +478,21 @@ def forces_now(
 
 @jit
 def follow_elements(
-    solid: Foundation,
-    line: CubicLine,
-    schedule: Schedule,
-    state: State,
-    depth: float,
-    out: FloatArray,
+    solid: Foundation, line: CubicLine, schedule: Schedule, state: State, depth: float, out: FloatArray
 ) -> int:
-    """March all elements through the moments and write `out`, shape (ROWS, moments); return an `Outcome`."""
+    """March all elements through the moments; return an `Outcome`.
+
+    `out`, shape (4, moments), receives the drag, the depth, its rate, and the fraction of the line in contact.
+    """
     moments, travels, deborahs, loads = schedule
-    n = line.height.size - 1
-    workspace, modes = _workspace_for(solid, n), np.empty(solid.rates.size)
-    shift = under_elements(line, travels[0], workspace.under, workspace.slope)
-    rate, work, dissipated = 0.0, 0.0, 0.0
+    workspace, lapse, modes = (
+        _workspace_for(solid, line.height.size - 1),
+        lapse_of(solid, 1.0),
+        np.empty(solid.rates.size),
+    )
+    shift, rate = under_elements(line, travels[0], workspace.under, workspace.slope), 0.0
     if solid.viscosity == 0:
-        depth, work, good = _instant(solid, state, workspace.under, loads[0], depth)
+        depth, good = _load_instantly(solid, state, workspace.under, loads[0], depth)
         if not good:
             return Outcome.DEPTH_NOT_FOUND
     for now in range(moments.size):
@@ -571,25 +503,32 @@ def follow_elements(
             old_depth, old_shift = depth, shift
             shift = under_elements(line, travels[now], workspace.under, workspace.slope)
             if not line.periodic and shift != old_shift:
-                dissipated += _forget(solid, state, old_shift, shift)
-            fading(solid, time, workspace.decay, workspace.fades)
+                _renew(state, old_shift, shift)
+            lapse = Lapse(
+                time,
+                lapse.decay,
+                lapse.fades,
+                lapse.part_decay,
+                lapse.part_fades,
+                lapse.modes,
+                lapse.strains,
+            )
+            fading(solid, time, lapse.decay, lapse.fades)
             mean = mean_after(solid, state, loads[now - 1], loads[now], time, modes)
-            step = Step(time, old_depth, deborahs[now - 1], deborahs[now])
-            depth, done, gone, good = _step(solid, state, workspace, step, mean, depth + rate * time)
+            both = deborahs[now - 1], deborahs[now]
+            depth, good = _step(solid, state, workspace, lapse, mean, old_depth, depth + rate * time, both)
             if not good:
                 return Outcome.DEPTH_NOT_FOUND
-            work, dissipated = work + done, dissipated + gone
             if solid.viscosity == 0:
                 rate = (depth - old_depth) / time
-        first = -1 if line.periodic else (-shift) % n
-        if not line.periodic and (state.touching[first] or state.touching[(first - 1) % n]):
+        first = -1 if line.periodic else (-shift) % workspace.under.size
+        if not line.periodic and (state.touching[first] or state.touching[first - 1]):
             return Outcome.OUTSIDE_LINE
         drive = Drive(deborahs[now], loads[now], first)
         exact, rate, drag, length = forces_now(solid, state, workspace, depth, rate, drive)
         if length <= 0 and now > 0 and drive.load > 0:  # a loaded body must be in contact
             return Outcome.DEPTH_NOT_FOUND
         out[DRAG, now], out[DEPTH, now], out[RATE, now], out[CONTACT, now] = drag, exact, rate, length
-        out[STORED, now], out[WORK, now], out[DISSIPATED, now] = _state_energy(solid, state), work, dissipated
     return Outcome.CONVERGED
 
 
