@@ -52,7 +52,7 @@ PUBLIC: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
     "Oils": (
         (
             "mdr_dask.physics.lubrication.oil",
-            ("Oil", "walther_constants", "walther_fit", "pressure_viscosity", "barus", "roelands"),
+            ("Oil", "walther_constants", "pressure_viscosity", "log_viscosity"),
         ),
     ),
     "Superposition": (("mdr_dask.physics.superposition.master_curve", ("superpose", "Superposition", "rereference")),),

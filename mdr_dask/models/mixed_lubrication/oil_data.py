@@ -13,7 +13,7 @@ from mdr_dask.errors import DataError
 from mdr_dask.headings import Column
 from mdr_dask.models.base import Alternatives, Parameters, quantity
 from mdr_dask.models.data_file import DataFile, NamedFile
-from mdr_dask.physics.lubrication.oil import Oil, density_at, kinematic_viscosity, walther_constants, walther_fit
+from mdr_dask.physics.lubrication.oil import Oil, density_at, kinematic_viscosity, walther_constants
 from mdr_dask.tables import read_sheet, read_table
 from mdr_dask.units import conversion, shown, shown_apart
 
@@ -58,7 +58,8 @@ class OilData(Parameters):
         self.require_one_alternative()
         if self.viscosities is None or info.context is not None:  # a table is read only in a campaign
             try:
-                walther_constants(*self.two_viscosities)
+                T1, nu1, T2, nu2 = self.two_viscosities
+                walther_constants((T1, T2), (nu1, nu2))
             except DataError as problem:
                 raise ValueError(str(problem)) from None
         return self
@@ -137,7 +138,7 @@ def _fitted(file: DataFile, density: float, density_temperature: float) -> _Fit:
     if is_dynamic:
         viscosity = viscosity / density_at(temperature, density, density_temperature)
     try:
-        constants = walther_fit(temperature, viscosity)
+        constants = walther_constants(temperature, viscosity)
     except ValueError as problem:
         raise DataError(f"{file.name}: {problem}") from None
     return _Fit(temperature, constants, viscosity / kinematic_viscosity(temperature, *constants) - 1)

@@ -332,53 +332,6 @@ def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> 
     return first, second
 
 
-@jit
-def _occupied(contact: NDArray[np.int32] | IntArray, windows: IntArray, lengths: IntArray, ends: IntArray) -> None:
-    """Add, for each part, the windows in contact, their lengths in contact, and the beginnings and ends of contact."""
-    parts = windows.size
-    before = contact[-1] > 0
-    for part in range(parts):
-        for k in range(part * contact.size // parts, (part + 1) * contact.size // parts):
-            here = contact[k] > 0
-            windows[part] += here
-            lengths[part] += contact[k]
-            ends[part] += here != before
-            before = here
-
-
-class Occupied(NamedTuple):
-    """Intimate contact in equal parts of a revolution; every array has the shape (parts,).
-
-    Parameters
-    ----------
-    windows : int array
-        Number of windows in contact.
-    lengths : int array
-        Sum of the lengths in contact of these windows, in the units of the input.
-    ends : int array
-        Number of times that contact begins or ends.
-    """
-
-    windows: IntArray
-    lengths: IntArray
-    ends: IntArray
-
-
-def occupied(contact: NDArray[np.int32] | IntArray, parts: int = 1) -> Occupied:
-    """Count windows in intimate contact, in equal parts of a revolution.
-
-    Parameters
-    ----------
-    contact : int array, shape (positions,)
-        Lengths in contact of successive windows in time.
-    parts : int
-        Number of parts; part k begins at position ``k positions // parts``.
-    """
-    found = Occupied(*np.zeros((3, parts), dtype=np.int64))
-    _occupied(contact, *found)
-    return found
-
-
 def contact_resistance(resistivity: ArrayLike, contact_length: ArrayLike) -> FloatArray:
     """Return ``R_c = rho/L_cont`` in ohm (thesis eq. 5.1: parallel spots of equal material); infinite without contact.
 

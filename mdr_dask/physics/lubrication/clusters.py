@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
@@ -26,7 +25,7 @@ class Clusters(NamedTuple):
         Spline of ``z - h0`` in m, extended periodically: the last coefficient, all coefficients, and the first two
         coefficients.
     limit : float
-        The number ``s dx^2`` in m. A cluster breaks the layer if ``total > limit (end - start)^3``.
+        The number ``s dx^2`` in m. A cluster breaks the layer if ``total > limit (end - start)^3`` (thesis eq. 5.6).
     closed : bool
         Whether one cluster covers the whole closed line, so that it has no end.
     """
@@ -42,16 +41,6 @@ class Clusters(NamedTuple):
     def points(self) -> int:
         """Number of nodes of the line."""
         return self.overlap.size - 3
-
-    @property
-    def length(self) -> FloatArray:
-        """Length of each cluster in spacings."""
-        return self.end - self.start
-
-    @property
-    def broken(self) -> NDArray[np.bool_]:
-        """Whether each whole cluster breaks the layer (thesis eq. 5.6)."""
-        return self.total > self.limit * self.length**3
 
 
 @jit

@@ -82,10 +82,10 @@ def fluid_friction(
         Mean shear stress divided by the mean pressure of the whole load, without rolling friction. The integral uses 64
         Gauss points in the angle of ``x = a sin(angle)``.
     """
-    nodes, weights = np.polynomial.legendre.leggauss(64)
-    cosine = np.cos(np.pi / 2 * nodes)
     if sliding_velocity == 0:
         return 0.0
+    nodes, weights = np.polynomial.legendre.leggauss(64)
+    cosine = np.cos(np.pi / 2 * nodes)
     logarithm = log_viscosity(film_share * contact.pressure * cosine) + np.log(
         abs(sliding_velocity) / (film * eyring_stress)
     )
@@ -212,9 +212,7 @@ FORMULAS: dict[str, FilmFormula] = {
 
 
 def square_of_half_width(W: float) -> float:
-    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact, the factor that converts films in units of ``a^2/R`` to units of
-    R.
-    """
+    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact, which converts films from units of ``a^2/R`` to units of R."""
     return 8 * W / np.pi
 
 
@@ -283,9 +281,8 @@ def regime(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> NDArray[np.intp]:
     """Return the index in `REGIMES` of the regime of each case.
 
     Elastic flattening makes an isoviscous film thicker and a piezoviscous film thinner. So the isoviscous film is the
-    thicker of its two limits, and the piezoviscous film is the thinner of its two limits. The limit
-    that gives the thicker of these two films determines the regime. This is the limit of Moes' interpolation for a
-    sharp transition.
+    thicker of its two limits, and the piezoviscous film is the thinner of its two limits. The limit that gives the
+    thicker of these two films determines the regime. Moes' interpolation formula has this limit for a sharp transition.
     """
     rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(W, U, G)
     isoviscous = np.where(elastic_iso > rigid_iso, 2, 0)

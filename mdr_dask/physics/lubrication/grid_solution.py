@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit
@@ -15,8 +16,6 @@ from mdr_dask.physics.lubrication.grids import adapted_density
 
 #: A second pressure maximum is a spike if it exceeds the minimum before it by this fraction of the maximum pressure.
 _SPIKE = 0.01
-#: Number of positions, in the two cells around the lowest node, among which the minimum film is found.
-_SUBDIVISION = 41
 #: Number of nodes on either side of a position that the interpolating polynomial uses. The minimum film on coarse grids
 #: needs three nodes on either side.
 _CUBIC, _QUINTIC = 2, 3
@@ -28,8 +27,8 @@ _TOO_EARLY = 0.035
 class GridSolution:
     """Pressure in units of p0, and film in units of ``a^2/R``, at the nodes of one grid.
 
-    `central` is the film at ``X = 0``, and `steps` is the number of Newton steps. `spacing` is the ratio of the node
-    spacing to the spacing given by the density of nodes. The numerical method uses a pressure that is linear between
+    `central` is the film at ``X = 0``, and `spacing` is the ratio of the node spacing to the spacing given by the
+    density of nodes. The numerical method uses a pressure that is linear between
     two nodes, so that its film sags between the nodes. Therefore :meth:`film_between` uses a polynomial through the
     nodes.
     """
@@ -38,7 +37,6 @@ class GridSolution:
     pressure: FloatArray
     film: FloatArray
     central: float
-    steps: int
     spacing: float = np.nan
 
     def film_between(self, positions: FloatArray) -> FloatArray:
@@ -84,15 +82,13 @@ class GridSolution:
         The polynomial is quintic, because the error of a cubic exceeds the remaining error of the grids.
         """
         i = int(np.clip(np.argmin(self.film), 1, self.film.size - 2))
-        positions = np.linspace(self.nodes[i - 1], self.nodes[i + 1], _SUBDIVISION)
-        heights = _between(self.nodes, self.film, positions, _QUINTIC)
-        k = int(np.clip(np.argmin(heights), 1, _SUBDIVISION - 2))
-        left, right = heights[k] - heights[k - 1], heights[k + 1] - heights[k]
-        if not right > left:
-            return float(positions[k]), float(heights[k])
-        offset = -(left + right) / (2 * (right - left))  # the vertex of a parabola
-        width = positions[1] - positions[0]
-        return float(positions[k] + offset * width), float(heights[k] + offset * (left + right) / 4)
+        low, high = float(self.nodes[i - 1]), float(self.nodes[i + 1])
+        found = minimize_scalar(
+            lambda x: _between(self.nodes, self.film, np.array([x]), _QUINTIC)[0],
+            bounds=(low, high),
+            options={"xatol": 1e-6 * (high - low)},
+        )
+        return float(found.x), float(found.fun)
 
     @cached_property
     def spike(self) -> tuple[float, float]:
@@ -142,7 +138,7 @@ class GridSolution:
         if not (root.size == 4 and np.all(np.diff(root) < 0)):
             return float(behind)
         cell = behind - self.nodes[last]
-        end = _at_zero(root.tolist(), x.tolist()) + _TOO_EARLY * cell
+        end = _between(root[::-1].copy(), x[::-1].copy(), np.zeros(1), _CUBIC)[0] + _TOO_EARLY * cell
         return float(np.clip(end, x[2], behind + cell))
 
 
@@ -188,15 +184,3 @@ def _between(nodes: FloatArray, values: FloatArray, positions: FloatArray, sides
             total += share
         result[k] = total
     return result
-
-
-def _at_zero(x: list[float], values: list[float]) -> float:
-    """Return the value at zero of the polynomial through `values` at the positions x."""
-    total = 0.0
-    for i, value in enumerate(values):
-        share = value
-        for j, other in enumerate(x):
-            if j != i:
-                share *= other / (other - x[i])
-        total += share
-    return total

@@ -69,10 +69,11 @@ def aligned(
 ) -> tuple[FloatArray, float]:
     """Return nodes with a given density; the film ends at a node, and no node is within half a cell of the front.
 
-    The error of a film changes by up to a tenth with the position, within its cell, at which the film ends. The error
-    is least if the film ends at a node. So grids can be compared only if the film ends at a node on all of them. Behind
-    a sharp spike, the pressure falls within one or two cells, and the minimum film depends on the position of these
-    cells. So the cells are made slightly wider or narrower, until the front lies in the middle of a cell.
+    The film ends somewhere inside a cell. The error of the film depends on this position by up to a tenth, and is least
+    if the film ends at a node. Therefore errors on different grids can be compared only if the film ends at a node on
+    every grid. Behind a sharp spike, the pressure falls within one or two cells, and the minimum film depends on the
+    position of these cells. Therefore the cells are made slightly wider or narrower, until the front lies in the middle
+    of a cell.
 
     Parameters
     ----------

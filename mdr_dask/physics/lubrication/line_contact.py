@@ -39,30 +39,11 @@ FACTOR = SAFETY / (2.0**ORDER - 1)
 ADAPTED_NODES = 161
 
 
-class Attempt(NamedTuple):
-    """Initial guess and step limits for the first solution.
-
-    Parameters
-    ----------
-    factor : float
-        Ratio of the guessed film to the film expected from the limiting regimes.
-    starved : float
-        Upper limit of the guessed film, divided by the square of the distance to the inlet.
-    nodes : int
-        Number of nodes.
-    pace : Pace
-        Step limits of Newton's method.
-    """
-
-    factor: float
-    starved: float
-    nodes: int
-    pace: Pace
-
-
-#: The attempts, in the order in which they are tried. The second attempt takes small steps from a thick film on a fine
-#: grid; it is slow but hardly ever fails.
-ATTEMPTS = (Attempt(1.5, 0.2, 121, Pace(0.12, 80)), Attempt(2.5, 0.4, 361, Pace(0.05, 200)))
+#: Attempts at the first solution, in the order in which they are tried: ratio of the guessed film to the film expected
+#: from the limiting regimes; upper limit of the guess, divided by the square of the distance to the inlet; number of
+#: nodes; step limits of Newton's method. The second attempt takes small steps from a thick film on a fine grid; it is
+#: slow but hardly ever fails.
+ATTEMPTS = ((1.5, 0.2, 121, Pace(0.12, 80)), (2.5, 0.4, 361, Pace(0.05, 200)))
 #: Step limits on further grids. The first limits belong to an extrapolated initial guess; if this guess fails, the
 #: second limits are used from the previous solution.
 PACES = (Pace(0.12, 16), Pace(0.03, 250))
@@ -313,17 +294,17 @@ def _solve_on(
     # Newton's method needs a positive film in the initial guess
     lift = max(0.0, 0.1 * central - float(film_on(grid, guess, central).min()))
     found = newton(grid, case.liquid, case.film_number, guess, central + lift, pace)
-    return found.outcome, GridSolution(nodes, found.pressure, found.film, found.central, found.steps, spacing)
+    return found.outcome, GridSolution(nodes, found.pressure, found.film, found.central, spacing)
 
 
 def _first_solution(case: LineContact) -> tuple[Outcome, GridSolution]:
     """Return a solution on a grid that is suitable for the expected film."""
-    for attempt in ATTEMPTS:
-        guess = attempt.factor * expected_film(case.M, case.L)
+    for factor, starved, count, pace in ATTEMPTS:
+        guess = factor * expected_film(case.M, case.L)
         inlet = grids.inlet_position(guess) if case.inlet is None else case.inlet
-        guess = min(guess, attempt.starved * inlet**2)
-        nodes = grids.first_grid(guess, inlet, attempt.nodes)
-        outcome, state = _solve_on(case, nodes, grids.first_pressure(nodes, guess), guess, attempt.pace)
+        guess = min(guess, starved * inlet**2)
+        nodes = grids.first_grid(guess, inlet, count)
+        outcome, state = _solve_on(case, nodes, grids.first_pressure(nodes, guess), guess, pace)
         if outcome == Outcome.CONVERGED:
             break
     return outcome, state

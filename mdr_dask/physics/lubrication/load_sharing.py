@@ -28,8 +28,6 @@ _LEAST_LOGARITHM = -256.0
 _BALANCE = 100.0
 #: Distance between the means of two lines, in rms heights, at which the mean gap is zero in double precision.
 _CLOSED = -37.0
-#: Largest number of Newton steps; five are usual.
-_MOST_STEPS = 100
 #: Distance between the means of two lines, in rms heights, beyond which the overlap is zero in double precision.
 _APART = 9.0
 
@@ -43,18 +41,10 @@ def distance_of_means(gap: float) -> float:
     """Return the distance d of the means at which the mean gap ``<(d - z)+>`` equals `gap`, both in rms heights."""
     if gap > _APART:
         return gap
-    # the gap at d is the overlap at -d; its logarithm is concave in d, so Newton's method converges from the left
     if mean_overlap(-_CLOSED) >= gap:
         return _CLOSED
-    middle = mean_overlap(0.0)
-    distance = gap if gap > middle else max(-sqrt(2 * log(middle / gap)), _CLOSED)
-    for _ in range(_MOST_STEPS):
-        left = mean_overlap(-distance)
-        step = 2 * left / erfc(-distance / sqrt(2)) * log(left / gap)
-        distance -= step
-        if abs(step) < 1e-13 * (1 + abs(distance)):
-            break
-    return distance
+    # the gap at d is the overlap at -d; its logarithm varies slowly with d
+    return float(brentq(lambda d: log(max(mean_overlap(-d), 1e-320) / gap), _CLOSED, _APART, xtol=1e-13))
 
 
 class Asperities(NamedTuple):

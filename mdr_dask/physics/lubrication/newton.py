@@ -75,10 +75,9 @@ class Pace(NamedTuple):
 
 
 class Iterate(NamedTuple):
-    """Result of an iteration: outcome, steps, pressure and film at the nodes, film at ``X = 0``."""
+    """Result of an iteration: outcome, pressure and film at the nodes, film at ``X = 0``."""
 
     outcome: Outcome
-    steps: int
     pressure: FloatArray
     central: float
     film: FloatArray
@@ -404,7 +403,7 @@ def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: flo
         same = np.array_equal(active, solved)
         # the first step may be small by chance; later steps shrink quadratically
         if steps > 1 and size < last and same:
-            return Iterate(Outcome.CONVERGED, steps, P, central, H)
+            return Iterate(Outcome.CONVERGED, P, central, H)
         if steps == pace.most:
             break
         if same and size < _SHRINKS * before:
@@ -416,12 +415,12 @@ def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: flo
             _fill_equations(grid, P, found, active, A, b)
             factors, last = factorise(A), pace.tolerance
         if factors is None:
-            return Iterate(Outcome.SINGULAR, steps + 1, P, central, H)
+            return Iterate(Outcome.SINGULAR, P, central, H)
         solution = factors.solve(b)
         step = -P
         step[active] = solution[:-1]
         before = size if steps else 1.0
         central, size = _take_step(grid, pace.clip, P, central, H, step, solution[-1])
         if np.isnan(size):
-            return Iterate(Outcome.FILM_COLLAPSED, steps + 1, P, central, H)
-    return Iterate(Outcome.TOO_MANY_STEPS, pace.most, P, central, H)
+            return Iterate(Outcome.FILM_COLLAPSED, P, central, H)
+    return Iterate(Outcome.TOO_MANY_STEPS, P, central, H)

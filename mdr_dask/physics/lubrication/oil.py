@@ -33,79 +33,43 @@ GOLD: dict[str, tuple[float, float]] = {
 CORRELATIONS: tuple[str, ...] = (*GOLD, "wooster")
 
 
-def walther_fit(temperature: FloatArray, viscosity: FloatArray) -> tuple[float, float]:
-    """Return A and B of ASTM D341 from measured viscosities, by least squares of ``log10 log10(nu + 0.7)``.
+def walther_constants(temperature: ArrayLike, viscosity: ArrayLike) -> tuple[float, float]:
+    """Return A and B of ASTM D341, ``log10 log10(nu + 0.7) = A - B log10 T`` with nu in mm^2/s and T in K.
+
+    With more than two viscosities, the constants follow from a least-squares fit of the left side.
 
     Parameters
     ----------
-    temperature : array, shape (n,)
+    temperature : array_like, shape (n,)
         Temperatures in K; at least two are different.
-    viscosity : array, shape (n,)
+    viscosity : array_like, shape (n,)
         Kinematic viscosities in m^2/s at these temperatures.
 
     Raises
     ------
     ValueError
-        If there are fewer than two temperatures, a viscosity is below 2 mm^2/s, or viscosities do not fall with
-        temperature.
+        If there are fewer than two temperatures, a viscosity is below 2 mm^2/s (where D341 needs more terms), or the
+        viscosity does not fall with temperature.
 
     Examples
     --------
-    >>> import numpy as np
-    >>> A, B = walther_fit(np.array([313.15, 333.15, 373.15]), np.array([335e-6, 136e-6, 38.3e-6]))
+    >>> A, B = walther_constants([313.15, 333.15, 373.15], [335e-6, 136e-6, 38.3e-6])
     >>> print(f"{A:.2f} {B:.2f}")
     6.97 2.63
     """
-    if np.unique(temperature).size < 2:
-        raise ValueError("expected viscosities at two temperatures or more")
-    if viscosity.min() < 2 * _MM2:
+    T, nu = (np.asarray(each, dtype=np.float64) for each in (temperature, viscosity))
+    if np.unique(T).size < 2:
+        raise ValueError(f"expected viscosities at two temperatures or more, got all of them at {float(T[0])!r} K")
+    if nu.min() < 2 * _MM2:
         raise ValueError(
-            f"expected kinematic viscosities of at least 2 mm^2/s (ASTM D341), got {viscosity.min()!r} m^2/s"
+            f"expected kinematic viscosities of at least 2 mm^2/s (ASTM D341), got {float(nu.min())!r} m^2/s"
         )
-    slope, intercept = (
-        np.polynomial.Polynomial.fit(np.log10(temperature), np.log10(np.log10(viscosity / _MM2 + 0.7)), 1)
-        .convert()
-        .coef[::-1]
-    )
+    slope, A = np.polyfit(np.log10(T), np.log10(np.log10(nu / _MM2 + 0.7)), 1)
     if slope >= 0:
-        raise ValueError("expected viscosities that fall with temperature")
-    return float(intercept), float(-slope)
-
-
-def walther_constants(T1: float, nu1: float, T2: float, nu2: float) -> tuple[float, float]:
-    """Return A and B of ASTM D341 from two kinematic viscosities.
-
-    Parameters
-    ----------
-    T1, T2 : float
-        Two different temperatures in K.
-    nu1, nu2 : float
-        Kinematic viscosities in m^2/s at T1 and T2; the viscosity at the higher temperature must be lower.
-
-    Returns
-    -------
-    A, B : float
-        Constants of ``log10 log10(nu + 0.7) = A - B log10 T`` with nu in mm^2/s and T in K.
-
-    Raises
-    ------
-    ValueError
-        If the temperatures are equal, a viscosity is below 2 mm^2/s (where D341 needs more terms), or the viscosity
-        does not fall with temperature.
-    """
-    if T1 == T2:
-        raise ValueError(f"two viscosities at different temperatures are needed, got both at {T1!r} K")
-    if min(nu1, nu2) < 2 * _MM2:
         raise ValueError(
-            f"expected kinematic viscosities of at least 2 mm^2/s (ASTM D341), got {min(nu1, nu2)!r} m^2/s"
+            f"expected viscosities that fall with temperature, got {nu.tolist()!r} m^2/s at {T.tolist()!r} K"
         )
-    if (nu2 - nu1) * (T2 - T1) >= 0:
-        raise ValueError(
-            f"expected a viscosity that falls with temperature, got {nu1!r} at {T1!r} K, {nu2!r} at {T2!r} K"
-        )
-    y1, y2 = (np.log10(np.log10(nu / _MM2 + 0.7)) for nu in (nu1, nu2))
-    B = (y1 - y2) / np.log10(T2 / T1)
-    return float(y1 + B * np.log10(T1)), float(B)
+    return float(A), float(-slope)
 
 
 def kinematic_viscosity(temperature: ArrayLike, A: float, B: float) -> FloatArray:
@@ -197,7 +161,7 @@ class Oil:
 
     def kinematic(self, temperature: ArrayLike) -> FloatArray:
         """Return the kinematic viscosity in m^2/s at temperatures in K."""
-        return kinematic_viscosity(temperature, *walther_constants(self.T1, self.nu1, self.T2, self.nu2))
+        return kinematic_viscosity(temperature, *walther_constants((self.T1, self.T2), (self.nu1, self.nu2)))
 
     def dynamic(self, temperature: ArrayLike) -> FloatArray:
         """Return the viscosity at ambient pressure in Pa s at temperatures in K."""
@@ -268,16 +232,6 @@ def log_viscosity(law: str, pressure: ArrayLike, viscosity: ArrayLike, alpha: Ar
     return np.asarray(
         logarithm + scale * ((1 + p / ROELANDS_PRESSURE) ** (np.asarray(alpha) * ROELANDS_PRESSURE / scale) - 1)
     )
-
-
-def barus(pressure: ArrayLike, viscosity: ArrayLike, alpha: ArrayLike) -> FloatArray:
-    """Return ``eta0 exp(alpha p)`` in Pa s (thesis eq. B.4)."""
-    return np.exp(log_viscosity("barus", pressure, viscosity, alpha))
-
-
-def roelands(pressure: ArrayLike, viscosity: ArrayLike, alpha: ArrayLike) -> FloatArray:
-    """Return the viscosity in Pa s under pressure by Roelands' law; see `log_viscosity`."""
-    return np.exp(log_viscosity("roelands", pressure, viscosity, alpha))
 
 
 #: Constants of the density law in 1/Pa (thesis eq. B.6).

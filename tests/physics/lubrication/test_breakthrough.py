@@ -55,7 +55,7 @@ def test_the_integral_of_a_closed_line_does_not_depend_on_where_it_is_closed():
 
 def test_a_line_wholly_in_contact_is_one_cluster():
     found = clusters_of(np.full(8, 2.0), 1.0, strength=1e-9)
-    assert (found.length.tolist(), found.closed) == ([8], True)
+    assert ((found.end - found.start).tolist(), found.closed) == ([8], True)
     for rule, spacings in (("part", 3), ("clip", 3), ("whole", 8), ("inside", 0)):
         assert bt.contact_lengths(found, 3.0, rule).tolist() == [spacings * bt.PARTS] * 8
 
@@ -69,8 +69,8 @@ def test_a_parabolic_asperity_breaks_if_its_curvature_exceeds_twelve_strengths()
             curvature = 12 * STRENGTH * factor
             depth = curvature / 2 * (width_points / 2 * spacing) ** 2
             found = clusters_of(depth - curvature * x**2 / 2, 0.0, spacing, STRENGTH)
-            np.testing.assert_allclose(found.length, width_points, rtol=1e-6)
-            assert found.broken.tolist() == [broken]
+            np.testing.assert_allclose(found.end - found.start, width_points, rtol=1e-6)
+            assert (found.total > found.limit * (found.end - found.start) ** 3).tolist() == [broken]
 
 
 @pytest.mark.parametrize("rule", bt.EDGE_RULES)
