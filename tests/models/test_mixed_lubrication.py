@@ -12,8 +12,6 @@ from mdr_dask.models import load
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.mixed_lubrication.declaration import STEEL
 from mdr_dask.models.mixed_lubrication.oil_data import OilData
-from mdr_dask.models.mixed_lubrication.operation import operation_of
-from mdr_dask.models.mixed_lubrication.revolution import with_first_points
 from mdr_dask.physics.lubrication import oil
 from mdr_dask.physics.lubrication.line_contact import line_contact, solve_film
 from mdr_dask.units import to_si
@@ -126,8 +124,8 @@ def test_an_automatic_number_of_points_meets_the_accuracy_or_warns():
     columns = {"layer_thickness": layers, "film_thickness": films}
     rollers = {"points": "auto", "shortest_wavelength": 2e-6, "columns": columns, "realisations": (0, 1)}
     asked = dataclasses.replace(block(["breakthrough_probability"], **rollers), accuracy=0.1)
-    begun = with_first_points(operation_of(asked.case(0), 0.1), 0.1).source.points
-    truth = MODEL.compute(block(["breakthrough_probability"], **rollers | {"points": 16 * begun})).values
+    most = asked.case(0).source().points[-1]
+    truth = MODEL.compute(block(["breakthrough_probability"], **rollers | {"points": 4 * most})).values
     found = MODEL.compute(asked)
     value, stated = (found.values[f"breakthrough_probability{end}"] for end in ("", "_error"))
     errors = abs(value - truth["breakthrough_probability"])
@@ -173,7 +171,7 @@ def test_what_misses_the_accuracy_is_named():
     result = MODEL.compute(dataclasses.replace(asked, accuracy=1e-6))
     error = result.values["breakthrough_probability_error"] / result.values["breakthrough_probability"]
     assert result.messages[0, 0] == (
-        f"an accuracy of 1e-06 is missed: breakthrough_probability by {error[0, 0]:.2g} (estimated); raise points"
+        f"an accuracy of 1e-06 is missed: breakthrough_probability by {error[0, 0]:.2g} (estimated); increase points"
     )
 
 

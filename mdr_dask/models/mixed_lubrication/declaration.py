@@ -8,7 +8,6 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, distinguishable
 from mdr_dask.models.base import Alternatives, Block, Coordinate, Model, Number, Output, Parameters, deferred, quantity
 from mdr_dask.models.mixed_lubrication.lines import Generated, Measured, OfSurfaces, Source
@@ -20,9 +19,10 @@ from mdr_dask.physics.lubrication.oil import OILS, Oil
 Positive = Annotated[float, Field(gt=0)]
 #: Contact modulus of steel on steel in Pa, with E = 210 GPa and nu = 0.3 for both bodies.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
-#: Largest number of points of a line, and smallest number of spacings per shortest wave if the accuracy determines the
-#: points.
-MOST_POINTS, LEAST_PER_WAVE = 10**7, 2.5
+#: Largest number of points of a line.
+MOST_POINTS = 10**7
+#: Points per shortest wave on the coarsest lines, and number of doublings, if the accuracy determines the points.
+LEAST_PER_WAVE, DOUBLINGS = 2.5, 3
 #: Number of shortest waves around a roller, if neither shortest_wavelength nor points are given.
 WAVES = 100_000
 #: Positions of the profiles, in half widths of the contact.
@@ -147,6 +147,8 @@ class MixedLubrication(Parameters):
 
         Cases with equal sources can share lines.
         """
+        from scipy.fft import next_fast_len
+
         one, two = self.surface_1, self.surface_2
         if one is not None and two is not None and one.profile is not None and two.profile is not None:
             return Measured(one.profile, two.profile, self.rms_roughness is not None)
@@ -155,8 +157,11 @@ class MixedLubrication(Parameters):
             shortest = self.perimeter / (WAVES if points == "auto" else points / 10)
         modes = int(self.perimeter / shortest * (1 + 1e-12))
         if points == "auto":
-            points = int(np.ceil(LEAST_PER_WAVE * modes))
-        waves = points, self.perimeter / self.longest(), modes
+            least = min(next_fast_len(int(np.ceil(LEAST_PER_WAVE * modes)), real=True), MOST_POINTS)
+            grids = tuple(least * 2**k for k in range(1 + DOUBLINGS) if least * 2**k <= MOST_POINTS)
+        else:
+            grids = (points // 2, points) if points >= 4 * modes else (points,)
+        waves = grids, self.perimeter / self.longest(), modes
         if one is not None and two is not None:
             return OfSurfaces(*waves, one, two, self.perimeter)
         assert self.hurst is not None
@@ -211,7 +216,7 @@ class MixedLubrication(Parameters):
         return ""
 
     def _problem_of_width(self, source: Source) -> str:
-        length = source.points * source.spacing(self.perimeter)
+        length = source.length(self.perimeter)
         width = 2 * float(self.dry_contact(self.normal_force).half_width)
         if width > length:
             got, most = distinguishable(width, length, digits=4)
@@ -301,32 +306,18 @@ OF_LINES = {
 
 
 def seconds(block: Block[MixedLubrication]) -> float:
-    """Return the estimated time of a block in seconds.
-
-    The time depends on the numbers of lines, points, cases and films, on creep, and on whether profiles are requested.
-    """
-    millions = _expected_points(block) / 1e6
+    """Return the estimated time of a block in seconds, from the points of the first two lines of every case."""
+    columns = (block.column(name) for name in ("points", "shortest_wavelength", "roller_radius"))
+    millions = np.empty(block.cases)
+    for case, (points, shortest, radius) in enumerate(zip(*columns, strict=True)):
+        waves = WAVES if shortest == "auto" else 2 * np.pi * radius / shortest
+        millions[case] = (3 * LEAST_PER_WAVE * waves if points == "auto" else 1.5 * points) / 1e6
     creep = np.asarray(block.column("slide_roll_ratio"), dtype=np.float64) != 0
-    of_case = np.where(creep, 0.012 + 0.06 * millions, 0.0025 + 0.011 * millions)
-    of_case += 0.05 * millions if DRAWN & set(block.outputs) else 0.0
+    of_case = 0.003 + np.where(creep, 0.06, 0.011) * millions
     films = 0.06 * float(np.sum(block.column("film_formula") == "ehl"))
     keys = [path for path in block.columns if path.partition(".")[0] in OF_LINES]
     lines = {tuple(str(block.columns[key][k]) for key in keys): millions[k] for k in range(block.cases)}
     return films + len(block.realisations) * float(0.04 * sum(lines.values()) + np.sum(of_case))
-
-
-def _expected_points(block: Block[MixedLubrication]) -> FloatArray:
-    """Return the expected points of every case.
-
-    If the accuracy determines the points, the number for a usual boundary layer is returned.
-    """
-    per_wave = LEAST_PER_WAVE * max(1.0, float(0.033 / (block.accuracy or 0.01)) ** 0.28)
-    columns = (block.column(name) for name in ("points", "shortest_wavelength", "roller_radius"))
-    expected = np.empty(block.cases)
-    for case, (points, shortest, radius) in enumerate(zip(*columns, strict=True)):
-        waves = WAVES if shortest == "auto" else 2 * np.pi * radius / shortest
-        expected[case] = per_wave * waves if points == "auto" else points
-    return expected
 
 
 MODEL = Model(

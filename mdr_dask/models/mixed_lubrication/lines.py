@@ -1,15 +1,10 @@
-"""The two rough lines of a case, and the reasons why input is invalid.
-
-The lines are generated, generated with the spectra of measured surfaces, or measured.
-"""
+"""The two rough lines of a case: generated, generated with the spectra of measured surfaces, or measured."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import distinguishable
@@ -19,28 +14,31 @@ from mdr_dask.models.parts.surface import Surface, lines_of
 
 @dataclass(frozen=True)
 class _Random:
-    """Base of pairs of lines with random phases: the parameters that both lines share, without spectra."""
+    """Base of pairs of lines with random phases.
 
-    points: int
-    longest: float  # harmonic number of the longest wavelength
-    modes: int  # harmonic number of the shortest wavelength
+    Parameters
+    ----------
+    points : tuple of int
+        Numbers of points of the lines, increasing. The lines have the same waves on every number of points.
+    longest, modes : float, int
+        Number of longest and of shortest waves around a roller.
+    """
 
-    @property
-    def per_wave(self) -> float:
-        """Points per shortest wave."""
-        return self.points / self.modes
+    points: tuple[int, ...]
+    longest: float
+    modes: int
 
-    def spacing(self, perimeter: float) -> float:
-        """Return the distance between points in m, around a roller with the circumference `perimeter` in m."""
-        return perimeter / self.points
+    def length(self, perimeter: float) -> float:
+        """Return the length of the lines in m around a roller with the circumference `perimeter` in m."""
+        return perimeter
 
     def problem(self, perimeter: float) -> str:
         """Return the reason why these lines are impossible around a roller, or an empty string."""
         if self.longest > self.modes:
             longest, shortest = distinguishable(perimeter / self.longest, perimeter / max(self.modes, 1), digits=4)
             return f"expected the longest wavelength above the shortest, got {longest} m and {shortest} m"
-        if 2 * self.modes > self.points:
-            wave, least = distinguishable(perimeter / self.modes, 2 * perimeter / self.points, digits=4)
+        if 2 * self.modes > self.points[-1]:
+            wave, least = distinguishable(perimeter / self.modes, 2 * perimeter / self.points[-1], digits=4)
             return (
                 f"expected a shortest wavelength of at least two point spacings, {least} m, got {wave} m "
                 "(increase points)"
@@ -51,44 +49,18 @@ class _Random:
         """Return the amplitudes of both lines."""
         raise NotImplementedError
 
-    def slope(self, perimeter: float) -> float:
-        """Return the rms slope of both lines together, in their unit of height per m."""
-        return _slope(self) / perimeter
+    def lines(self, seed: int, realisation: int, points: int) -> FloatArray:
+        """Return the least-squares splines of both lines, shape (2, points).
 
-    def lines(self, seed: int, realisation: int, other: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Return the least-squares splines of both lines, or, if `other`, the less accurate interpolating splines.
-
-        Both lines take their phases in turn from one random stream. So a shorter cut-off wavelength does not change the
-        longer waves.
+        Both lines take their phases in turn from one random stream. So a shorter shortest wavelength does not change
+        the longer waves.
         """
-        from mdr_dask.physics.surfaces.splines import closest, through
+        from mdr_dask.physics.surfaces.roughness import phase_factors
+        from mdr_dask.physics.surfaces.splines import closest
 
-        first, second = self._waves(seed, realisation)
-        spline = through if other else closest
-        return spline(first, self.points), spline(second, self.points)
-
-    def together(self, seed: int, realisation: int, other: bool = False) -> FloatArray:
-        """Return the spline of the sum of both lines, which is sufficient for pure rolling."""
-        from mdr_dask.physics.surfaces.splines import closest, through
-
-        spline = through if other else closest
-        return spline(np.add(*self._waves(seed, realisation)), self.points)
-
-    def _waves(self, seed: int, realisation: int) -> tuple[NDArray[np.complex128], ...]:
-        """Return the Fourier coefficients of both lines."""
-        from mdr_dask.physics.surfaces import roughness
-
-        factors = roughness.phase_factors(seed, realisation, 2 * self.modes).reshape(-1, 2)
-        amplitudes = zip(self.amplitudes(realisation), factors.T, strict=True)
-        return tuple(0.5 * amplitude * of_roller for amplitude, of_roller in amplitudes)
-
-
-@lru_cache(maxsize=64)
-def _slope(lines: _Random) -> float:
-    from mdr_dask.physics.surfaces.roughness import spectral_slope
-
-    first, second = (spectral_slope(amplitude) for amplitude in lines.amplitudes(0))
-    return float(np.hypot(first, second))
+        phases = phase_factors(seed, realisation, 2 * self.modes).reshape(-1, 2).T
+        amplitudes = self.amplitudes(realisation)
+        return np.array([closest(0.5 * a * phase, points) for a, phase in zip(amplitudes, phases, strict=True)])
 
 
 @dataclass(frozen=True)
@@ -155,18 +127,14 @@ class Measured:
     scaled: bool  # to unit rms height
 
     @property
-    def points(self) -> int:
-        """Number of points of the shorter file; the longer line is cut to this length."""
-        return min(line_of(file).height.size for file in (self.file_1, self.file_2))
+    def points(self) -> tuple[int, int]:
+        """Number of every second point, and of all points; both lines are cut to an even number of points."""
+        half = min(line_of(file).height.size for file in (self.file_1, self.file_2)) // 2
+        return half, 2 * half
 
-    @property
-    def per_wave(self) -> float:
-        """Points per shortest wave: infinite, because a measured line is defined by its points."""
-        return np.inf
-
-    def spacing(self, _: float) -> float:
-        """Return the distance between points in m, as in the files; it does not depend on the perimeter."""
-        return line_of(self.file_1).spacing
+    def length(self, _: float) -> float:
+        """Return the length of the lines in m; it does not depend on the perimeter of the rollers."""
+        return self.points[-1] * line_of(self.file_1).spacing
 
     def problem(self, _: float) -> str:
         """Return the reason why the lines cannot be combined, or an empty string."""
@@ -179,39 +147,25 @@ class Measured:
         """Return the rms height of both lines together, in m, or in the unit of the scaled lines."""
         return float(np.sqrt(sum(np.mean(line**2) for line in self._pair())))
 
-    def lines(self, seed: int, realisation: int, other: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Return interpolating splines of both lines; each begins at a random point of its ring.
+    def lines(self, seed: int, realisation: int, points: int) -> FloatArray:
+        """Return the interpolating splines of both lines, shape (2, points), on all points or on every second point.
 
-        With the slide-roll ratio S, the contact passes 1 + S/2 times the length of line 1, and 1 - S/2 times the length
-        of line 2, in one revolution at the mean velocity. Means over
-        realisations are therefore unbiased only if both lines begin at random points. If
-        `other`, the splines pass through every second point.
+        Each line begins at a random point of its ring. With the slide-roll ratio S, the contact passes 1 + S/2 times
+        the length of line 1, and 1 - S/2 times the length of line 2, in one revolution at the mean velocity. Means over
+        realisations are therefore unbiased only if both lines begin at random points.
         """
         from mdr_dask.physics.surfaces.splines import through_heights
 
         stream = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(realisation,))))
-        offset, start = (int(stream.integers(self.points)) for _ in range(2))
-        step = 2 if other else 1
-        first, second = (
-            through_heights(np.roll(line, roll)[: line.size // step * step : step])
-            for line, roll in zip(self._pair(), (start, start + offset), strict=True)
-        )
-        return first, second
-
-    def slope(self, perimeter: float) -> float:
-        """Return the rms slope of both lines together, in their unit of height per m."""
-        squares = sum(np.mean(np.diff(line) ** 2) for line in self._pair())
-        return float(np.sqrt(squares)) / self.spacing(perimeter)
-
-    def together(self, seed: int, realisation: int, other: bool = False) -> FloatArray:
-        """Return the spline of the sum of both lines."""
-        return np.add(*self.lines(seed, realisation, other))
+        offset, start = (int(stream.integers(self.points[-1])) for _ in range(2))
+        rings = zip(self._pair(), (start, start + offset), strict=True)
+        return np.array([through_heights(np.roll(line, roll)[:: self.points[-1] // points]) for line, roll in rings])
 
     def _pair(self) -> tuple[FloatArray, FloatArray]:
         """Return the lines without mean and tilt, so that the step where the ends of a line meet is small."""
         from mdr_dask.physics.surfaces.measured import detrended, rms_height
 
-        lines = [detrended(line_of(file).height[: self.points], "line") for file in (self.file_1, self.file_2)]
+        lines = [detrended(line_of(file).height[: self.points[-1]], "line") for file in (self.file_1, self.file_2)]
         first, second = (line / rms_height(line) if self.scaled else line for line in lines)
         return first, second
 

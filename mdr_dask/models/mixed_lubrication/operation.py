@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
-from mdr_dask.arrays import FloatArray
 from mdr_dask.models.mixed_lubrication.declaration import MixedLubrication
 from mdr_dask.models.mixed_lubrication.lines import Source
 from mdr_dask.physics.lubrication import breakthrough, film_formulas, line_contact, oil
@@ -62,30 +61,9 @@ class Operation:
         return self.film / self.scale
 
     @property
-    def spacing(self) -> float:
-        """Distance between points of the lines in m."""
-        return self.source.spacing(self.case.perimeter)
-
-    @property
     def length(self) -> float:
         """Length of the lines in m."""
-        return self.spacing * self.source.points
-
-    @property
-    def coarseness(self) -> float:
-        """Spacing of the points divided by ``slope/s``, the length of the pieces of cut clusters that break the layer.
-
-        Here `slope` is the rms slope and s the layer strength.
-        """
-        return self.spacing * self.strength / self.source.slope(self.case.perimeter)
-
-    def on(self, source: Source) -> Operation:
-        """Return the case with another source, which gives the same lines at another number of points."""
-        return replace(self, source=source)
-
-    def pair(self, lines: tuple[FloatArray, FloatArray]) -> breakthrough.Pair:
-        """Return the splines of two lines at the film thickness of this case."""
-        return breakthrough.Pair(*lines, self.level, self.length / lines[0].size, self.strength)
+        return self.source.length(self.case.perimeter)
 
     @property
     def squares(self) -> float:

@@ -4,28 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache, partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
 
-from mdr_dask.arrays import FloatArray
+from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.models.base import Block, Result, Status
-from mdr_dask.models.mixed_lubrication import revolution
-from mdr_dask.models.mixed_lubrication.declaration import MODEL, MixedLubrication, coordinates
+from mdr_dask.models.mixed_lubrication.declaration import DRAWN, MODEL, MixedLubrication, coordinates
 from mdr_dask.models.mixed_lubrication.lines import Source
 from mdr_dask.models.mixed_lubrication.operation import NoFilmError, Operation, fixed_values, operation_of
-from mdr_dask.models.mixed_lubrication.revolution import Revolution
+from mdr_dask.models.mixed_lubrication.revolution import Revolution, drawn, revolve, values
 from mdr_dask.models.parts.accuracy import missed_accuracy
+from mdr_dask.physics.refine import Solution, refine
 
 #: Film ratio below which overlapping asperities merge into large clusters that do not break the layer.
 LEAST_FILM_RATIO = 0.5
-#: Outputs that need the rough lines.
-_OF_LINES = {"breakthrough_probability", "revolution_error"} | revolution.OF_LENGTH
-#: Outputs, each with a magnitude. If the output is smaller, its error is relative to this magnitude.
-_FLOORS = {"asperity_load_share": 1.0}
-_PROFILES = {"upper_profile", "lower_profile"}
-_ELECTRICAL = {"contact_conductance", "contact_resistance"}
+#: Outputs that follow from the length in contact, and all outputs that need the rough lines.
+_OF_LENGTH = {"contact_length", "contact_conductance", "contact_resistance", *DRAWN}
+_OF_LINES = {"breakthrough_probability", "revolution_error", *_OF_LENGTH}
+#: Outputs that can be zero, each with a magnitude. If the output is smaller, its error is relative to this magnitude.
+#: The magnitude of the contact length is divided by the width of the contact.
+_FLOORS = {"asperity_load_share": 1.0, "breakthrough_probability": 0.1, "contact_length": 0.01}
+#: Lower bound of the order of convergence of probability and length in the spacing of the points. The splines converge
+#: faster, but single clusters break on one grid and not on the next, and contact begins between two windows.
+_ORDER = 1
 
 
 def compute(block: Block[MixedLubrication]) -> Result:
@@ -42,7 +45,7 @@ def compute(block: Block[MixedLubrication]) -> Result:
             _refuse(result, index, Status.FAILED, problem)
             continue
         try:
-            operation = revolution.with_first_points(operation_of(case, block.accuracy), block.accuracy)
+            operation = operation_of(case, block.accuracy)
         except NoFilmError as error:
             _refuse(result, index, Status.NOT_CONVERGED, str(error))
             continue
@@ -51,7 +54,7 @@ def compute(block: Block[MixedLubrication]) -> Result:
         _store(result, block, index, slice(None), fixed)
         _warn(result, block, index, operation)
         for position in range(len(block.realisations)):
-            _note(result, index, position, _missed(block, fixed))
+            _note(result, index, position, _missed(block, fixed, _FLOORS))
         result.status[index] = Status.DONE
     if _OF_LINES & set(block.outputs):
         for source, members in groups.items():
@@ -90,20 +93,15 @@ def _note(result: Result, index: int, position: int, note: str) -> None:
 
 
 def _missed(
-    block: Block[MixedLubrication],
-    found: Mapping[str, float],
-    advice: str = "",
-    floors: Mapping[str, float] | None = None,
+    block: Block[MixedLubrication], found: Mapping[str, float], floors: Mapping[str, float], advice: str = ""
 ) -> str:
     """Return a message about requested outputs that miss the accuracy of the campaign, or an empty string."""
     if block.accuracy is None:
         return ""
     known = [name for name in block.outputs if np.isfinite(found.get(name, np.nan))]
-    values, errors = (
-        {name: [found[name]] for name in known},
-        {name: [found.get(f"{name}_error", 0.0)] for name in known},
-    )
-    text = missed_accuracy(values, errors, block.accuracy, {**_FLOORS, **(floors or {})}).get(0, "")
+    values = {name: [found[name]] for name in known}
+    errors = {name: [found.get(f"{name}_error", 0.0)] for name in known}
+    text = missed_accuracy(values, errors, block.accuracy, floors).get(0, "")
     return f"{text}{advice}" if text else ""
 
 
@@ -114,40 +112,43 @@ def _realise(
     members: list[tuple[int, Operation]],
     position: int,
 ) -> None:
-    """Compute one realisation of all cases that share lines; repeat cases that miss the accuracy with more points."""
-    drawn = block.seed, block.realisations[position]
-    lines, together = cache(partial(source.lines, *drawn)), cache(partial(source.together, *drawn))
+    """Compute one realisation of all cases that share lines, each on the points that the accuracy needs."""
+    lines = lru_cache(maxsize=1)(partial(source.lines, block.seed, block.realisations[position]))
+    found: list[Revolution] = [None] * len(members)  # type: ignore[list-item]
+    arrays: list[dict[str, FloatArray]] = [{}] * len(members)
+    with_length = bool(_OF_LENGTH & set(block.outputs))
 
-    def solve(operation: Operation, sample: bool = False) -> Revolution:
-        if operation.case.slide_roll_ratio == 0:
-            return revolution.rolling(operation, together(sample), sample)
-        return revolution.creeping(operation, lines(sample), sample)
+    def solve(points: int, which: IntArray) -> Solution:
+        for k in which:
+            operation = members[k][1]
+            found[k] = revolve(operation, lines(points))
+            arrays[k] = drawn(operation, found[k], lines(points), block.outputs)
+        outputs = [np.array([found[k].probability for k in which])]
+        if with_length:
+            outputs.append(np.array([found[k].length / members[k][1].width for k in which]))
+        return Solution(outputs, np.zeros(which.size, np.int8))
 
-    def errors_of(operation: Operation, found: Revolution) -> FloatArray:
-        return found.errors(solve(operation, sample=True))
-
-    again: dict[Source, list[tuple[int, Operation]]] = {}
-    for index, operation in members:
-        window = solve(operation)
-        errors = cache(partial(errors_of, operation, window))
-        finer = revolution.with_more_points(operation, window, errors, block.accuracy, block.outputs)
-        if finer is not None:
-            again.setdefault(finer.source, []).append((index, finer))
-            continue
-        found: dict[str, Any] = revolution.values(operation, window, errors, block.outputs)
-        advice = "" if operation.case.points == "auto" else "; raise points"
-        sizes = window.sizes()
-        if window.length:  # conductance and resistance have the relative error of the length
-            factor = sizes["contact_length"] / window.length
-            sizes |= {name: factor * found[name] for name in _ELECTRICAL & found.keys()}
-        _note(result, index, position, _missed(block, found, advice, sizes))
-        if "contact_length_trace" in block.outputs:
-            found["contact_length_trace"] = revolution.trace(operation, window, partial(lines, False))
-        if _PROFILES & set(block.outputs):
-            found |= revolution.profiles(operation, window, lines(False))
-        _store(result, block, index, position, found)
-    for finer_source, members_again in again.items():
-        _realise(result, block, finer_source, members_again, position)
+    floors = [_FLOORS["breakthrough_probability"], _FLOORS["contact_length"]][: 1 + with_length]
+    points = source.points
+    if block.accuracy is None:  # two grids with errors, otherwise one
+        points = points[:2] if any(f"{name}_error" in block.outputs for name in _OF_LINES) else points[:2][-1:]
+    accuracy = block.accuracy or np.inf
+    errors = refine(solve, len(members), points, accuracy, _ORDER, floors=floors).errors
+    for k, (index, operation) in enumerate(members):
+        of_length = errors[-1, k] * operation.width if with_length else np.nan
+        numbers = values(operation, found[k], np.array([errors[0, k], of_length]))
+        length, found_length = operation.width * _FLOORS["contact_length"], numbers["contact_length"]
+        # conductance and resistance have the relative error of the length
+        floors_here = {
+            "breakthrough_probability": _FLOORS["breakthrough_probability"],
+            "contact_length": length,
+            "contact_conductance": length * operation.squares / operation.case.resistivity,
+            "contact_resistance": numbers["contact_resistance"]
+            * max(1.0, length / found_length if found_length else 1.0),
+        }
+        advice = "" if operation.case.points == "auto" else "; increase points"
+        _note(result, index, position, _missed(block, numbers, floors_here, advice))
+        _store(result, block, index, position, numbers | arrays[k])
 
 
 def _warn(result: Result, block: Block[MixedLubrication], index: int, operation: Operation) -> None:
