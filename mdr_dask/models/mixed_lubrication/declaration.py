@@ -10,7 +10,15 @@ from pydantic import Field, model_validator
 
 from mdr_dask.errors import DataError, distinguishable
 from mdr_dask.models.base import Alternatives, Block, Coordinate, Model, Number, Output, Parameters, deferred, quantity
-from mdr_dask.models.mixed_lubrication.lines import Generated, Measured, OfSurfaces, Source
+from mdr_dask.models.mixed_lubrication.lines import (
+    LEAST_PER_WAVE,
+    MOST_POINTS,
+    Generated,
+    Measured,
+    OfSurfaces,
+    Source,
+    points_for,
+)
 from mdr_dask.models.mixed_lubrication.oil_data import OilData
 from mdr_dask.models.parts.surface import NO_AREA, Surface, without_exponent
 from mdr_dask.physics.lubrication.film_formulas import HertzLine, hertz_line
@@ -19,10 +27,6 @@ from mdr_dask.physics.lubrication.oil import OILS, Oil
 Positive = Annotated[float, Field(gt=0)]
 #: Contact modulus of steel on steel in Pa, with E = 210 GPa and nu = 0.3 for both bodies.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
-#: Largest number of points of a line.
-MOST_POINTS = 10**7
-#: Points per shortest wave on the coarsest lines, and number of doublings, if the accuracy determines the points.
-LEAST_PER_WAVE, DOUBLINGS = 2.5, 3
 #: Number of shortest waves around a roller, if neither shortest_wavelength nor points are given.
 WAVES = 100_000
 #: Positions of the profiles, in half widths of the contact.
@@ -147,8 +151,6 @@ class MixedLubrication(Parameters):
 
         Cases with equal sources can share lines.
         """
-        from scipy.fft import next_fast_len
-
         one, two = self.surface_1, self.surface_2
         if one is not None and two is not None and one.profile is not None and two.profile is not None:
             return Measured(one.profile, two.profile, self.rms_roughness is not None)
@@ -156,11 +158,13 @@ class MixedLubrication(Parameters):
         if shortest == "auto":
             shortest = self.perimeter / (WAVES if points == "auto" else points / 10)
         modes = int(self.perimeter / shortest * (1 + 1e-12))
+        grids: tuple[int, ...]
         if points == "auto":
-            least = min(next_fast_len(int(np.ceil(LEAST_PER_WAVE * modes)), real=True), MOST_POINTS)
-            grids = tuple(least * 2**k for k in range(1 + DOUBLINGS) if least * 2**k <= MOST_POINTS)
+            grids = points_for(modes)
+        elif points < 4 * modes:  # half of the points do not resolve the shortest wave
+            grids = (points,)
         else:
-            grids = (points // 2, points) if points >= 4 * modes else (points,)
+            grids = (points // 2, points)
         waves = grids, self.perimeter / self.longest(), modes
         if one is not None and two is not None:
             return OfSurfaces(*waves, one, two, self.perimeter)

@@ -11,6 +11,19 @@ from mdr_dask.errors import distinguishable
 from mdr_dask.models.parts.measured_line import ProfileFile, line_of
 from mdr_dask.models.parts.surface import Surface, lines_of
 
+#: Largest number of points of a line.
+MOST_POINTS = 10**7
+#: Points per shortest wave on the coarsest lines, and number of doublings, if the accuracy determines the points.
+LEAST_PER_WAVE, DOUBLINGS = 2.5, 3
+
+
+def points_for(modes: int) -> tuple[int, ...]:
+    """Return the numbers of points on which lines with `modes` shortest waves are solved, increasing."""
+    from scipy.fft import next_fast_len
+
+    least = min(next_fast_len(int(np.ceil(LEAST_PER_WAVE * modes)), real=True), MOST_POINTS)
+    return tuple(least * 2**k for k in range(1 + DOUBLINGS) if least * 2**k <= MOST_POINTS)
+
 
 @dataclass(frozen=True)
 class _Random:
