@@ -11,6 +11,7 @@ profile below the virgin one, the virgin profile is used.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,14 +21,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.mdr.revolution import Image, PowerProfile, Profile, image_rise
 from mdr_dask.physics.mdr.transforms import gauss
-from mdr_dask.physics.wear.worn import (
-    Scar,
-    Worn,
-    check_stick_radius,
-    contact_pressure,
-    largest_wear,
-    worn_image,
-)
+from mdr_dask.physics.wear.worn import Scar, Worn, check_stick_radius, worn_by
 
 #: Factor of the fast rule, fitted by eye in the thesis. The best factor lies between 0.9 and 1 (see docs/wear.md).
 THESIS_XI = 0.8
@@ -199,28 +193,10 @@ def _worn(profile: Profile, rule: Rule, radius: float, edge: float) -> Worn:
         inside = np.where(left > 0.0, rest / np.maximum(left, 1e-100) ** 2, 0.0) - 1.0
         return np.asarray(profile.image_slope(x) * np.where(x <= 1.0, inside, rest - 1.0))
 
-    def height(r: FloatArray) -> FloatArray:
-        result = profile.height(r)
-        inside = (r > c) & (r < radius)
-        worn = np.empty(int(np.sum(inside)))
-        _heights(rule, r[inside], quadrature, worn)
-        result[inside] += np.maximum(worn, 0.0)
-        return result
-
     scar = Scar(c, radius, change, slope, tuple(float(cut) for cut in quadrature.cuts[1:] if cut > c))
-    return Worn(
-        contact_radius=radius,
-        stick_border=c,
-        depth=1.0,
-        normal_force=force,
-        wear_volume=volume,
-        worn_depth=largest_wear(scar),
-        height=height,
-        image=worn_image(profile, scar),
-        pressure=contact_pressure(profile, scar, edge, 1.0, c),
-        energy_volume=volume if rest == 0.0 else np.nan,  # in the limit all dissipated energy has caused wear
-        relative_error=ERROR,
-    )
+    worn = worn_by(profile, scar, c, edge, 1.0, force)
+    energy = volume if rest == 0.0 else np.nan  # in the limit all dissipated energy has caused wear
+    return replace(worn, wear_volume=volume, energy_volume=energy, relative_error=ERROR)
 
 
 @jit_inline
@@ -310,13 +286,6 @@ def _scar_integral(rule: Rule, radius: float, moment: int, quadrature: Quadratur
 def _angle(x: float, radius: float) -> float:
     """Return arccos(x / R) without cancellation near x = R."""
     return math.atan2(math.sqrt((radius - x) * (radius + x)), x)
-
-
-@jit
-def _heights(rule: Rule, radii: FloatArray, quadrature: Quadrature, result: FloatArray) -> None:
-    """Write f - f0 at radii beyond c to `result`."""
-    for k in range(radii.size):
-        result[k] = 2.0 / math.pi * _scar_integral(rule, radii[k], 0, quadrature)
 
 
 @jit

@@ -41,7 +41,7 @@ def test_limit_leaves_no_step_and_conserves_volume(exponent, c):
     worn, profile = wear.limit(PowerProfile(exponent), c), PowerProfile(exponent)
     a = worn.contact_radius
     at_edge = worn.height(np.array([a * (1 - 1e-12)]))[0] - profile.height(np.array(a))
-    assert abs(at_edge) < 1e-10 * (1 - c**exponent) + 1e-13
+    assert abs(at_edge) < 1e-7 * (1 - c**exponent)  # of an infinite slope at the axis and a small c
 
     def ring(r):
         return 2 * np.pi * r * float(worn.height(np.array([r]))[0] - profile.height(np.array(r)))
