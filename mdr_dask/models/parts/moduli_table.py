@@ -128,7 +128,7 @@ def _as_measured(chosen: ModulusTable, law: Law | None) -> Moduli:
         shift, rise = 10**across, 10**along
         text = f"both moduli, {_vertical(chosen)}{text}{_compared(levels, across, law, reference)}"
     elif law is not None:
-        reference, text = law.reference, f"the shift factors given, moduli {_vertical(chosen)}"
+        reference, text = law.reference, f"the given shift factors, moduli {_vertical(chosen)}"
         shift, rise = law.factor(levels), vertical_factor(chosen, levels, reference)
     else:
         raise DataError(
