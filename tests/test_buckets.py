@@ -136,8 +136,9 @@ def test_a_study_in_a_bucket_is_run_grown_verified_and_mended_like_one_on_a_disk
         store.datasets(bucket)
     found, left = store.repair(bucket)
     assert {finding.name for finding in found.findings} == {"height/c/0/0", "position/c/0"}
-    assert left.findings == []
+    assert [(each.kind, each.name) for each in left.findings] == [("missing", "position/c/0")]
     assert run(small(toy, 9), bucket).done == 8
+    assert store.verify(bucket).findings == []
     assert chunks(bucket) == chunks(url)
 
 

@@ -220,7 +220,7 @@ def layout_faults(url: str) -> Iterator[Finding]:
     for name, content in read_many(url, record.files):
         if content is None:
             if not is_older:  # otherwise a run was stopped before it wrote this file
-                yield Finding("missing", name, "part of the layout")
+                yield Finding("missing", name, "part of the layout; --repair or the next run writes it again")
         elif digest(content) not in record.files[name]:
             yield Finding("damaged", name, "not what was written")
 
