@@ -53,7 +53,7 @@ def test_units_change_nothing() -> None:
         np.testing.assert_allclose(there.values[name], here.values[name], rtol=1e-9)
         np.testing.assert_allclose(there.values[f"{name}_thickness"], 0.02 * there.values[name], rtol=1e-14)
     assert np.isnan(here.values["central_film_thickness"]).all()
-    assert "needs radius" in here.messages[0, 0]
+    assert "needs the parameter radius" in here.messages[0, 0]
     assert not there.messages
 
 
