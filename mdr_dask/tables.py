@@ -223,6 +223,8 @@ def _separator(lines: Sequence[str]) -> str:
     """Return the separator with which most lines contain several numbers, or else the one that most lines contain."""
 
     def has_numbers(line: str, mark: str) -> bool:
+        if mark != BLANKS and mark not in line:
+            return False
         filled = [cell for cell in _split(line, mark) if cell]
         count = sum(bool(_NUMBER.fullmatch(cell)) for cell in filled)
         return count > 1 and 2 * count >= len(filled)
@@ -315,10 +317,10 @@ def _grid(source: str, every: Sequence[Line]) -> _Grid:
     width = 1 + max(filled, default=0)  # without the separators at the ends of all lines
     cells = np.array([[*row[:width], *[""] * (width - len(row))] for row in rows], dtype=object)
     length = np.array([min(len(row), width) for row in rows])
-    number, missing = (
-        np.array([[bool(pattern.fullmatch(cell)) for cell in row] for row in cells]) for pattern in (_NUMBER, _MISSING)
-    )
-    return _Grid(source, cells, lines, comments, length, cells != "", number, ~(number | missing))
+    number = np.array([[bool(_NUMBER.fullmatch(cell)) for cell in row] for row in cells])
+    word = ~number
+    word[word] = [not _MISSING.fullmatch(cell) for cell in cells[word]]
+    return _Grid(source, cells, lines, comments, length, cells != "", number, word)
 
 
 class _Head(NamedTuple):

@@ -230,10 +230,6 @@ REFUSED = {
         DMA,
         "3:3: expected a line of numbers, got 'bad'",
     ),
-    "no unit": ("f [Hz],E'\n1,5\n", DMA, "expected its unit, such as 'storage modulus [MPa]'"),
-    "misspelt": ("f [Hz],storage modulos [Pa]\n1,5\n", DMA, "did you mean 'storage modulus'?"),
-    "missing": ("f [Hz],torque [N]\n1,5\n", DMA, "expected a column storage modulus, got torque"),
-    "disagree": ("f [Hz],omega [rad/s],E' [Pa]\n1,5,5\n", DMA, "is given twice, and 'f' disagrees"),
     "names with blanks between blanks": (
         "Time (s)    Load point velocity (um/s)    Friction\n0   3   0.6\n",
         STEPS,
@@ -249,6 +245,4 @@ REFUSED = {
         FRICTION,
         "4:3: column friction coefficient: expected a number",
     ),
-    "unknown unit": ("f [Hz],E' [mpa]\n1,5\n", DMA, "unknown unit 'mpa' (did you mean 'MPa'?)"),
-    "decimal commas in commas": ("f [Hz],E' [Pa]\n1,5,2\n", DMA, "put semicolons between the values"),
 }
