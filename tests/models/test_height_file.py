@@ -189,6 +189,9 @@ def test_a_scan_that_leaves_doubt_is_refused(layout, units, message, tmp_path):
     path.write_text(joined(np.c_[PLACE, PLACE**2 + 0.1 * PLACE]))
     with pytest.raises(DataError, match="one column of positions and one of heights, got 2 columns: name them"):
         read_scan(DataFile.of(path), Units("um", "mm"))
+    path.write_text(joined(np.c_[HEIGHT, HEIGHT[::-1]]))
+    with pytest.raises(DataError, match="one column of positions and one of heights, got 2 columns: name them"):
+        read_scan(DataFile.of(path), Units("um", "mm"))
     path.write_text(joined(np.c_[np.arange(200), 2 + np.arange(200), HEIGHT]))
     with pytest.raises(DataError, match="one column of positions and one of heights, got 3 columns: name them"):
         read_scan(DataFile.of(path), Units("um", "mm"))

@@ -530,7 +530,7 @@ def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]
     count = rows.shape[1]
     rises = [k for k, one in enumerate(positions.rising(rows.T)) if one]
     numbered = [k for k in rises if positions.is_numbered(rows[:, k])]
-    along = [] if count == 1 else [k for k in rises if k not in numbered] or rises or [0]
+    along = [] if count == 1 else [k for k in rises if k not in numbered] or rises
     across = [k for k in range(count) if count == 1 or (k not in rises and k not in along)]
     if len(across) != 1 or len(along) > 1:
         raise DataError(
