@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import BoolArray, FloatArray, IntArray
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.headings import Column, factors, is_called, match, plain, split_unit
-from mdr_dask.units import example_unit, is_unit, scaled
+from mdr_dask.units import example_unit, in_degrees, is_unit, scaled
 
 COMMENT = "#%"
 BLANKS = r"\s+"
@@ -443,10 +443,11 @@ def _names_and_units(grid: _Grid, head: _Head) -> tuple[tuple[str, ...], tuple[s
     if head.names is None:
         names = _names_in_comment(grid, head)
         parts = [split_unit(name) for name in names] or [("", "")] * head.numeric.size
-        return tuple(name for name, _ in parts if names), tuple(unit for _, unit in parts)
+        return tuple(name for name, _ in parts if names), tuple(in_degrees(unit) for _, unit in parts)
     parts = [split_unit(name) for name in grid.cells[head.names][: grid.length[head.names]]]
     below = [""] * len(parts) if head.units is None else [cell.strip("[](){}<> ") for cell in grid.cells[head.units]]
-    return tuple(name for name, _ in parts), tuple(one or own for one, (_, own) in zip(below, parts, strict=False))
+    units = (in_degrees(one or own) for one, (_, own) in zip(below, parts, strict=False))
+    return tuple(name for name, _ in parts), tuple(units)
 
 
 def _names_in_comment(grid: _Grid, head: _Head) -> list[str]:
@@ -514,7 +515,7 @@ def _from_pairs(grid: _Grid, sheet: Sheet, labels: int | None) -> Sheet:
             if any(two):
                 cells.append([*two, of_pair[1].replace(",", ".")])
                 rows.append(line)
-    units = (*sheet.units[:2], known[0][2].strip())
+    units = (*sheet.units[:2], in_degrees(known[0][2]))
     names = (*sheet.names[:2], "temperature")
     return replace(sheet, names=names, units=units, cells=np.array(cells, dtype=object), lines=tuple(rows))
 

@@ -388,6 +388,12 @@ def dimension_of(unit: str) -> tuple[Any, str]:
     return dimension, coherent or "1"
 
 
+def in_degrees(unit: str) -> str:
+    """Return ``degC`` or ``degF`` for other spellings of these units, such as ``C``, ``℃`` and ``deg C``."""
+    found = _DEGREES.fullmatch(unicodedata.normalize("NFKC", unit.replace("º", "°")).strip())
+    return f"deg{(found[1] or found[2]).upper()}" if found else unit
+
+
 def _factor_and_unit(text: str) -> tuple[float, str]:
     """Return the number before a unit, or 1, and the unit in the spelling of pint: ``mm^3`` for ``mm³`` or ``mm3``."""
     text = re.sub(r"[⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻]+", lambda power: "^" + unicodedata.normalize("NFKC", power[0]), text)
@@ -397,8 +403,7 @@ def _factor_and_unit(text: str) -> tuple[float, str]:
     unit = text[found.end() :] if found else text
     unit = unit.replace("−", "-").replace("·", " ").replace("microns", "micron")
     unit = re.sub(r"(?<=[A-Za-zμ])\^?\{?(-?\d{1,2})\}?(?!\d)", r"^\1", unit)
-    if degrees := _DEGREES.fullmatch(unit):
-        unit = f"deg{(degrees[1] or degrees[2]).upper()}"
+    unit = in_degrees(unit)
     unit = "" if unit == "1" else f"1{unit}" if unit.startswith("/") else unit
     return float(f"1{number}" if number[0] in "eE" else number), unit
 

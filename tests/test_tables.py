@@ -105,7 +105,7 @@ WRONG = {
     ),
     "below absolute zero": (
         "f [Hz],E' [Pa],T [C]\n1,2,-300\n",
-        "2:5: column temperature: expected a value above 0, got '-300 C'",
+        "2:5: column temperature: expected a value above 0, got '-300 degC'",
     ),
     "overflow": ("f [Hz],E' [MPa]\n1,1e305\n", "2:3: $expected a finite number"),
     "decimal comma in commas": (

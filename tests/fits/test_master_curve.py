@@ -90,7 +90,7 @@ def test_frame_of_columns_with_other_names():
 
 def test_measured_moduli_with_a_row_of_units_and_scattering_temperatures():
     table = read_table(DATA / "freq_user_raw.csv")
-    assert table.attrs["units"] == {"f": "Hz", "E_stor": "MPa", "E_loss": "MPa", "T": "C", "Set": "-"}
+    assert table.attrs["units"] == {"f": "Hz", "E_stor": "MPa", "E_loss": "MPa", "T": "degC", "Set": "-"}
     kept = table[(table["T"] > 39) & (table["T"] < 80)]
     kept.attrs.update(table.attrs)
     result = master_curve(kept)
