@@ -17,7 +17,7 @@ from mdr_dask.errors import StoreError
 from mdr_dask.models.base import Status
 from mdr_dask.plan import BlockIndex
 from mdr_dask.store.files import chunk_name, group_name, guarded, listed, read_many
-from mdr_dask.store.layout import layout_faults
+from mdr_dask.store.layout import RECORD, layout_faults
 from mdr_dask.store.study import array_of, document
 
 #: Largest number of faults that a message names.
@@ -116,7 +116,8 @@ def require_sound(url: str, series: Sequence[str], to_run: bool = False) -> None
     """Raise StoreError if the layout of a study is damaged or a chunk of a finished block is missing.
 
     Only the layout and the ledger are read, no values; `mdr_dask.store.verify` compares every file with its digest. A
-    run writes missing files of the layout again, so missing files are no fault `to_run`.
+    run writes missing files of the layout again, so missing files are no fault `to_run`. A store without the record of
+    the layout can be read, but its metadata and coordinates are not checked.
     """
     faults = _faults(url, series, to_run)
     if any(faults):  # check again: a run may have changed a file during the first check
@@ -129,7 +130,7 @@ def require_sound(url: str, series: Sequence[str], to_run: bool = False) -> None
 
 def _faults(url: str, series: Sequence[str], to_run: bool) -> Iterator[str]:
     for fault in layout_faults(url):
-        if not (to_run and fault.kind == "missing"):
+        if fault.kind == "damaged" or not (to_run or fault.name == RECORD):
             yield f"{fault.name} is {fault.kind}"
     for name in series:
         metadata = document(url, name) or {}
