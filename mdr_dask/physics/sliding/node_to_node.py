@@ -114,7 +114,8 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
     n = height.size // stride
 
     def periodic(values: FloatArray) -> FloatArray:
-        period = np.roll(values, -first)[::stride][:n]
+        to_end = values[first::stride][:n]
+        period = np.append(to_end, values[first + to_end.size * stride - values.size :: stride][: n - to_end.size])
         return np.concatenate([period[-BEFORE:], period, period[:AFTER]])
 
     h = periodic(height) - height[first]
