@@ -1,13 +1,10 @@
 """Relaxation rates of a campaign of velocity jumps, compared with independent values."""
 
-import json
-
 import numpy as np
 import pytest
 
 from mdr_dask import execute
 from mdr_dask.campaign import load
-from mdr_dask.cli import main
 from mdr_dask.fits import available as fits
 from mdr_dask.store import datasets
 
@@ -29,9 +26,7 @@ parameters:
   oversampling: 4
   steps_per_decade: 8
 series:
-  example: {velocity: [0.05 m/s]}
   checked: {hurst: [0.3, 0.7], velocity: [0.02 m/s, 0.05 m/s, 0.2 m/s]}
-  velocity: {hurst: [0.2, 0.6], velocity: {geometric: [0.1 mm/s, 1 m/s, 9]}}
 errors: false
 outputs:
   - friction_coefficient_before
@@ -71,19 +66,3 @@ def test_rates_that_were_checked_independently(groups):
     assert np.all(abs(np.log(found["rate"] / checked)) < wider * half + 0.05)
     # law 4.12 holds within 0.9 to 1.6, and eight lines scatter
     assert np.all((found["rate"] / found["law_rate"] > 0.6) & (found["rate"] / found["law_rate"] < 2))
-
-
-def test_the_command_line_fits_each_series_and_joins_intervals(store, capsys):
-    names = ["kinetics", "relaxation", "jump_law", "rate_power"]
-    assert main(["fit", store, *names]) == 0
-    printed = capsys.readouterr().out
-    assert all(f"velocity: {name}: " in printed for name in names)
-    assert "_low" not in printed
-    assert main(["fit", store, "relaxation", "--series", "example"]) == 0
-    head, row = capsys.readouterr().out.splitlines()
-    assert head.split()[:4] == ["velocity", "[m/s]", "passing_number", "rate"]
-    value, low, high = (float(part.strip("(,)")) for part in row.split()[2:5])
-    assert low < value < high
-    assert main(["fit", store, "relaxation", "--series", "example", "--json"]) == 0
-    (found,) = json.loads(capsys.readouterr().out)["rows"]
-    assert (found["rate_low"], found["rate_high"]) == (pytest.approx(low, rel=1e-3), pytest.approx(high, rel=1e-3))

@@ -60,7 +60,7 @@ def results(text: str, *changes: tuple[str, str]) -> xr.Dataset:
     """Run a campaign and return what its store holds."""
     path = write(text, *changes)
     assert main(["run", path, "--quiet"]) == 0
-    return xr.open_zarr(f"results/{path[:-5]}.zarr", consolidated=False).load()
+    return xr.open_zarr(f"results/{path[:-5]}.zarr").load()
 
 
 def profile(name: str, spacing: float, seed: int, size: int = 4000) -> None:
