@@ -37,8 +37,9 @@ DIFFERENCE = 1e-7
 SHORTEST = 1e-4
 """A march fails if a step is shorter than this value times the longest step so far, or than this value times the first
 step if that is shorter. In marches that succeeded, no later step was shorter than 0.13 times the longest step."""
-NEWTON = 1e-3
-"""Tolerance of Newton's method as a fraction of the step tolerance, so that its error does not matter."""
+NEWTON, ROUNDING = 1e-5, 1e-9
+"""Tolerance of Newton's method: `NEWTON` times the step tolerance, because a moving border amplifies its error, but not
+below `ROUNDING`."""
 
 
 class NotConvergedError(ArithmeticError):
@@ -226,7 +227,7 @@ class _Newton:
     """Newton's method with a Jacobian that is reused from step to step while the iteration converges."""
 
     def __init__(self, problem: Problem, tolerance: float) -> None:
-        self.problem, self.enough = problem, NEWTON * tolerance
+        self.problem, self.enough = problem, max(NEWTON * tolerance, ROUNDING)
         self.factors: Factors | None = None
 
     def solve(self, guess: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray]) -> FloatArray | None:

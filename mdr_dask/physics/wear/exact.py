@@ -86,7 +86,7 @@ class Resolution(NamedTuple):
         digits = -np.log10(self.accuracy)
         # with fewer halvings, the error of the panels at the moving edge would make the steps very short
         levels = max(round(2.7 * digits - 3.3), 2)
-        order = 4 if digits < 3.8 else 5 if digits < 4.5 else 6
+        order = 5 if digits < 3.2 else 6  # steep bodies need many nodes per panel
         left, right = (max(halvings - self.rougher, 0) for halvings in (levels + near, levels))
         return graded_panels(left, right, order - min(self.rougher, 1))
 

@@ -28,7 +28,7 @@ from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.mdr.half_integrals import Mesh, Panels, interpolate, interpolate_weighted, value_at
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import gauss
-from mdr_dask.physics.wear.evolution import Moment, settled
+from mdr_dask.physics.wear.evolution import ROUNDING, Moment, settled
 
 #: Weight of the border relative to the depth in the step error. It is large, because f rises like a square root beyond
 #: the border.
@@ -296,7 +296,7 @@ class PartialSlip:
         slip, rate = self.panels.inner @ (y * factor), self.panels.outer @ y
         rate[-1] = 0.0
         rows = np.empty(unknowns.size)
-        if self.border is not None and np.min(slip) <= 0.0:
+        if self.border is not None and np.min(slip) < -ROUNDING:
             rows[:] = np.nan  # the equations have another solution, in which s is negative
             return rows
         rows[:size] = slip * (1.0 - theta / root * rate) - known[:size]
