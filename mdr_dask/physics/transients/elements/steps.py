@@ -410,12 +410,13 @@ def _move(
                 state.free_terms[j, m] = workspace.after_terms[j, m]
         elif solid.viscosity > 0:
             state.free[j] = recover(solid, state.free[j], state.free_terms, j, lapse.decay, lapse.modes)
-        w0, w1, part, leaves = (
-            old_depth + workspace.old_under[j],
-            depth + workspace.under[j],
-            workspace.parts[j],
-            workspace.leaves[j],
-        )
+        w0, w1 = old_depth + workspace.old_under[j], depth + workspace.under[j]
+        if not was and w1 <= after[j]:  # the free recovery is already known
+            u[j] = after[j]
+            for m in range(solid.times.size):
+                state.terms[j, m] = workspace.after_terms[j, m]
+            continue
+        part, leaves = workspace.parts[j], workspace.leaves[j]
         u[j], touching[j] = advance(solid, lapse, w0, w1, u[j], was, part, leaves, after[j], state.terms, j)
         if not touching[j]:
             state.free[j] = u[j]
