@@ -1,4 +1,4 @@
-"""Laws fitted to a store, with intervals and goodness of fit."""
+"""Fit laws to the results in a store, with intervals of the constants and the goodness of fit."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from importlib.metadata import entry_points
 
 from mdr_dask.fits.base import Fit
 
-#: Modules of this package with a tuple ``FITS``, and the models whose stores they fit; a module is imported for these
-#: models only. Without models, its fits are for all models.
+#: Modules of this package that have a tuple ``FITS``, and the models to whose stores these fits apply. A module is
+#: imported only for its models. If the tuple of models is empty, the fits apply to every model.
 SUBJECTS: dict[str, tuple[str, ...]] = {
     "calibration": (),
     "ehl": ("ehl_line",),
@@ -25,7 +25,7 @@ GROUP = "mdr_dask.fits"
 
 
 def available(model: str) -> dict[str, Fit]:
-    """Return the fits for stores of a model, by name; other packages offer tuples of them in `GROUP`."""
+    """Return the fits for stores of a model, by name, including those that other packages offer in `GROUP`."""
     subjects = [subject for subject, models in SUBJECTS.items() if model in models or not models]
     own = (import_module(f"mdr_dask.fits.{subject}").FITS for subject in subjects)
     others = (entry.load() for entry in entry_points(group=GROUP))

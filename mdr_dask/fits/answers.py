@@ -20,8 +20,8 @@ GROUPS = 32
 #: A group of cases is left out if a shift by one standard error changes the constant by less than this share of the
 #: half width of its interval.
 NEGLIGIBLE = 0.01
-#: Relative change of the scatter. The half widths for the original and for the changed scatter are extrapolated
-#: linearly to zero scatter.
+#: Relative change of the scatter, by which the fit is repeated. The half widths for the original and for the changed
+#: scatter are then extrapolated linearly to zero scatter.
 LESS = 0.01
 
 
@@ -31,7 +31,7 @@ def require_known(campaign: Campaign) -> None:
     Raises
     ------
     CampaignError
-        With one sentence for each unknown constant.
+        If there are unknown constants. The message has one sentence for each of them.
     """
     known = available(campaign.model) if campaign.replication.answers else {}
     is_adaptive = any(axis.refinement for one in campaign.series for axis in one.axes)
@@ -60,7 +60,7 @@ def half_widths(
     Raises
     ------
     FitError
-        If the fit cannot be made, or does not give this constant.
+        If the law cannot be fitted, or the fit does not give this constant.
     """
     found = {}
     for name, result in fit.results(groups).items():
@@ -71,7 +71,7 @@ def half_widths(
 
 
 def is_wide(value: xr.DataArray, half: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
-    """Return where an interval is too wide. Intervals without finite ends do not count: there the law does not hold."""
+    """Return where an interval is too wide; an interval without finite ends does not count, as the law fails there."""
     return (half > _allowed(value, tolerance)) & np.isfinite(half)
 
 
@@ -81,12 +81,12 @@ def _allowed(value: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
 
 
 def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.DataArray]:
-    """Return the half width that an interval would have without scatter of the realisations, by series.
+    """Return the half width that an interval would have if realisations did not scatter, by series.
 
-    This half width comes from grid errors and from the misfit of the law; more realisations do not reduce it. The fit
-    is repeated with the scatter multiplied by ``1 - LESS`` and by ``1 + LESS``, and the change of the half width is
-    extrapolated linearly to zero scatter. The smaller of the two results is returned, because the verdict on the law,
-    and with it the half width, may jump at one of the two changes of the scatter.
+    This half width is due to grid errors and to the misfit of the law. More realisations do not reduce it. The fit is
+    repeated with the scatter multiplied by ``1 - LESS`` and by ``1 + LESS``, and the change of the half width is
+    extrapolated linearly to zero scatter. The smaller of the two results is returned: one of the two changes may alter
+    the verdict on the law, and the half width then jumps.
     """
     now = half_widths(fit, constant, groups)
 
@@ -99,7 +99,7 @@ def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -
 
 
 def _scattered(data: xr.Dataset, scale: float) -> xr.Dataset:
-    """Return a study with the same means, and the scatter of its realisations multiplied by `scale`."""
+    """Return a study with the same means, in which the scatter of the realisations is multiplied by `scale`."""
     found = {}
     for name in _results(data):
         mean = data[name].mean("realisation")
@@ -138,10 +138,11 @@ def cases_behind(
 ) -> xr.DataArray:
     """Return the cases of a series that affect a constant with too wide an interval.
 
-    Along every dimension that the constant itself does not have, neighbouring values form groups. The results of one
-    group after the other are shifted by a small fraction of their standard error, and the fit is repeated. If the
-    constant changes, the group matters. A case is chosen if its group matters along each of these dimensions. Therefore
-    whole rows and columns are chosen, and all cases that a fit compares get the same generated lines.
+    Along every dimension that the constant itself does not have, neighbouring values are collected in groups. For one
+    group after the other, the results are shifted by a small fraction of their standard error, and the fit is repeated.
+    If the constant changes, the group matters. A case is chosen if, along each of these dimensions, it belongs to a
+    group that matters. Therefore whole rows and columns are chosen, and all cases that a fit compares get the same
+    generated lines.
 
     Parameters
     ----------

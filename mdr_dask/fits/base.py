@@ -2,10 +2,10 @@
 
 Every result has a variable ``law_holds``: a sentence about the law with the constants that its source states. The
 sentence begins with *yes*, *approximately*, *no* or *not tested*. If constants are fitted, ``fitted_law_holds`` is the
-corresponding sentence about the law with the fitted constants. If scatter and errors do not explain the departures of
-the data from the fitted law, these departures count as an error of every case and widen the intervals (`fitted`). Some
-fits then give NaN for the ends of the intervals instead. A constant that the data do not determine (`undetermined`) is
-NaN.
+corresponding sentence about the law with the fitted constants. Scatter and errors may not explain the departures of the
+data from the fitted law. These departures then count as an error of every case and widen the intervals (see `fitted`);
+some fits give NaN for the ends of the intervals instead. A constant that the data do not determine is NaN (see
+`undetermined`).
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.campaign import Campaign
 from mdr_dask.errors import FitError, distinguishable
 
-#: A law holds if the rms relative departure is at most this, and the largest departure at most twice this.
+#: A law holds if the rms of the relative departures is at most this, and the largest of them at most twice this.
 WITHIN = 0.05
-#: A law holds approximately if the rms relative departure is at most this, and the largest at most twice this.
+#: A law holds approximately if the rms of the relative departures is at most this, and the largest at most twice this.
 APPROXIMATE = 0.15
 #: A departure counts against a law if the probability that scatter and errors alone cause it is below this.
 DOUBTFUL = 0.05
@@ -43,14 +43,14 @@ class Fit:
         The law, in one line.
     compute : callable, mapping of str to Dataset -> Dataset
         Takes the groups of a store by the name of the series (``""`` for a store without series). Each group has the
-        dimensions (axes..., realisation, ...) and all scalar parameters as coordinates, both varied and fixed
-        parameters. Returns every constant with the ends of its 95 % interval, ``<name>_low`` and ``<name>_high``,
-        measures of the goodness of fit, and ``law_holds``. Units are in the attrs.
+        dimensions (axes..., realisation, ...). Its coordinates are all scalar parameters, varied or fixed. Returns
+        every constant with the ends of its 95 % interval, ``<name>_low`` and ``<name>_high``, measures of the goodness
+        of fit, and ``law_holds``. Units are in the attrs.
     apart : bool
         Whether each series of a store is fitted separately. ``compute`` then gets a mapping with one series.
     constants : tuple of str, or callable, Campaign -> tuple of str
-        Constants with an interval. A campaign may add realisations until such an interval is narrow enough
-        (``until: {name.constant: 1 %}``).
+        Constants for which the fit gives an interval. A campaign may add realisations until such an interval is narrow
+        enough (``until: {name.constant: 1 %}``).
     """
 
     name: str
@@ -100,7 +100,7 @@ FITTED_LAW_HOLDS = {"units": "1", "long_name": "whether the law holds with the f
 
 
 def _judged(result: xr.Dataset) -> xr.Dataset:
-    """Return a result with ``law_holds`` as its last variable; *not tested* if the fit gives no verdict."""
+    """Return a result with ``law_holds`` as its last variable. If the fit gives no verdict, it is *not tested*."""
     sentence = result.get("law_holds", xr.DataArray("not tested: this fit compares no law with its data"))
     return result.drop_vars("law_holds", errors="ignore").assign(law_holds=sentence.assign_attrs(LAW_HOLDS))
 
@@ -129,7 +129,7 @@ class Fitted:
         return float(np.sqrt(np.mean(self.residuals[0] ** 2)))
 
     def holds(self, where: Callable[[int], str] | None = None) -> str:
-        """Return a sentence on whether the law with the fitted constants holds; `where` as in `verdict`."""
+        """Return a sentence on whether the law with the fitted constants holds (`where`: see `verdict`)."""
         if np.isnan(self.constants[0]).any():
             return f"not tested: these cases do not determine the constants; departs by {100 * self.rms:.2g} % rms"
         return verdict(self.residuals, self.count, self.constants.shape[1], where)
@@ -147,7 +147,8 @@ def fitted(
     Parameters
     ----------
     fit : callable
-        Takes data, shape (rows, cases), and returns constants, shape (rows, p): exponents, or logarithms of factors.
+        Takes data, shape (rows, cases), and returns constants, shape (rows, p). A constant is an exponent, or the
+        logarithm of a factor.
     left : callable
         Takes data and constants, and returns data minus law, shape (rows, cases).
     data : array, shape (1 + RESAMPLES + 2 groups, cases)
@@ -156,7 +157,7 @@ def fitted(
         Realisations that were resampled.
     stated : array, shape (p,), optional
         Constants that the source of the law states. A constant also counts as undetermined if the data would not
-        determine it for constants equal to the stated values.
+        determine it in a law with the stated constants.
     """
     constants = fit(data)
     residuals = left(data, constants)
@@ -174,9 +175,9 @@ def fitted(
 def undetermined(effects: FloatArray) -> BoolArray:
     """Return which constants of a law the data do not determine.
 
-    The constant is changed by one, and the other constants are fitted again. If the law then changes by less than
-    `WITHIN` in every case, the constant is undetermined. Its fitted value would only reflect departures that are
-    allowed for a law that holds.
+    One constant is changed by 1, and the other constants are fitted again. If the law then changes by less than
+    `WITHIN` in every case, the constant is undetermined: departures of this size are allowed for a law that holds, and
+    they alone would decide the fitted value.
 
     Parameters
     ----------
@@ -214,7 +215,8 @@ def verdict(
     where : callable, int -> str, optional
         Returns a description of a case; used for the case with the largest departure.
     excluded : bool
-        Whether the interval of a fitted constant excludes the stated value; scatter then does not explain departures.
+        Whether the interval of a fitted constant excludes the stated value. If so, scatter does not explain the
+        departures.
     """
     if residuals.shape[1] <= constants:
         return law_holds(residuals[0], np.nan, constants)
@@ -240,22 +242,24 @@ def law_holds(
 ) -> str:
     """Return a sentence on whether a law holds.
 
-    Scatter never improves a verdict. If scatter may hide a departure beyond a limit, the limit counts as exceeded. If
-    scatter may hide any departure up to the largest limit, the law is not tested.
+    Scatter never improves a verdict. If scatter may hide a departure beyond `WITHIN`, the law holds at best
+    approximately. If scatter may hide a departure beyond `APPROXIMATE`, small departures do not confirm the law, and it
+    is not tested.
 
     Parameters
     ----------
     departures : array
         Relative departures of the data from the law.
     chance : float or None
-        Probability that scatter and errors alone cause departures of this size; NaN if it is unknown, None if scatter
-        and errors cannot cause such departures.
+        Probability that scatter and errors alone cause departures of this size. NaN if the probability is unknown; None
+        if scatter and errors cannot cause such departures.
     constants : int
         Number of constants fitted to these data.
     where : str
         Description of the case with the largest departure.
     scatter : float
-        Rms departure that scatter and errors alone exceed with a probability of 5 %; NaN if it is unknown.
+        With a probability of 5 %, scatter and errors alone cause an rms departure larger than this. NaN if it is
+        unknown.
     """
     if departures.size <= constants:
         return f"not tested: {departures.size} cases for {constants} constants leave nothing to compare"

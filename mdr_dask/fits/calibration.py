@@ -1,4 +1,4 @@
-"""Calibration: estimate unknown parameters from measured points by their posterior density on a study."""
+"""Calibration: estimate unknown parameters of a study from measured points, by their posterior density."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from mdr_dask.fits.posterior import DEVIATIONS, Noise, Posterior, distance, like
 from mdr_dask.fits.prediction import Prediction, prediction
 from mdr_dask.tables import decoded
 
-#: Smallest error of measurement that is considered, relative to the rms residual of the best prediction.
+#: Smallest error of measurement that is considered, relative to the rms of the residuals of the best prediction.
 LEAST = 0.2
-#: Smallest residual that is used, relative to the values; smaller residuals may be due to rounding.
+#: Smallest residual that is used, relative to the measured values. Smaller residuals may be due to rounding.
 _ROUNDING = 1e-9
 
 
@@ -45,9 +45,8 @@ class Calibration:
     units : dict of str to str
         Units of the unknowns, the conditions and the output.
     contradicted : Residuals or None
-        Residuals that the errors in the table do not explain, or None if these errors explain the residuals. In the
-        first case the posterior is computed with larger errors of measurement, which do explain the residuals, so that
-        the intervals include the misfit.
+        None if the errors in the table explain the residuals. Otherwise these residuals; the posterior is then computed
+        with larger errors of measurement, which do explain the residuals. The intervals thus include the misfit.
     """
 
     measured: Measured
@@ -83,7 +82,7 @@ class Calibration:
         return identifiability.products(self.posterior, self.values, self.free)
 
     def name_and_unit(self, product: identifiability.Product) -> tuple[str, str]:
-        """Return a product as text, and its unit."""
+        """Return a product as text, and the unit of the product."""
         units = [self.units[name] for name in self.unknowns]
         return identifiability.written(self.unknowns, product.exponents), identifiability.unit_of(
             units, product.exponents
@@ -135,8 +134,9 @@ def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
     Parameters
     ----------
     dataset : Dataset
-        A group of a study that is a grid. The axes that are not measured conditions are the unknowns, one to four. The
-        prior of each unknown is uniform over its axis, or over the logarithm if the axis is spaced logarithmically.
+        A group of a study that is a grid. The axes that are not measured conditions are the unknowns; there may be one
+        to four. The prior of each unknown is uniform over its axis, or uniform in the logarithm if the axis is spaced
+        logarithmically.
     measured : Measured
 
     Raises
@@ -146,10 +146,11 @@ def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
 
     Notes
     -----
-    The likelihood is normal. Its covariance has four parts: the errors of measurement; the scatter of the lines, which
-    all cases share; half of the estimated errors of grid and interpolation as an error common to all points; and the
-    other half as an error that is independent for each point. Errors of measurement that are not given are either equal
-    for all points or proportional to the values, with a uniform prior for the logarithm of their size.
+    The likelihood is a normal distribution. Its covariance has four parts: the errors of measurement; the scatter of
+    the lines, which all cases share; half of the estimated errors of grid and interpolation as an error common to all
+    points; and the other half as an error that is independent for each point. If the table gives no errors of
+    measurement, two kinds are considered: errors equal for all points, and errors proportional to the values. The prior
+    of the logarithm of their size is uniform.
     """
     predicted = prediction(dataset, measured)
     named = (*predicted.unknowns, *measured.conditions, measured.output)
@@ -204,8 +205,8 @@ def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
 def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
     """Return possible sizes of the error of measurement.
 
-    The smallest size is `LEAST` times the rms residual. The largest is the upper end of the one-sided 99.9 % interval
-    of the error that follows from the residuals.
+    The smallest size is `LEAST` times the rms of the residuals. The largest size is the upper end of the one-sided 99.9
+    % interval that the residuals give for the error.
     """
     spare = max(1, count - unknowns)
     most = min(100.0, float(np.sqrt(count / (2 * gammaincinv(spare / 2, 0.001)))))
@@ -309,7 +310,7 @@ def _intervals(values: FloatArray, weights: FloatArray) -> dict[str, float]:
 
 
 def _bound(found: Calibration, k: int) -> dict[str, float]:
-    """Return the one-sided interval of an unknown with one open end; empty unless all other unknowns are determined."""
+    """Return the one-sided interval of an unknown with one open end; empty if another unknown is undetermined."""
     low, high = found.ends[k]
     if found.free != [k] or low == high:
         return {}
@@ -323,7 +324,7 @@ def _correlation(found: Calibration, one: int, other: int) -> float:
 
 
 def sentence(found: Calibration) -> str:
-    """Return a sentence on what the data determine; it starts with the verdict if the model does not explain them."""
+    """Return a sentence on what the data determine; the verdict precedes it if the model does not explain the data."""
     if found.law_holds.startswith("no:"):
         return f"the model does not explain the measured points; with errors that would explain them, {_known(found)}"
     return _known(found)

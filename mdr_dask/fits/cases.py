@@ -27,7 +27,7 @@ def each(
     fit: Callable[[xr.Dataset], Variables],
     *outputs: str,
 ) -> xr.Dataset:
-    """Fit a law separately at every point of the dimensions that the law itself does not contain.
+    """Fit a law separately for every combination of values of the dimensions that one fit does not need.
 
     Parameters
     ----------
@@ -36,9 +36,9 @@ def each(
     inner : callable
         Returns the dimensions that one fit needs, such as those of load and velocity.
     fit : callable
-        Returns the results of the fit at one point of the other dimensions.
+        Returns the results of the fit for one combination of values of the other dimensions.
     *outputs : str
-        Outputs that the fit needs. The first one has no other dimensions than the axes of the study.
+        Outputs that the fit needs. The only dimensions of the first output are the axes of the study.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def dimensions(data: xr.Dataset, *names: str) -> list[str]:
 
 
 def one_value(data: xr.Dataset, name: str) -> float:
-    """Return the only value of a parameter; raise FitError if the study lacks it, or if it differs between cases."""
+    """Return the value of a parameter that all cases share; raise FitError if the study lacks it, or if it varies."""
     require(data, name)
     values = data[name]
     if values.size != 1:
@@ -99,7 +99,7 @@ class Table(NamedTuple):
         return bootstrap.with_errors(bootstrap.means(self.values[used].T), self.mean_error(used))
 
     def logarithms(self, used: Any = slice(None)) -> FloatArray:
-        """Return the stack of the logarithms of the means; an infinite error counts as 100 % of the mean."""
+        """Return the stack of the logarithms of the means; an infinite grid error counts as 100 % of the mean."""
         means = bootstrap.means(self.values[used].T)
         relative = self.mean_error(used) / means[0]
         return bootstrap.with_errors(bootstrap.logarithms(means), np.where(np.isinf(relative), 1.0, relative))
@@ -116,7 +116,7 @@ class Table(NamedTuple):
         return int(np.isfinite(self.values[used]).sum(axis=1).min())
 
     def mean(self) -> FloatArray:
-        """Return the mean of every case; NaN without any successful realisation."""
+        """Return the mean of every case; NaN for a case in which every realisation failed."""
         mean: FloatArray = bootstrap.means(self.values.T)[0]
         return mean
 
@@ -139,7 +139,7 @@ def table_of(data: xr.Dataset, scale: Any, *columns: xr.DataArray, output: str =
 
 
 def linear(design: FloatArray, logs: FloatArray, count: int) -> Fitted:
-    """Fit a law that is linear in its constants to a stack of logarithms; design has the shape (constants, cases)."""
+    """Fit a law that is linear in its constants to a stack of logarithms; `design` has the shape (constants, cases)."""
     solve = np.linalg.pinv(design)
     return fitted(lambda rows: rows @ solve, lambda rows, constants: rows - constants @ design, logs, count)
 
@@ -184,7 +184,7 @@ def nonlinear(
     Returns
     -------
     Fitted, Variables
-        The fit, and variables with the rms and the largest departures and with both verdicts.
+        The fit; and variables with the rms departure, the largest departure and both verdicts.
     """
     found = fitted(
         lambda rows: _least_squares(model, stated, rows), lambda rows, best: rows - model(best), logs, count, stated

@@ -26,8 +26,8 @@ def laws_of(
 ) -> tuple[list[ShiftLaw], dict[str, str]]:
     """Fit the laws that suit the groups: a power law for velocities, Arrhenius and WLF for temperatures.
 
-    The laws are fitted relative to the middle group, so that the fit does not depend on the reference. The constants
-    are given for the reference.
+    The laws are fitted relative to the middle group. Therefore the fit does not depend on the reference. The fitted
+    constants are then converted to the reference.
 
     Returns
     -------
@@ -62,12 +62,12 @@ def laws_of(
 
 
 def sign_of(over: str) -> int:
-    """Return the sign of log10 a_T in shift factors: -1 if the abscissa is a time, otherwise (frequency) 1."""
+    """Return -1 for a time as abscissa, else (frequency) 1; a shift factor in decades is this sign times log10 a_T."""
     return -1 if over == "t" or over.lower().startswith("time") else 1
 
 
 def kelvins(temperatures: FloatArray, unit: str, groups: FloatArray | None = None) -> FloatArray:
-    """Return temperatures in K. Without a unit they are taken as kelvins if their median is above 250, else as degC.
+    """Return temperatures in K; if they have no unit, they count as K if their median exceeds 250, else as degC.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def kelvins(temperatures: FloatArray, unit: str, groups: FloatArray | None = Non
 
 
 def constants_of(laws: list[ShiftLaw]) -> dict[str, xr.Variable]:
-    """Return the constants of laws with their intervals, and the distance of the shift factors from each law."""
+    """Return the constants of laws with their intervals, and how far the shift factors lie from each law."""
     return {name: value for law in laws for name, value in _constants(law).items()}
 
 
@@ -100,7 +100,7 @@ def _constants(law: shift_laws.ShiftLaw) -> dict[str, xr.Variable]:
 
 
 def with_verdict(curve: xr.Dataset, verdicts: dict[str, str]) -> xr.Dataset:
-    """Return a master curve with ``law_holds``: whether its curves collapse, and which law its shift factors follow.
+    """Add ``law_holds`` to a master curve: whether its curves collapse, and which law its shift factors follow.
 
     If the curves do not determine all shift factors, the collapse is not tested. For example, two plateaus of the same
     height coincide for any shift.
@@ -124,7 +124,7 @@ def _collapse(curve: xr.Dataset) -> str:
     """Return a sentence on whether the curves collapse.
 
     The scatter about the merged curve is compared with the scatter of each curve about its own polynomial. If two
-    ordinates were shifted together, the sentence describes the ordinate that collapses less well.
+    ordinates were shifted together, the sentence is about the ordinate that collapses less well.
     """
     names = [name for name in ("ordinate", "companion") if f"point_{name}" in curve]
     answers = [_collapse_of(curve, name) for name in names]
@@ -156,7 +156,7 @@ def _collapse_of(curve: xr.Dataset, name: str) -> str:
 
 
 class _Within(NamedTuple):
-    """Sum over all curves of the squared residuals about a polynomial for each curve, and its degrees of freedom."""
+    """Squared residuals of each curve about its own polynomial, summed over all curves, and the degrees of freedom."""
 
     squares: float
     freedom: int

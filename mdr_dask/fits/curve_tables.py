@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 ALIASES = {"normal_force": "normal force", "friction_coefficient": "friction coefficient"} | {
     f"{kind}_modulus": f"{kind} modulus" for kind in ("storage", "loss")
 }
-"""Names of columns in a study, and the names that tables use for them (`mdr_dask.tables.SYNONYMS`)."""
+"""Names of columns in a study, and other names of these columns in tables (from `mdr_dask.tables.SYNONYMS`)."""
 
-LEAST_JUMP = 3.0  # a gap that separates two groups of scattered values is at least this many times a gap within a group
+LEAST_JUMP = 3.0  # the gap between two groups of scattered values is at least this many times a gap within a group
 
 
 def read_table(path: str | Path) -> pd.DataFrame:
@@ -39,7 +39,7 @@ def read_table(path: str | Path) -> pd.DataFrame:
     Raises
     ------
     DataError
-        If there is no row of names, or an entry is not a number.
+        If the table has no row of names, or an entry is not a number.
     """
     sheet = read_sheet(decoded(Path(path).read_bytes(), str(path)), str(path))
     if not sheet.names:
@@ -56,7 +56,7 @@ def read_table(path: str | Path) -> pd.DataFrame:
 
 
 def frame_of(table: xr.Dataset | pd.DataFrame) -> pd.DataFrame:
-    """Return a table unchanged; return a study as a table of means over realisations, one row for each case."""
+    """Return a table unchanged. Convert a study into a table of means over realisations, one row for each case."""
     if isinstance(table, pd.DataFrame):
         return table
     mean = table.mean("realisation", keep_attrs=True) if "realisation" in table.dims else table
@@ -67,7 +67,7 @@ def frame_of(table: xr.Dataset | pd.DataFrame) -> pd.DataFrame:
 
 
 def finite_rows(frame: pd.DataFrame, columns: list[str]) -> tuple[pd.DataFrame, str]:
-    """Return the rows with a finite number in every column, and a sentence about the rows left out (may be empty)."""
+    """Return the rows with a finite number in every column, and a sentence about omitted rows (empty without any)."""
     missing = {name: ~np.isfinite(frame[name].to_numpy(dtype=np.float64)) for name in columns}
     anywhere = np.logical_or.reduce(list(missing.values()))
     if not anywhere.any():
@@ -81,7 +81,7 @@ def finite_rows(frame: pd.DataFrame, columns: list[str]) -> tuple[pd.DataFrame, 
 def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
     """Return the column with this name, or the first one with a synonym of it.
 
-    The result is None without such a column, or if several columns have synonyms and do not agree.
+    The result is None if there is no such column, or if several columns have synonyms as names and their values differ.
     """
     columns = [str(name) for name in frame.columns]
     if wanted in columns:
@@ -114,13 +114,13 @@ FAMILIES = (
     ("frequency", ("compliance",), "temperature"),
     ("time", ("compliance",), "temperature"),
 )
-"""Abscissa, ordinates and group of tables that need no options; the first family that fits is used."""
+"""Abscissa, ordinates and group of tables that need no options. The first family that fits a table is used."""
 
 
 def columns_to_use(
     frame: pd.DataFrame, abscissa: str | None, ordinate: str | Sequence[str] | None, group: str | None
 ) -> tuple[str, tuple[str, ...], str]:
-    """Return abscissa, ordinates and group: the given columns, completed from the first family that fits the table."""
+    """Return the columns of abscissa, ordinates and group; those not given follow from the first family that fits."""
     wished = None if ordinate is None else (ordinate,) if isinstance(ordinate, str) else tuple(ordinate)
     found = []
     for over, values, by in FAMILIES:
@@ -176,9 +176,9 @@ def _has_unit(unit: str, wanted: str) -> bool:
 
 
 def second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
-    """Return a second parameter in which the curves differ (velocity or temperature), or None.
+    """Return a second parameter in which the curves differ (velocity or temperature); None if there is none.
 
-    Raise DataError if the normal force differs, or more than one other parameter.
+    Raise DataError if the curves differ in the normal force, or in more than one other parameter.
     """
     found = None
     for name in ("normal_force", "velocity", "temperature"):
@@ -193,7 +193,7 @@ def second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
 def curves_of(
     frame: pd.DataFrame, over: str, ordinates: Sequence[str], by: str
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
-    """Return the value of the group of each curve, and log10 of the points of each curve.
+    """Return for each curve the value of its group, and log10 of abscissas and ordinates of its points.
 
     Ordinates have the shape (channels, points).
     """
@@ -211,7 +211,7 @@ def curves_of(
 def pairs_of(
     frame: pd.DataFrame, over: str, ordinates: Sequence[str], by: tuple[str, str]
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
-    """Return the values of both groups of each curve, shape (curves, 2), and the points of each as in `curves_of`."""
+    """Return the values of both groups of each curve, shape (curves, 2), and its points as in `curves_of`."""
     labels = np.array([clusters(frame[name].to_numpy(dtype=np.float64)) for name in by])
     keys, curves = [], []
     for pair in sorted(set(map(tuple, labels.T))):
@@ -232,10 +232,10 @@ def pairs_of(
 def clusters(values: FloatArray, abscissa: FloatArray | None = None) -> NDArray[np.intp]:
     """Return the index of the group of each value.
 
-    Measured values that scatter about a few set values are divided into groups at the wide gaps. If the gaps between
+    Measured values scatter about a few set values; they are divided into groups at the wide gaps. If the gaps between
     distinct values are nearly equal, or if most values occur several times, each distinct value is a group of its own.
-    Values that alternate within one sweep of the abscissa are an exception: they are rounded readings of one set value
-    and form one group.
+    There is one exception: values that alternate within one sweep of the abscissa are rounded readings of one set
+    value, and form one group.
     """
     distinct, place, times = np.unique(values, return_inverse=True, return_counts=True)
     if distinct.size < 3:
@@ -254,6 +254,6 @@ def clusters(values: FloatArray, abscissa: FloatArray | None = None) -> NDArray[
 
 
 def is_temperature(by: str, unit: str = "") -> bool:
-    """Return whether a column contains temperatures, by its name or its unit."""
+    """Return whether a column contains temperatures, judged by its name or its unit."""
     named = column_of(pd.DataFrame(columns=[by]), "temperature") is not None or "temperature" in by.casefold()
     return named or _has_unit(unit, "K")

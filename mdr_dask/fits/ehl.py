@@ -1,4 +1,4 @@
-"""Fit film formulas to computed films: powers of the load parameter W, speed parameter U and material parameter G."""
+"""Fit film formulas to computed films: the film is proportional to powers of W (load), U (speed) and G (material)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _GROUPS = {"load": "W", "speed": "U", "material": "G"}
 
 
 def _logarithms(dataset: xr.Dataset, output: str) -> FloatArray:
-    """Return ln W, ln U, ln G and ln (h/R) of the cases with a film, shape (4, cases)."""
+    """Return ln W, ln U, ln G and ln(h/R) of the cases with a film thickness h, shape (4, cases)."""
     film = dataset[output].isel(realisation=0)
     table = np.stack([np.ravel(array) for array in xr.broadcast(*groups_of(dataset.coords.get), film)]).astype(
         np.float64
@@ -44,7 +44,7 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     residuals = table[3] - design[:, varied] @ solution
     inverse = np.linalg.pinv(design[:, varied])
     width[varied] = t.ppf(0.975, freedom) * np.sqrt(np.sum(inverse**2, axis=1) * np.sum(residuals**2) / freedom)
-    if np.sqrt(np.mean(residuals**2)) > WITHIN:  # a misfit is systematic and does not average out like scatter
+    if np.sqrt(np.mean(residuals**2)) > WITHIN:  # a systematic misfit does not average out like scatter
         width[varied] += np.abs(inverse) @ np.abs(residuals)
     constants[varied] = np.where(undetermined(design[:, varied]), np.nan, solution)
     return constants, width, residuals
@@ -53,9 +53,9 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 def _films(data: xr.Dataset) -> Variables:
     """Fit ``h/R = factor W^load U^speed G^material`` to the central and the minimum film.
 
-    An exponent is NaN if its parameter (W, U or G) does not vary, or varies only together with the other two. Films
-    have no scatter, so the intervals measure the misfit of the formula. ``law_holds`` refers to the formula of Pan and
-    Hamrock with its published constants.
+    An exponent is NaN if its parameter (W, U or G) does not vary, or varies only together with the other two. Computed
+    films have no scatter. Therefore the intervals measure the misfit of the formula. ``law_holds`` refers to the
+    formula of Pan and Hamrock with its published constants.
     """
     found: Variables = {}
     departures, of_stated = [], []

@@ -1,4 +1,4 @@
-"""The laws of steady sliding friction (thesis eqs. 3.11 to 3.18), fitted to a store.
+"""Fit the laws of steady sliding friction (thesis eqs. 3.11 to 3.18) to a store.
 
 `mdr_dask.bootstrap` defines the stacks from which intervals are computed.
 """
@@ -36,14 +36,14 @@ from mdr_dask.physics.sliding import laws
 MODELS = ("sliding_friction",)
 FRICTION = "friction_coefficient"
 ZONE_ONE = (0.01, 0.3)  # range of F_N / (G h L) in zone 1; other limits change alpha by up to 0.02, beta by up to 0.14
-LINEAR = 0.05  # region I: mu / v changes by less than this fraction between neighbouring velocities
+LINEAR = 0.05  # in region I, mu / v changes by less than this fraction between neighbouring velocities
 NEEDS_SLOPE = "not tested: the study has no output contact_slope"
 
 
 def spectral_slope(data: xr.Dataset) -> xr.DataArray:
     """Return the spectral rms slope, from the store or from the parameters of a generated line.
 
-    It is NaN for a smooth line, for which friction over slope has no meaning.
+    The slope is NaN for a smooth line, for which friction divided by slope has no meaning.
     """
     if "rms_slope" in data:
         stored = data["rms_slope"].mean("realisation")
@@ -95,8 +95,8 @@ def _first_linear(friction: FloatArray, velocity: FloatArray) -> int | None:
     """Return the index of the lowest velocity at which friction is proportional to velocity.
 
     Friction at two neighbouring velocities is compared, using the realisations that succeeded at both velocities. The
-    index is not always 0, because the time stepping of the papers gives a spurious lower limit of friction at low
-    velocity. None if friction is not proportional to velocity anywhere.
+    index is not always 0: with the time stepping of the papers, friction at low velocity does not fall below a spurious
+    lower limit. The result is None if friction is not proportional to velocity anywhere.
     """
     if velocity.size == 1:
         return 0
@@ -109,7 +109,7 @@ def _first_linear(friction: FloatArray, velocity: FloatArray) -> int | None:
 
 
 def loads_of_zone_one(force: FloatArray, known: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
-    """Return the indices of the cases of each load in zone 1."""
+    """Return, for each load in zone 1, the indices of the cases with this load."""
     inside = (force >= ZONE_ONE[0]) & (force <= ZONE_ONE[1]) & known
     return [np.flatnonzero((force == load) & known) for load in np.unique(force[inside])]
 
@@ -145,7 +145,7 @@ def _zone_one(data: xr.Dataset) -> Variables:
 
 
 def _plateau(data: xr.Dataset) -> Variables:
-    """Return the largest friction over all velocities, and compare it with the slope of the line and in contact."""
+    """Return the largest friction over all velocities; compare it with the slopes of the whole line and in contact."""
     require(data, "shear_modulus", "relaxation_time")
     velocities, form = _velocities(data)
     table = table_of(data, spectral_slope(data), velocities)
@@ -192,7 +192,7 @@ def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], coun
 
 
 def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str]:
-    """Return velocities and a format for one of them: the velocity number, or v tau if the study has no rms height."""
+    """Return the velocity numbers (v tau if the study has no rms height), and a format to write one of them."""
     if "rms_roughness" in data:
         return loads_and_velocities(data)[1], "v tau slope / (sqrt 2 h) = {:.2g}"
     return data["velocity"] * data["relaxation_time"], "v tau = {:.2g} m"
@@ -217,7 +217,7 @@ def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: st
 
 
 def rising(force: FloatArray, velocity: FloatArray, mean: FloatArray, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which known cases are in regions I to III: at each load, velocities up to that of the largest friction."""
+    """Return the known cases in regions I to III: at each load, those up to the velocity of the largest friction."""
     used = known & (mean > 0)
     for load in np.unique(force[used]):
         same = np.flatnonzero(used & (force == load))

@@ -11,18 +11,18 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.posterior import Posterior
 
-#: The data leave an end of an axis open if ln(density) at this end is less than this below its maximum. For a normal
-#: density, the end then lies within two standard errors of the maximum.
+#: The data leave an end of an axis open if ln(density) at this end is less than `OPEN` below the maximum of
+#: ln(density). For a normal density, the end then lies within two standard errors of the maximum.
 OPEN = 2.0
-#: An unknown is not determined if unknowns with an open end explain more than this share of its variance.
+#: An unknown is also undetermined if the unknowns with an open end explain more than this share of its variance.
 LINKED = 0.25
-#: A product is determined if its spread is less than this fraction of its spread without data.
+#: A product is determined if the data reduce its spread to less than this fraction of the spread without data.
 NARROW = 0.25
 #: Exponents are rounded to halves or thirds if the spread of the product grows by at most this factor.
 ROUNDED = 1.15
 #: Probability of each interval, by the suffix of the names of its ends.
 LEVELS = {"": 0.95, "_68": 0.6827}
-#: Suffixes of the names of the median and of the ends of the intervals; `SHARES` has the corresponding quantiles.
+#: Suffixes of the names of the median and of the ends of the intervals. `SHARES` has the corresponding quantiles.
 ENDS = ("", *(f"_{end}{kind}" for kind in LEVELS for end in ("low", "high")))
 SHARES = (0.5, *(0.5 + sign * level / 2 for level in LEVELS.values() for sign in (-1, 1)))
 
@@ -35,7 +35,7 @@ class Ends(NamedTuple):
 
 
 def open_ends(found: Posterior) -> list[Ends]:
-    """Return which ends of the axis of each unknown the data leave open."""
+    """Return for each unknown which ends of its axis the data leave open."""
     highest = found.density.max()
     ends = []
     for place in found.places.T:
@@ -70,7 +70,7 @@ def _explained(centred: FloatArray, weights: FloatArray, k: int, by: list[int]) 
 
 
 class Product(NamedTuple):
-    """A product of powers of unknowns that the data determine, although they do not determine the unknowns.
+    """A product of powers of unknowns, which the data determine although they do not determine the unknowns themselves.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ def products(found: Posterior, values: FloatArray, free: Sequence[int]) -> list[
     values : array, shape (cells, unknowns)
         The unknowns in SI.
     free : sequence of int
-        The unknowns that are not determined.
+        Indices of the unknowns that the data do not determine.
     """
     if len(free) < 2 or np.any(values[:, free] <= 0):
         return []
@@ -124,7 +124,7 @@ def _reduced(rows: FloatArray) -> FloatArray:
 
 
 def _product(found: Posterior, logarithms: FloatArray, free: Sequence[int], row: FloatArray, unknowns: int) -> Product:
-    """Return a product; its exponents are rounded to simple fractions if the spread hardly grows."""
+    """Return a product; exponents are rounded to simple fractions if this hardly increases its spread."""
     best = _spread(logarithms @ row, found.weights)
     for denominator in (1, 2, 3):
         plain = np.round(row * denominator) / denominator

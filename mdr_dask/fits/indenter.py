@@ -1,4 +1,4 @@
-"""The law of rough indenters fitted to a store (thesis eqs. 3.34 to 3.40)."""
+"""Fit the law of rough indenters (thesis eqs. 3.34 to 3.40) to a store."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mdr_dask.fits.cases import Variables, constant, each, holds, measure, nonli
 from mdr_dask.fits.friction import FRICTION, KELVIN, MODELS, spectral_slope
 from mdr_dask.physics.sliding import laws
 
-BODY = 0.3  # the law applies to bodies whose rms slope in contact is at most this fraction of that of the roughness
+BODY = 0.3  # the law applies up to this ratio of the rms slopes of the body in contact and of the roughness
 
 
 def _body(data: xr.Dataset) -> tuple[Any, float]:
@@ -90,7 +90,7 @@ def _indenter(data: xr.Dataset) -> Variables:
     logs = table.logarithms(used)
 
     def model(constants: FloatArray) -> FloatArray:
-        with np.errstate(invalid="ignore"):  # with one realisation, all resamples are NaN
+        with np.errstate(invalid="ignore"):  # if there is only one realisation, all resamples are NaN
             law: FloatArray = np.log(laws.indenter(xi, np.exp(constants)))
         return law
 

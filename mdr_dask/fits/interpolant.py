@@ -1,4 +1,4 @@
-"""A dense table of an output of a study and of its error, which any program can interpolate linearly."""
+"""Make a dense table of an output of a study and its error; any program can interpolate this table linearly."""
 
 from __future__ import annotations
 
@@ -17,22 +17,23 @@ from mdr_dask.fits.interpolation import FEWEST, LEFT, Scale, chord_error, cubic,
 from mdr_dask.models.base import Status
 from mdr_dask.questions.selection import written_apart
 
-#: Largest number of values of a table, and largest number of table intervals per interval of the study.
+#: Largest number of values of a table, and largest number of intervals of the table per interval of the study.
 LARGEST, PIECES = 2_000_000, 16
 
 
 def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     """Return an output as a dense table over the axes of its study, with its error.
 
-    The mean over realisations is interpolated by monotone cubics (PCHIP), axis by axis. The scale of an axis is
-    logarithmic if its values are more evenly spaced in the logarithm. The scale of the output is logarithmic if its
-    values differ by more than a factor of ten. The table is dense enough for linear interpolation (``Dataset.interp``).
+    The mean over realisations is interpolated by monotone cubics (PCHIP), axis by axis. An axis is interpolated on a
+    logarithmic scale if its logarithms are more evenly spaced than its values. The output is interpolated on a
+    logarithmic scale if its values differ by more than a factor of ten. The table is dense enough for linear
+    interpolation (``Dataset.interp``).
 
     Parameters
     ----------
     dataset : Dataset
-        A group of a study that is a grid. An axis with a single value becomes a fixed parameter. Axes whose values are
-        words are kept.
+        A group of a study that is a grid. An axis with a single value becomes a fixed parameter. An axis of words
+        remains an axis of the table, without interpolation.
     output : str
         One of its outputs.
 
@@ -82,7 +83,7 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
 
 
 def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray]:
-    """Return the mean of an output, and the half width of its interval or, without an interval, its grid error."""
+    """Return the mean of an output, and the half width of its interval; if it has no interval, its grid error."""
     if "realisation" not in dataset[output].dims:
         return dataset[output], xr.zeros_like(dataset[output])
     kept = [name for name in (output, dataset[output].attrs.get("ancillary_variables")) if name in dataset]
@@ -107,7 +108,7 @@ def _spared(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.DataArray, xr.DataArray]:
-    """Interpolate the cases that adaptive axes left out, and include the error of this interpolation."""
+    """Interpolate the cases that adaptive axes left out, and add the error of this interpolation."""
     axes = [k for k, dim in enumerate(mean.dims) if _is_numeric(mean, str(dim))]
     table, error = scale.of_values(mean.to_numpy()).copy(), half.to_numpy().copy()
     for axis in axes * 2:  # twice, because values filled along one axis are used along the other axes
@@ -126,7 +127,7 @@ def _between(scale: Scale, places: FloatArray, line: FloatArray, error: FloatArr
     filled = cubic(places[known], line[known], places, 0, Scale.of(places))
     left_out = (
         left_out_error(scale, line[known], places[known], 0) / LEFT
-    )  # without the factor LEFT: the gaps are as wide as the gaps that leaving out every second value makes
+    )  # no factor LEFT: the missing values leave gaps as wide as those of the estimate, which omits every second value
     between = np.interp(places, places[known], error[known] + left_out)
     inside = (places >= places[known][0]) & (places <= places[known][-1])
     return np.where(inside, filled, np.nan), np.where(known, error, between)
@@ -157,7 +158,7 @@ def _provenance(dataset: xr.Dataset) -> dict[str, str]:
 
 
 class Law:
-    """A law in a file written by ``mdr-dask law``, for evaluation at many points.
+    """A law from a file written by ``mdr-dask law``; it can be evaluated at many points.
 
     Parameters
     ----------
@@ -182,7 +183,7 @@ class Law:
         self._interpolate = RegularGridInterpolator(tuple(self.axes.values()), both)
 
     def __call__(self, **places: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return values and errors (half widths of 95 % intervals) at places.
+        """Return values and errors (half widths of 95 % intervals) at given values of the axes.
 
         Parameters
         ----------
@@ -192,7 +193,7 @@ class Law:
         Raises
         ------
         DataError
-            If an axis is missing or unknown, or if a place lies outside the range of an axis.
+            If an axis is missing or unknown, or if a value lies outside the range of its axis.
         """
         points = np.stack(np.broadcast_arrays(*self._checked(places).values()), axis=-1)
         found = self._interpolate(points).reshape(*points.shape[:-1], 2)

@@ -8,10 +8,10 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 
-#: Least number of values of an axis. If every second value is left out, enough values for a curve must remain.
+#: Least number of values of an axis: even if every second value is left out, enough values for a curve must remain.
 FEWEST = 4
-#: Ratio of the error of interpolation from all values to the error from every second value. It is 1/4 for an error of
-#: second order; at a kink it would be 1/2.
+#: The error of interpolation between all values, divided by the error if only every second value is used. The ratio is
+#: 1/4 for an error of second order; at a kink it would be 1/2.
 LEFT = 0.25
 
 
@@ -23,9 +23,10 @@ class Scale:
 
     @classmethod
     def of(cls, numbers: FloatArray, spread: bool = False) -> Scale:
-        """Return the scale on which ascending numbers are more evenly spaced; linear unless all are positive.
+        """Return the scale on which ascending numbers are more evenly spaced; it is linear unless all are positive.
 
-        With `spread`, the numbers may have any order, and the scale is logarithmic if they span more than a decade.
+        With `spread`, the numbers may have any order, and the criterion is another one: the scale is logarithmic if the
+        numbers span more than a decade.
         """
         if numbers.min() <= 0:
             return cls(False)
@@ -45,7 +46,7 @@ class Scale:
 
 
 def dense(places: FloatArray, pieces: int) -> FloatArray:
-    """Return places with each interval divided into equal pieces on their scale; the given places are kept."""
+    """Divide each interval between places into equal pieces on their scale; the result includes the given places."""
     scale = Scale.of(places)
     cut = [np.linspace(a, b, pieces, endpoint=False) for a, b in pairwise(scale.of_values(places))]
     grid = scale.back(np.concatenate([*cut, scale.of_values(places[-1:])]))
@@ -56,7 +57,7 @@ def dense(places: FloatArray, pieces: int) -> FloatArray:
 def cubic(
     places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int, scale: Scale | None = None
 ) -> FloatArray:
-    """Interpolate values along an axis by monotone cubics, at other places; by default on the scale of the axis."""
+    """Interpolate values along an axis at other places by monotone cubics; `scale` is that of the axis by default."""
     from scipy.interpolate import PchipInterpolator
 
     scale = scale or Scale.of(places)
@@ -67,7 +68,7 @@ def cubic(
 def linear(
     places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int, scale: Scale | None = None
 ) -> FloatArray:
-    """Interpolate values along an axis linearly, at other places; scale as in `cubic`."""
+    """Interpolate values along an axis at other places linearly; `scale` as in `cubic`."""
     from scipy.interpolate import make_interp_spline
 
     scale = scale or Scale.of(places)
@@ -77,8 +78,8 @@ def linear(
 def left_out_error(scale: Scale, table: FloatArray, places: FloatArray, axis: int) -> FloatArray:
     """Return the error of interpolation at every place of an axis, estimated by leaving out every second value.
 
-    `table` contains values on `scale`, but the returned error is the error of the numbers themselves. Each place has
-    the largest of the errors at this place and at its two neighbours.
+    `table` contains values on `scale`, but the returned error is the error of the numbers themselves. The error of each
+    place is the largest of the estimates at this place and at its two neighbours.
     """
     values, truth = np.moveaxis(table, axis, -1), np.moveaxis(scale.back(table), axis, -1)
     most = np.zeros_like(truth)
@@ -92,7 +93,7 @@ def left_out_error(scale: Scale, table: FloatArray, places: FloatArray, axis: in
 
 
 def chord_error(table: FloatArray, grid: FloatArray, axis: int) -> FloatArray:
-    """Return the error of linear interpolation between the values of a table: second derivative times spacing^2 / 8."""
+    """Return the error of linear interpolation in a table: the second derivative times spacing^2 / 8."""
     values, steps = np.moveaxis(table, axis, -1), np.diff(grid)
     bend = np.abs(np.diff(np.diff(values) / steps)) / (steps[1:] + steps[:-1])
     inside = bend * np.maximum(steps[1:], steps[:-1]) ** 2 / 4
@@ -101,5 +102,5 @@ def chord_error(table: FloatArray, grid: FloatArray, axis: int) -> FloatArray:
 
 
 def _largest(padded: FloatArray) -> FloatArray:
-    """Return the largest of every three neighbours along the last axis."""
+    """Return the largest value of every three neighbours along the last axis."""
     return np.asarray(np.max([padded[..., :-2], padded[..., 1:-1], padded[..., 2:]], axis=0))

@@ -1,7 +1,7 @@
 """Friction just after a jump of the velocity: its size, its law and the limits of the law (thesis eqs. 4.8 to 4.11).
 
-The velocity jumps at time t_0 from v_1 to v_2 = v_1 + dv. Friction is mu_1 before the jump and mu_2 long after the
-jump, and d_mu_0 is its jump at t_0. The symbol s means the rms slope.
+The velocity jumps at time t_0 from v_1 to v_2 = v_1 + dv. Friction is mu_1 before the jump and mu_2 long after it;
+d_mu_0 is the sudden change of friction at t_0. The symbol s means the rms slope.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ LEVELS = ("friction_coefficient_before", "friction_coefficient_jump", "friction_
 LEAST = 2  # smallest number of successful realisations of a case
 
 LAW = 0.4  # constant of eqs. 4.10 and 4.11 in the thesis
-REGION_ONE = 0.1  # mu_1 / s up to which eqs. 4.9 and 4.11 differ by less than 3 %
-PLATEAU = 1.1  # mu_1 / s above which friction counts as on its plateau; the plateau is at 1.26 to 1.44
+REGION_ONE = 0.1  # up to this mu_1 / s, eqs. 4.9 and 4.11 differ by less than 3 %
+PLATEAU = 1.1  # above this mu_1 / s, friction counts as on its plateau, where mu_1 / s is 1.26 to 1.44
 
 NUMBERS = {
     "before_over_slope": "mu_1 / rms_slope",
@@ -77,7 +77,7 @@ def each_jump(
 
 
 def single(data: xr.Dataset) -> list[str]:
-    """Return no dimension: every case is fitted for itself."""
+    """Return no dimensions, because every case is fitted on its own."""
     return []
 
 
@@ -89,7 +89,7 @@ class Jumps(NamedTuple):
     before, jump, after : array, shape (1 + RESAMPLES + 2 groups, cases)
         Stacks of mu_1, d_mu_0 and mu_2.
     change, slope : array, shape (cases,)
-        dv / v_1, and the rms slope; NaN for smooth lines.
+        dv / v_1 and the rms slope. The slope is NaN for smooth lines.
     counts : int array, shape (cases,)
         Number of successful realisations.
     """
@@ -146,7 +146,8 @@ def _kinetics(case: xr.Dataset) -> Variables:
     return found
 
 
-#: Limits of eq. 4.11: value, name of the verdict, meaning of the constant, and of the verdict.
+#: Limits of eq. 4.11. Each entry has the value of the limit, the name of the verdict, and the meanings of the mean and
+#: of the verdict.
 LIMITS = {
     "zeta": (1.0, "zeta_holds", "mean zeta in region I; 1 by eq. 4.9", "whether zeta = 1 in region I (eq. 4.9)"),
     "plateau_jump": (
@@ -165,7 +166,7 @@ def jump_law(before: FloatArray, constant: float | FloatArray) -> FloatArray:
 
 
 def _jump_law(data: xr.Dataset) -> Variables:
-    """Fit the constant of eq. 4.11 to all cases in regions I to III, and test the limits 4.9 and 4.10."""
+    """Fit the constant of eq. 4.11 to all cases in regions I to III, and test its limits, eqs. 4.9 and 4.10."""
     jumps = jumps_of(data)
     numbers = jumps.numbers()
     before, jump, zeta = numbers["before_over_slope"], numbers["jump_over_slope"], numbers["zeta"]
@@ -190,7 +191,7 @@ def _constant(before: FloatArray, jump: FloatArray, count: int) -> Variables:
         return measured | holds(reason, reason)
 
     def model(constants: FloatArray) -> FloatArray:
-        # data shifted by the departures from the law are compared with mu_1 of the data
+        # additional rows hold data shifted by the departures from the law; they use mu_1 of the first row
         law: FloatArray = np.log(jump_law(before if len(constants) == len(before) else before[:1], np.exp(constants)))
         return law
 
@@ -206,7 +207,7 @@ def _constant(before: FloatArray, jump: FloatArray, count: int) -> Variables:
 
 
 def _limit(name: str, stack: FloatArray, count: int) -> Variables:
-    """Return the mean of a number over the cases of a region, and a sentence on whether it equals its limit there."""
+    """Return the mean of a number over the cases of a region, and a sentence on whether the mean equals the limit."""
     limit, verdict_name, meaning, question = LIMITS[name]
     if not stack.shape[1]:
         nothing = constant(name, np.full(1 + bootstrap.RESAMPLES, np.nan), count, meaning)
@@ -224,7 +225,7 @@ TRENDS = {
 
 
 def _jump_linearity(data: xr.Dataset) -> Variables:
-    """Fit straight lines to zeta and xi against dv / v_1; by eq. 4.8 both are constant."""
+    """Fit straight lines to zeta and xi against dv / v_1; according to eq. 4.8, zeta and xi are constant."""
     if np.unique(data["velocity_change"]).size < 3:
         raise FitError("expected a series with jumps dv / v_1 of three sizes or more")
     jumps = jumps_of(data)

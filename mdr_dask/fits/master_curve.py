@@ -1,4 +1,4 @@
-"""Master curves of a store or of any table: shift factors, the merged curve, and the laws that the factors follow."""
+"""Master curves of a store or of any table: shift factors, merged curve, and laws of the shift factors."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from mdr_dask.physics.superposition import master_curve as superposition
 from mdr_dask.physics.superposition import two_factors as two_shifts
 from mdr_dask.physics.superposition.master_curve import EXPANSION, OFFSET, Superposition, Vertical
 
-SHARE_OF_BARS = 0.6827  # fraction of the random draws of a factor that lie within its bar ``_error``
+SHARE_OF_BARS = 0.6827  # fraction of the random draws of a shift factor that lie within its error bar ``_error``
 
 
 def master_curve(
@@ -38,9 +38,9 @@ def master_curve(
     vertical: Vertical | None = None,
     reference: float | None = None,
 ) -> xr.Dataset:
-    """Shift curves of a table into one.
+    """Shift the curves of a table so that they merge into one curve.
 
-    If the curves differ in velocity v and in temperature T, the shift has two parts: log x becomes
+    If the curves differ in velocity v and in temperature T, the shift of the abscissa x has two parts: log x becomes
     log x + a(v) + b(T).
 
     Parameters
@@ -48,35 +48,36 @@ def master_curve(
     table : Dataset or DataFrame
         A series of a store (realisations are averaged) or columns of numbers.
     abscissa, ordinate, group : str, optional
-        Columns: the abscissa, the values, and the parameter in which the curves differ. By default the coefficient of
-        friction against force at different velocities (or temperatures), or the moduli against frequency or time at
-        different temperatures. Storage and loss modulus of one test are two ordinates, which are shifted together.
+        Columns of the abscissa, of the values, and of the parameter in which the curves differ. By default, these are
+        the coefficient of friction against force at different velocities (or temperatures), or the moduli against
+        frequency or time at different temperatures. Storage and loss modulus of one test are two ordinates and are
+        shifted together.
     vertical : {'none', 'modulus', 'compliance', 'free'}, optional
-        Kind of the factors along the ordinate, see `superpose`. By default ``modulus`` or ``compliance`` for these
-        quantities against time or frequency at different temperatures, otherwise ``none``.
+        Kind of the factors along the ordinate, see `superpose`. For moduli or compliances against time or frequency at
+        different temperatures, the default is ``modulus`` or ``compliance``; otherwise it is ``none``.
     reference : float, optional
-        Value of the group at which the factors are zero; by default the middle group. Between two groups, the factor
-        follows from interpolation about the best law, whose error is included in the intervals. With
-        two kinds of groups, the reference is the nearest value of the first kind.
+        Value of the group at which the factors are zero; by default that of the middle group. If the reference lies
+        between two groups, the factor there is interpolated about the best law, and the intervals include the error of
+        this interpolation. With two kinds of groups, the reference becomes the nearest value of the first kind.
 
     Returns
     -------
     Dataset
-        ``shift_factor`` and ``vertical_factor`` (decades added to the logarithms of abscissa and ordinate) over the
-        group, with ``_error`` (68 %), ``_low`` and ``_high`` (95 %), ``covariance`` and ``draws``;
-        ``point_abscissa``, ``point_ordinate``, ``point_group``: all points after shifting; ``curve_abscissa``,
-        ``curve_ordinate``, ``curve_error``: the merged curve (the error in decades), with the range measured at the
-        reference in its attrs; ``point_companion``, ``curve_companion``, ``curve_companion_error`` for a second
-        ordinate; constants of the laws that apply. With two kinds of groups also ``second_factor``
-        over the second kind, the constants of its laws, and in the attrs ``second``, ``second_reference``,
-        ``chi_squared`` and ``probability`` of the sum of both factors. The attr ``vertical`` describes the vertical
-        factors that were used.
+        ``shift_factor`` and ``vertical_factor`` are added, in decades, to the logarithms of abscissa and ordinate; they
+        have the dimension of the group, and ``_error`` (68 %), ``_low`` and ``_high`` (95 %), ``covariance`` and
+        ``draws``. ``point_abscissa``, ``point_ordinate`` and ``point_group`` are all points after shifting.
+        ``curve_abscissa``, ``curve_ordinate`` and ``curve_error`` are the merged curve and its error in decades; its
+        attrs contain the range that was measured at the reference. A second ordinate has ``point_companion``,
+        ``curve_companion`` and ``curve_companion_error``. The constants of the laws that apply are also included. With
+        two kinds of groups, there are also ``second_factor`` over the second kind and the constants of its laws; the
+        attrs then contain ``second`` and ``second_reference``, and ``chi_squared`` and ``probability`` of the sum of
+        both factors. The attr ``vertical`` describes the vertical factors that were used.
 
     Raises
     ------
     DataError
-        If a column is missing, not positive, or the curves do not overlap; if vertical factors are requested for two
-        kinds of groups, which do not determine them.
+        If a column is missing or not positive; if the curves do not overlap; or if vertical factors are requested for
+        two kinds of groups, because such curves do not determine them.
     """
     frame = frame_of(table)
     over, ordinates, by = columns_to_use(frame, abscissa, ordinate, group)
@@ -130,7 +131,7 @@ def _require_no_axis_beside(values: xr.DataArray, used: set[str | None]) -> None
 
 
 def _undetermined(found: Superposition) -> str:
-    """Return a sentence about the shifts between neighbours that the curves do not determine; empty without any."""
+    """Return a sentence about undetermined shifts between neighbouring curves; empty if all are determined."""
     if not found.undetermined:
         return ""
     runs = ", ".join(f"between {low:.6g} and {high:.6g}" for low, high in found.undetermined)
@@ -172,7 +173,7 @@ def _of_two_groups(
 
 
 def _inside(groups: FloatArray, reference: float) -> float:
-    """Return the reference, or the nearest group if it lies just outside the range (measured set points scatter)."""
+    """Return the reference, or the nearest group if the reference lies just outside, as measured set points scatter."""
     margin = 0.1 * np.ptp(groups) / max(groups.size - 1, 1)
     if not groups.min() - margin <= reference <= groups.max() + margin:
         told, low, high = distinguishable(reference, groups.min(), groups.max(), digits=6)
@@ -292,11 +293,11 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
 
 
 def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    """Return the friction due to roughness for a force master curve, from the series of a store.
+    """Return the friction due to roughness, for a master curve against force, from the series of a store.
 
     It is the coefficient of friction of the first rough series that varies force and velocity, averaged over
-    realisations. If there is a series with the same forces and velocities and without roughness, its friction, which is
-    due to the bulk alone, is subtracted.
+    realisations. There may be a series with the same forces and velocities but without roughness. Its friction is due
+    to the bulk alone and is subtracted.
 
     Raises
     ------

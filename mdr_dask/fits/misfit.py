@@ -1,4 +1,4 @@
-"""Test a model against measured points: by chi squared if errors are known, else by a trend of the residuals."""
+"""Test a model against measured points: by chi squared if their errors are known, else by a trend of the residuals."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Residuals(NamedTuple):
     chi_squared : float
         Chi squared, including correlations of the errors; NaN if the errors of measurement are unknown.
     freedom : int
-        Degrees of freedom: points minus determined combinations of unknowns.
+        Degrees of freedom: number of points minus number of combinations of unknowns that the data determine.
     errors : float
         Rms of the standard deviations of measured minus predicted values, divided by the rms of the measured values.
     """
@@ -42,12 +42,12 @@ class Residuals(NamedTuple):
 
     @property
     def chance(self) -> float:
-        """Probability that errors alone cause residuals of this size; NaN if the errors are unknown."""
+        """Probability that errors alone cause residuals as large as these; NaN if the errors are unknown."""
         return float(chdtrc(self.freedom, self.chi_squared)) if self.freedom > 0 else np.nan
 
 
 def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str:
-    """Return a sentence on whether the model explains the points: *not tested* if errors would hide any misfit."""
+    """Return a sentence on whether the model explains the points; *not tested* if errors would hide any misfit."""
     size = f"residuals are {100 * residuals.relative:.2g} % of the measured values, rms"
     hidden = (
         f"not tested: errors of {100 * residuals.errors:.2g} % of the measured values would hide any misfit; {size}"

@@ -16,9 +16,10 @@ START = {1: 64, 2: 24, 3: 12, 4: 8}
 #: `BEST`: least number of cells that are refined, by the number of unknowns. `MOST`: largest number of cells after a
 #: refinement.
 BEST, MOST = {1: 32, 2: 256, 3: 768, 4: 1536}, 160_000
-#: Cells with ln(density) more than this below the maximum are left out; together they have a probability below 1e-5.
+#: Cells are left out if their ln(density) is more than this below the maximum. Together, such cells have a probability
+#: below 1e-5.
 REACH = 14.0
-#: Refinement ends if ln(density) varies within a cell by less than this, on average over the cells.
+#: Refinement ends when ln(density) varies within a cell by less than this, on average over the cells.
 SMOOTH = 0.6
 #: Largest number of refinements.
 LEVELS = 16
@@ -58,7 +59,8 @@ def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) 
     values : array, shape (points,)
         Measured values.
     noises : list of Noise
-        Possible errors of measurement. All have the same prior probability, and so have all sizes of one element.
+        Possible errors of measurement. All elements of the list have the same prior probability, and within one element
+        all sizes have the same prior probability.
 
     Returns
     -------
@@ -82,9 +84,10 @@ def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) 
 
 
 def distance(values: FloatArray, predicted: Predicted, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return chi squared, and the logarithm of the determinant of the covariance, shape (sets,).
+    """Return chi squared and the logarithm of the determinant of the covariance, each of shape (sets,).
 
-    The covariance is diagonal except for a few errors that all points share; these are added by Woodbury's identity.
+    The covariance is diagonal except for a few errors that all points share. Woodbury's identity includes these errors
+    without inverting a large matrix.
     """
     variance = np.maximum(predicted.alone + noise, np.finfo(float).tiny)
     residual = values - predicted.mean
@@ -103,7 +106,7 @@ class Posterior(NamedTuple):
     Attributes
     ----------
     places : array, shape (cells, unknowns)
-        Centres; 0 and 1 are the ends of the axes, linear or logarithmic.
+        Centres of the cells; 0 and 1 are the ends of the linear or logarithmic axes.
     weights : array, shape (cells,)
         Probability of each cell; the sum is 1.
     density : array, shape (cells,)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 MOST, LARGEST = 4, 4e6
 #: Largest number of table intervals per interval of the study.
 PIECES = 16
-#: Relative difference up to which a measured and a computed value of a parameter are the same.
+#: Relative difference up to which a measured and a computed value of a parameter count as equal.
 SAME = 1e-6
 #: The scatter that all cases share, because they use the same lines, is represented by a few modes. `MODES` is their
 #: largest number, `SHARE` the share of the variance that is enough.
@@ -39,8 +39,8 @@ class Predicted(NamedTuple):
     ----------
     mean : array, shape (sets, points)
     together : array, shape (sets, points, modes)
-        Errors that all points share, as one standard deviation for each mode. They are due to the scatter of the lines,
-        the grid and the interpolation.
+        Errors that all points share; each mode is a vector of standard deviations. These errors are due to the scatter
+        of the lines, the grid and the interpolation.
     alone : array, shape (sets, points)
         Variance of the errors that are independent for each point.
     """
@@ -61,7 +61,7 @@ class Prediction:
     realisations : int
         Number of lines.
     logarithmic : bool
-        Whether the output is interpolated in logarithms.
+        Whether the logarithm of the output is interpolated.
     """
 
     unknowns: Mapping[str, FloatArray]
@@ -100,7 +100,7 @@ def prediction(dataset: xr.Dataset, measured: Measured) -> Prediction:
     Raises
     ------
     FitError
-        If the study is not a grid, has no unknowns or too many of them, has too few values of an axis, or has cases
+        If the study is not a grid, has no unknowns or too many of them, has an axis with too few values, or has cases
         without a value.
     DataError
         If a measured point lies outside the study.
@@ -176,8 +176,8 @@ def _fields(
 ) -> tuple[FloatArray, bool]:
     """Return the fields that are interpolated, and whether the field of the mean contains logarithms.
 
-    The shape is (conditions ..., unknowns ..., fields). The fields are the mean, whether it is missing, the independent
-    scatter, the error of grid and interpolation, and the common modes of the scatter.
+    The shape is (conditions ..., unknowns ..., fields). The fields are the mean, a flag for a missing mean, the
+    independent scatter, the error of grid and interpolation, and the common modes of the scatter.
     """
     order = [*along, *unknowns]
     array = dataset[output]
@@ -249,14 +249,14 @@ def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray)
 
 
 def _widened(number: NDArray[np.intp]) -> FloatArray:
-    """Return the 97.5 % quantile of Student's t divided by that of the normal distribution, for a number of lines."""
+    """Return, for a number of lines, the 97.5 % quantile of Student's t divided by that of the normal distribution."""
     few = np.maximum(number, 2)
     widened: FloatArray = bootstrap.widening(few) * np.sqrt((few - 1) / few)
     return widened
 
 
 def _at_point(fields: FloatArray, axes: Sequence[FloatArray], place: Sequence[float]) -> FloatArray:
-    """Return the fields at a measured point, interpolated along one condition after the other (first dimensions)."""
+    """Return the fields at a measured point, interpolated along the first dimensions, one condition after the other."""
     for axis, wanted in zip(axes, place, strict=True):
         nearest = int(np.argmin(np.abs(axis - wanted)))
         if _is_computed(axis, np.array([wanted])):

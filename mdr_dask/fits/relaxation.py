@@ -1,6 +1,6 @@
-"""How friction relaxes after a jump of the velocity: one exponential, and the laws of its rate (eqs. 4.5 to 4.15).
+"""Relaxation of friction after a jump of the velocity: one exponential and its rate (thesis eqs. 4.5 to 4.15).
 
-`mdr_dask.fits.jumps` defines the symbols; t' = (t - t_0) / tau.
+`mdr_dask.fits.jumps` defines the symbols. In addition, t' = (t - t_0) / tau.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ GRID = 400  # rates that are tried, evenly spaced on a logarithmic scale
 
 TRUSTED = 0.5  # a rate is used to fit the power law if the half width of the interval of ln(rate) is below this
 SURE = 0.1  # added in quadrature to the error of ln(rate) in the weights, so that no single rate dominates the fit
-INSTANT = 1e-9  # no relaxation is fitted if the relaxing part of friction is below this times the rms slope
+INSTANT = 1e-9  # no relaxation is fitted if the relaxing part of friction is smaller than this times the rms slope
 
 TRACE = "friction_coefficient"
 #: Constants of the relaxation of a case, with units and meanings.
@@ -56,8 +56,9 @@ class Relaxation(NamedTuple):
     Attributes
     ----------
     rate, amplitude, integral_rate : array, shape (rows,)
-        Stacks. If scatter and errors do not explain the departures of the trace from one exponential, `rate` has
-        additional rows at its end: rates fitted to the trace shifted by these departures, and the integral rate.
+        Stacks of the fitted rate, of the amplitude, and of the rate that follows from the integral of the trace. If
+        scatter and errors do not explain the departures of the trace from one exponential, `rate` has additional rows
+        at its end: rates fitted to the trace shifted by these departures, and the integral rate.
     holds : str
         Whether one exponential fits; departures are relative to the largest relaxing part.
     """
@@ -78,8 +79,8 @@ def widths(time: FloatArray) -> FloatArray:
 def point_weights(time: FloatArray, trace: FloatArray, error: FloatArray) -> FloatArray:
     """Return the weight of each moment of a mean trace: its duration over its variance.
 
-    On a logarithmic grid the early moments are dense, and neighbours carry the same information. The weight by duration
-    corrects for this.
+    On a logarithmic grid, the early moments are dense and their neighbours carry the same information. Weights in
+    proportion to the duration correct for this.
     """
     variance = error**2 + (FLOOR * np.abs(trace).max()) ** 2
     weights: FloatArray = widths(time) / variance
@@ -88,7 +89,7 @@ def point_weights(time: FloatArray, trace: FloatArray, error: FloatArray) -> Flo
 
 
 def tried_rates(time: FloatArray) -> FloatArray:
-    """Return the rates that are tried for a trace; slower and faster rates cannot be resolved at these moments."""
+    """Return the rates that are tried for a trace; its moments do not resolve slower or faster rates."""
     rates: FloatArray = np.geomspace(0.02 / time[-1], 2 / time[time > 0][0], GRID)
     return rates
 
@@ -138,7 +139,7 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
     count : int
         Realisations.
     expected : float
-        Rate by the law. It determines the fitted part of the trace, t' <= 8 / expected.
+        Rate by eq. 4.12. It determines the fitted part of the trace, t' <= 8 / expected.
     """
     inside = time <= window(time, expected)
     t, y = time[inside], traces[:, inside]
@@ -152,7 +153,7 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
     if not chance >= DOUBTFUL:
         rates, amplitudes = exponential(t, bootstrap.moved(y[0], residuals[0]), weights)
         rate, amplitude = np.concatenate([rate, rates, integral[:1], rate[:1]]), np.concatenate([amplitude, amplitudes])
-    if outside[0] or outside.mean() > bootstrap.TAILS[0]:  # a rate at an end of the tried range is no estimate
+    if outside[0] or outside.mean() > bootstrap.TAILS[0]:  # a rate at an end of the tried range is not an estimate
         rate = np.full_like(rate, np.nan)
     relative = residuals / np.abs(y[0]).max()
     holds = law_holds(relative[0], chance, 2, scatter=bootstrap.scatter(relative, count))
@@ -160,7 +161,7 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
 
 
 def window(time: FloatArray, expected: float) -> float:
-    """Return the last moment of the fit, which includes at least eight moments after the first."""
+    """Return the last moment of the fit; the fit includes at least eight moments after the first one."""
     return float(time[time <= max(WINDOW / expected, time[min(8, time.size - 1)])][-1])
 
 
@@ -168,7 +169,7 @@ def window(time: FloatArray, expected: float) -> float:
 
 
 def law_rate(number: float, hurst: float) -> float:
-    """Return the rate of eq. 4.12 from v_1 tau q_max: its power is 1 below v_1 tau q_max = 1, and 1 - H above."""
+    """Return the rate of eq. 4.12 from v_1 tau q_max; its power is 1 below v_1 tau q_max = 1 and 1 - H above 1."""
     return number if number < 1 else number ** (1 - hurst)
 
 
@@ -178,7 +179,7 @@ def _wavenumber(case: xr.Dataset) -> float:
 
 
 def _passing_number(case: xr.Dataset) -> float:
-    """Return v_1 tau q_max: the relaxation time over the time in which v_1 covers 1 / q_max."""
+    """Return v_1 tau q_max: the relaxation time divided by the time in which the body slides by 1 / q_max."""
     return one_value(case, "velocity") * one_value(case, "relaxation_time") * _wavenumber(case)
 
 
@@ -268,7 +269,7 @@ def _closed_law(case: xr.Dataset, rate: float) -> Variables:
 
 
 def _relaxation(case: xr.Dataset) -> Variables:
-    """Return rate, time and length of the relaxation of a case, and compare with the law of eqs. 4.13 to 4.15."""
+    """Return rate, time and length of the relaxation of a case, and compare it with the law of eqs. 4.13 to 4.15."""
     found, count = _fit_case(case), int(jumps_of(case).counts[0])
     nothing = np.full(1 + bootstrap.RESAMPLES, np.nan)
     rate, integral = (found.rate, found.integral_rate) if found else (nothing, nothing)
@@ -320,7 +321,7 @@ def _rate_power(data: xr.Dataset) -> Variables:
 
 
 def _side_by_side(found: list[Relaxation | None]) -> FloatArray:
-    """Return the stacks of the rates of all cases as columns; missing rows of a column repeat its first row."""
+    """Return the stacks of the rates of all cases as columns; a shorter column is filled with its first value."""
     most = 1 + bootstrap.RESAMPLES + 2 * bootstrap.GROUPS
     stacks = [one.rate[:most] if one else np.full(1, np.nan) for one in found]
     columns = np.empty((max(1 + bootstrap.RESAMPLES, *(stack.size for stack in stacks)), len(stacks)))

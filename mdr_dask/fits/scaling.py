@@ -1,4 +1,4 @@
-"""Growth of the contact, slope in contact, and the general scaling of sliding friction (thesis eqs. 3.12 to 3.23)."""
+"""Fit contact growth, slope in contact, and the general scaling of sliding friction (thesis eqs. 3.12 to 3.23)."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from mdr_dask.fits.friction import (
 )
 from mdr_dask.physics.sliding import laws
 
-KNOTS = 2  # knots of the common curve per decade of velocity
+KNOTS = 2  # number of knots of the common curve per decade of velocity
 SLOPE_FOLLOWED = "whether friction beyond its maximum is proportional to the slope in contact"
 
 
@@ -110,7 +110,7 @@ def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> Floa
 
 
 def _contact_slope(data: xr.Dataset) -> Variables:
-    """Compare the slope in contact with eq. 3.21, whose factor is fitted, and compare friction with this slope."""
+    """Compare the slope in contact with eq. 3.21 after fitting its factor, and compare friction with this slope."""
     hurst, points = one_value(data, "hurst"), one_value(data, "points")
     slopes = table_of(data, spectral_slope(data), output="contact_slope")
     fractions = table_of(data, 1.0, output="contact_fraction")
@@ -122,7 +122,7 @@ def _contact_slope(data: xr.Dataset) -> Variables:
     found = linear(np.ones((1, used.size)), bootstrap.difference(slopes.logarithms(used), law), count)
     fraction = fractions.mean()[used]
     holding = found.holds(lambda k: f"L_cont / L = {fraction[k]:.2g}")
-    if np.ptp(np.log(fraction)) < WITHIN:  # because the factor is fitted, equal lengths cannot contradict the law
+    if np.ptp(np.log(fraction)) < WITHIN:  # as the factor is fitted, equal contact lengths cannot contradict the law
         holding = f"not tested: the lengths in contact of these cases differ by less than {WITHIN:.0%}"
     return {
         **constant("factor", np.exp(found.constants[:, 0]), count, "slope in contact over eq. 3.21", positive=True),
@@ -171,8 +171,8 @@ class Collapse(NamedTuple):
     constants : int
         Number of fitted constants: heights of the common curve at its knots, and shifts.
     vague : array, shape (curves,)
-        Whether the data do not determine a shift of the curve. This happens to straight curves and to curves next to a
-        straight curve.
+        Whether a shift of the curve is undetermined. This happens to straight curves and to curves next to a straight
+        curve.
     """
 
     shifts: FloatArray
@@ -196,13 +196,13 @@ def collapse(
     rows : array, shape (rows, points)
         Stack of logarithms of friction.
     curve : int array, shape (points,)
-        Curve of each point.
+        Index of the curve to which each point belongs.
     start : array, shape (curves,)
         Shifts along x at which the search starts. A second search starts at zero, and the better result is used.
     reference : int
-        Curve that is not shifted.
+        Index of the curve that is not shifted.
     vertical : bool
-        Whether to shift along friction, too.
+        Whether curves are also shifted along the logarithm of friction.
     """
     from scipy.optimize import OptimizeResult, least_squares
 
@@ -214,7 +214,8 @@ def collapse(
         place = x + begin[curve]
         ends = place.min() - 0.5, place.max() + 0.5
         knots = np.linspace(*ends, 2 + int(np.ceil(KNOTS * (ends[1] - ends[0]) / np.log(10))))
-        bends = 1e-3 * np.diff(np.eye(knots.size), 2, axis=0)  # straightens the curve where there are no points
+        # a weak penalty on bends straightens the curve where there are no points
+        bends = 1e-3 * np.diff(np.eye(knots.size), 2, axis=0)
 
         def residuals(unknown: FloatArray) -> FloatArray:
             height, shift = unknown[: knots.size], unknown[knots.size :].reshape(axes, free.size)
@@ -242,10 +243,10 @@ def collapse(
 
 
 def _natural(knots: FloatArray, place: FloatArray) -> FloatArray:
-    """Return the cardinal splines of some knots at some places, shape (places, knots).
+    """Return the values, shape (places, knots), of the cardinal splines of some knots at some places.
 
     Cardinal spline k is the natural cubic spline that is 1 at knot k and 0 at every other knot. Outside the range of
-    the knots it continues as a straight line.
+    the knots, the spline continues as a straight line.
     """
     from scipy.interpolate import CubicSpline
 

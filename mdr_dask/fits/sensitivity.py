@@ -1,7 +1,8 @@
 """Sobol indices: the share of the variance of an output that each input of a study explains.
 
-The output is the mean over realisations. Each index is a ratio of mean products of the outputs of two cases. Products
-of two results of the same realisation are left out, because they contain the variance of the scatter.
+The output is the mean over realisations. Each index is a ratio of two means of products; each product multiplies the
+outputs of two cases. Products of two results of the same realisation are left out, because they contain the variance of
+the scatter.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError, distinguishable
 
-#: Largest half width of the interval of an index with which inputs can be compared.
+#: Inputs can be compared if the half width of the interval of each index is at most this.
 NARROW = 0.1
 #: Least number of points from which an index is computed.
 FEWEST = 16
@@ -37,25 +38,27 @@ def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
     dataset : Dataset
         A group of a study with the dimension ``case``.
     output : str
-        An output without other dimensions.
+        An output that has no dimensions besides those of cases and realisations.
 
     Returns
     -------
     Dataset
         Over ``parameter``: ``first`` and ``total`` with the ends of their 95 % intervals, ``<index>_low`` and
-        ``<index>_high``; NaN for an index that the design does not give. ``attrs`` contain the numbers of cases, of
-        cases without a value and of realisations, and ``advice``: whether there are enough points.
+        ``<index>_high``; NaN for an index that the design does not give. ``attrs`` contain the number of cases, the
+        number of cases without a value, the number of realisations, and ``advice``, a sentence on whether there are
+        enough points.
 
     Raises
     ------
     FitError
-        If the study is a grid, has too few points, or the output does not vary or has dimensions of its own.
+        If the study is a grid or has too few points, or if the output does not vary or has dimensions of its own.
 
     Notes
     -----
-    Failed cases are left out. In Saltelli's design, a base point is left out of the index of an input if one of the
-    three cases that it needs failed. The intervals are those of a jackknife over groups of points and over
-    realisations. Points of a Sobol sequence are more even than random points, so the intervals are rather too wide.
+    Failed cases are left out. In Saltelli's design, the index of an input needs three cases for each base point. A base
+    point is left out of this index if one of its three cases failed. The intervals are those of a jackknife over groups
+    of points and over realisations. Points of a Sobol sequence are more even than random points. Therefore the
+    intervals are too wide rather than too narrow.
 
     References
     ----------
@@ -132,7 +135,7 @@ def _is_saltelli(columns: FloatArray) -> bool:
 
 
 def _product(left: FloatArray, right: FloatArray) -> FloatArray:
-    """Return for each point the mean product over pairs of different realisations.
+    """Return for each point the product of both outputs, averaged over pairs of different realisations.
 
     With only one realisation, return the product of the two outputs.
     """
@@ -158,12 +161,12 @@ def _exchanged(values: FloatArray) -> FloatArray:
 
 
 def _of_neighbours(values: FloatArray) -> FloatArray:
-    """Return the first-order index with the ends of its interval, and NaN for the total index, shape (3, 2).
+    """Return value and interval ends of the first-order index, and NaN for the total index, shape (3, 2).
 
     There are two estimates. The first uses only products of neighbours; it is right for random points. The second also
     includes the product of each point with itself; it is right for points that fill space evenly, such as a Sobol
-    sequence, because the other inputs of neighbours then differ systematically. The index is the middle of both
-    estimates, and the interval contains both.
+    sequence: there, the other inputs of neighbours differ systematically. The index is the middle of both estimates,
+    and the interval contains both estimates.
     """
     (without, with_itself), (low, _), (_, high) = _with_interval(values, _neighbours)
     first = [(without + with_itself) / 2, low, high]
@@ -181,7 +184,7 @@ def _neighbours(values: FloatArray) -> FloatArray:
 
 
 def _with_interval(values: FloatArray, indices: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    """Return indices and the ends of their intervals by jackknife, shape (3, indices).
+    """Return indices and the ends of their intervals, shape (3, indices); the intervals follow from a jackknife.
 
     Parameters
     ----------

@@ -10,7 +10,8 @@ from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import DOUBTFUL
 
-TOPS = (0.3, 0.2, 0.1, 0.05)  # points at most this fraction below the maximum; the first range that a parabola fits
+#: Fits use the points at most this fraction below the maximum. The fractions are tried in turn until a parabola fits.
+TOPS = (0.3, 0.2, 0.1, 0.05)
 FLAT = 0.05  # points at most this fraction below the maximum count as plateau
 
 
@@ -23,15 +24,15 @@ def smoothed(mean: FloatArray) -> FloatArray:
 
 
 class Top(NamedTuple):
-    """The maximum of a parabola that is fitted to the points about the largest friction.
+    """The maximum of a parabola that is fitted to the points near the largest friction.
 
     Attributes
     ----------
     height : array, shape (rows,)
         Stack of the maximum, corrected for its bias; residuals of the parabola count as an error.
     place, rise : array, shape (rows,)
-        Logarithm of the velocity of the maximum, and d ln(friction) / d ln(velocity) there. This slope is not 0 if the
-        maximum is at an end of the velocities.
+        Stacks of the logarithm of the velocity of the maximum, and of d ln(friction) / d ln(velocity) there. This slope
+        is not 0 if the maximum is at an end of the range of velocities.
     """
 
     height: FloatArray
@@ -40,7 +41,7 @@ class Top(NamedTuple):
 
 
 def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
-    """Fit a parabola to as many points about the largest friction as scatter and errors allow.
+    """Fit a parabola to as many points near the largest friction as scatter and errors allow.
 
     Parameters
     ----------
@@ -67,7 +68,7 @@ def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
 
 
 def _about_the_top(mean: FloatArray, drop: float) -> slice:
-    """Return the points about the maximum that are at most the share `drop` below it; at least three."""
+    """Return the points near the maximum that are at most the fraction `drop` below it, but at least three points."""
     smooth = smoothed(mean)
     at = int(np.argmax(smooth))
     low = np.flatnonzero(smooth[at:] <= (1 - drop) * smooth[at])
@@ -79,7 +80,7 @@ def _about_the_top(mean: FloatArray, drop: float) -> slice:
 
 
 def _parabola(x: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return for every row the maximum of its parabola, its place, the logarithmic slope there, and the residuals."""
+    """Return for every row the maximum of its parabola, the place and slope of the maximum, and the residuals."""
     centre, half = x.mean(), np.ptp(x) / 2
     u = (x - centre) / half
     design = np.vstack([np.ones_like(u), u, u**2])
