@@ -43,7 +43,8 @@ def publish(url: str, target: Path) -> int:
     if found.findings:
         first = found.findings[0]
         raise StoreError(
-            f"{url}: {len(found.findings)} faults, first {first.name} {first.kind}; 'mdr-dask verify --repair {url}'"
+            f"{url}: number of faulty files: {len(found.findings)} (the first, {first.name}, is {first.kind}); repair "
+            f"the store with 'mdr-dask verify --repair {url}' before you publish it"
         )
     study = read_study(url)
     campaign, data = _campaign(url, study)

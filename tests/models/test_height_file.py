@@ -130,7 +130,7 @@ def test_a_text_map_is_read_as_it_stands(layout, tmp_path):
             "the spacing is 2 um in its heading and 2.5 um in `spacing`: leave out",
         ),
         ("x [um] y [um] z [nm]\n" + joined(xyz(), " "), Units("um"), "the file states nm, got 'um': leave out `unit`"),
-        (joined(np.c_[xyz(), xyz()]), XYZ, "expected a map, or columns x, y and z, got 6 columns: name them"),
+        (joined(np.c_[xyz(), xyz()]), XYZ, "expected a map, or columns x, y and z, got 6 columns: name the columns"),
         ("", UNITS, "expected the same number of heights in every row"),
     ],
 )
@@ -187,13 +187,13 @@ def test_a_scan_that_leaves_doubt_is_refused(layout, units, message, tmp_path):
     with pytest.raises(DataError, match=message):
         read_scan(DataFile.of(path), units)
     path.write_text(joined(np.c_[PLACE, PLACE**2 + 0.1 * PLACE]))
-    with pytest.raises(DataError, match="one column of positions and one of heights, got 2 columns: name them"):
+    with pytest.raises(DataError, match="one column of positions and one of heights, got 2 columns: name the columns"):
         read_scan(DataFile.of(path), Units("um", "mm"))
     path.write_text(joined(np.c_[HEIGHT, HEIGHT[::-1]]))
-    with pytest.raises(DataError, match="one column of positions and one of heights, got 2 columns: name them"):
+    with pytest.raises(DataError, match="one column of positions and one of heights, got 2 columns: name the columns"):
         read_scan(DataFile.of(path), Units("um", "mm"))
     path.write_text(joined(np.c_[np.arange(200), 2 + np.arange(200), HEIGHT]))
-    with pytest.raises(DataError, match="one column of positions and one of heights, got 3 columns: name them"):
+    with pytest.raises(DataError, match="one column of positions and one of heights, got 3 columns: name the columns"):
         read_scan(DataFile.of(path), Units("um", "mm"))
 
 

@@ -487,8 +487,8 @@ def _scattered(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame
     columns = _coordinates(file, lines, first, cells)
     if not columns:
         raise DataError(
-            f"{file.name}: expected a map, or columns x, y and z, got {cells.shape[1]} columns: name them in the line "
-            "above, such as x [mm], y [mm], z [um]"
+            f"{file.name}: expected a map, or columns x, y and z, got {cells.shape[1]} columns: name the columns "
+            "in a header line above the numbers, such as x [mm], y [mm], z [um]"
         )
     x, y, z = (cells[place].to_numpy(dtype="float64") for place, _ in columns)
     units = [unit for _, unit in columns]
@@ -534,8 +534,8 @@ def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]
     across = [k for k in range(count) if count == 1 or (k not in rises and k not in along)]
     if len(across) != 1 or len(along) > 1:
         raise DataError(
-            f"{file.name}: expected one column of positions and one of heights, got {count} columns: name them in the "
-            "first line, such as x [mm], z [um]"
+            f"{file.name}: expected one column of positions and one of heights, got {count} columns: name the "
+            "columns in a header line above the numbers, such as x [mm], z [um]"
         )
     wanted = [("heights", "unit", units.height), ("positions", "x_unit", units.position)][: 1 + len(along)]
     missing = [f"does not state the unit of its {what}: give `{option}`" for what, option, unit in wanted if not unit]
