@@ -7,10 +7,10 @@ unknowns is
     [ B_c^T  D  ],
 
 where A_c is banded (half bandwidth 3) and channels are coupled only by the offsets. The Cholesky factor consists of the
-banded factors L_c of A_c, the border W_c = L_c^-1 B_c, and the factor of the corner D - sum_c W_c^T W_c. A lower or
-symmetric matrix M is stored by diagonals: ``band[i, d]`` is M[i, i - d]. The corner is stored in the same way, with all
-its diagonals, so that the same functions can be used for both. For one row of parameters the solution takes
-O(splines (4 + offsets)^2) operations.
+banded factors L_c of A_c, the borders W_c = L_c^-1 B_c, and the factor of the corner S = D - sum_c W_c^T W_c. A lower
+or symmetric matrix M is stored by diagonals: ``band[i, d]`` is M[i, i - d]. The corner is stored in the same way, with
+all its diagonals, and is therefore processed by the same functions. For one row of parameters (shifts and scales), the
+solution takes O(splines (4 + offsets)^2) operations.
 """
 
 from __future__ import annotations
@@ -56,7 +56,8 @@ class Linear(NamedTuple):
     log_determinant : array, shape (rows,)
         Logarithm of the determinant of the precision.
     fitted, slope : array, shape (rows, channels, points)
-        Mean of the curve minus the offset, and its derivative with respect to the abscissa in cells, at each point.
+        Mean of the curve minus the offset at each point, and the derivative of the curve with respect to the abscissa,
+        which is measured in cells.
     variance, tilt : array, shape (rows, channels, points)
         Variance of `fitted`, and covariance of `fitted` and `slope`.
     rough : array, shape (rows, channels, splines - 2)
@@ -127,7 +128,10 @@ def solve_rows(
 
 
 def drawn(factors: Factors, normal: FloatArray) -> FloatArray:
-    """Transform standard normal numbers to departures from the mean with precision L L^T, shape (rows, unknowns)."""
+    """Transform standard normal numbers to random departures of the unknowns from their mean.
+
+    The departures have the precision L L^T. Both arrays have the shape (rows, unknowns).
+    """
     found = normal.copy()
     _back_substitute(*factors, found)
     return found
@@ -211,7 +215,7 @@ def _add_ties(
 ) -> None:
     """Add the contributions of the points of a channel to border, corner and right side of the offsets.
 
-    The signs follow from the offsets being subtracted from the spline.
+    The offsets are subtracted from the spline; therefore the border and the right side get negative contributions.
     """
     for p in range(first.size):
         k = member[p]
@@ -245,7 +249,7 @@ def _select(
     within = np.empty((splines, ORDER))  # the band of the covariance of a channel
     inner = np.empty((offsets, offsets))
     gain = np.empty((splines, offsets))  # G = A^-1 B
-    cross = np.empty((splines, offsets))  # G S^-1: the covariance with the offsets, apart from its sign
+    cross = np.empty((splines, offsets))  # G S^-1: covariance of coefficients and offsets, with the opposite sign
     for r in range(rows):
         _inverse_band(corner[r], inner)
         for i in range(offsets):
@@ -275,7 +279,7 @@ def _select(
 def _add_border(
     band: FloatArray, border: FloatArray, corner: FloatArray, within: FloatArray, gain: FloatArray, cross: FloatArray
 ) -> None:
-    """Add G S^-1 G^T to the band of the covariance of a channel; write G and G S^-1."""
+    """Write G and G S^-1 to `gain` and `cross`, and add G S^-1 G^T to the band of the covariance of a channel."""
     splines, offsets = border.shape
     gain[:] = border
     _backward(band, gain)
@@ -372,7 +376,7 @@ def _backward(band: FloatArray, right: FloatArray) -> None:
 
 @jit
 def _inverse_band(band: FloatArray, inverse: FloatArray) -> None:
-    """Write the entries within the band of the inverse of L L^T (recursion of Takahashi, Fagan and Chin, 1973)."""
+    """Write the entries of the inverse of L L^T that lie in the band (recursion of Takahashi, Fagan and Chin, 1973)."""
     size, width = band.shape
     for j in range(size - 1, -1, -1):
         last = min(j + width, size) - 1

@@ -31,10 +31,12 @@ class ShiftLaw:
     name : str
         ``power``, ``arrhenius`` or ``wlf``.
     constants : dict of str to (value, low, high)
-        Value of each constant and ends of its 95 % interval. The names are ``exponent``; ``activation_energy``, in
-        J/mol; ``c1``, and ``c2`` in K, at the reference.
+        Value of each constant and ends of its 95 % confidence interval. A power law has the constant ``exponent``,
+        Arrhenius' law ``activation_energy`` (J/mol), and the WLF law ``c1`` (dimensionless) and ``c2`` (K), both at the
+        reference temperature.
     factors : callable, array -> array
-        Factors according to the law, decades; zero at the anchor of the fit.
+        Factors according to the law, decades. They are zero at the anchor, the group whose factor is zero by
+        definition.
     departures : array, shape (groups,)
         Measured factors minus factors according to the law, decades.
     chance : float
@@ -67,7 +69,7 @@ def fit_power(
     anchor : int
         Index of the group at which the factors are zero by definition.
     reference : float
-        Value of the groups for which the constants are given; it has no influence on the power law.
+        Not used, because the exponent does not depend on the reference; `fit_wlf` needs this argument.
 
     Raises
     ------
@@ -82,7 +84,7 @@ def fit_power(
 def fit_arrhenius(
     temperature: FloatArray, log_factors: FloatArray, covariance: FloatArray, anchor: int, reference: float = 1.0
 ) -> ShiftLaw:
-    """Fit ``log10 a_T = E / (R ln 10) (1/T - 1/T_anchor)``, temperatures in K; see `fit_power`."""
+    """Fit ``log10 a_T = E / (R ln 10) (1/T - 1/T_anchor)`` to temperatures in K; arguments as in `fit_power`."""
     if np.any(temperature <= 0):
         raise FitError("the law of Arrhenius needs absolute temperatures")
 
@@ -95,7 +97,7 @@ def fit_arrhenius(
 def fit_wlf(
     temperature: FloatArray, log_factors: FloatArray, covariance: FloatArray, anchor: int, reference: float
 ) -> ShiftLaw:
-    """Fit ``log10 a_T = -c1 (T - T_ref) / (c2 + T - T_ref)``; see `fit_power`.
+    """Fit ``log10 a_T = -c1 (T - T_ref) / (c2 + T - T_ref)``; arguments as in `fit_power`, temperatures in K.
 
     The law is first fitted with the anchor as reference. The fitted constants are the slope c1 / c2 and the bend 1 /
     c2, which both remain finite if the factors are linear in temperature. The constants c1 and c2 at the reference
@@ -179,7 +181,8 @@ def _fit(
 ) -> _Fitted:
     """Fit by generalised least squares.
 
-    If the departures from the law are larger than the errors of the factors, an additional scatter is fitted.
+    If the departures from the law are larger than the errors of the factors explain, an additional scatter is fitted
+    and added to these errors.
     """
     known = np.diag(covariance) > 0
     freedom = int(known.sum()) - guess.size

@@ -65,7 +65,7 @@ class Superposition:
     curve_x : array, shape (curve points,)
         Abscissae of the merged curves.
     curve_y, curve_error : array, shape (channels, curve points)
-        The merged curves and their standard errors. They are the curves at the reference.
+        The merged curves, which are the curves at the reference, and their standard errors.
     curve_cross : array, shape (channels, curve points, 2 groups)
         Covariance of the curves and the factors.
     measured : tuple of float
@@ -108,7 +108,7 @@ class Superposition:
         return np.asarray(self.draws[:, self.groups.size :].std(axis=0), dtype=np.float64)
 
     def interval(self, confidence: float = CONFIDENCE) -> FloatArray:
-        """Return the ends of the intervals of all factors, shape (2, 2 groups)."""
+        """Return the ends of the confidence intervals of all factors, shape (2, 2 groups)."""
         ends = (0.5 - confidence / 2, 0.5 + confidence / 2)
         return np.asarray(np.quantile(self.draws, ends, axis=0), dtype=np.float64)
 
@@ -228,7 +228,7 @@ def _merged(
     lifted -= offsets[:, None, :1]
     factors = np.hstack([shifts * width, offsets - offsets[:, :1] + rise - rise[0]])
     vertical = factors[:, count:].mean(axis=0)
-    # curve through the points shifted by the mean factors; on a plateau the mean of the drawn curves departs from them
+    # the curve is fitted to the points at their mean shift: on a plateau, the mean of the drawn curves would miss them
     likeliest = solve(problem, rows.mean(axis=0)[None]).mean
     curve = np.concatenate([problem.spline(c, likeliest, mean[None], grid) for c in range(channels)])
     curve -= likeliest[:, -count:][:, :1] if problem.offset else 0.0
@@ -347,8 +347,8 @@ def rereference(
 def interpolation_error(places: FloatArray, factors: FloatArray, place: float) -> float:
     """Return the error of a linear interpolation, ``d^2 |h''| / 8`` for neighbours a distance d apart.
 
-    The second derivative h'' is the larger of the second derivatives of the factors at the two neighbours. At one of
-    the places themselves the error is zero.
+    The second derivative h'' is the larger of the second derivatives of the factors at the two neighbours. If `place`
+    is one of the `places`, the error is zero.
     """
     if place in places:
         return 0.0

@@ -24,10 +24,13 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.superposition.banded import Factors, drawn, solve_rows
 
 CELLS = 8
-"""Number of spline cells along a curve of median width: ten give the same factors, five do not resolve sharp bends."""
+"""Number of spline cells along a curve of median width.
+
+With ten cells the shift factors are the same; five cells do not resolve sharp bends.
+"""
 
 MARGIN = 0.5
-"""Distance by which the spline extends beyond the first guess on each side, in widths of a curve."""
+"""Distance by which the spline extends on each side beyond the curves after the first shift, in widths of a curve."""
 
 ROUNDING = 1e-5
 """Smallest scatter of a curve, decades: the rounding of a table with five digits."""
@@ -54,7 +57,7 @@ NOISE, NOISE_SCATTER = 0.01, 2.0
 """Prior of the relative scatter of each channel: median, and standard deviation of the logarithm of the scatter."""
 
 TREND = 10.0
-"""Standard deviation of the mean step of drifting offsets, divided by that of the steps about their mean."""
+"""Ratio of two prior standard deviations of drifting offsets: of the mean step, and of the steps about their mean."""
 
 FARTHEST = 8.0
 """Largest distance of the logarithm of a scale from its prior median; it prevents overflow."""
@@ -103,7 +106,7 @@ class Curves:
         )
 
     def begin(self, moved: FloatArray) -> FloatArray:
-        """Return where the spline begins for each row, shape (rows,); it is centred on the shifted points."""
+        """Return where the spline of each row begins, shape (rows,). The spline is centred on the shifted points."""
         return np.asarray((moved.min(axis=1) + moved.max(axis=1) - (self.splines - 3) / CELLS) / 2, dtype=np.float64)
 
     def spline(self, channel: int, unknowns: FloatArray, shifts: FloatArray, grid: FloatArray) -> FloatArray:
@@ -227,7 +230,7 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
 
 
 def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return the first of the four splines at each place in cells, their values, and their derivatives there."""
+    """Return the first of the four splines that overlap at each place (in cells), their values, and derivatives."""
     # NaN and infinity from diverged rows must not become indices
     first = np.clip(np.nan_to_num(np.floor(place)), 0, splines - 4).astype(np.intp)
     inside = np.clip(place - first, 0.0, 1.0)

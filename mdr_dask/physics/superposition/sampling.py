@@ -28,13 +28,16 @@ Otherwise sampling is repeated with two, four and eight moves for each kept move
 """
 
 PATH, STEPS = 1.5, 3
-"""Length of a move in standard deviations (a quarter of a period), and its number of steps."""
+"""Length of a move in standard deviations (about a quarter of a period, pi/2), and number of steps of a move."""
 
 DIFFERENCE = 1e-3
 """Step of the finite differences of the gradient, in standard deviations of the prior."""
 
 STIFFNESSES = (0.0, 3.0, 6.0)
-"""Natural logarithms of the factors by which the prior bend is divided in the splines tried for a first guess."""
+"""Natural logarithms of the factors by which the prior bend is divided.
+
+A first guess tries one spline for each of these factors.
+"""
 
 SCAN = 81
 """Number of steps tried for each pair of neighbouring curves.
@@ -63,7 +66,7 @@ def first_guess(curves: Curves) -> FloatArray:
             rows = np.column_stack([steps * width, np.tile(middle[1:], (SCAN, 1))])
             rows[:, 1 : 1 + 2 * curves.y.shape[0]] -= stiffness
             channels = curves.y.shape[0]
-            # the best step is between two tried steps, which for a steep curve causes an error of the ordinate
+            # the best step may lie between two tried steps: the noise must include the resulting error of the ordinate
             coarse = curves.height * width * (steps[1] - steps[0]) / np.sqrt(12)
             noise = slice(1 + 2 * channels, 1 + 3 * channels)
             rows[:, noise] = np.maximum(rows[:, noise], np.log(coarse))
@@ -113,7 +116,10 @@ def draws(curves: Curves, generator: np.random.Generator) -> tuple[Curves, Float
 def _moved(
     curves: Curves, place: FloatArray, here: Solved, scale: FloatArray, generator: np.random.Generator
 ) -> tuple[FloatArray, Solved, float]:
-    """Move all chains by one Hamiltonian move and `HOPS` jumps; also return the mean acceptance of the move."""
+    """Move all chains by one Hamiltonian move and `HOPS` jumps.
+
+    Return the new parameters, their density, and the mean acceptance probability of the Hamiltonian move.
+    """
     length = PATH / STEPS * generator.uniform(0.7, 1.3, (CHAINS, 1))
     momentum = generator.standard_normal(place.shape)
     speed, new, there = momentum, place, here
@@ -137,8 +143,9 @@ def _moved(
 
 
 def _reduction(kept: FloatArray) -> float:
-    """Return the largest potential scale reduction factor of some parameters, shape (moves, chains, parameters).
+    """Return the largest potential scale reduction factor of all parameters.
 
+    The array `kept` has the shape (moves, chains, parameters).
     The factor compares the variance of the means of the chains with the variance within the chains (A. Gelman, D. B.
     Rubin, Stat. Sci. 7 (1992) 457). It is 1 if all chains represent the same distribution.
     """
@@ -156,10 +163,10 @@ def _chosen(taken: NDArray[np.bool_], new: Solved, old: Solved) -> Solved:
 
 
 def _hop(curves: Curves, place: FloatArray, generator: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Return rows with one step between neighbours drawn again from its prior, and the rise of the prior energy.
+    """Return rows in which one step between neighbours is drawn again from its prior, and the rise of the prior energy.
 
-    The prior of the step is conditional on the other steps. Such jumps let a chain pass between the many small maxima
-    of the density along a plateau.
+    The prior of this step is conditional on the other steps. By such jumps a chain can pass between the many small
+    maxima of the density along a plateau.
     """
     lines, rows = curves.count - 1, np.arange(place.shape[0])
     known = step_precision(curves.count)

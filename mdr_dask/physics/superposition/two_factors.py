@@ -27,7 +27,7 @@ class TwoShifts:
         Reduced chi-squared of the differences between the factors of all pairs and the sums a + b. If it is above one,
         the errors are multiplied by its square root.
     probability : float
-        Probability of a chi-squared at least as large if every factor is such a sum; 1 if there is no degree of freedom
+        Probability of a chi-squared at least as large if every factor is a sum a + b; 1 if no degree of freedom is left
         for a test.
     """
 
@@ -47,8 +47,8 @@ def superpose_twice(
     """Shift curves that differ in two quantities into one curve, and split each factor into a sum of two.
 
     First all curves are superposed with independent factors. Then a and b are fitted to these factors by least squares,
-    weighted by the covariance of the factors. To first order the result equals a joint fit. Its chi-squared tests
-    whether the factors are sums.
+    weighted by the covariance of the factors. To first order the result equals that of a joint fit. The chi-squared of
+    the least-squares fit tests whether the factors are sums.
 
     Parameters
     ----------
@@ -58,7 +58,8 @@ def superpose_twice(
     curves : sequence of (x, y)
         log10 of abscissa and ordinate.
     references : pair of float, optional
-        Values of the two quantities at which the factors are zero; by default the middle values.
+        Values of the two quantities at which the factors are zero. The nearest measured values are used; by default,
+        the middle of the measured values.
     seed : int
         Seed of the draws of `superpose`.
 
