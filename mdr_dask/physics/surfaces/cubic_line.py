@@ -15,12 +15,12 @@ from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.surfaces import shapes
 
 NONE = 2.0  # result of `summit` if the cell has no maximum
-STEEPEST_RISE = 4 / 27  # largest rise of a cubic above its ends, divided by the slopes at the ends
-UNRESOLVED = 0.5  # a line is resolved if its mean squared slopes at the nodes and in the cells differ by less
+STEEPEST_RISE = 4 / 27  # largest rise of a cubic above its ends, divided by the sum of the slopes at the ends
+UNRESOLVED = 0.5  # relative difference of the mean squared slopes at nodes and in cells above which nodes are too few
 
 
 class CubicLine(NamedTuple):
-    """A line of n cubic cells between n + 1 equidistant nodes, in the order in which an element meets them.
+    """A line of n cubic cells between n + 1 equidistant nodes, in the order in which an elastomer element passes them.
 
     Parameters
     ----------
@@ -96,8 +96,8 @@ class Cells(NamedTuple):
     Parameters
     ----------
     height : array, shape (n + 2,)
-        Heights at the nodes relative to the highest point of the line, which are never positive. Light contact depends
-        on small distances from the highest point; in this form they have no rounding error.
+        Heights at the nodes minus the height of the highest point; they are never positive. Contact under a light load
+        depends on small distances from the highest point, which have no rounding error in this form.
     enter, leave : array, shape (n + 1,)
         Slopes at the start and the end of each cell.
     peak : array, shape (n + 1,)
@@ -187,7 +187,7 @@ def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float]:
 def cut(line: CubicLine) -> Cells:
     """Split a line into its cells; a periodic line starts at its highest point."""
     best, place, top = _highest(line.height, line.enter, line.leave)
-    if line.smooth and place == 1:  # the same cell, wherever the numbering of the nodes begins
+    if line.smooth and place == 1:  # a highest node belongs to the cell that begins there, however nodes are numbered
         best, place = (best + 1) % line.enter.size, 0.0
     columns = _turned(line, top, best if line.periodic else 0)
     if line.smooth and _is_resolved(columns[1][:-1], columns[5][:-1]):
@@ -249,10 +249,11 @@ def _is_resolved(slope: FloatArray, stretch: FloatArray) -> bool:
 
 @jit
 def _resum(slope: FloatArray, stretch: FloatArray) -> None:
-    """Compute the integrals of the squared slope over cells by the Euler-Maclaurin formula; their total is exact.
+    """Compute the integrals of the squared slope over cells by the Euler-Maclaurin formula.
 
-    The first cell keeps the integral of its polynomial, because a period begins and ends inside this cell. The other
-    cells share the difference between this integral and that of the formula.
+    The first cell keeps the integral of its polynomial, because a period begins and ends inside this cell. The
+    difference between this integral and that of the formula is distributed over the other cells, so that the total
+    remains exact.
     """
     n, kept = slope.size - 1, stretch[0]
     before, here, after = slope[n - 1] ** 2, slope[0] ** 2, slope[1] ** 2

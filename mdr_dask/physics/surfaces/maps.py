@@ -20,11 +20,11 @@ LEAST_POINTS = 16  # smallest number of points along each axis
 MOST_MISSING = 0.05  # largest fraction of missing points that are filled
 FAR = 19.0  # deviation of an outlier, in robust standard deviations; no point of a generated surface reaches it
 BAND = 128  # number of rows processed together, so that they fit into the processor's cache
-TELLING = 1e-3  # a ring that contributes less than this fraction of the largest contribution may be due to rounding
-MOST_SCATTER = 0.02  # largest mean square of angular harmonics that scatter may cause in an octave that is used
+TELLING = 1e-3  # rings that contribute less than this fraction of the largest contribution may consist of rounding
+MOST_SCATTER = 0.02  # an octave is used if scatter causes at most this mean square of its angular harmonics
 FLAT = 1e-12  # a map is flat if the range of heights, divided by the largest height, is below this value
 ROUNDING = 1e-20  # rounding error of the transform, as a fraction of the largest ring
-HANN_MODES = 0.3  # number of independent waves per wave of the transform, with Hann's window
+HANN_MODES = 0.3  # number of independent waves divided by the number of waves of the transform, for Hann's window
 
 
 class SurfaceMap(NamedTuple):
@@ -45,7 +45,7 @@ class SurfaceMap(NamedTuple):
 def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
     """Return the points that deviate from their neighbours along both axes by more than `FAR` standard deviations.
 
-    The standard deviation of these deviations is estimated from their median.
+    The standard deviation is estimated from the median of the deviations.
     """
     height = surface.height
     away = np.empty((max(height.shape[0] - 2, 0), max(height.shape[1] - 2, 0)))
@@ -67,7 +67,7 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
 
 
 def _off_neighbours(height: FloatArray) -> FloatArray:
-    """Return how far inner points are from the mean of their two neighbours, along the axis where this is smaller.
+    """Return how far each inner point is from the mean of its two neighbours along an axis, for the closer axis.
 
     The smaller distance is used because a point on a crest is close to its neighbours along the crest, but far from its
     neighbours across the crest.
@@ -180,8 +180,8 @@ class MapSpectrum:
     count : array, shape (rings,)
         Number of waves in each ring; a wave vector and its negative count as two waves.
     independent : float
-        Number of statistically independent waves divided by the number of waves of the transform; below 1 with a
-        window.
+        Number of statistically independent waves divided by the number of waves of the transform. It is below 1 if a
+        window was applied.
     rms_height : float
         rms height of the windowed map, m.
     slopes : tuple of float
@@ -324,7 +324,7 @@ def _rings(
 
 
 def telling(wavenumber: FloatArray, density: FloatArray) -> NDArray[np.bool_]:
-    """Return the rings whose contribution to the mean square of height or gradient exceeds the rounding of a file."""
+    """Return the rings that contribute more to the mean square of height or gradient than rounding in a file may."""
     height, gradient = density * wavenumber, density * wavenumber**3
     return np.asarray((height > TELLING * height.max()) | (gradient > TELLING * gradient.max()))
 
@@ -336,7 +336,7 @@ def _cut(power: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
 
 
 def _axis(power: FloatArray, ring: NDArray[np.int32], total: FloatArray, count: FloatArray) -> float:
-    """Return the power of waves along an axis divided by the mean power of their ring; the median over rings."""
+    """Return the median over the rings of the power of waves along an axis, divided by the mean power of their ring."""
     number = np.arange(1.0, total.size + 1)
     alive = number[telling(number, total / number)]
     inner = (ring >= 4) & np.isin(ring, alive)

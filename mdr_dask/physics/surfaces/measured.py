@@ -16,7 +16,7 @@ Detrend = Literal["none", "mean", "line", "parabola"]
 
 ORDERS: dict[str, int] = {"mean": 0, "line": 1, "parabola": 2}
 UNEVEN = 1e-3
-"""Relative difference up to which spacings count as uniform, because instruments print positions with few digits."""
+"""Relative difference up to which spacings count as uniform. It is not 0, because instruments print few digits."""
 
 LEAST_POINTS = 8
 
@@ -60,10 +60,10 @@ def measured_line(
     detrend : {"none", "mean", "line", "parabola"}
         Least-squares polynomial that is subtracted.
     taper : float
-        Fraction of the line (0 to 1), at both ends together, in which a cosine window reduces the heights to their
-        mean, so that the periodic line has no step.
+        Fraction of the line (0 to 1), both ends together, in which a cosine window reduces the heights to their mean.
+        The periodic line then has no step at its ends.
     shortest, longest : float
-        Shortest and longest wavelength, m, that are kept; 0 for no limit.
+        Shortest and longest wavelength that are kept, m; 0 for no limit.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def _window(points: int, taper: float) -> FloatArray:
 
 
 def detrended(height: FloatArray, order: Detrend) -> FloatArray:
-    """Return heights minus their least-squares polynomial; `order` has the names of `detrend` in `measured_line`."""
+    """Return heights minus their least-squares polynomial; `order` is a value of `detrend` in `measured_line`."""
     if order == "none":
         return height.copy()
     place = np.linspace(-1, 1, height.size)
@@ -138,5 +138,5 @@ def rms_height(height: FloatArray) -> float:
 
 
 def rms_slope(height: FloatArray, length: float) -> float:
-    """Return the spectral rms slope of the periodic line through samples, with the wave that is two points long."""
+    """Return the rms slope of all waves of the periodic line through samples, down to the wave of two points."""
     return waves_of(height).rms_slope() / length

@@ -10,12 +10,14 @@ from mdr_dask.physics.surfaces.cubic_line import CubicLine, highest_point, inden
 from mdr_dask.physics.surfaces.shapes import Shape
 from mdr_dask.physics.surfaces.waves import Waves
 
-SEEN = 8  # nodes per Nyquist point of the grid on which the highest point of a line is located
+SEEN = 8  # number of nodes per Nyquist point in the grid on which the highest point of a line is searched
 
 
 @dataclass(frozen=True)
 class RoughLine:
-    """A rough line on a plane or an indenter; positions are in units of its length, all heights in one unit.
+    """A rough line on a plane or an indenter.
+
+    Positions are in units of the length of the line. Roughness and indenter have the same unit of height.
 
     Parameters
     ----------

@@ -74,7 +74,7 @@ def cut_of_lines(lines: Sequence[MeasuredLine], hann: bool = True) -> Cut:
     power = length / (2 * np.pi) * np.mean(np.abs(np.fft.rfft(height * window) / points) ** 2, axis=0)[1:]
     waves = np.arange(1, power.size + 1)
     last = (points - 1) // 2  # without the wave of two points, whose phase is unknown
-    independent = len(lines) / (1.94 if hann else 1.0)  # 1.94: a wave's power correlates with its neighbours
+    independent = len(lines) / (1.94 if hann else 1.0)  # 1.94: Hann's window correlates the power of adjacent waves
     return averaged(2 * np.pi / length * waves[:last], power[:last], independent)
 
 
@@ -86,7 +86,7 @@ def averaged(wavenumber: FloatArray, density: FloatArray, independent: float, co
     wavenumber, density : array, shape (waves,)
         Ascending wave numbers, and the spectrum at these wave numbers.
     independent : float
-        Number of independent squared amplitudes per wave number and wave, from which the standard error follows.
+        Number of statistically independent squared amplitudes per wave; it determines the standard error.
     count : array, shape (waves,), optional
         Number of waves at each wave number; 1 by default.
     """
@@ -128,7 +128,7 @@ def of_cut(cut: Cut) -> Spectrum:
     q, density, error = (np.asarray(column, dtype=np.float64)[_until_the_end(cut)] for column in cut)
     if q.size < 3:
         raise DataError(f"expected a spectrum of three wave numbers or more, got {q.size}")
-    # waves shorter than the last wave number of the cut contribute to the cut; they are assumed to end one step further
+    # waves beyond the last wave number of the cut contribute to the cut: the spectrum is assumed to end one step beyond
     edge = q[-1] ** 2 / q[-2]
     knots = np.append(q, edge)
     place, weight = quadrature(q, knots)

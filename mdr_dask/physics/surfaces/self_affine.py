@@ -36,7 +36,7 @@ class SelfAffine(NamedTuple):
 
 
 def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> float:
-    """Return the wave number beyond which the spectrum is flat, like noise; infinite if there is no flat tail.
+    """Return the wave number beyond which the spectrum is flat, like noise, or infinity if there is no flat tail.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> 
 
 
 def steep_limit(bins: Cut) -> float:
-    """Return the wave number beyond which C2D falls more steeply than any roughness; infinite if there is none."""
+    """Return the wave number beyond which C2D falls more steeply than that of any roughness, or infinity."""
     wavenumber, density = bins.wavenumber, bins.density
     there = density > 0
     x, y = np.log(wavenumber[there]), np.log(density[there])
@@ -73,7 +73,7 @@ def steep_limit(bins: Cut) -> float:
 def fit_self_affine(bins: Cut) -> SelfAffine | None:
     """Fit a power law to a spectrum, with cut-offs if the data show them.
 
-    Return None if the spectrum is no power law or has too few bins.
+    If the spectrum is not a power law or has too few bins, return None.
 
     Parameters
     ----------

@@ -138,12 +138,12 @@ def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatAr
 
 
 class Smooth(NamedTuple):
-    """Steady states of a smooth line, one entry per case; NaN if no depth is found.
+    """Steady states of a smooth line, one entry per case. If Newton's method fails, depth and drag are NaN.
 
     Parameters
     ----------
     depth : array
-        Penetration d of the tip.
+        Penetration depth d of the tip.
     drag : array
         F_x / (4 G).
     leading, trailing : array
@@ -163,8 +163,8 @@ def smooth(loads: FloatArray, deborah: FloatArray, coefficient: float, exponent:
     """Return the steady states of a smooth line c |x|^n that slides towards -x over a Kelvin foundation.
 
     At the depth d the contact lies between -a and b, with d = c a^n and d = c (b^n + n v tau b^(n-1)). If the second
-    equation has no positive solution, b is 0. The load is a convex function of d with the derivative a + b + v tau, so
-    that Newton's method converges.
+    equation has no positive solution, b is 0. Newton's method converges, because the load is a convex function of d
+    with the derivative a + b + v tau.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def _trailing(drop: FloatArray, deborah: FloatArray, exponent: float) -> FloatAr
     """Return the positive solution b of b^n + n deborah b^(n-1) = drop, or 0 if there is none (possible for n = 1)."""
     if exponent == 1:
         return np.maximum(drop - deborah, 0.0)
-    # the logarithm of the left side is a convex, increasing function of y = log b: Newton's method from the right
+    # Newton's method for y = log b, from above: the logarithm of the left side is a convex, increasing function of y
     goal = np.log(drop)
     y, active = goal / exponent, np.ones(drop.size, np.bool_)
     for _ in range(ITERATIONS):

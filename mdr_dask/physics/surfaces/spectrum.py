@@ -107,10 +107,11 @@ class Spectrum:
         return Spectrum(q, self.at(q))
 
     def continued(self, longest: float = 0.0, shortest: float = 0.0, decades: float = 1.0) -> Spectrum:
-        """Return the spectrum, continued by power laws to wavelengths, m, beyond its ends; 0 for no continuation.
+        """Return the spectrum, continued by power laws up to the wavelength `longest` and down to `shortest`, m.
 
-        Each power law starts at the outermost point. Its exponent is the slope of the straight line that is fitted to
-        the logarithms of the points within `decades` of this end.
+        An end whose wavelength is given as 0 is not continued. Each power law starts at the outermost point. Its
+        exponent is the slope of a straight line, which is fitted to the logarithms of the points within `decades` of
+        this end.
         """
         q, density = [self.wavenumber], [self.density]
         for index, end in (
@@ -142,7 +143,7 @@ class Spectrum:
         return math.sqrt(2 * np.pi * self._moment(3))
 
     def _moment(self, order: int) -> float:
-        """Return the integral of q^order C2D; it is exact for the power laws between points."""
+        """Return the integral of q^order C2D over q, which is exact for the power laws between points."""
         q, value = self._logs[0], np.exp(self._logs[1] + (order + 1) * self._logs[0])
         rise = np.diff(np.log(value))
         # the integral of exp(v), where v is linear, is the width times the logarithmic mean of the end values

@@ -84,7 +84,7 @@ def _at_nodes(phase: FloatArray) -> FloatArray:
 
 @jit
 def piece(spline: FloatArray, k: int) -> Piece:
-    """Return the polynomial that follows from the four coefficients k to k + 3, between the nodes of the middle two."""
+    """Return the polynomial of the four coefficients k to k + 3. It is valid between the nodes k + 1 and k + 2."""
     c0, c1, c2, c3 = spline[k], spline[k + 1], spline[k + 2], spline[k + 3]
     return (c0 + 4 * c1 + c2) / 6, (c2 - c0) / 2, (c0 - 2 * c1 + c2) / 2, (c3 - 3 * c2 + 3 * c1 - c0) / 6
 
@@ -111,7 +111,7 @@ def shares(t: float) -> Piece:
 
 @jit
 def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
-    """Append the positions between k and k + 1 at which a piece changes sign to `found`; return the new count.
+    """Append to `found` the positions, between k and k + 1, at which piece k changes sign; return the new count.
 
     There are at most three sign changes. There is no sign change if all four coefficients are positive, or if none of
     the four is positive.
@@ -167,6 +167,6 @@ def _zero(of: Piece, low: float, at_low: float, high: float, at_high: float) -> 
     return t
 
 
-#: After a Newton step shorter than `CLOSE`, the error is about the square of the step. After `STEPS` halvings, the
-#: interval is as short as the rounding error.
+#: Newton's method ends with a step shorter than `CLOSE`; the error is then about the square of this step. If Newton's
+#: method does not converge, `STEPS` halvings make the interval as short as the rounding error.
 CLOSE, STEPS = 1e-7, 60

@@ -20,7 +20,7 @@ class Waves:
     coefficients : array, shape (modes,)
         c_k for k = 1..modes, half the complex amplitude of each wave.
     points : int
-        Nyquist points of the line: 2 modes or 2 modes + 1.
+        Number of Nyquist points, the equidistant samples that determine the line: 2 modes or 2 modes + 1.
     """
 
     coefficients: NDArray[np.complex128]
