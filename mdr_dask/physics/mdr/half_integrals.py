@@ -21,7 +21,7 @@ from mdr_dask.physics.mdr.transforms import gauss
 
 
 class Mesh(NamedTuple):
-    """Panels for a piecewise polynomial, the first of which begins at 0.
+    """Panels for a piecewise polynomial; the first panel begins at 0.
 
     There is no node at 0, because functions may jump there.
 
@@ -67,7 +67,7 @@ class Panels:
     outer : array, shape (n, n)
         (1/pi) int_z^1 u'(z') / sqrt(z' - z) dz'.
     slope : array, shape (n, n)
-        u'(z); at the common end of two panels, the slope in the left panel.
+        u'(z). At the common end of two panels, this is the slope in the left panel.
     weights : array, shape (n,)
         Weights of the integral int_0^1 u dz.
     """
@@ -168,14 +168,17 @@ def _add_panel(
 
 
 def interpolate(mesh: Mesh, values: FloatArray, places: FloatArray) -> FloatArray:
-    """Return the piecewise polynomial through `values`, shape (n,), at places; it is zero beyond the mesh."""
+    """Return the piecewise polynomial through `values`, shape (n,), at the positions `places`; 0 beyond the mesh."""
     result = np.zeros_like(places)
     _interpolate(mesh, values, places, result)
     return result
 
 
 def interpolate_weighted(mesh: Mesh, rows: FloatArray, shares: FloatArray, stretch: FloatArray) -> FloatArray:
-    """Return the sum over k of shares[k] p_k(stretch[k] z) at all nodes z; p_k is the polynomial through rows[k]."""
+    """Return the sum over k of shares[k] p_k(stretch[k] z) at all nodes z.
+
+    p_k is the piecewise polynomial through rows[k].
+    """
     result = np.zeros(mesh.nodes.size)
     _weighted(mesh, rows, shares, stretch, result)
     return result

@@ -1,8 +1,8 @@
 """Closed forms for contacts of power-law bodies of revolution (sphere, cone, other powers), and for the stick radius.
 
 The profile is f = A r^n, and its image is g = B |x|^n with B = kappa_n A (see `transforms.power_factor`). E_star and
-G_star are the effective moduli of normal and tangential contact, which are independent, because the bodies are assumed
-to be elastically similar.
+G_star are the effective moduli of normal and tangential contact. The bodies are assumed to be elastically similar, so
+that the normal and the tangential problem are independent of each other.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def normal_force(radius: ArrayLike, amplitude: ArrayLike, exponent: ArrayLike, E
 
 
 def radius_from_force(force: ArrayLike, amplitude: ArrayLike, exponent: ArrayLike, E_star: ArrayLike) -> FloatArray:
-    """Return the contact radius for a normal force, the inverse of `normal_force`."""
+    """Return the contact radius for a normal force; this is the inverse of `normal_force`."""
     n = np.asarray(exponent, dtype=float)
     factor = 2.0 * np.asarray(E_star) * power_factor(n) * np.asarray(amplitude) * n / (n + 1.0)
     return np.asarray((np.asarray(force, dtype=float) / factor) ** (1.0 / (n + 1.0)))
@@ -57,10 +57,10 @@ def stiffness(radius: ArrayLike, E_star: ArrayLike) -> FloatArray:
 
 
 def stick_radius(slip_share: ArrayLike, exponent: ArrayLike) -> FloatArray:
-    """Return the stick radius c / a0 = (1 - eta)^(1/n) for a slip share eta = G* U0 / (mu E* d0) (thesis eq. 6.7).
+    """Return the relative stick radius c / a0 = (1 - eta)^(1/n) for the slip share eta (thesis eq. 6.7).
 
-    U0 is the tangential displacement, d0 the depth and a0 the contact radius. For eta >= 1 the whole contact slips, and
-    the result is NaN.
+    The slip share is eta = G* U0 / (mu E* d0), with the tangential displacement U0, the depth d0 and the contact radius
+    a0. For eta >= 1 the whole contact slips, and the result is NaN.
     """
     rest = 1.0 - np.asarray(slip_share, dtype=float)
     return np.where(rest > 0.0, np.maximum(rest, 0.0) ** (1.0 / np.asarray(exponent, dtype=float)), np.nan)

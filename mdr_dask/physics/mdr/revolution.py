@@ -152,7 +152,7 @@ class TableProfile:
         return self.image_slope_curve(np.asarray(position))
 
     def rise(self, gap: FloatArray, start: float) -> FloatArray:
-        """Return g0(start + gap) - g0(start); for a short gap, by integration of the slope."""
+        """Return g0(start + gap) - g0(start). For a short gap, the slope is integrated to avoid cancellation."""
         gap = np.asarray(gap, dtype=float)
         abscissa, weight = gauss(8)
         short = gap * (self.image_slope_curve(start + gap[..., None] * abscissa) @ weight)
@@ -208,7 +208,7 @@ def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfi
     Parameters
     ----------
     radius, height : array_like, shape (m,)
-        r from 0 upwards and f(r), in one length unit; heights are measured from f(0).
+        Radii r from 0 upwards, and heights f(r), in the same unit of length. Heights are counted from f(0).
     depth : float
         Indentation depth d0 > 0, in the same unit.
 
@@ -246,9 +246,10 @@ FARTHEST, KNOTS = 8.0, 80
 
 
 def from_body(body: Any, depth: float) -> TableProfile:
-    """Build the profile of a body in closed form that is pressed to a depth, in the unit of length of the body.
+    """Build the profile of a body that is given in closed form and pressed to a depth.
 
-    The profile consists of cubic pieces, which become shorter towards the breaks of the body.
+    The depth is in the unit of length of the body. The profile consists of cubic pieces, which become shorter towards
+    the breaks of the body.
 
     Parameters
     ----------
@@ -311,7 +312,7 @@ def bisect(function: Callable[[float], float], low: float, high: float) -> float
 
 
 def _monotone(x: FloatArray, y: FloatArray) -> CubicSpline | PchipInterpolator:
-    """Return a cubic spline if it increases everywhere, otherwise the monotone cubic interpolant."""
+    """Return the cubic spline through the points if it increases everywhere, else the monotone cubic interpolant."""
     spline = CubicSpline(x, y)
     fine = (x[:-1, None] + np.diff(x)[:, None] * np.linspace(0.0, 1.0, 9)).ravel()
     falls = np.any(spline(fine, 1) < -1e-9 * np.max(np.abs(spline(fine, 1))))

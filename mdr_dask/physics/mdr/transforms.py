@@ -107,9 +107,9 @@ def forward_transform(
     Parameters
     ----------
     slope : callable, array -> array
-        f'(r) for r >= 0, without the jumps of f.
+        f'(r) for r >= 0. The jumps of f are not part of it.
     position : array_like, shape (m,)
-        Positions x; g is even.
+        Positions x. They may be negative, because g is even.
     apex : float
         f(0).
     breaks : sequence of float
@@ -162,11 +162,11 @@ def pressure(
     image_slope : callable, array -> array
         g'(x), without the jumps of g.
     radius : array_like, shape (m,)
-        Radii; the pressure is zero outside the contact and infinite on the axis under a cone.
+        Radii r >= 0. The pressure is zero outside the contact, and infinite on the axis under a cone.
     contact_radius : float
         Half-width a of the one-dimensional contact.
     edge_gap : float
-        d - g(a) just inside the edge, the jump of the line load at the edge; non-zero under a flat punch.
+        Jump of the line load at the edge: the value of d - g just inside the edge. It is not zero under a flat punch.
     breaks : sequence of float
         Places where a derivative of g jumps.
     jumps : sequence of (position, height)

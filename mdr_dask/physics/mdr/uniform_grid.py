@@ -32,7 +32,7 @@ class UniformGrid:
     forward : array, shape (n, n)
         g = forward @ f.
     stress : array, shape (n, n)
-        p = stress @ q, where q = d - g is the line load, set to zero outside the contact.
+        p = stress @ q, where q is the line load: d - g inside the contact, and zero outside.
     """
 
     nodes: FloatArray
@@ -56,7 +56,7 @@ class UniformGrid:
         return float(self.nodes[k] - self.spacing * (image[k] - depth) / (image[k] - image[k - 1]))
 
     def pressure(self, image: FloatArray, depth: float) -> FloatArray:
-        """Return p(r) at the nodes; the cell that contains the contact edge is cut there."""
+        """Return p(r) at the nodes; the cell that contains the contact edge is cut at the edge."""
         load = np.maximum(depth - image, 0.0)
         k = int(np.argmax(image >= depth))
         result = self.stress @ load
@@ -71,7 +71,7 @@ class UniformGrid:
         return result
 
     def force(self, image: FloatArray, depth: float) -> float:
-        """Return F_N = 2 int (d - g)_+ dx over x >= 0; the cell that contains the contact edge is cut there."""
+        """Return F_N = 2 int (d - g)_+ dx over x >= 0; the cell that contains the contact edge is cut at the edge."""
         load = np.maximum(depth - image, 0.0)
         k = int(np.argmax(image >= depth))
         if k == 0:
@@ -126,8 +126,8 @@ def uniform_grid(cells: int, length: float) -> UniformGrid:
 def _kernel(low: ArrayLike, high: ArrayLike, radius: ArrayLike) -> FloatArray:
     """Return the integral of 1 / sqrt(x^2 - r^2) from `low` to `high`, for low >= r.
 
-    In the cell next to the axis, with r = low = 0, the integral diverges. There a slope of the line load that is
-    proportional to x is assumed, with the same mean, and the result is 2.
+    In the cell next to the axis, with r = low = 0, the integral diverges. In this cell the slope of the line load is
+    therefore assumed to be proportional to x, with the same mean as before; the result is then 2.
     """
     low, high, r = np.broadcast_arrays(*(np.asarray(each, dtype=np.float64) for each in (low, high, radius)))
     with np.errstate(divide="ignore", invalid="ignore"):
