@@ -33,13 +33,13 @@ GROWTH = 1.8
 SLOW = 0.4
 """Ratio of successive Newton corrections above which the Jacobian is renewed."""
 DIFFERENCE = 1e-7
-"""Step of the finite differences with respect to the unknowns after the image; about the root of the rounding error."""
+"""Step of the finite differences for the unknowns that follow the image; about the root of the rounding error."""
 SHORTEST = 1e-4
 """A march fails if a step is shorter than this value times the longest step so far, or than this value times the first
 step if that is shorter. In marches that succeeded, no later step was shorter than 0.13 times the longest step."""
 NEWTON, ROUNDING = 1e-5, 1e-9
-"""Tolerance of Newton's method: `NEWTON` times the step tolerance, because a moving border amplifies its error, but not
-below `ROUNDING`."""
+"""Tolerance of Newton's method: `NEWTON` times the step tolerance, but at least `ROUNDING`. `NEWTON` is small, because
+a moving border amplifies the error of Newton's method."""
 
 
 class NotConvergedError(ArithmeticError):
@@ -55,9 +55,9 @@ class Moment:
     time : float
         Cycles N in partial slip, sliding path s in gross slip.
     unknowns : array, shape (n,)
-        The unknowns of the problem: the values of the image at all nodes except the last, then the width of the panels
-        in squared radii, divided by its value in the virgin contact. Some problems have further unknowns. All unknowns
-        are of the order of one.
+        The unknowns of the problem. First come the values of the image at all nodes except the last; then the width of
+        the panels in squared radii, divided by its value in the virgin contact. Some problems have further unknowns.
+        All unknowns are of the order of one.
     accumulated : array, shape (n,)
         The quantity accumulated at the radii of the nodes; zero at the edge.
     """
@@ -87,7 +87,7 @@ class Problem(Protocol):
         """Return the moment at the end of a solved step."""
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return accumulated quantity - known - theta * rate at every node, and the conditions at the edge."""
+        """Return (accumulated quantity) - known - theta * rate at every node, and the conditions at the edge."""
 
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
         """Return the derivatives of the residual with respect to the nodal unknowns."""
@@ -106,7 +106,7 @@ def march(
 ) -> list[Any]:
     """Advance a contact in time until a step ends at or beyond `end`.
 
-    The steps do not depend on `end`, so a longer march repeats a shorter one exactly.
+    The steps do not depend on `end`: a march to a later end begins with exactly the same steps.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def march(
     start : Moment, optional
         The first moment; by default the virgin contact.
     stops : callable, Moment -> bool
-        Returns True for a moment after which the march stops before `end`.
+        Function that returns True for a moment at which the march must stop, even before `end`.
 
     Returns
     -------
@@ -157,7 +157,7 @@ def march(
 def settled(problem: Problem) -> Any:
     """Return the virgin contact as a solution of the discrete equations.
 
-    So the first time step does not contain a jump from the exact to the discrete solution.
+    Otherwise the first time step would contain a jump from the exact to the discrete solution.
     """
     virgin = problem.start()
     known = problem.memory([virgin], np.zeros(1))
@@ -166,7 +166,7 @@ def settled(problem: Problem) -> Any:
 
 
 def at(problem: Problem, history: Sequence[Any], time: float, tolerance: float) -> tuple[int, Any]:
-    """Return the number of steps before a time, and the moment at this time, which a step of its own reaches.
+    """Return the number of steps before a time, and the moment at this time, computed by one additional step.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def at(problem: Problem, history: Sequence[Any], time: float, tolerance: float) 
 
 
 def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatArray:
-    """Return the integral of a rate at every moment, by the BDF formulas of the steps; shape (steps + 1,)."""
+    """Return the integral of a rate up to every moment, by the BDF formulas of the steps; shape (steps + 1,)."""
     total = np.zeros(len(history))
     for number in range(1, len(history)):
         order = min(number, 3)
@@ -243,7 +243,7 @@ class _Newton:
     ) -> FloatArray | None:
         """Iterate until the unknowns converge; return None if they do not.
 
-        Where convergence is slow, renew the Jacobian if `fresh`; otherwise return None.
+        If convergence is slow and `fresh` is True, renew the Jacobian; if `fresh` is False, return None.
         """
         unknowns, last, renew = guess.copy(), np.inf, fresh
         for _ in range(MOST_ITERATIONS):
@@ -272,7 +272,7 @@ class _Newton:
     def _renew(
         self, unknowns: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray], residual: FloatArray
     ) -> None:
-        """Factorise the Jacobian; the columns of the edge and the unknowns after the edge are finite differences."""
+        """Factorise the Jacobian. The columns of the panels' width and of later unknowns are finite differences."""
         matrix = self.problem.jacobian(unknowns, theta)
         for column in range(self.problem.panels.nodes.size - 1, unknowns.size):
             moved = unknowns.copy()

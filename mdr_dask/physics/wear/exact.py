@@ -32,22 +32,24 @@ from mdr_dask.physics.wear.worn import (
 )
 
 COARSEST = 1e-2
-"""Accuracies above this value are replaced by this value: the panels are not coarser than that."""
+"""Largest accuracy used for panels and steps; if a larger accuracy is requested, this value is used instead."""
 COARSEST_OF_MOVING = 3e-4
-"""The same for a moving border. Longer steps do not follow the border, so that more steps fail and the solution takes
-longer."""
+"""The same for a moving border. With a larger value, the steps are too long to follow the border: more steps fail, and
+the solution takes longer."""
 ENDED = 1e4
-"""N / sqrt(a^2 - c^2) from which on a contact is its limiting profile, where a is a bound of the contact radius. The
-difference decreases at least as fast as exp(-N / (5 sqrt(a^2 - c^2))), so it is below the rounding error."""
+"""Value of N / sqrt(a^2 - c^2) from which on the limiting profile is returned; a is a bound of the contact radius. The
+difference from the limiting profile falls at least as fast as exp(-N / (5 sqrt(a^2 - c^2))), so it is below the
+rounding error."""
 JUMP = 0.1
-"""The border stops when y in the panel next to the border exceeds this value, because the image jumps there."""
+"""The border stops when y = 1 - (d - g) / eta in the panel next to the border exceeds this value, because the image
+jumps there."""
 LOWEST = 1e-2
 """A step that gives y below minus this value is rejected, and the border stops at the moment before this step."""
 ROUGHER = 4.0
-"""Factor on the step tolerance from each solution to the next rougher one."""
+"""Ratio of the step tolerance of each rougher solution to that of the previous solution."""
 EDGE = 0.2
-"""Least stated error of a radius, as a fraction of its change in the last time step. All solutions have this error in
-common, because a radius that the edge passes within a step wears from the end of this step on."""
+"""Smallest stated error of a radius, as a fraction of the change of this radius in the last time step. All solutions
+have this error in common: a position that the edge passes within a step begins to wear only at the end of this step."""
 NEAR_AXIS = 1e-5
 """Radius, in units of a0, at which the exponent of a body at its tip is evaluated."""
 SHARPEST = 8.0
@@ -55,12 +57,12 @@ SHARPEST = 8.0
 
 
 class Resolution(NamedTuple):
-    """Panels and steps for an accuracy of f, relative to eta d0.
+    """Panels and steps for a requested accuracy.
 
     Parameters
     ----------
     accuracy : float
-        The accuracy.
+        Allowed error of f, divided by eta d0.
     rougher : int
         0 for the solution, 1 and 2 for the two rougher solutions from which its error is estimated.
     """
@@ -91,9 +93,10 @@ class Resolution(NamedTuple):
         return graded_panels(left, right, order - min(self.rougher, 1))
 
     def panels_in_gross_slip(self, sharpness: float) -> Panels:
-        """Return panels for a pressure that jumps at the edge in the end, and for a power-law profile at the axis.
+        """Return panels that resolve the pressure jump that develops at the edge, and a power-law tip at the axis.
 
-        `sharpness` is 2 / n for a tip of the power n < 2. The error at the tip is the height in the innermost panel.
+        `sharpness` is 2 / n for a tip of the power n < 2. The error at the tip is the height of the profile within the
+        innermost panel.
         """
         digits = -np.log10(self.accuracy)
         tip = max(round(2.0 * digits) + 1 - self.rougher, 3.3 * digits - 2.2 - self.rougher)
@@ -101,7 +104,7 @@ class Resolution(NamedTuple):
         return graded_panels(round(sharpness * tip), edge, 4 - min(self.rougher, 2))
 
 
-#: Return the contacts after all wanted amounts of wear, from one solution at a resolution.
+#: Function that returns the contacts after all wanted amounts of wear, from one solution at a resolution.
 Solver = Callable[[Resolution], dict[float, Worn]]
 
 
@@ -116,21 +119,23 @@ def exact(
 ) -> list[Worn]:
     """Return the worn contact after each amount of wear, by the exact rule df/dN = p (f - f_star) / eta.
 
+    The module `slip` defines the profile f_star.
+
     Parameters
     ----------
     profile : Profile
         The virgin body, pressed to the depth 1.
     stick_radius : float
-        c of the virgin contact, between 0 and 1; 0 means gross slip in one direction, with df/ds = p in
-        the whole contact.
+        Stick radius c of the virgin contact, between 0 and 1. A value of 0 means gross slip in one direction, with
+        df/ds = p in the whole contact.
     amounts : sequence of float
-        Cycles N >= 0 in units of N0, or sliding paths s = k E* l / (sigma0 a0); any order. Infinity gives the limiting
-        profile of partial slip.
+        Cycles N >= 0 in units of N0, or sliding paths s = k E* l / (sigma0 a0) after a length l; in any order. An
+        infinite value gives the limiting profile of partial slip.
     accuracy : float
-        Wanted error of f, divided by eta d0, which is the order of magnitude of the wear. Values below 3e-6 are not
+        Allowed error of f, divided by eta d0, which is the order of magnitude of the wear. Errors below 3e-6 are not
         reached, because round-off accumulates over the steps.
     constant_force : bool
-        Keep the force of the virgin contact instead of its depth.
+        Whether to keep the force of the virgin contact instead of its depth.
     errors : bool
         Whether to estimate the errors; this about doubles the computing time.
 
@@ -158,7 +163,7 @@ def exact(
         solve: Solver = partial(_slid, profile, wanted, constant_force)
     else:
         check_stick_radius(stick_radius)
-        # near full stick the border hardly moves, and the two conditions agree within the accuracy
+        # near full stick the border hardly moves: the results at constant depth and at constant force agree
         border_moves = constant_force and 0.5 * (1.0 - stick_radius) > accuracy**2
         coarsest = COARSEST_OF_MOVING if border_moves else coarsest
         solve = partial(_fretted, profile, stick_radius, wanted, border_moves)
@@ -188,7 +193,7 @@ def _solutions(solve: Solver, resolution: Resolution, errors: bool) -> list[dict
 
 
 def _solved(solve: Solver, resolution: Resolution) -> dict[float, Worn]:
-    """Return the solution at a resolution; where the evolution fails, at the next finer resolution."""
+    """Return the solution at a resolution. If the evolution fails, repeat it at up to two finer resolutions."""
     for accuracy in (resolution.accuracy, 0.5 * resolution.accuracy):
         try:
             return solve(resolution._replace(accuracy=accuracy))
@@ -198,7 +203,7 @@ def _solved(solve: Solver, resolution: Resolution) -> dict[float, Worn]:
 
 
 class _Leg(NamedTuple):
-    """A part of an evolution: its problem, its moments, the tolerance of a step, and the dissipated energy before."""
+    """A part of an evolution: problem, moments, tolerance of a step, and the energy dissipated before this part."""
 
     problem: PartialSlip | GrossSlip
     moments: Sequence[Any]
@@ -211,7 +216,7 @@ class _Leg(NamedTuple):
         return float(self.moments[-1].time)
 
     def at(self, time: float) -> tuple[Any, _Common]:
-        """Return the moment at a time, and what all kinds of slip have in common."""
+        """Return the moment at a time, and the outputs that are computed in the same way for all kinds of slip."""
         number, moment = at(self.problem, self.moments, time, self.tolerance)
         moments = [*self.moments[:number], moment]
         energy = self.before + integral_along(moments, [self.problem.wear_rate(one.unknowns) for one in moments])[-1]
@@ -220,7 +225,7 @@ class _Leg(NamedTuple):
 
 
 class _Common(NamedTuple):
-    """Dissipated energy over mu, number of steps, and least error of the contact radius."""
+    """Dissipated energy divided by mu, number of steps, and smallest stated error of the contact radius."""
 
     energy: float
     steps: int
@@ -321,9 +326,9 @@ def _frozen(problem: PartialSlip, path: FloatArray) -> _Frozen:
 def _end(problem: PartialSlip, moment: SlipMoment) -> Worn:
     """Return the limiting profile of a contact whose stick border stops at `moment`.
 
-    In the limit the shape of the stick zone no longer changes, and this zone carries the whole force. So g = d beyond
-    the border b, where d = (F/2 + int_0^b g dx) / b is the depth. The radius of the scar follows from int_0^a (g - g0)
-    / sqrt(a^2 - x^2) dx = 0.
+    After infinitely many cycles, the stick zone carries the whole force, and its shape no longer changes. Beyond the
+    border b, g is therefore equal to the depth d = (F/2 + int_0^b g dx) / b. The radius a of the scar is the root of
+    int_0^a (g - g0) / sqrt(a^2 - x^2) dx = 0.
     """
     profile, c, eta = problem.profile, problem.inner_radius, problem.eta
     border, frozen = problem.radius(moment.path[0, -1]), _frozen(problem, moment.path)
@@ -429,7 +434,7 @@ def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resol
 
 
 def _slid_contact(leg: _Leg, path: float) -> Worn:
-    """Turn the nodal values after one sliding path into a worn contact, whose image is NaN beyond the contact."""
+    """Turn the nodal values after one sliding path into a worn contact. Its image is NaN outside the contact."""
     problem, (moment, common) = leg.problem, leg.at(path)
     assert isinstance(problem, GrossSlip)
     profile, panels, unknowns, worn = problem.profile, problem.panels, moment.unknowns, moment.accumulated

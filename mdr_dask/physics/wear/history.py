@@ -1,8 +1,8 @@
 """Wear under histories of amplitude, depth and force; every block is a new problem of partial or gross slip.
 
 The wear in one cycle is exactly df/dN = p(r) s(r), where s is the half-integral of the positive part of
-1 - (d - g) / eta. The grid is uniform, because earlier blocks leave stick borders at different radii. At constant force
-the depth grows, and the stick radius with it. For amplitudes of gross slip s is positive everywhere; an infinite
+1 - (d - g) / eta. The grid is uniform, because earlier blocks leave stick borders at different radii. At constant
+force, the depth and the stick radius grow. If the amplitude causes gross slip, s is positive everywhere. An infinite
 amplitude means sliding.
 """
 
@@ -21,13 +21,13 @@ from mdr_dask.physics.wear.worn import Worn
 STEP_SHARE = 0.45
 """Time step as a fraction of the largest stable explicit step, which is 1.7 grid spacings."""
 LEAST_EDGE_ERROR = 0.5
-"""Least stated error of the radii, in cells of the grid. A border between two nodes is uncertain, and the results of
-two grids may agree by chance."""
+"""Smallest stated error of contact radius and stick border, in cells of the grid. The position of a border between two
+nodes is uncertain, and the results of two grids may agree by chance."""
 
 
 @dataclass(frozen=True)
 class LoadBlock:
-    """A number of cycles with constant amplitude and constant depth or force.
+    """A number of cycles with a constant amplitude, and with a constant depth or a constant force.
 
     Parameters
     ----------
@@ -35,10 +35,11 @@ class LoadBlock:
         Dimensionless number of cycles N = 4 U0 n k E* / (sigma0 a0), with the number n of cycles and the amplitude U0
         of this block.
     slip_share : float
-        eta = G* U0 / (mu E* d0) > 0 with the first depth d0. The slip is gross if eta exceeds the depth in units of
-        d0; an infinite eta means sliding.
+        eta = G* U0 / (mu E* d0) > 0, with the depth d0 of the virgin contact. If eta exceeds the depth in units of d0,
+        the slip is gross. An infinite eta means sliding.
     depth, force : float, optional
-        The quantity that is constant during the block, in units of d0 or E* d0 a0; give exactly one of them.
+        The quantity that is constant during the block: depth in units of d0, or force in units of E* d0 a0. Exactly one
+        of them must be given.
     """
 
     cycles: float
@@ -65,12 +66,12 @@ def history(
     Parameters
     ----------
     profile : Profile
-        The virgin body; its first contact under depth 1 has radius 1.
+        The virgin body; at depth 1 its contact radius is 1.
     blocks : sequence of LoadBlock
         The blocks in the order of time.
     cells : int
-        Number of cells of the grid. The error is about proportional to the cell width, and, once the image has a jump,
-        to the square root of the cell width.
+        Number of cells of the grid. The error is about proportional to the cell width. Once the image has a jump, the
+        error is about proportional to the square root of the cell width.
     reach : float
         Largest radius of the grid, in units of a0.
     errors : bool

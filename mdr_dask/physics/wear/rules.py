@@ -2,10 +2,10 @@
 
 The functions are compiled.
 
-The fast rule (thesis eq. 6.11) has a closed form. Inside the first contact, y = (g - g_c) / eta follows a logistic law;
-outside it, g - 1 decays. Both change with the exponent xi N / a(c), so the rule needs only the remaining fraction
-exp(-xi N / a(c)). This fraction is zero in the limiting profile (thesis eqs. 6.8-6.10). Where the rule would give a
-profile below the virgin one, the virgin profile is used.
+The fast rule (thesis eq. 6.11) has a closed form. Inside the first contact, y = (g - g0(c)) / eta follows a logistic
+law, with eta = 1 - g0(c). Outside the first contact, g - 1 decays. Both are functions of the remaining fraction
+exp(-xi N / a(c)), which is zero for the limiting profile (thesis eqs. 6.8-6.10). Where the rule would give a profile
+below the virgin one, the virgin profile is used.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ THESIS_XI = 0.8
 
 
 NODES = 16
-"""Gauss nodes in each of the four pieces of integration; with them the results agree with quadrature to `ERROR`."""
+"""Number of Gauss nodes in each of the four pieces of integration; it is sufficient for the accuracy `ERROR`."""
 LAYER_GROWTH = 30.0
 """Ratio of the widths of successive pieces of integration at the stick border. The piece next to the border is as wide
 as the layer in which the fast rule has not yet flattened the image."""
 LEAST = 1e-30
 """Smallest remaining fraction, so that the layer at the stick border does not become thinner than round-off."""
 SCAR, END = 1e-10, 1e-13
-"""Tolerances of the integral that vanishes at the radius of the scar, divided by eta: for the fast rule, whose results
-have to be smooth to `ERROR` only, and for the limiting profile, about the rounding error."""
+"""Tolerances, divided by eta, of the integral that vanishes at the radius of the scar. `SCAR` is for the fast rule,
+whose results need only be smooth to `ERROR`. `END` is for the limiting profile; it is about the rounding error."""
 ERROR = 2e-6
 """Numerical error of every output divided by its largest value. The error of the fast rule itself is not included."""
 _NO_TABLE = PowerProfile(1.0).pieces()
 
 
 class Rule(NamedTuple):
-    """One case of the rule: virgin image, stick radius c, `level` = g0(c), eta, remaining fraction `rest`."""
+    """One case of the rule: virgin image, stick radius c, `level` = g0(c), eta = 1 - g0(c), remaining fraction."""
 
     image: Image
     c: float
@@ -61,9 +61,9 @@ class Quadrature(NamedTuple):
 
 
 class Bracket(NamedTuple):
-    """Interval with a root of a falling function: its ends, the values at the ends, and the end computed last.
+    """Interval that contains the root of a falling function: its ends, and the values of the function at the ends.
 
-    `newer` is -1 if the lower end was computed last, 1 for the higher end, and 0 at the start.
+    `newer` is -1 if the value at the lower end was computed last, 1 if that at the higher end was, and 0 at the start.
     """
 
     low: float
@@ -195,7 +195,8 @@ def _worn(profile: Profile, rule: Rule, radius: float, edge: float) -> Worn:
 
     scar = Scar(c, radius, change, slope, tuple(float(cut) for cut in quadrature.cuts[1:] if cut > c))
     worn = worn_by(profile, scar, c, edge, 1.0, force)
-    energy = volume if rest == 0.0 else np.nan  # in the limit all dissipated energy has caused wear
+    # the wear law gives the energy of the limiting profile; the fast rule does not determine the dissipated energy
+    energy = volume if rest == 0.0 else np.nan
     return replace(worn, wear_volume=volume, energy_volume=energy, relative_error=ERROR)
 
 
@@ -208,7 +209,7 @@ def _between(bracket: Bracket) -> float:
 
 @jit_inline
 def _narrowed(bracket: Bracket, x: float, value: float) -> Bracket:
-    """Return the bracket narrowed by the value at x, with the rule of Anderson and Björck."""
+    """Return the bracket with one end replaced by x, with the rule of Anderson and Björck."""
     low, low_value, high, high_value, newer = bracket
     before = low_value if value > 0.0 else high_value
     share = 1.0 - value / before
@@ -329,7 +330,7 @@ def _numbers(rule: Rule, limit: float, quadrature: Quadrature) -> tuple[float, f
         radius = _scar_radius(rule, Bracket(1.0, first, limit, last, 0), quadrature)
     volume = 4.0 * _scar_integral(rule, radius, 1, quadrature)
     load, worn = _sticking_load(rule, abscissa, weight), 0.0
-    for piece in range(4 if rule.rest > 0.0 else 0):  # in the limit, the slip zone carries no load
+    for piece in range(4 if rule.rest > 0.0 else 0):  # in the limiting profile, the slip zone carries no load
         width = cuts[piece + 1] - cuts[piece]
         for k in range(abscissa.size):
             gap = cuts[piece] - rule.c + width * abscissa[k]

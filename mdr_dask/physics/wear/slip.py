@@ -1,15 +1,16 @@
 """The equations of one time step of partial slip and of gross slip, for `evolution.march`.
 
 Partial slip at constant depth and under constant force differ in the unknowns only. At constant depth the stick border
-b stays at its first value c. Under constant force the depth d grows, and the border moves outwards until the image
-jumps there; then it no longer moves. Inside the border the image is frozen: g(b) = d - eta at the time when the border
-passed. The slip is s = (f - f_star) / eta, where f_star is the profile of the image that is g up to the border and the
-plateau d - eta beyond it. While the plateau rises, f_star changes by df_star = (2/pi) arccos(b / r) dd. So only the
-path (b, d) has to be stored for the annulus between c and b.
+b stays at its first value c. Under constant force the depth d grows, and the border moves outwards until the image has
+a jump at the border; then the border no longer moves. Inside the border the image is frozen: it keeps the value
+g = d - eta that it had when the border passed. The slip is s = (f - f_star) / eta. Here f_star is the profile of an
+image that equals g up to the border and has the constant value d - eta (the plateau) beyond the border. While the
+plateau rises, f_star changes by df_star = (2/pi) arccos(b / r) dd. Therefore it is enough to store the path (b, d) for
+the annulus between c and b.
 
-The accumulated quantity is the worn depth divided by eta. Squared radii are counted from c^2 in units of 1 - c^2, the
-width of the virgin slip zone: q = (r^2 - c^2) / (1 - c^2). The depth is counted from 1 in units of eta. So all unknowns
-are of the order of one, even near full stick.
+The accumulated quantity is the worn depth divided by eta. Squared radii are expressed by q = (r^2 - c^2) / (1 - c^2),
+which is 1 at the edge of the virgin slip zone. The depth is expressed by (d - 1) / eta. All unknowns are then of the
+order of one, even near full stick.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear.evolution import ROUNDING, Moment, settled
 
-#: Weight of the border relative to the depth in the step error. It is large, because f rises like a square root beyond
-#: the border.
+#: Weight of the border relative to the depth in the error of a step. It is large, because f rises like a square root
+#: beyond the border.
 BORDER_WEIGHT = 30.0
 #: Position on the panels up to which the rise of the plateau is stored; the border is at 0, the edge at 1.
 BEYOND = 1.25
@@ -81,13 +82,13 @@ class Past(NamedTuple):
     shares, borders, widths : array, shape (m,)
         One entry for each moment: its weight, border and width.
     worn : array, shape (m, n)
-        Worn depth divided by eta at the nodes. If the border does not move: this value minus `frozen`, divided by
-        sqrt(z), where z is the position on the panels.
+        Worn depth divided by eta at the nodes. If the border does not move, `frozen` is subtracted, and the difference
+        is divided by sqrt(z), where z is the position on the panels.
     frozen : float
         The worn depth divided by eta at a border that does not move; NaN while the border moves.
     moved : array, shape (n + order,)
-        The rise of the plateau along the path, at the nodes of the newest past moment and at those of one panel beyond
-        the edge.
+        The rise of the plateau along the path, at the nodes of the newest past moment and at the nodes of one panel
+        beyond the edge.
     path : array, shape (2, k)
         The path of the newest past moment, see `SlipMoment`.
     carried : float
@@ -125,7 +126,7 @@ class PartialSlip:
     """Slip outside the stick border.
 
     The unknowns are y = 1 - (d - g) / eta at all nodes except the last, where y = 1, and the width of the slip zone.
-    Under constant force the depth follows, and then the border while it moves.
+    Under constant force, the depth is the next unknown, and the border is the last one as long as it moves.
 
     Parameters
     ----------
@@ -138,9 +139,9 @@ class PartialSlip:
     panels : Panels
         The panels between the border and the edge.
     load : float, optional
-        Half the force on the virgin slip zone divided by eta, which is kept; None at constant depth.
+        Half the force on the virgin slip zone, divided by eta, if the force is kept constant; None at constant depth.
     border : float, optional
-        The border if it does not move.
+        Value of q at the border if the border does not move; None while it moves.
     frozen : float
         The worn depth divided by eta at a border that does not move.
     """
@@ -210,10 +211,9 @@ class PartialSlip:
         return still, replace(moment, unknowns=moment.unknowns[:-1])
 
     def memory(self, past: Sequence[SlipMoment], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """Return a function of the unknowns that gives the part of the residual that follows from the past moments.
+        """Return a function of the unknowns that computes the contributions of the past moments to the residual.
 
-        These are the past contributions to s and to the worn depth at the nodes, and the additional load of the stick
-        zone.
+        The contributions are those to s and to the worn depth at the nodes, and the additional load of the stick zone.
         """
         places = [self.place(moment.unknowns) for moment in past]
         worn = np.array([moment.accumulated for moment in past])
@@ -236,7 +236,7 @@ class PartialSlip:
         return known
 
     def path_to(self, before: SlipMoment, place: Place) -> FloatArray:
-        """Return the path of the next moment after `before`."""
+        """Return the path up to the moment that follows `before`."""
         end = [[place.border], [place.depth]]
         return before.path if self.border is not None else np.append(before.path, end, axis=1)
 
@@ -286,7 +286,7 @@ class PartialSlip:
         return shares
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return s - known - theta (p / eta) s at the nodes, then the deviation of a constant force.
+        """Return s - known - theta (p / eta) s at the nodes and, under constant force, the deviation of the force.
 
         The row of the last node makes s continuous at the edge. If the border moves, the last row is y at the border,
         which has to be zero.
@@ -457,8 +457,8 @@ def _root(q: float, border: float) -> float:
 def _piece(body: VirginBody, first: float, last: float, change: float, q: float) -> float:
     """Return (2/pi) int arccos(b / r) dd over a straight piece of the path, along which the depth changes by `change`.
 
-    The integration variable is sqrt(r^2 - b^2), because the integrand is smooth in it; `first` and `last` are its
-    values at the ends of the piece.
+    The integration variable is sqrt(r^2 - b^2), because the integrand is a smooth function of this variable. `first`
+    and `last` are the values of the variable at the ends of the piece.
     """
     scale = math.sqrt(body.width / (body.square + body.width * q))
     whole = first + last
@@ -477,8 +477,9 @@ def _piece(body: VirginBody, first: float, last: float, change: float, q: float)
 class GrossSlip:
     """Slip in the whole contact; nodes lie at r^2 = z a^2, where z is the position on the panels.
 
-    The unknowns are the image g at all nodes except the last (at the edge, g equals the depth d), the relative width
-    a^2 of the contact, and, if the force is given, the depth d. The accumulated quantity is the worn depth, int p ds.
+    The unknowns are the image g at all nodes except the last, the squared contact radius a^2 in units of a0^2, and, if
+    the force is given, the depth d. At the last node, the edge, g equals d. The accumulated quantity is the worn depth,
+    int p ds.
     """
 
     profile: Profile
@@ -537,7 +538,7 @@ class GrossSlip:
         return accumulated
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return f - f0 - known - theta p at the nodes, then the deviation of the force if the force is given.
+        """Return f - f0 - known - theta p at the nodes and, if the force is given, the deviation of the force.
 
         The row of the last node is the condition that f is continuous at the edge.
         """

@@ -48,14 +48,15 @@ class Worn:
     height, image, pressure : callable, array -> array
         f(r), g(x) and p(r), for any position.
     energy_volume : float
-        The dissipated energy divided by mu, in the unit of volume: by the wear law it equals the wear volume. NaN if
-        it is unknown.
+        The dissipated energy divided by mu, in the unit of volume. According to the wear law, it equals the wear
+        volume. NaN if it is unknown.
     steps : int
-        Time steps taken.
+        Number of time steps.
     rougher : tuple of Worn
         Two rougher solutions of the same contact, from which its error is estimated.
     least_errors : mapping of str to float
-        Least stated errors of numbers in which the rougher solutions may agree by chance, by the name of the output.
+        Smallest stated error of an output, by the name of the output. It is given for outputs in which the rougher
+        solutions may agree by chance.
     relative_error : float
         Error of every output divided by the largest value of the output; used if there is no rougher solution.
     """
@@ -84,9 +85,9 @@ class Worn:
     def error(self, output: str, places: FloatArray) -> float | FloatArray:
         """Return the expected absolute error of an output; for functions, at the positions `places`.
 
-        The error follows from the differences from the rougher solutions. Without rougher solutions, it is a fraction
-        of the largest value. For functions, the largest difference among neighbouring positions is used. These
-        positions are dense at the borders of stick zone and contact.
+        The error follows from the differences between this solution and the rougher solutions. Without rougher
+        solutions, it is the fraction `relative_error` of the largest value. For functions, the largest difference among
+        neighbouring positions is used. These positions are dense at the borders of stick zone and contact.
         """
         if not self.rougher:
             value = np.asarray(self.value(output, places), dtype=float)
@@ -101,8 +102,8 @@ class Worn:
     def _distance(self, output: str, places: FloatArray = NOWHERE) -> FloatArray:
         """Return the distance of an output from the rougher solutions.
 
-        This is the difference from the first rougher solution, or half the difference from the second one if that is
-        larger, because two solutions may agree by chance.
+        This is the larger of two numbers: the difference from the first rougher solution, and half the difference from
+        the second one. Two are needed, because two solutions may agree by chance.
         """
         value = self.value(output, places)
         with np.errstate(invalid="ignore"):
@@ -118,7 +119,7 @@ class Worn:
 
 
 def _spread(distance: FloatArray) -> FloatArray:
-    """Return the largest finite value among the neighbours of each entry."""
+    """Return, for each entry, the largest finite value among the entry and its `REACH` neighbours on each side."""
     finite = np.where(np.isfinite(distance), distance, 0.0)
     padded = np.pad(finite, REACH, mode="edge")
     return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 2 * REACH + 1).max(axis=1))
@@ -172,7 +173,7 @@ def worn_volume(scar: Scar) -> float:
 
 
 def worn_image(profile: Profile, scar: Scar) -> Function:
-    """Return the worn image g(x). Beyond the scar, the image is continued such that f = f0."""
+    """Return the worn image g(x). Beyond the scar, the image is continued so that the profile is unworn, f = f0."""
 
     def image(position: FloatArray) -> FloatArray:
         x = np.abs(position)
@@ -203,7 +204,7 @@ def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, bo
 
     def slope(x: FloatArray) -> FloatArray:
         inside = np.maximum(x, c)
-        changes = (x > c) & ~(np.abs(x - border) < JUMP_WIDTH * border)  # changes this close to the border are a jump
+        changes = (x > c) & ~(np.abs(x - border) < JUMP_WIDTH * border)  # closer changes are part of the jump
         return np.asarray(profile.image_slope(x) + np.where(changes, scar.slope(inside), 0.0))
 
     near = np.array([border * (1.0 - JUMP_WIDTH), border * (1.0 + JUMP_WIDTH), edge * (1.0 - 1e-13)])
