@@ -1,7 +1,8 @@
 """Reduce results over realisations to means, standard deviations, quantiles and intervals.
 
-An output may have a companion that holds its discretisation errors. The two errors of a mean are stored separately, as
-``standard_error`` (scatter of the realisations) and ``grid_error``; its interval combines both.
+An output may have a companion that holds its discretisation errors. A mean has two errors, which are stored separately:
+``standard_error`` from the scatter of the realisations, and ``grid_error`` from the discretisation. The interval of the
+mean combines both.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ def standard_error(array: xr.DataArray) -> xr.DataArray:
 
 
 def grid_error(error: xr.DataArray) -> xr.DataArray:
-    """Return the discretisation error of the mean: the mean of the errors, because they need not cancel."""
+    """Return the discretisation error of the mean: the mean of the absolute errors, because errors need not cancel."""
     return mean(abs(error))
 
 
@@ -70,7 +71,8 @@ def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
     Returns
     -------
     DataArray
-        With the dimension ``bound`` (``low``, ``high``) in place of ``realisation`` (`mdr_dask.bootstrap.interval`).
+        The ends of the intervals. The dimension ``bound`` (``low``, ``high``) replaces ``realisation``. For the method
+        see `mdr_dask.bootstrap.interval`.
     """
     count = array.sizes["realisation"]
     if error is not None:
@@ -83,7 +85,7 @@ def mean_and_ends(array: xr.DataArray, error: xr.DataArray | None) -> tuple[xr.D
     """Return the mean and both ends of its `interval`.
 
     If the scatter is unknown, for example with one realisation, the ends are the mean plus and minus its discretisation
-    error.
+    error. If the discretisation error is unknown too, they are NaN.
     """
     known = (array,) if error is None else xr.broadcast(array, abs(error))
     found: tuple[xr.DataArray, xr.DataArray, xr.DataArray] = xr.apply_ufunc(
@@ -181,7 +183,10 @@ NAMES = tuple(statistic.name for statistic in STATISTICS)
 
 
 def companion(dataset: xr.Dataset, output: str) -> xr.DataArray | None:
-    """Return the discretisation errors of an output, or None; its attribute ``ancillary_variables`` has their name."""
+    """Return the discretisation errors of an output, or None if the dataset has none.
+
+    The attribute ``ancillary_variables`` of the output contains the name of the variable with its errors.
+    """
     name = dataset[output].attrs.get("ancillary_variables")
     return dataset[name] if name in dataset.data_vars else None
 
@@ -200,7 +205,7 @@ def aggregate(dataset: xr.Dataset, statistics: Sequence[str] = NAMES) -> xr.Data
     -------
     Dataset
         A variable ``<output>_<statistic>`` for every output and statistic, with units and meaning in attrs. The
-        statistic ``grid_error`` exists only for outputs that have a companion with errors.
+        statistic ``grid_error`` exists only for outputs that have a companion with discretisation errors.
     """
     for name in statistics:
         if name not in NAMES:

@@ -40,7 +40,7 @@ def reporter(quiet: bool) -> Iterator[Callable[[Progress], None]]:
 
 @contextmanager
 def at_work(what: str) -> Iterator[None]:
-    """On a terminal, print every few seconds the text `what` and the time since the start."""
+    """On a terminal, print the text `what` and the time since the start every few seconds."""
 
     def draw(_: Progress | None, elapsed: float) -> None:
         _write(", ".join([what, seconds(round(elapsed)), *(["compiling ..."] if _compiles() else [])]))

@@ -1,9 +1,9 @@
 """Bootstrap intervals from the scatter of realisations and from the discretisation errors of results.
 
-A *stack* is an array whose first row is the mean. It is followed by `RESAMPLES` rows with the means of resampled
-realisations, and by rows in which the mean is shifted by its errors. A fit is applied to every row; the result is a
-stack of the fitted constants, from which `interval` computes an interval. A resample that contains only failed
-realisations is NaN and is left out.
+A *stack* is an array with three kinds of rows. The first row is the mean. The next `RESAMPLES` rows are the means of
+resampled realisations. In the remaining rows, the mean is shifted by its discretisation errors. A fit is applied to
+every row. The result is a stack of the fitted constants, from which `interval` computes an interval. A resample that
+contains only failed realisations is NaN and is left out.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from mdr_dask.arrays import FloatArray
 
 CONFIDENCE = 0.95
 RESAMPLES = 400
-#: Values are divided into this number of groups of neighbours. One group at a time is shifted by its errors, all with
-#: the same sign.
+#: Neighbouring values are put into groups; this is the number of groups. In each shifted row, the values of one group
+#: are shifted by their errors, all with the same sign.
 GROUPS = 32
 #: Probabilities of the ends of an interval.
 TAILS = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
@@ -30,9 +30,10 @@ NOTHING = -1000.0
 
 @lru_cache(maxsize=8)
 def weights(count: int) -> FloatArray:
-    """Return how often each realisation is drawn, shape (1 + RESAMPLES, count); in the first row each is drawn once.
+    """Return how often each resample draws each realisation, shape (1 + RESAMPLES, count); the first row is all ones.
 
-    All cases use the same resamples, because they share their rough lines; differences between cases are then paired.
+    All cases use the same resamples, because realisations of the same number have the same rough line in all cases. The
+    difference between two cases is then computed for each resample.
     """
     generator = np.random.Generator(np.random.Philox(0))
     drawn = generator.multinomial(count, np.full(count, 1 / count), RESAMPLES)
@@ -44,8 +45,8 @@ def weights(count: int) -> FloatArray:
 def means(values: FloatArray) -> FloatArray:
     """Return the stack of means over the first axis (realisations).
 
-    Values that are not finite are left out. Without any finite value the mean is NaN; with fewer than two, its
-    resamples are NaN.
+    Values that are not finite are left out. Without any finite value, the mean and its resamples are NaN. With one
+    finite value, only the resamples are NaN.
     """
     flat = values.reshape(values.shape[0], -1)
     known = np.isfinite(flat)
@@ -59,7 +60,10 @@ def means(values: FloatArray) -> FloatArray:
 
 
 def complete(values: FloatArray) -> FloatArray:
-    """Return the values, with NaN for all values of a realisation (first axis) if one of them is not finite."""
+    """Return the values without incomplete realisations.
+
+    If a realisation (first axis) has a value that is not finite, all values of this realisation become NaN.
+    """
     known = np.all(np.isfinite(values.reshape(values.shape[0], -1)), axis=1)
     return np.where(known.reshape(-1, *(1 for _ in values.shape[1:])), values, np.nan)
 
@@ -87,7 +91,7 @@ def with_errors(stack: FloatArray, errors: FloatArray) -> FloatArray:
 def difference(one: FloatArray, other: FloatArray) -> FloatArray:
     """Return the stack of the difference of two stacks with the same resamples.
 
-    It has the rows for the errors of the first stack, then the rows for the errors of the second stack.
+    Its shifted rows are those for the errors of the first stack, then those for the errors of the second stack.
     """
     plain = 1 + RESAMPLES
     rows = [one[:plain] - other[:plain], one[plain:] - other[0], one[0] - other[plain:]]
@@ -103,9 +107,9 @@ def logarithms(stack: FloatArray) -> FloatArray:
 
 
 def _reach(shifts: FloatArray) -> FloatArray:
-    """Return the sum over all groups of the larger of two upward shifts, which belong to the two signs of the errors.
+    """Return the sum over all groups of the largest upward shift of each group.
 
-    A shift that is NaN counts as 0.
+    Each group has two shifts, one for each sign of the errors. A shift that is negative or NaN counts as 0.
     """
     known = np.where(np.isnan(shifts), 0.0, shifts)
     reach: FloatArray = np.maximum(np.maximum(known[0::2], known[1::2]), 0.0).sum(axis=0)
@@ -125,10 +129,10 @@ def regrouped(stack: FloatArray) -> FloatArray:
 def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tuple[FloatArray, FloatArray]:
     """Return 95 % intervals from a stack, along its first axis.
 
-    The percentiles of a bootstrap over few realisations are too narrow, so their distances from the value are
-    multiplied by sqrt(n / (n - 1)) t / z. Here t and z are the 97.5 % quantiles of Student's distribution with n - 1
-    degrees of freedom and of the normal distribution. The shifts by errors are added linearly, because the same error
-    in every realisation does not average out.
+    With few realisations, the percentiles of a bootstrap lie too close to the value. Their distances from the value are
+    therefore multiplied by sqrt(n / (n - 1)) t / z. Here t is the 97.5 % quantile of Student's distribution with n - 1
+    degrees of freedom, and z is that of the normal distribution. The shifts by discretisation errors are added
+    linearly, because an error that is the same in every realisation does not average out.
 
     Parameters
     ----------
@@ -162,15 +166,16 @@ def widening(count: ArrayLike) -> FloatArray:
 
 
 def chance(residuals: FloatArray, count: int, draws: int = RESAMPLES) -> float:
-    """Return the probability that scatter and errors alone cause residuals as large as those of the first row.
+    """Return the probability that scatter and errors alone cause an rms residual at least as large as that of the data.
 
-    It is NaN if there are too few resamples, for example with one realisation.
+    The residuals of the data are in the first row. The probability is NaN if there are too few resamples, for example
+    with one realisation.
 
     Parameters
     ----------
     residuals : array, shape (1 + RESAMPLES + 2 groups, ...)
-        Stack of data minus law. If the law holds, the first row differs from zero by about as much as the resamples
-        differ from the first row.
+        Stack of the differences between data and law. If the law holds, the first row differs from zero by about as
+        much as the resamples differ from the first row.
     count : int
         Number of realisations that were resampled.
     draws : int
@@ -193,7 +198,9 @@ def scatter(residuals: FloatArray, count: int) -> float:
 
 
 def _caused(residuals: FloatArray, count: int, draws: int) -> FloatArray:
-    """Return the rms residuals that scatter and errors alone cause, one per resample; none for too few resamples.
+    """Return the rms residuals that scatter and errors alone cause, one per resample.
+
+    The array is empty if there are too few resamples.
 
     The errors of different groups affect different cases, so the squares of the residuals that they cause are added.
     """

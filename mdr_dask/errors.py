@@ -11,7 +11,7 @@ class MdrDaskError(Exception):
 
 
 class CampaignError(MdrDaskError):
-    """A campaign that cannot be run; its arguments are the messages about all problems."""
+    """A campaign that cannot be run; the arguments of the exception are the messages about all problems."""
 
     def __str__(self) -> str:
         return "\n".join(str(problem) for problem in self.args)
@@ -34,7 +34,7 @@ class ClusterError(MdrDaskError):
 
 
 class MachineError(MdrDaskError):
-    """A fault of the machine, such as a full disk: no case has failed, and the run can be repeated elsewhere."""
+    """A fault of the machine, such as a full disk. No case has failed, so the run can continue on another machine."""
 
 
 class DataError(MdrDaskError):
@@ -56,7 +56,11 @@ def _rounded(number: float, digits: int) -> str:
 def distinguishable(
     value: float, *limits: float, digits: int = 3, write: Callable[[float, int], str] = _rounded
 ) -> tuple[str, ...]:
-    """Return a number and its limits as texts, with `digits` digits or more if different numbers need them."""
+    """Return a number and its limits as texts.
+
+    The texts have `digits` digits. They have more digits if the text of the number would otherwise equal the text of a
+    limit that differs from the number.
+    """
     for more in range(digits, _ALL_DIGITS):
         first, *others = (write(number, more) for number in (value, *limits))
         if all(text != first for text, limit in zip(others, limits, strict=True) if limit != value):
@@ -64,7 +68,7 @@ def distinguishable(
     return tuple(write(number, _ALL_DIGITS) for number in (value, *limits))
 
 
-#: Names of parameters and outputs in this package, by other common names of the same quantity.
+#: Names of the parameters and outputs that may be meant, by other common names of the quantity.
 _SYNONYMS = {
     "load": ("normal_force", "line_load"),
     "force": ("normal_force", "line_load"),
@@ -85,12 +89,15 @@ _SYNONYMS = {
     "alpha": ("pressure_viscosity",),
     "slip": ("slide_roll_ratio",),
 }
-#: How quantities with related names differ from the suggested parameter.
+#: Texts that follow a suggested name in a message, by the quantity that the user named: they say how the two differ.
 _DIFFERENCES = {"diameter": ", half the diameter", "pressure": ", a load instead of a pressure"}
 
 
 def did_you_mean(word: Any, known: Sequence[str]) -> str:
-    """Return a hint in parentheses, after a space: the nearest known word, or all known words if they are few."""
+    """Return a hint in parentheses, after a space: the nearest known word.
+
+    If no known word is near, the hint lists all known words, or is empty if there are more than 12.
+    """
     from difflib import get_close_matches
 
     folded = {name.casefold(): name for name in known}

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from mdr_dask.units import conversion, is_unit
 
-#: Further names of quantities. A `Column` of such a name has these names too.
+#: Further names of quantities. A `Column` whose name is a key here also has the names listed under this key.
 SYNONYMS = {
     name: tuple(text.split(", "))
     for name, text in {
@@ -44,7 +44,7 @@ _ALIKE = str.maketrans({"’": "'", "′": "'", "″": "''", '"': "''", "µ": "�
 _WITH_SYMBOL = re.compile(r"(.+?)\s*(?:\(([^()]+)\)|\s(\S['\"’′″]*))")
 #: The end of an abbreviated word, as in ``Ang. frequency``.
 _ABBREVIATED = re.compile(r"(?<=\w{3})\.")
-#: A name with its unit in brackets, or behind a slash, a comma or the word "in".
+#: Two forms of a heading: a name with its unit in brackets, and a name with its unit after a slash, a comma or "in".
 _BRACKETED = re.compile(r"(.+?)[\s,/]*([\[({<])([^\])}>]*)[\])}>]")
 _BEHIND = re.compile(r"(.+?)\s*(?:/|,|\bin\b)\s*(\S.*)")
 
@@ -64,7 +64,7 @@ class Column:
     needed : bool
         Whether a table must have this column.
     above, least : float, optional
-        Limits in SI: values must be greater than `above` and not smaller than `least`; a limit that is None is ignored.
+        Limits in SI: values must be greater than `above` and not smaller than `least`. None means no limit.
     given_unit : str
         Unit to use if the table states no unit. If `given_unit` is empty, a table must state the unit, except for pure
         numbers.
@@ -107,8 +107,8 @@ def plain(name: str) -> str:
 def split_unit(heading: str) -> tuple[str, str]:
     """Return the name and the unit of a heading: ``f [Hz]``, ``f (Hz)``, ``f / Hz``, ``f, Hz`` or ``f in Hz``.
 
-    The text in square brackets is always a unit; other texts only if they look like units and are no symbols of the
-    quantity, as in ``force (F)``.
+    Text in square brackets is always taken as a unit. Any other text is taken as a unit only if it looks like one. In
+    other brackets it must also not be a symbol of the quantity, as in ``force (F)``.
     """
     found = _BRACKETED.fullmatch(heading.strip())
     if found:
@@ -121,7 +121,10 @@ def split_unit(heading: str) -> tuple[str, str]:
 
 
 def match(name: str, unit: str, columns: Sequence[Column]) -> tuple[Column | None, str]:
-    """Return the column that a name means, or None, and its unit, which may be part of the name (``freq_hz``)."""
+    """Return the column that a name means, and its unit, which may be part of the name (``freq_hz``).
+
+    The column is None if the name fits none of the columns.
+    """
     front, _, behind = name.replace(" ", "_").rpartition("_")
     readings = [(name, unit)]
     if front and not unit:
@@ -143,7 +146,10 @@ def _fits(unit: str, column: Column) -> bool:
 
 
 def factors(unit: str, wanted: str) -> tuple[float, float, float]:
-    """Return numbers p, q and z: a number x in a unit is p (q x + z) in SI. Hz and 1/s may be angular frequencies."""
+    """Return numbers p, q and z: a number x in a unit is p (q x + z) in the SI unit `wanted`.
+
+    If an angular frequency is wanted, p is 2 pi for Hz, and 1/s counts as rad/s.
+    """
     if not unit:
         return 1.0, 1.0, 0.0
     try:

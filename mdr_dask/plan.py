@@ -20,16 +20,17 @@ from mdr_dask.errors import CampaignError, ModelError, distinguishable
 from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, with_value
 from mdr_dask.models.numbers import numbers_of
 
-#: Estimated seconds that a block should take. This is long compared with scheduling a task (about 3 ms) and writing a
-#: chunk (about 1 ms).
+#: Time in s that a block should take, as estimated by the model. This is long compared with the times for scheduling a
+#: task (about 3 ms) and for writing a chunk (about 1 ms).
 BLOCK_SECONDS = 1.0
 #: Approximate number of blocks of a small study, so that several workers can share it.
 FEW_BLOCKS = 16
-#: Smallest estimated seconds that a block of a small study should take.
+#: Shortest time in s that a block of a small study should take, as estimated by the model.
 LEAST_SECONDS = 0.1
-#: Blocks whose cases share work are always halved if they take more seconds than this.
+#: Time in s. Blocks whose cases share work are always halved if they take longer than this.
 SHARED_SECONDS = 30.0
-#: Shorter blocks whose cases share work are halved only if the total work then grows by less than this factor.
+#: Blocks whose cases share work and that take less than `SHARED_SECONDS` are halved only if the total work then grows
+#: by less than this factor.
 REPEATED_WORK = 1.15
 #: Largest number of blocks of a series for which the model estimates the time.
 SAMPLED = 1000
@@ -37,7 +38,7 @@ SAMPLED = 1000
 RECORDS_TOGETHER = 1000
 #: Largest chunk of one array, in bytes.
 CHUNK_BYTES = 64 * 2**20
-#: Largest number of cases of a campaign; a larger number is taken to be a mistake in the file.
+#: Largest number of results of a series; a larger number is taken to be a mistake in the file.
 MOST_CASES = 10**9
 
 BlockIndex = tuple[int, ...]
@@ -60,7 +61,7 @@ class Template:
     outputs : tuple of Output
         The arrays, without ``status``.
     extra : mapping of str to Coordinate
-        Dimensions of outputs in addition to those of cases and realisations.
+        Dimensions that outputs have in addition to those of cases and realisations, with their coordinates.
     """
 
     campaign: Campaign
@@ -96,7 +97,10 @@ class Template:
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Notes of the model and of parts of its parameters, without duplicates; only one axis is varied at a time."""
+        """Notes of the model and of parts of its parameters, without duplicates.
+
+        They are collected from parameter sets in which one axis at a time is varied.
+        """
         base = self.series.parameters
         sets = [base, *(with_value(base, axis.path, value) for axis in self.series.axes for value in axis.some)]
         of_parts = [note for parameters in sets for note in notes_of(parameters)]
@@ -117,7 +121,10 @@ class Template:
         return blocks * arrays + math.ceil(blocks / RECORDS_TOGETHER) + 2 * (len(coordinates) + 1) + arrays + 1
 
     def block_indices(self) -> Iterator[BlockIndex]:
-        """Yield all blocks; the first realisations of all cases come first, so that all cases soon have results."""
+        """Yield the indices of all blocks.
+
+        The blocks with the first realisations of all cases come first, so that all cases soon have results.
+        """
         *cases, realisations = (range(count) for count in self.grid)
         for last in realisations:
             for index in itertools.product(*cases):
@@ -135,14 +142,18 @@ class Template:
         return self._block(dict(zip(self.dims, self.region(index), strict=True)))
 
     def seconds(self, index: BlockIndex) -> float:
-        """Return the estimated seconds of a block, scaled from the block of its cases with the first realisations."""
+        """Return the estimated time of a block in s.
+
+        The model estimates the block with the same cases and the first realisations. If the given block has fewer
+        realisations, its time is shorter in proportion.
+        """
         *cases, last = index
         rest = self.sizes["realisation"] - last * self.chunks["realisation"]
         part = min(rest / self._first_realisations, 1.0)
         return part * self._first_seconds((*cases, 0))
 
     def _first_seconds(self, index: BlockIndex) -> float:
-        """Return the seconds that the model estimates for a block of the first realisations; the result is cached."""
+        """Return the time in s that the model estimates for a block of the first realisations; the result is cached."""
         known = self._estimates
         if index not in known:
             known[index] = models.load(self.campaign.model).seconds(self.block(index))
@@ -181,7 +192,10 @@ class Template:
         return {axis.path: _as_array(axis) for axis in self.series.axes}
 
     def sample(self, chunks: Mapping[str, int], position: float) -> Block[Any]:
-        """Return a block of the given lengths for estimates; `position` is 0 for the first block, 1 for the last."""
+        """Return a block with the given lengths, for estimates.
+
+        `position` is the place of the block in the group, from 0 (the first block) to 1 (the last block).
+        """
         starts = self._starts(chunks, position)
         return self._block({dim: slice(start, start + chunks[dim]) for dim, start in starts.items()})
 
@@ -189,7 +203,7 @@ class Template:
         return {dim: round(position * (size - chunks[dim])) for dim, size in self.sizes.items()}
 
     def mean_seconds(self, chunks: Mapping[str, int]) -> float:
-        """Return the mean of the estimated times of the first, middle and last block of the given lengths."""
+        """Return the mean estimated time, in s, of the first, middle and last block of the given lengths."""
         known, model, found = self._means, models.load(self.campaign.model), []
         for position in (0.0, 0.5, 1.0):
             key = tuple(self._starts(chunks, position).values()), tuple(chunks.values())
@@ -233,7 +247,7 @@ class Estimate:
 
     @property
     def rounds(self) -> float:
-        """Largest possible work of all rounds together, relative to the first round."""
+        """Largest possible work of all rounds together, divided by the work of the first round."""
         return self.growth * self.at_most / self.realisations
 
 
@@ -254,7 +268,9 @@ def templates(
     Raises
     ------
     CampaignError
-        If a series is too large to be run; every such series is named.
+        If a series has too many results, or one of its cases needs too much memory; all problems are reported together.
+    ModelError
+        If an output has a dimension for which the model gives no coordinates.
     """
     model = models.load(campaign.model)
     known = stored_chunks or {}
@@ -323,8 +339,9 @@ def available_memory() -> float:
 def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
     """Return the lengths of a block along each dimension.
 
-    A block first holds whole axes along which cases share work. If its estimated time allows more, it gets more
-    realisations, then more values of the other axes, and finally the realisations of later rounds.
+    A block first gets all values of the axes along which cases share work; these axes are cut only if the block would
+    become too large. As far as its estimated time allows, it then gets more realisations, more values of the other
+    axes, and finally the realisations of later rounds.
     """
     whole = _whole_dims(template, model)
     chunks = {dim: size if dim in whole else 1 for dim, size in template.sizes.items()}
@@ -355,10 +372,10 @@ def _whole_dims(template: Template, model: Model[Any]) -> list[str]:
 
 
 def _is_cut(template: Template, chunks: Mapping[str, int], dim: str, most: float) -> bool:
-    """Return whether blocks that take more than `most` seconds are halved along a dimension.
+    """Return whether blocks should be halved along a dimension.
 
-    They are not halved if the halves would repeat much of the shared work, unless a block takes more than
-    `SHARED_SECONDS`.
+    Blocks are halved if they take more than `most` seconds. But if they take at most `SHARED_SECONDS`, they are halved
+    only if the halves repeat little of the shared work (`REPEATED_WORK`).
     """
     now = template.mean_seconds(chunks)
     if now <= most or now > SHARED_SECONDS:
@@ -379,9 +396,10 @@ def _is_whole(axis: Axis, path: str) -> bool:
 
 
 def _part(template: Template, dim: str, most: int) -> int:
-    """Return the length of the parts when a dimension is cut into the fewest nearly equal parts of at most `most`.
+    """Return the length of the parts into which a dimension is cut: at most `most`, in nearly equal parts.
 
-    If rounds add realisations, the length instead divides the number of realisations of the first round.
+    If rounds add realisations, the parts along ``realisation`` instead have the largest length that divides the number
+    of realisations of the first round.
     """
     size = template.sizes[dim]
     replication = template.campaign.replication
@@ -422,14 +440,17 @@ def estimate(campaign: Campaign) -> Estimate:
 
 
 def _growth(series: Series) -> float:
-    """Return the factor by which a series grows if its adaptive axes reach their largest numbers of values."""
+    """Return the factor by which the number of cases grows if all adaptive axes reach their largest size."""
     return math.prod(
         max(axis.refinement.at_most / len(axis.values), 1.0) for axis in series.axes if axis.refinement is not None
     )
 
 
 def _estimate_series(template: Template, model: Model[Any]) -> Estimate:
-    """Estimate a series from its blocks of the first realisations, or from `SAMPLED` of them."""
+    """Estimate the costs of a series from its blocks of the first realisations.
+
+    If there are more than `SAMPLED` such blocks, only `SAMPLED` of them are used.
+    """
     blocks, lengths = math.prod(template.grid[:-1]), template.grid[:-1]
     sample = np.linspace(0, blocks - 1, min(blocks, SAMPLED)).round().astype(int)
     seconds, solves = 0.0, 0.0

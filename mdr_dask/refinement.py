@@ -2,7 +2,7 @@
 
 Outputs are interpolated by monotone cubics on the linear or logarithmic scale of the axis. Every new value lies halfway
 between two older values, so that neighbouring cases use the same values. To test an interval, the output in it is
-predicted from the values that are older than both the interval and its newer end. If the prediction meets the
+predicted without the newer one of its ends, from older values only. If the error of the prediction is within the
 tolerance, the interval is accepted. Otherwise the interval is halved.
 """
 
@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import BoolArray, FloatArray, IntArray
 from mdr_dask.campaign import Campaign, Refinement, Series, Tolerance
 
-#: Number of groups of realisations for the jackknife: one group after the other is left out, to estimate the scatter of
-#: a mean.
+#: Number of groups of realisations for the jackknife, which estimates the scatter of a mean: the mean is computed again
+#: and again, each time without one of the groups.
 GROUPS = 20
 #: Probability that an interval is halved because of scatter alone.
 CHASED = 0.05
@@ -30,11 +30,12 @@ CHASED = 0.05
 FINEST = 2.0**-10
 #: Smallest number of values along an axis from which the output is predicted.
 FEWEST = 3
-#: Coarsest subdivision of the axis at which comparing a predicted with a computed value counts as a test of an
-#: interval: level 3, the eighths of the axis. Values at the quarters are predicted from only three values, and such a
-#: prediction may be right by chance. Longer intervals are therefore halved without a test.
+#: Lowest level of a value at which the comparison of prediction and computed output counts as a test. Level 3 are the
+#: eighths of the axis. The outputs at the quarters (level 2) are predicted from only three values, and such a
+#: prediction may be right by chance. Intervals longer than an eighth of the axis are therefore always halved.
 TESTED = 3
-#: Positions in an interval at which predictions are compared, as fractions of its length from the newer end (0).
+#: Positions in an interval at which predictions are compared with the interpolation through all values. A position is
+#: the distance from the newer end as a fraction of the length of the interval.
 COMPARED = (0.0, 0.25, 0.5, 0.75)
 
 
@@ -45,10 +46,10 @@ class Mean:
     Parameters
     ----------
     groups : array, shape (1 + groups, cases...)
-        Row 0 holds the means over all realisations. Each further row leaves out one group of realisations. NaN for a
-        case without a successful realisation.
+        Row 0 contains the means over all realisations. Each further row contains the means without one group of
+        realisations. A case without a successful realisation is NaN.
     error : array, shape (cases...)
-        Discretisation error of the mean of each case; 0 for a case whose error is unknown.
+        Discretisation error of the mean of each case, 0 if it is unknown.
     """
 
     groups: FloatArray
@@ -85,10 +86,10 @@ class Mesh:
     series : Series
         The series, with the values of adaptive axes in the order in which they were added.
     shares : mapping of int to array, shape (values,)
-        Positions of the values of each adaptive axis, as fractions of its range from 0 to 1; the key is the index of
-        the axis.
+        Positions of the values of each adaptive axis, from 0 to 1 between the ends of the axis. The key is the index of
+        the axis among all axes of the series.
     used : mapping of int to bool array, shape (values of the other axes that are not adaptive..., values)
-        Whether a value of an adaptive axis is needed, for each combination of values of the non-adaptive axes; the key
+        Whether a value of an adaptive axis is needed, for each combination of values of the non-adaptive axes. The key
         is the index of the adaptive axis.
     """
 
@@ -153,7 +154,7 @@ class Stage:
         return any(mesh.used for mesh in self.meshes)
 
     def after(self, meshes: tuple[Mesh, ...]) -> Stage | None:
-        """Return the next stage, which has the given meshes; None if the meshes contain no new case."""
+        """Return the next stage, which has the given meshes, or None if these meshes contain no new case."""
         new = tuple(_beyond(mesh.cases, before.cases) for mesh, before in zip(meshes, self.meshes, strict=True))
         if not any(cases.any() for cases in new):
             return None
@@ -171,8 +172,9 @@ def _beyond(cases: BoolArray, before: BoolArray) -> BoolArray:
 class _Interval:
     """An interval of an adaptive axis whose interpolation error exceeds the tolerance or was not tested.
 
-    `case` is the index of the combination of non-adaptive values, `share` the middle of the interval and `width` its
-    length, both as fractions of the axis, and `excess` the interpolation error divided by the tolerance (at least 1).
+    `case` is the index of the combination of non-adaptive values. `share` is the position of the middle of the interval
+    and `width` its length, both as fractions of the axis. `excess` is the interpolation error divided by the tolerance,
+    or 1 if this ratio is smaller.
     """
 
     case: tuple[int, ...]
@@ -194,10 +196,10 @@ def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]
     Returns
     -------
     Mesh
-        The mesh with more values; unchanged if no value is needed or allowed.
+        The mesh with more values. It is unchanged if no further value is needed or allowed.
     dict of str to int
-        For each adaptive axis, the number of combinations of the non-adaptive axes for which interpolation misses a
-        tolerance although no further value is allowed.
+        For each adaptive axis, the number of combinations of non-adaptive values for which an interval misses a
+        tolerance or was not tested, but may not be halved.
     """
     found, short = mesh, {}
     for number in mesh.used:
@@ -241,7 +243,7 @@ def _halved(mesh: Mesh, number: int, intervals: list[_Interval]) -> Mesh:
 
 
 def _intervals(mesh: Mesh, number: int, means: Mapping[str, Mean]) -> Iterator[_Interval]:
-    """Yield the intervals of an adaptive axis that were not tested or miss a tolerance."""
+    """Yield the intervals of an adaptive axis that were not tested, or in which interpolation misses a tolerance."""
     refinement = mesh.refinement(number)
     for case in np.ndindex(mesh.used[number].shape[:-1]):
         used = {k: np.flatnonzero(mask[case]) for k, mask in mesh.used.items()}
@@ -275,10 +277,10 @@ def _lines(mean: Mean, number: int) -> Mean:
 
 
 def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolerance) -> FloatArray:
-    """Return for each interval the interpolation error divided by the tolerance; the largest value over all lines.
+    """Return for each interval the interpolation error divided by the tolerance, the largest ratio of all lines.
 
-    Failed cases are left out of their line. The ratio is minus infinity for an interval that has a failed case at an
-    end in every line.
+    Failed cases are left out of their line. If every line has a failed case at an end of an interval, the ratio of this
+    interval is minus infinity.
     """
     worst = np.full(places.size - 1, -np.inf)
     known = np.isfinite(lines.groups[0])
@@ -296,7 +298,7 @@ def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolera
 
 
 def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray, error: FloatArray) -> FloatArray:
-    """Return for each interval the error of a prediction from the values that are older than the newer end.
+    """Return for each interval the error of a prediction from values that are older than its newer end.
 
     A value of level n lies halfway between two values of lower levels. In the two intervals next to this value, the
     output is predicted from all values of lower levels, once by a monotone cubic and once by a cubic spline. Both
@@ -317,8 +319,9 @@ def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray
     Returns
     -------
     array, shape (lines, values - 1)
-        Largest absolute difference between prediction and interpolation, minus the part that scatter of the
-        realisations and discretisation errors can explain. Negative if these explain the whole difference.
+        Largest absolute difference between a prediction and the interpolation through all values, minus the part that
+        the scatter of the realisations and the discretisation errors can explain. The result is negative if they
+        explain more than the whole difference.
     """
     from scipy.interpolate import CubicSpline, PchipInterpolator
     from scipy.special import ndtri

@@ -1,4 +1,4 @@
-"""Find the number of realisations of each case: add rounds until its standard errors meet all tolerances."""
+"""Find the number of realisations of each case: add rounds until the standard errors of a case meet the tolerances."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.models.base import Model, Status
 
-#: A round multiplies the number of realisations by a factor at which half of the cases will probably have enough. The
-#: factor is limited to this range.
+#: A round multiplies the number of realisations by the factor with which half of the unfinished cases will probably
+#: have enough realisations. This factor is limited to the range from `LEAST_GROWTH` to `MOST_GROWTH`.
 LEAST_GROWTH, MOST_GROWTH = 1.25, 4.0
 #: Factor by which a round for a fitted constant multiplies the number of realisations. It is fixed, because the number
 #: of realisations that such a constant needs cannot be estimated.
 GROWTH = 1.5
 #: A case with `FEWEST` or more results stops if its estimated standard error meets the tolerance. With fewer results
-#: this estimate is poor: if cases stopped because of it, 95 % intervals could have a coverage of only 89 %. So a case
-#: with fewer results stops only if it has at least `FEW` results and would meet the tolerance even if the variance were
-#: `DOUBT` times as large. `growth_needed` lists two further conditions. The coverage was measured with
-#: ``python -m benchmarks campaigns``.
+#: the standard error is estimated poorly. If cases stopped on this estimate alone, only 89 % of the 95 % intervals
+#: might contain the true mean. So a case with fewer than `FEWEST` results stops only if it has at least `FEW` results
+#: and would meet the tolerance even if the variance were `DOUBT` times as large. `growth_needed` lists two further
+#: conditions. The coverage was measured with ``python -m benchmarks campaigns``.
 FEWEST, FEW, DOUBT = 12, 7, 2.0
 #: A case with two or more results also stops if its standard error is below this fraction of the tolerance, because its
 #: results are then practically equal.
@@ -39,8 +39,7 @@ def next_round(replication: Replication, count: int, growth: NDArray[np.float64]
     count : int
         Number of realisations so far.
     growth : float array, shape (cases,)
-        Factor by which the number of realisations of each case must grow; at most 1 for a case with enough
-        realisations.
+        Factor by which the number of realisations of each case must grow. It is at most 1 if the case has enough.
     """
     more = np.minimum(growth[growth > 1], MOST_GROWTH)
     if not more.size:
@@ -62,17 +61,18 @@ def growth_needed(
     values : mapping of str to array, shape (..., realisations)
         The outputs that have a tolerance.
     status : int8 array, shape (..., realisations)
-        The ledger; only cases that are done count.
+        The ledger. Only results that are done are used.
     until : mapping of str to Tolerance
         Largest allowed standard error of the mean, by output.
     scatter : mapping of str to array, shape (..., realisations), optional
-        Standard error of each single realisation, for outputs of which a realisation gives such an estimate.
+        Standard error of the output in each single realisation, for outputs of which one realisation gives such an
+        estimate.
 
     Returns
     -------
     float array, shape (...)
-        At most 1 if the case has enough results for every tolerance, 0 for a case without a successful result. A case
-        has enough results for a tolerance if at least one of these conditions holds:
+        The factor of each case. It is at most 1 if the case has enough results for every tolerance, and 0 if the case
+        has no successful result. A case has enough results for a tolerance if at least one of these conditions holds:
 
         * There are at least `FEWEST` results, and the standard error is within the tolerance.
         * There are at least `FEW` results, and the standard error would be within the tolerance even if the variance
@@ -106,7 +106,10 @@ def known_scatter(model: Model[Any], until: Collection[str], outputs: Collection
 
 
 def _times(error: NDArray[np.float64], allowed: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the factor by which the number of results must grow to reach the allowed error; infinite if it is NaN."""
+    """Return the factor by which the number of results must grow to reach the allowed error.
+
+    The factor is infinite if the error is NaN.
+    """
     known = np.where(error > 0, error, 0.0)
     with np.errstate(divide="ignore", over="ignore"):
         found = np.divide(known, allowed, out=np.zeros(known.shape), where=known > 0) ** 2
@@ -114,7 +117,7 @@ def _times(error: NDArray[np.float64], allowed: NDArray[np.float64]) -> NDArray[
 
 
 def _error_from_within(scatter: NDArray[np.float64], done: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return the standard error of the mean of independent realisations from the standard error of each realisation."""
+    """Return the standard error of a mean of independent realisations, given the standard error of each realisation."""
     count = np.maximum(done.sum(axis=-1), 1)
     return np.asarray(np.sqrt((np.where(done, scatter, 0.0) ** 2).sum(axis=-1)) / count)
 
@@ -124,7 +127,7 @@ def mean_and_error(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return mean and standard error of the valid values along the last axis.
 
-    The mean is NaN without a valid value, the standard error with fewer than two valid values.
+    The mean is NaN if there is no valid value. The standard error is NaN if there are fewer than two.
     """
     count = valid.sum(axis=-1)
     mean = np.where(valid, values, 0.0).sum(axis=-1) / np.maximum(count, 1)

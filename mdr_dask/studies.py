@@ -1,6 +1,6 @@
-"""Run and analyse studies from Python, with dictionaries for campaign files and labelled arrays for results.
+"""Run and analyse studies from Python: a dictionary replaces the campaign file, and results are labelled arrays.
 
-Importing this module registers the accessor ``mdr`` of every Dataset.
+Importing this module gives every Dataset of xarray the accessor ``mdr``.
 """
 
 from __future__ import annotations
@@ -122,13 +122,13 @@ def run(
     Returns
     -------
     Dataset or DataTree
-        The study, as returned by `open_study`. Failed results and questions about numbers without a unit are reported
-        as warnings.
+        The study, as returned by `open_study`. Failed results, and questions about numbers without a unit, are shown as
+        warnings.
 
     Raises
     ------
     MdrDaskError
-        If the campaign cannot be run; the message is the same as that of ``mdr-dask run``.
+        If the campaign cannot be run. The message is that of ``mdr-dask run``.
 
     Examples
     --------
@@ -155,9 +155,9 @@ def open_study(url: str | Path) -> xr.Dataset | xr.DataTree:
     Returns
     -------
     Dataset or DataTree
-        Outputs along the axes and ``realisation`` with their units and errors, and ``status``. A campaign with series
-        gives a DataTree with a node for each series. Arrays are read when they are used. The attribute ``complete`` is
-        False as long as results are missing; means are then taken over the available results.
+        The outputs, with their units and errors, and ``status``; their dimensions are the axes and ``realisation``. A
+        campaign with series gives a DataTree with a node for each series. An array is read when it is first used. The
+        attribute ``complete`` is False as long as results are missing. Means are then taken over the available results.
 
     Raises
     ------
@@ -221,7 +221,7 @@ def table(
 ) -> pd.DataFrame:
     """Return a study as a table, like ``mdr-dask show``.
 
-    A row is a case with the means of its outputs; with ``statistics=None``, a row is a single result.
+    Each row contains a case and the means of its outputs. With ``statistics=None``, each row is a single result.
 
     Returns
     -------
@@ -251,13 +251,14 @@ def fit(study: Study, law: str, measured: str | Path | pd.DataFrame | None = Non
     law : str
         Name of the law; ``calibration`` finds unknown parameters from measured points.
     measured : str, Path or DataFrame, optional
-        Table of measured points, in place of the table of the campaign; units are in brackets after the column names.
+        Table of measured points, used instead of the table of the campaign. Units are in brackets after the column
+        names.
 
     Returns
     -------
     Dataset or DataTree
-        Constants, the ends of their intervals (``_low`` and ``_high``), and ``law_holds``. If series are fitted
-        separately, a DataTree with a node for each series.
+        The constants, the ends of their intervals (with ``_low`` and ``_high`` after the name), and ``law_holds``. If
+        series are fitted separately, the result is a DataTree with a node for each series.
 
     Raises
     ------
@@ -277,7 +278,7 @@ def fit(study: Study, law: str, measured: str | Path | pd.DataFrame | None = Non
 
 
 def plot(study: Study, figure: str, select: Words = (), **view: Any) -> Figure:
-    """Draw a named figure or an output, like ``mdr-dask plot``; ``.save`` writes the figure and its data.
+    """Draw a named figure or an output, like ``mdr-dask plot``.
 
     Parameters
     ----------
@@ -288,13 +289,13 @@ def plot(study: Study, figure: str, select: Words = (), **view: Any) -> Figure:
     select : sequence of str
         Parts of the study, as for the option ``--select``.
     **view
-        ``over`` (one axis; two axes for a map, no axis for main effects), ``by``, ``panels`` and ``log``; see
-        :class:`mdr_dask.plots.view.View`.
+        Options for an output. ``over`` is one axis for curves, two axes for a map, or empty for main effects. For
+        ``by``, ``panels`` and ``log`` see :class:`mdr_dask.plots.view.View`.
 
     Returns
     -------
     Figure
-        A figure of matplotlib; ``.table()`` returns its data.
+        A figure of matplotlib. Its method ``save`` writes the figure and its data, and ``table`` returns the data.
 
     Raises
     ------
@@ -336,7 +337,7 @@ def master_curve(
     Returns
     -------
     Dataset
-        Shift factors, the merged curve with its error, and the constants of the laws that the factors follow.
+        The shift factors, the merged curve with its error, and the constants of the laws that the factors follow.
     """
     from pandas import DataFrame
 
@@ -359,7 +360,10 @@ class StudyAccessor:
 
     @property
     def numbers(self) -> xr.Dataset:
-        """The dimensionless numbers of the cases; a number is left out if the study lacks a quantity in its formula."""
+        """The dimensionless numbers of the cases.
+
+        A number is left out if the study lacks a quantity that its formula needs.
+        """
         columns = Columns(self._dataset)
         known = [name for name in numbers(self._dataset) if columns.find(name) is not None]
         return xr.Dataset({name: columns.column(name) for name in known if name not in self._dataset})
@@ -395,7 +399,10 @@ class StudyAccessor:
 
 
 def _place(found: Campaign, is_temporary: bool) -> str:
-    """Return the path of the store of a campaign; a temporary store is named by a digest of the campaign's text."""
+    """Return the path of the store of a campaign.
+
+    The name of a temporary store contains a digest of the text of the campaign.
+    """
     if not is_temporary:
         return found.store
     digest = hashlib.sha256(found.text.encode()).hexdigest()[:16]

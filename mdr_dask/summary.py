@@ -1,4 +1,4 @@
-"""Describe the results and the costs of a campaign before it is run, as text and as JSON, for ``mdr-dask check``."""
+"""Describe, before a campaign is run, its results and its costs, as text and as JSON, for ``mdr-dask check``."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from mdr_dask.units import seconds, shown
 
 #: Longest list of values that is printed in full.
 LISTED = 6
-#: Seconds that a run takes to start and to end.
+#: Time in s that a run needs in addition to its blocks, to start and to end.
 START = 2.0
 
 
 @dataclass(frozen=True, repr=False)
 class Summary(Estimate):
-    """The results and the costs of a campaign; as text, it is the output of ``mdr-dask check``.
+    """The results and the costs of a campaign. Printed, it is the text of ``mdr-dask check``.
 
     Attributes
     ----------
     lines : tuple of str
         The axes of each series, notes about its data, and its costs, as lines of text.
     questions : tuple of str
-        Questions about bare numbers far from the usual values.
+        Questions about numbers without a unit that are far from the usual values.
     """
 
     lines: tuple[str, ...] = ()
@@ -101,7 +101,7 @@ def _adaptive(refinement: Refinement, first: int) -> str:
 
 
 def spacing(values: tuple[float, ...]) -> str:
-    """Return ``, linear`` or ``, geometric`` for values at equal distances or ratios."""
+    """Return ``, linear`` for values at equal distances, ``, geometric`` for equal ratios, or else an empty text."""
     import numpy as np
 
     numbers = np.asarray(values, dtype=np.float64)
@@ -114,7 +114,10 @@ def spacing(values: tuple[float, ...]) -> str:
 
 
 def cost_lines(costs: Estimate) -> Iterator[str]:
-    """Yield counts, size and time of a study; with ``until``, for the first round and for all possible rounds."""
+    """Yield lines with the counts, the size and the time of a study.
+
+    If there may be further rounds, each quantity is given for the first round and for all possible rounds.
+    """
     more = costs.rounds
     cases, results = _counted("case", costs.cases, costs.growth), _counted("result", costs.results, more)
     yield f"{cases} x {_counted('realisation', costs.realisations, costs.at_most / costs.realisations)} = {results}"
@@ -142,7 +145,10 @@ def human_bytes(size: float) -> str:
 
 
 def costs_row(costs: Estimate) -> dict[str, Any]:
-    """Return counts, bytes and seconds of a study under stable keys, for the first round and for all rounds."""
+    """Return counts, bytes and seconds of a study by key, for the first round and for all possible rounds.
+
+    The keys stay the same in later versions, because users read them from JSON.
+    """
     first = {name: getattr(costs, name) for name in ("results", "solves", "blocks", "bytes", "files")}
     return {
         "cases": costs.cases,
@@ -176,6 +182,6 @@ def axes_rows(campaign: Campaign) -> list[dict[str, Any]]:
 
 
 def _counted(what: str, first: int, more: float) -> str:
-    """Return a text with the count of the first round and, if there may be further rounds, the count of all rounds."""
+    """Return a text with the count of the first round, and with that of all rounds if there may be further ones."""
     last = round(first * more)
     return f"{first if more == 1 else f'{first} to {last}'} {what}{'s' if last != 1 else ''}"

@@ -35,7 +35,7 @@ SEPARATORS = ("\t", ";", ",", BLANKS)
 SHEET = "# sheet of a workbook: "
 #: Largest number of problems of one table that are shown.
 MOST_SHOWN = 10
-#: Two columns of one quantity agree if their relative difference is at most this; instruments print three digits.
+#: Two columns of one quantity agree if their relative difference is at most this. Instruments print three digits.
 AGREE = 0.01
 NO_ROWS = "expected a line of names and at least one line of values"
 
@@ -53,7 +53,7 @@ Cells = NDArray[np.object_]
 
 
 class Problem(NamedTuple):
-    """One problem: line and column of the cell, counted from 1, and a text; line 0 stands for no single cell."""
+    """One problem: line and column of the cell, counted from 1, and a text. Line 0 means that no single cell is wrong."""
 
     line: int
     column: int
@@ -72,7 +72,7 @@ class Line(NamedTuple):
         return f"sheet {self.sheet!r}, row {self.number}" if self.sheet else f"line {self.number}"
 
     def problem(self, column: int, what: str) -> Problem:
-        """Return a problem at the cell with the given index; in a workbook, the text says where."""
+        """Return a problem at the cell with the given index. In a workbook, the text names the sheet and the row."""
         if self.sheet:
             return Problem(0, 0, f"{self}: {what}")
         place = 0
@@ -135,7 +135,7 @@ class Sheet:
 
     @property
     def remark(self) -> str:
-        """A text that names the lines left out; empty if no line is left out."""
+        """A text that names the lines below the numbers, which are not read; empty if there are none."""
         shown = dict.fromkeys(repr(text[:60]) for text in self.notes)
         return f"lines below the numbers, left out: {', '.join(shown)}" if shown else ""
 
@@ -143,8 +143,8 @@ class Sheet:
 class Read(dict[str, FloatArray]):
     """The columns that were read from a table, by `Column.name`.
 
-    `lines` contains the line of each row, `headings` the names of the columns as written, and `remark` a text that
-    names the unused columns and the lines left out; it is empty if everything is used.
+    `lines` contains the line of each row, and `headings` the names of the columns as written. `remark` is a text that
+    names the columns and lines of the table that were not used; it is empty if all were used.
     """
 
     headings: Mapping[str, str] = {}
@@ -153,7 +153,7 @@ class Read(dict[str, FloatArray]):
 
 
 def is_table(path: str | Path) -> bool:
-    """Return whether a path is a file that may contain a table, and not a campaign or a published study."""
+    """Return whether a path is a file that may contain a table: any file except a campaign and a published study."""
     return Path(path).is_file() and Path(path).suffix not in (".yaml", ".zip")
 
 
@@ -205,7 +205,7 @@ def _lines(text: str) -> list[Line]:
     for number, line in enumerate(text.lstrip("\ufeff").splitlines(), 1):
         if line.startswith(SHEET):
             sheet, before = line.removeprefix(SHEET), number
-        elif line.strip(" ,;\t-=_+|"):  # neither empty nor a rule
+        elif line.strip(" ,;\t-=_+|"):  # neither empty nor a ruled line
             lines.append(Line(number - before, line, sheet))
     return lines
 
@@ -220,7 +220,10 @@ def _split(line: str, separator: str) -> list[str]:
 
 
 def _separator(lines: Sequence[str]) -> str:
-    """Return the separator with which most lines contain several numbers, or else the one that most lines contain."""
+    """Return the separator with which most lines contain several numbers.
+
+    If there are no such lines, return the separator that most lines contain.
+    """
 
     def has_numbers(line: str, mark: str) -> bool:
         if mark != BLANKS and mark not in line:
@@ -244,16 +247,18 @@ def _separator(lines: Sequence[str]) -> str:
 def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = None) -> Sheet:
     """Find the names, the units and the lines of numbers of a table.
 
-    Text above the names is skipped. If the line of names is repeated, the table continues below it. A temperature in
-    the text above such blocks becomes a column, unless the table has one. Text below the last numbers is left out.
-    Pairs of columns with a number above each pair (as digitised from a figure) become three columns.
+    Text above the names is skipped. Text below the last numbers is left out. A table may consist of several blocks of
+    numbers, each below the same line of names. If the text above every block contains a temperature, it becomes a
+    column, unless the table has such a column. Pairs of columns with a temperature above each pair (as digitised from a
+    figure) become three columns.
 
     Parameters
     ----------
     text, source : str
         The table and the name of its file.
     is_name : callable, optional
-        For tables whose entries may be words: returns whether a text is a name by which the line of names is found.
+        For tables whose entries may be words. It returns whether a text is the name of a column; the first line with
+        such a name is the line of names.
 
     Raises
     ------
@@ -283,11 +288,11 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
 
 @dataclass(frozen=True, eq=False)
 class _Grid:
-    """The cells of a text, empty behind short lines, and what they contain.
+    """The cells of a text as an array, and what the cells contain. Short lines are filled up with empty cells.
 
-    `length` is the number of cells of each line. The arrays of the shape of `cells` say which cells are filled, which
-    are numbers, and which are words, neither numbers nor marks of missing numbers. `comments` contains the lines that
-    begin with a comment sign.
+    `length` is the number of cells of each line. `filled`, `number` and `word` have the shape of `cells` and mark the
+    cells that are not empty, that are numbers, and that are words. A word is neither a number nor a mark of a missing
+    number, such as ``n/a``. `comments` contains the lines that begin with a comment sign.
     """
 
     source: str
@@ -326,8 +331,9 @@ def _grid(source: str, every: Sequence[Line]) -> _Grid:
 class _Head(NamedTuple):
     """What precedes the numbers, and where the numbers are.
 
-    Positions of the lines of names, of units, and of labels of pairs of columns (None if there is no such line), and of
-    the first line below them; which columns contain numbers, and which lines.
+    `names`, `units` and `labels` are the positions of the line of names, of the line of units, and of the line with a
+    label for each pair of columns; each is None if there is no such line. `begin` is the position of the first line
+    below them. `numeric` marks the columns that contain numbers, and `data` the lines that contain numbers.
     """
 
     names: int | None
@@ -339,7 +345,10 @@ class _Head(NamedTuple):
 
 
 def _head(grid: _Grid) -> _Head:
-    """Find the names and units: the last lines of text above the numbers that have as many cells as most lines."""
+    """Find the names and units.
+
+    They are in the last lines of text above the numbers that have as many cells as most lines.
+    """
     data, numeric = _lines_of_numbers(grid)
     full = np.flatnonzero(data & (grid.length == numeric.size))
     if not full.size:
@@ -358,12 +367,13 @@ def _head(grid: _Grid) -> _Head:
 
 
 def _lines_of_numbers(grid: _Grid) -> tuple[BoolArray, BoolArray]:
-    """Return which lines contain numbers, and which columns do.
+    """Return masks of the lines and of the columns that contain numbers.
 
-    Columns of numbers contain numbers in at least half of the lines of the commonest length. A line of numbers contains
-    numbers or marks of missing numbers in at least half of the filled cells of these columns. But a line that begins
-    with a word in a column of numbers is text (a setting above the table, or a mean below it), and so is a line that
-    begins with a word and fills less than half of the columns, or half of them if it is short.
+    A column is numeric if it contains numbers in at least half of the lines of the commonest length. A line contains
+    numbers if, in the numeric columns, at least half of its filled cells are numbers or marks of missing numbers. A
+    line that begins with a word is nevertheless text in two cases: if the word is in a numeric column (a setting above
+    the table, or a mean below it), or if the line fills less than half of the columns (at most half, if it has fewer
+    cells than most lines).
     """
     mostly = grid.number.any(axis=1) & (grid.number.sum(axis=1) >= grid.word.sum(axis=1))
     mostly = mostly if mostly.any() else grid.number.any(axis=1)  # tables with more columns of words than of numbers
@@ -397,9 +407,9 @@ def _head_of_words(grid: _Grid, is_name: Callable[[str], bool]) -> _Head:
 
 
 def _body(grid: _Grid, head: _Head) -> tuple[list[int], list[tuple[str, str] | None], tuple[str, ...]]:
-    """Return the positions of the lines of numbers, the temperature stated above each, and the text below them.
+    """Return the positions of the lines of numbers, the temperature stated above each of them, and the text below all.
 
-    Between lines of numbers, only text that contains the line of names again is allowed.
+    Raise TableError if there is other text between lines of numbers than text that repeats the line of names.
     """
     kept, stated, wrong = [], [], []
     between: list[int] = []
@@ -430,15 +440,17 @@ def _body(grid: _Grid, head: _Head) -> tuple[list[int], list[tuple[str, str] | N
 
 
 def _stated(grid: _Grid, rows: Sequence[int]) -> tuple[str, str] | None:
-    """Return the last temperature, with its unit, in lines of text; None if they contain none."""
+    """Return the last temperature in lines of text, with its unit, or None if they contain no temperature."""
     found = [each for row in rows for each in _STATED.finditer(" ".join(grid.cells[row]))]
     return (found[-1][1].replace(",", "."), found[-1][2].replace(" ", "")) if found else None
 
 
 def _names_and_units(grid: _Grid, head: _Head) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of the columns, and the units from the line below them or, if it has none, from the names.
+    """Return the names and the units of the columns.
 
-    Without a line of names, the last comment above the numbers may contain them.
+    A unit is taken from the line of units or, if this line has none, from the name of the column.
+
+    If there is no line of names, the last comment above the numbers may contain the names.
     """
     if head.names is None:
         names = _names_in_comment(grid, head)
@@ -451,7 +463,7 @@ def _names_and_units(grid: _Grid, head: _Head) -> tuple[tuple[str, ...], tuple[s
 
 
 def _names_in_comment(grid: _Grid, head: _Head) -> list[str]:
-    """Return the names in the last comment above the numbers; empty unless there are as many as columns."""
+    """Return the names in the last comment above the numbers; empty unless there is one name for each column."""
     above = [line.text for line in grid.comments if line.number < grid.lines[head.begin].number and not line.sheet]
     for separator in SEPARATORS if above else ():
         names = _split(above[-1].lstrip(COMMENT + " "), separator)
@@ -477,7 +489,7 @@ def _require_even(grid: _Grid, rows: Sequence[int], width: int, head: _Head) -> 
 
 
 def _with_points(grid: _Grid, rows: Sequence[int]) -> Cells:
-    """Return lines with decimal points instead of commas; raise TableError if they contain both."""
+    """Return the cells of lines with decimal points instead of commas; raise TableError if the lines contain both."""
     cells = grid.cells[rows]
     places = [(row, column) for row, column in np.argwhere(grid.number[rows])]
     commas, points = ([place for place in places if mark in cells[place]] for mark in ",.")
@@ -501,7 +513,7 @@ def _are_pairs(names: Sequence[str]) -> bool:
 
 
 def _from_pairs(grid: _Grid, sheet: Sheet, labels: int | None) -> Sheet:
-    """Return pairs of columns as three columns; the third is the number above each pair, a temperature."""
+    """Return pairs of columns as three columns; the third contains the temperature above each pair."""
     count = len(sheet.names) // 2
     above = [] if labels is None else [cell for cell in grid.cells[labels] if cell]
     found = [re.match(r"\D*?([+-]?\d+(?:[.,]\d+)?)[\s\])(\[]*([^\])]*)", cell) for cell in above]
@@ -521,16 +533,21 @@ def _from_pairs(grid: _Grid, sheet: Sheet, labels: int | None) -> Sheet:
 
 
 def _are_units(row: Sequence[str]) -> bool:
-    """Return whether at least half of the words of a line are units, or all are in square brackets."""
+    """Return whether a line is a line of units.
+
+    It is if at least half of its words are units, or if all are in square brackets.
+    """
     filled = [text for text in row if text not in ("", "-", "--", "1", "[1]", "[-]")]
     known = sum(is_unit(text.strip("[](){}<> ")) and not text[0].isdigit() for text in filled)
     return bool(filled) and (2 * known >= len(filled) or all(re.fullmatch(r"\[.*\]", text) for text in filled))
 
 
 def matched(sheet: Sheet, columns: Sequence[Column]) -> list[tuple[Column | None, str, bool]]:
-    """Return for each column of a table what it means, its unit, and whether its entries are common logarithms.
+    """Return for each column of a table its meaning, its unit, and whether its entries are common logarithms.
 
-    Without names, columns are matched in the given order.
+    The meaning is one of the given `columns`, or None if the name fits none of them.
+
+    If the table has no names, its columns are the given `columns` in this order.
     """
     if not sheet.names:
         count = len(sheet.units)
@@ -562,12 +579,12 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
     columns : sequence of Column
         The columns that the table may have. The columns of a table without names must be in this order.
     allow_missing : bool
-        Whether empty entries are read as NaN; otherwise they are an error.
+        Whether missing entries are read as NaN. Otherwise they are errors.
 
     Returns
     -------
     Read
-        The columns that the table has, by `Column.name`, as arrays of shape (rows,).
+        The columns that were found in the table, by `Column.name`, each as an array of shape (rows,).
 
     Raises
     ------
@@ -615,7 +632,7 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
 
 
 def _unit(written: str, column: Column) -> str:
-    """Return the unit of a column after checking its dimension; an empty text if no conversion is needed."""
+    """Return the unit of a column after checking its dimension; empty for a pure number without a unit."""
     unit = written or column.given_unit
     if unit in ("-", "1") and column.unit == "1":
         return ""
@@ -654,7 +671,7 @@ def _values(
 
 
 def _wanted(value: float, column: Column) -> str:
-    """Return what was expected instead of an impossible value; an empty text for a possible one."""
+    """Return the text that a message gives as expected instead of a value; empty if the value is possible."""
     if not math.isfinite(value):
         return "a finite number"
     if column.above is not None and not value > column.above:
@@ -665,7 +682,7 @@ def _wanted(value: float, column: Column) -> str:
 def numbers(sheet: Sheet) -> FloatArray:
     """Return the entries of a table as numbers without conversion of units, shape (rows, columns).
 
-    Empty entries and columns that contain only words are NaN.
+    Missing entries become NaN, and so do all entries of a column without any number.
 
     Raises
     ------
@@ -687,7 +704,7 @@ def numbers(sheet: Sheet) -> FloatArray:
     return np.array(columns).T
 
 
-#: Largest number of columns without names that are described one by one; a table with more is described as a map.
+#: A table without names and with more columns than this is described as a map. Otherwise each column is described.
 MOST_DESCRIBED = 6
 
 

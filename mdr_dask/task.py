@@ -24,10 +24,13 @@ from mdr_dask.models.per_case import is_interrupt, real_numbers, reason
 from mdr_dask.store import Place
 from mdr_dask.version import __version__
 
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
-MAPPED, TRIMMED = 32 * 2**20, 128 * 2**20  # bytes: larger arrays are not on the heap; free heap that glibc keeps
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # numbers of two settings in malloc.h of glibc
+MAPPED, TRIMMED = (
+    32 * 2**20,
+    128 * 2**20,
+)  # in bytes: size above which glibc puts arrays outside the heap; free memory that it keeps in the heap
 
-#: Environment variable with the text of `kind` in the child processes of this machine.
+#: Environment variable from which child processes of this machine read the result of `kind`.
 KIND = "MDR_DASK_KIND_OF_MACHINE"
 
 
@@ -42,13 +45,15 @@ class Work:
     model : str
         Name of the model.
     versions : tuple
-        Versions of the program and of the model on the driver, as `versions` returns them.
+        Versions of the program and of the model in the process that started the run (the driver), as `versions` returns
+        them.
     block : Block
         Cases and realisations of the block.
     wanted, spared : bool array, shape of the block
         Results to compute, and results to mark as not needed.
     attempt : int
-        Number of the attempt: how often the computation of the block has been started, including this time.
+        Number of the attempt, from 1: the number of times that the computation of the block was started, including this
+        one.
     estimate : float
         Time that the model estimates, in seconds.
     """
@@ -84,8 +89,8 @@ class Work:
 class Outcome:
     """The return value of a task: counts and times, but no results.
 
-    `compile_seconds` is the part of `compute_seconds` in which this process compiled kernels. `warned` is the number of
-    results that are done but have a warning.
+    `compile_seconds` is the part of `compute_seconds` during which this process compiled kernels. `warned` is the
+    number of results that are done but have a warning.
     """
 
     counts: tuple[int, ...]
@@ -139,9 +144,10 @@ def run_block(work: Work) -> Outcome:
 
 
 def finished(work: Work) -> Outcome | None:
-    """Return the outcome of a task that another worker finished before it died, or None if it is not finished.
+    """Return the outcome of a task that another worker finished before it died, or None if the task is not finished.
 
-    The task is finished if the stored ledger has the digest that is in the record of this attempt.
+    The record of an attempt contains the digest of the ledger of the block. The task is finished if the stored ledger
+    has this digest.
     """
     record = store.record(work.place.url, work.place.series, work.place.index, work.attempt)
     if record is None or not store.is_written(work.place, record):
@@ -166,17 +172,18 @@ def _warned(record: Mapping[str, Any]) -> int:
     return sum(message["status"] == Status.DONE.name.lower() for message in record["messages"])
 
 
-#: Errors that a fault of the machine causes and not a case, for example a broken cache of the compiler, a full disk or
-#: a missing library.
+#: Errors that come from a fault of the machine and not from a case: for example, the cache of the compiler is broken, a
+#: disk is full, or a library is missing.
 MACHINE_FAULTS = (OSError, EOFError, ImportError, pickle.UnpicklingError)
-#: Largest number of characters that are stored of a message.
+#: Longer messages are cut to this number of characters before they are stored.
 LONGEST_MESSAGE = 1000
 
 
 def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
-    """Call the model. If it raises an exception for the block, compute each result separately to find the failing ones.
+    """Call the model. If it raises an exception, compute each result of the block separately to find the failing ones.
 
-    `is_own` means that the user wrote the model. Then every exception is a failed case, and results are checked.
+    If `is_own` is true, the user wrote the model. Then every exception counts as a failed case, and results are
+    checked.
     """
     is_single = block.cases == len(block.realisations) == 1
     try:
@@ -354,7 +361,9 @@ def _describe(block: Block[Any], case: int) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def kind() -> str:
-    """Return processor and numerical libraries as text, because the last digits of results may depend on them.
+    """Return a text that names the processor and the numerical libraries.
+
+    The last digits of results may depend on them.
 
     Child processes read the text from the variable `KIND` of their environment, so that they need not import SciPy.
     """
@@ -386,7 +395,10 @@ def one_blas_thread() -> AbstractContextManager[object]:
 
 @lru_cache(maxsize=1)
 def keep_freed_memory() -> None:
-    """Keep freed arrays of some megabytes in the process; otherwise each allocation costs page faults (glibc)."""
+    """Let glibc keep the memory of freed arrays of some megabytes in the process.
+
+    Otherwise each new array would get its memory from the operating system again, which takes time.
+    """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None) if os.name == "posix" else None
     if mallopt is not None:
         mallopt(M_MMAP_THRESHOLD, MAPPED)

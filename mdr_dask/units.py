@@ -1,4 +1,4 @@
-"""Convert the units of campaign files and tables to SI; the only module that uses pint."""
+"""Convert the units of campaign files and tables to SI. This is the only module that imports pint."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ from mdr_dask.errors import did_you_mean, distinguishable
 if TYPE_CHECKING:
     from pint import UnitRegistry
 
-#: Units in the syntax of pint. Pint's own list of 900 units takes ten times as long to load and contains single letters
-#: that are more likely mistakes in a campaign (``c``, ``e``, ``M``). Here angles have a dimension of their own.
+#: Units in the syntax of pint. Pint's own list of 900 units takes ten times as long to load. It also contains units
+#: with names of one letter (``c``, ``e``, ``M``), which in a campaign are more likely to be mistakes. In this list,
+#: unlike in pint's own list, angles have a dimension.
 DEFINITIONS = """
 yocto- = 1e-24 = y-
 zepto- = 1e-21 = z-
@@ -82,7 +83,7 @@ ohm = volt / ampere = Ω
 siemens = ampere / volt = S
 """
 
-#: Names of quantities in messages, by SI unit, each with an example.
+#: Names of quantities for messages, each with an example, by SI unit.
 _MEANINGS = {
     "1": ("a number", ""),
     "m": ("a length", "20 mm"),
@@ -109,7 +110,8 @@ _MEANINGS = {
     "W": ("a power", "1 W"),
 }
 
-#: Longer texts and exponents of more than two digits are refused, because pint may need extremely long to parse them.
+#: Texts with more characters, and exponents of more than two digits, are refused, because pint may need an extremely
+#: long time to parse them.
 _MOST_LETTERS = 60
 _BAD_POWER = re.compile(r"(\*\*|\^)\s*(?!\(?[-+]?\d{1,2}\)?(?![\d.]|\s*(\*\*|\^)))")
 
@@ -127,7 +129,7 @@ _SEVERAL = re.compile(r"\d.*?(,|;|\.\.|\bto\b|\s-\s)\s*[+-]?[\d.]")
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.DOTALL)
 
 
-#: Units among which a suggestion for an unknown unit is searched.
+#: The unit that a message suggests instead of an unknown unit is one of these.
 COMMON = (
     "m mm um nm cm km s ms us min h m/s mm/s km/h N mN kN Pa kPa MPa GPa K degC deg rad Hz kHz kg g J W bar psi rpm "
     "inch percent meter metre millimeter micrometer nanometer kilometer micron second millisecond microsecond minute "
@@ -142,14 +144,15 @@ def to_si(value: str, unit: str) -> float:
     Parameters
     ----------
     value : str
-        A number with a unit, such as ``"20 mm"``, or without one if it is in SI.
+        A number with a unit, such as ``"20 mm"``. A number without a unit is taken to be in SI.
     unit : str
         The coherent SI unit of the result, ``"1"`` for a pure number.
 
     Returns
     -------
     float
-        Correctly rounded for decimal units: ``"1.1 mm"`` is 0.0011, not 1.1 x 0.001.
+        The value in SI. For decimal units it is correctly rounded: ``"1.1 mm"`` is 0.0011, not the product 1.1 x 0.001,
+        which has a rounding error.
 
     Raises
     ------
@@ -180,7 +183,7 @@ def unit_behind(value: str) -> str:
 
 
 def spelt(value: str) -> str:
-    """Return a hint for a text that is not a number: a decimal point, or how lists and ranges are written."""
+    """Return a hint for a text that is not a number: to use a decimal point, or how to write lists and ranges."""
     if _THOUSANDS.fullmatch(value.strip()):
         return f" (write {value.replace(',', '')!r}, or {value.replace(',', '.')!r} with a decimal point)"
     if _COMMA.match(value):
@@ -251,16 +254,16 @@ def seconds(duration: float) -> str:
     return f"{minutes // 60} h {minutes % 60} min"
 
 
-#: ``check`` asks about a number without a unit if it is more than this number of decades from the usual value.
+#: ``check`` asks about a number without a unit if it differs from the usual value by more than this number of decades.
 _FAR = 3.0
 
 
 def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
     """Return whether a number without a unit may have been meant in another unit than the SI unit.
 
-    This is so if the number in SI is more than 3 decades from the first usual value. It is also so if a usual value has
-    a unit that is no decimal multiple of the SI unit (rpm, degC), and the number is nearer to the usual value when it
-    is read in this unit.
+    The number is doubtful if, taken in SI, it differs from the first usual value by more than 3 decades. It is also
+    doubtful if a usual value has a unit that is no decimal multiple of the SI unit (rpm, degC), and the number, taken
+    in this unit, is nearer to the first usual value than when taken in SI.
 
     Parameters
     ----------
@@ -281,7 +284,11 @@ def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
 
 
 def likely(value: float, unit: str, usual: Sequence[str]) -> str:
-    """Return a number with the unit of that usual value to which it is nearest; empty if it is far from all of them."""
+    """Return a number with the unit in which it was probably meant, or an empty text.
+
+    The units of the usual values are tried. The result has the unit with which the number is nearest to the first usual
+    value; it is empty if the number is then still more than 3 decades away.
+    """
     found = {}
     for each in usual:
         meant = f"{value:g} {unit_behind(each)}"
@@ -292,7 +299,7 @@ def likely(value: float, unit: str, usual: Sequence[str]) -> str:
 
 
 def _decades(value: float, unit: str, usual: str) -> float:
-    """Return the distance of a number in SI from a usual value in decades."""
+    """Return the difference in decades between a number in SI and a usual value."""
     return abs(math.log10(abs(value)) - math.log10(abs(to_si(usual, unit)))) if value else math.inf
 
 
@@ -323,7 +330,7 @@ def _may_be_unit(text: str) -> bool:
 
 
 def scaled(number: str, factor: float) -> float:
-    """Return a number times a factor, correctly rounded if the factor is a power of ten."""
+    """Return the product of a number and a factor; it is correctly rounded if the factor is a power of ten."""
     power = round(math.log10(factor))
     if math.isclose(factor, 10.0**power, rel_tol=1e-12):
         return float(Decimal(number).scaleb(power))
@@ -332,7 +339,7 @@ def scaled(number: str, factor: float) -> float:
 
 @lru_cache(maxsize=1)
 def registry() -> UnitRegistry[Any]:
-    """Return the registry of `DEFINITIONS`; pint is imported only here, when it is needed."""
+    """Return the registry of pint for the units in `DEFINITIONS`; pint is imported when it is needed."""
     from pint import UnitRegistry
 
     units: UnitRegistry[Any] = UnitRegistry(None)
@@ -368,7 +375,7 @@ def conversion(given: str, unit: str) -> tuple[float, float]:
     return (before * (1.0 if math.isclose(factor, 1.0) else factor), zero) if zero else (before * one, 0.0)
 
 
-#: Coherent SI units of the dimensions that pint derives from `DEFINITIONS`.
+#: Coherent SI unit of each base dimension in `DEFINITIONS`.
 _COHERENT = {"length": "m", "mass": "kg", "time": "s", "temperature": "K", "current": "A", "angle": "rad"}
 
 
@@ -409,7 +416,10 @@ def _factor_and_unit(text: str) -> tuple[float, str]:
 
 
 def _nearest(word: str, unit: str = "") -> str:
-    """Return a hint for an unknown unit: the nearest known one, with the dimension of `unit` if `unit` is given."""
+    """Return a hint for an unknown unit: the known unit with the nearest spelling.
+
+    If `unit` is given, only units with the dimension of `unit` are considered.
+    """
     common = COMMON.split()
     hint = did_you_mean(word, [each for each in common if dimension_of(each) == dimension_of(unit)] if unit else common)
     return hint if "mean" in hint else f", expected {expected(unit)}" if unit else ""
