@@ -53,7 +53,7 @@ Cells = NDArray[np.object_]
 
 
 class Problem(NamedTuple):
-    """One problem: line and column of the cell, counted from 1, and a text. Line 0 means that no single cell is wrong."""
+    """One problem: line and column of its cell, counted from 1, and a text. Line 0: no single cell is wrong."""
 
     line: int
     column: int
