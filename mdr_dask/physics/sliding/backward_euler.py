@@ -1,7 +1,7 @@
 """The method of the papers: steady state of a Kelvin foundation by backward Euler, many cases on a line at once.
 
 The displacement at node i is u_i = max(w_i, lambda u_(i-1)), with the penetration w = depth + height and lambda = 1 /
-(1 + dt / tau), where dt is the time in which the body travels the distance dx of two nodes. Because u is periodic, F_N
+(1 + dt / tau), where dt is the time in which the body travels the distance dx between two nodes. As u is periodic, F_N
 / (4 G dx) is the sum of u_i, and F_x / (4 G) is the sum of (u_i - lambda u_(i-1)) / (1 - lambda) (w_i - w_(i-1)).
 Blocks of nodes that are entirely in contact or entirely free are summed in closed form. In the other blocks the inner
 loops run over cases, as vector instructions. The results of a case do not depend on the other cases.
@@ -22,9 +22,11 @@ from mdr_dask.physics.sliding.cases import Cases
 ITERATIONS = 200
 COARSENING = 8  # ratio of the numbers of nodes of successive grids in the search for the depth
 COARSEST = 64  # largest number of nodes of the grid on which the search for the depth starts
-CONVERGED = 1e-9  # largest product of the last two relative steps of the depth, which is the error of the extrapolation
-EXACT_STEP = 1e-13  # relative step of the depth that is as small as rounding errors
-COARSE = 1e-3  # instead of CONVERGED on all grids except the finest
+# The search ends if the product of the last two relative steps of the depth is at most CONVERGED. This product is about
+# the error of the extrapolation over the last step.
+CONVERGED = 1e-9
+EXACT_STEP = 1e-13  # relative step of the depth that is about as small as rounding errors; the search ends here as well
+COARSE = 1e-3  # replaces CONVERGED on all grids except the finest
 
 BLOCK = 256  # nodes
 LANES = 8  # number of cases in one vector instruction
@@ -35,8 +37,9 @@ SUMS = 3
 # Indices of the properties of a block of nodes: largest and smallest height, smallest rise, height of the node before
 # the block, and the sums of height, rise, height times rise, and rise squared
 PEAK, LOWEST, STEEPEST, BEFORE, HEIGHTS, RISES, WORK, SQUARES = range(8)
-# Indices of the state of a case in a sweep: displacement u, its derivative with respect to the depth (FADE), the decay
-# of u over a block, the sum of decays over a block, and the sums over the nodes of a block of u, FADE and drag
+# Indices of the state of a case in a sweep: displacement u (U), the derivative of u with respect to the depth (FADE),
+# the decay of u over a block (THROUGH), the sum of this decay over the nodes of a block (MEMORY), and three sums over
+# the nodes of a block: of u (LOAD), of FADE (RATE) and of the drag (LOSS)
 U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS = range(7)
 ROWS = 7
 
@@ -81,7 +84,8 @@ class Lanes(NamedTuple):
     queue : array, shape (cases,)
         Cases in which contact begins or ends in a block.
     sums : array, shape (SUMS, cases)
-        Written: sum of u, the derivative of this sum with respect to the depth, and F_x / (4 G) times 1 - lambda.
+        Results of the sweep: the sum of u, the derivative of this sum with respect to the depth, and F_x / (4 G) times
+        1 - lambda.
     """
 
     state: FloatArray
@@ -232,8 +236,9 @@ def _newton(
     drags: FloatArray,
     outside: NDArray[np.bool_],
 ) -> None:
-    """Find the depth of every case; `depths` contains guesses and is overwritten, `drags` is NaN if no depth is found.
+    """Find the depth and the drag of every case.
 
+    The guesses in `depths` are replaced by the solutions. If no depth is found, the drag of the case is NaN.
     The load is a convex, increasing, piecewise linear function of the depth. After its first step Newton's method
     therefore approaches the solution from above. No sweep follows the last step. Instead, the drag is extrapolated to
     the last depth along the secant through the last two sweeps.
@@ -250,7 +255,7 @@ def _newton(
         kept = 0
         for k in range(count):
             case = active[k]
-            # behind the end of a line that is not periodic, u and its derivative decay exponentially
+            # behind the end of a line that is not periodic, u and the derivative of u decay exponentially
             carried = sums[CARRIED, k] + ends * deborah[k] * workspace[U, k]
             step = (load[k] - carried) / (sums[STIFFNESS, k] + ends * deborah[k] * workspace[FADE, k])
             drag = sums[DRAG, k] * (1 + deborah[k])

@@ -2,8 +2,8 @@
 
 The displacement is u = d + h, with the depth d and the height h. The pressure of wave k, with the amplitude c_k and the
 wave number q_k, is G*(q_k v) c_k (thesis eq. 3.14 for the Kelvin solid). The drag is therefore a sum over the spectrum
-and does not depend on the phases. This is valid if the pressure is positive everywhere. The pressure is computed at two
-nodes per Nyquist point, m in total. Between the nodes, a sum of waves with up to k periods on the line is at most
+and does not depend on the phases. This is valid if the pressure is positive everywhere. The pressure is computed at
+m nodes, two per Nyquist point. Between the nodes, a sum of waves with up to k periods on the line is at most
 1 / cos(pi k / m) times its largest value at the nodes (Ehlich and Zeller, Z. Angew. Math. Mech. 44, T22, 1964).
 """
 
@@ -29,7 +29,8 @@ def steady_full_contact(line: RoughLine, terms: Sequence[tuple[float, float]], c
     terms : sequence of (float, float)
         G_m / G_inf and tau_m v / L of the Prony terms; empty for a Kelvin solid.
     cases : Cases
-        eta v / (G_inf L) of the dashpot, and F_N / (4 G_inf L) in the unit of height, which is the mean displacement.
+        Deborah numbers eta v / (G_inf L) of the dashpot, and loads F_N / (4 G_inf L), in the unit of height. In full
+        contact this load is the mean displacement.
 
     Examples
     --------
@@ -49,7 +50,7 @@ def steady_full_contact(line: RoughLine, terms: Sequence[tuple[float, float]], c
     # sums over nodes are equal to sums over the spectrum; height and slope are orthogonal
     lost, stretch = pressure @ slope / nodes if terms else 0.0, slope @ slope / nodes
     bound = np.cos(np.pi * waves.size / nodes)
-    worst = [np.abs(pressure).argmax(), np.abs(slope).argmax()]  # two nodes already exclude most cases
+    worst = [np.abs(pressure).argmax(), np.abs(slope).argmax()]  # testing these two nodes already excludes most cases
     with np.errstate(over="ignore", invalid="ignore"):
         drag = lost + deborah * stretch
         pull = np.abs(pressure[worst] + np.multiply.outer(deborah, slope[worst])).max(axis=1)

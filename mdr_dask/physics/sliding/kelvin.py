@@ -64,9 +64,9 @@ def blocks_of(cells: Cells) -> Blocks:
 class Barriers(NamedTuple):
     """Limits of the depth for cells and blocks at one Deborah number.
 
-    At a depth above `cell` (or `block`), the force on elements in contact is positive everywhere in the cell (or
-    block). At a depth up to `idle`, the force is positive nowhere in the cell. The limit of a block is NaN until the
-    limits of its cells are computed.
+    If the depth is above `cell` (or `block`), the force on elements in contact is positive everywhere in the cell (or
+    block). If the depth is at most `idle`, the force is positive nowhere in the cell. The limit of a block is NaN until
+    the limits of its cells are computed.
     """
 
     cell: FloatArray
@@ -137,7 +137,7 @@ def contact_end(w0: float, a: float, b: float, c: float, deborah: float, start: 
 
     The penetration is w = w0 + a x + b x^2 + c x^3. The force must not be negative at `start`.
     """
-    # search the monotone pieces of the cubic force; its sign at the start may be lost to rounding
+    # search the monotone pieces of the cubic force; rounding may change the sign of the force at the start
     p, q, r = w0 + deborah * a, a + 2 * deborah * b, b + 3 * deborah * c
     low, positive = start, True
     discriminant = r * r - 3 * c * q
@@ -189,7 +189,7 @@ class FreeElement(NamedTuple):
 def _contact_begin_between(element: FreeElement, deborah: float, low: float, high: float) -> float:
     """Return the place x between `low` and `high` where the line reaches a free element.
 
-    There w rises to u exp(-(x - start) / deborah). At `high`, w must be larger than this expression.
+    At this place w rises to u exp(-(x - start) / deborah). At `high`, w must be larger than this expression.
     """
     w0, a, b, c, u, start = element
     if w0 + low * (a + low * (b + low * c)) >= u - u * _decayed((low - start) / deborah):
@@ -300,7 +300,8 @@ def sweep_cells(
         F_x / (4 G); the derivative of F_x / (4 G) with respect to the depth; the length in contact; the integral of
         w'^2 over the length in contact; and 1 if an end of a line that is not periodic is in contact, otherwise 0.
     places : Places, output
-        The positions where each patch begins and ends; patches beyond the capacity of the arrays are only counted.
+        The positions where each patch begins and ends. If there are more patches than the arrays can hold, the
+        positions of the excess patches are not written.
     """
     # local names, because reading an array from a tuple takes more time than computing a cell
     height, enter, leave, peak, mean, stretches = (

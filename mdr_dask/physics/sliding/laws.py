@@ -21,7 +21,7 @@ def force_number(force: Any, shear_modulus: Any, rms: Any, length: Any) -> Any:
 
 
 def velocity_number(velocity: Any, relaxation_time: Any, slope: Any, rms: Any) -> Any:
-    """Return v tau slope / (sqrt 2 h) (eq. 3.19); near 1, contact becomes limited to the front of the asperities."""
+    """Return v tau slope / (sqrt 2 h) (eq. 3.19). At values near 1, contact is limited to the front of asperities."""
     return velocity * relaxation_time * slope / (math.sqrt(2) * rms)
 
 
@@ -51,8 +51,8 @@ def full_contact(force: Any, velocity: Any) -> Any:
 def interpolation(force: Any, velocity: Any, exponent: Any, beta: Any) -> Any:
     """Return mu / (sqrt 2 slope) in regions I to III and both zones (eq. 3.17, 3.18); arguments as in `zone_one`.
 
-    The result combines three laws: 1 / mu^2 = 1 / mu_1^2 + 1 / mu_2^2 + 1 / mu_3^2, where mu_1 is the plateau, mu_2
-    follows from `full_contact` and mu_3 from `zone_one`.
+    The result combines three laws, 1 / mu^2 = 1 / mu_1^2 + 1 / mu_2^2 + 1 / mu_3^2. Here mu_1 is the plateau, mu_2
+    the result of `full_contact`, and mu_3 the result of `zone_one`.
     """
     return (1 + (crossover(force, exponent, beta) / velocity) ** 2) ** -0.5
 
@@ -70,7 +70,8 @@ def regions(force: Any, exponent: Any, beta: Any, share: float = 0.9) -> tuple[A
     force, exponent, beta : array_like
         As in `zone_one`.
     share : float
-        Region I ends where mu is this share of the linear law; region III begins where mu is this share of the plateau.
+        Fraction of mu that defines the ends. Region I ends where mu is this fraction of the linear law; region III
+        begins where mu is this fraction of the plateau.
     """
     width = math.sqrt(share**-2 - 1)
     middle = crossover(force, exponent, beta)
@@ -108,6 +109,6 @@ def single_tip(curvature: Any, force: Any, viscosity: Any, velocity: Any) -> Any
     curvature : array_like
         Curvature kappa of the highest point of the line, 1/m.
     force, viscosity, velocity : array_like
-        F_N, eta of the dashpot (G tau of a Kelvin solid) and v.
+        F_N, viscosity eta of the dashpot (G tau of a Kelvin solid), and v.
     """
     return 2 / 3 * np.sqrt(curvature * force / (2 * viscosity * velocity))

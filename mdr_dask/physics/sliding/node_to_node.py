@@ -37,7 +37,7 @@ BLOCK = 32  # cells
 WING = 4  # the nodes of a finer grid in a cell are interpolated from this number of nodes on each side of the cell
 BEFORE, AFTER = WING + 1, WING + 2  # numbers of nodes added from the previous and the next period, for `refine`
 ABOVE = 4 / 27  # a cubic cell rises above its ends by at most this factor times the sum of its inward slopes
-SUMMIT = 64  # number of nodes in the cell of the highest point; the highest of these nodes is used as the summit
+SUMMIT = 64  # number of fine nodes in the cell of the highest point; the highest of these nodes is used as the summit
 
 NO_ENDS: FloatArray = np.empty((2, 0))
 # Indices of the bounds and sums of a block of cells
@@ -97,7 +97,7 @@ def ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
 
 
 def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolved: bool, ends: FloatArray) -> Nodes:
-    """Return every stride-th node of a line.
+    """Return a coarser line that consists of every stride-th node of a line.
 
     Parameters
     ----------
@@ -105,8 +105,10 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
         Heights, and their derivatives with respect to the position x / L, where L is the length of the line.
     first : int
         Index of the first node, whose height is subtracted from all heights.
+    stride : int
+        Ratio of the numbers of nodes.
     resolved : bool
-        Whether the nodes are close enough for the given slopes to be used; otherwise slopes are computed from
+        Whether the remaining nodes are close enough to use the given slopes. If False, slopes are computed from
         differences of heights.
     ends : array, shape (2, n) or (2, 0)
         The corrections of `ends_of`. If the array is empty, integrals over cells are computed from neighbouring nodes.
@@ -249,7 +251,7 @@ def weights(refinement: int) -> FloatArray:
 
 @jit
 def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: FloatArray, slope: FloatArray) -> None:
-    """Write heights and slopes on a finer grid, from one fine node before the given cells to one after them."""
+    """Write heights and slopes on a finer grid, from one fine node before the given cells to one fine node after."""
     refinement = weights.shape[1]
     h, s = line.height, line.slope
     for place in range(-1, cells * refinement + 2):
@@ -273,22 +275,23 @@ def with_summit(line: Nodes) -> Nodes:
 LANES = 64  # number of cases that are computed together
 SMALL, LARGE = 1e-300, 1e12  # a positive number that prevents division by zero; largest value of 1 / De
 CLOSED = 1e-9  # largest relative difference of the displacements at the start and at the end of a converged period
-RESOLVED = 10  # smallest number of cells in contact with which a grid resolves the contact
+RESOLVED = 10  # a grid resolves the contact if at least this number of cells is in contact
 
 ITERATIONS = 25
 COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most COARSENING * COARSEST nodes
 LAST_STEP = 0.03  # largest relative last step of the depth; the results of the last step are extrapolated linearly
 SECANT_ERROR = 0.1  # assumed error of this extrapolation, as a fraction of the extrapolated change
-FIRST_STEP, FIRST_ERROR = 0.1, 0.03  # instead of LAST_STEP and the allowed error, on grids that only provide a guess
+FIRST_STEP, FIRST_ERROR = 0.1, 0.03  # replace LAST_STEP and the allowed error on grids that only provide a guess
 ROUNDING = 1e-12  # relative step of the depth that is as small as rounding errors
 ORDER = 3.0  # order of convergence: four inside cells, lower where contact begins or ends; measured: 3.3
 ARITHMETIC = 5e-5  # relative error of the integrals over cells that are partly in contact, on any grid
 
 ROWS = 15
-# Offset of each quantity in the workspace of a sweep. State and sums of the cases: displacement, its derivative with
-# respect to the depth, whether in contact, load, stiffness, drag, length in contact, integral of slope squared there.
-# Constants of the cases: depth, De, exp(-1 / De), 1 / De, decay over a block, displacement at the start of the period.
-# CALM: whether the last block was entirely in contact or entirely free.
+# Offset of each quantity in the workspace of a sweep. State of a case: displacement (U), derivative of the displacement
+# with respect to the depth (FADE), and 1 in contact, 0 if free (CONTACT). Sums of a case: load, stiffness (RATE), drag
+# (LOSS), length in contact, and integral of the squared slope over this length (STRETCH). Constants of a case: depth,
+# De, exp(-1 / De), 1 / De, decay over a block (THROUGH), and displacement at the start of the period (BEGAN). CALM is 1
+# if the case is entirely in contact or entirely free in the last block.
 U, FADE, CONTACT, LOAD, RATE, LOSS, LENGTH, STRETCH = range(0, 8 * LANES, LANES)
 DEPTH, DEBORAH, DECAY, INVERSE, THROUGH, BEGAN, CALM = range(8 * LANES, ROWS * LANES, LANES)
 # Indices of the results of a case that are extrapolated over the last step of the depth
@@ -386,10 +389,10 @@ def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: 
 def _contact_in_cell(
     cell: Cell, r: float, u: float, kept: float, inverse: float
 ) -> tuple[bool, float, float, float, float]:
-    """Return whether a free element comes into contact in a cell, and the place where this contact ends.
+    """Return whether a free element comes into contact in a cell, and four values about the end of this contact.
 
-    Three values at the place where the contact ends follow: w, the fraction of w that remains at the end of the cell,
-    and the gap between line and element if there were no contact.
+    The values are: the place where the contact ends, w at this place, the fraction of w that remains at the end of the
+    cell, and the gap between line and element that this place would have without contact.
     """
     force, gap = cell.w1 + r * cell.s1, kept - cell.w1
     if force > 0:
@@ -651,7 +654,7 @@ class NodeToNode:
     error : float
         Largest relative error of the drag due to the search for the depth.
     contact : bool
-        Whether errors of contact fraction and contact slope include the patches that no grid resolves.
+        Whether the errors of contact fraction and contact slope include contact patches that the grids may miss.
     """
 
     def __init__(self, line: RoughLine, cases: Cases, error: float, contact: bool) -> None:

@@ -1,12 +1,12 @@
 """Steady sliding in dimensionless quantities: a solid, a line, and cases of speed and load.
 
-Closed forms are used for a smooth indenter or a smooth plane on a Kelvin solid, and with an automatic grid for full
-contact of any solid with a rough plane. All other cases are solved on finer and
-finer grids by :func:`mdr_dask.physics.refine.refine`, which estimates the errors. The solvers are:
+Closed forms are used for a Kelvin solid on a smooth indenter or a smooth plane. If the grid is automatic, a closed form
+is also used for full contact of any solid with a rough plane. All other cases are solved on finer and finer grids by
+:func:`mdr_dask.physics.refine.refine`, which estimates the errors. The solvers are:
 
-* `node_to_node` for a Kelvin solid on a plane, which is fastest;
-* `steady` (sweeps over cubic cells) for a Kelvin solid under an indenter, and for cases that miss the accuracy from
-  node to node;
+* `node_to_node`, the fastest solver, for a Kelvin solid on a rough plane;
+* `steady` (sweeps over cubic cells) for a Kelvin solid under an indenter, and for cases in which `node_to_node` misses
+  the accuracy;
 * `viscoelastic` (sweeps over straight cells) for any other solid.
 """
 
@@ -32,7 +32,9 @@ FLOORS = (0.0, 1.0, 0.0, 0.0)
 
 The floor of the depth is the unit of height, which is the rms height.
 """
-NODE_LEVELS = tuple(2**k for k in range(12))  # nodes per Nyquist point; above 2 only where contact begins or ends
+NODE_LEVELS = tuple(
+    2**k for k in range(12)
+)  # nodes per Nyquist point; values above 2 only where contact begins or ends
 CELL_LEVELS = tuple(2**k for k in range(1, 7))
 GENERAL_LEVELS = tuple(2**k for k in range(1, 9))
 ORDER_OF_CELLS = 2.0  # order of convergence of sweeps over cubic cells if contacts are shorter than a cell
@@ -52,7 +54,7 @@ class PronyTerms:
 
 @dataclass(frozen=True)
 class Request:
-    """The requested accuracy, or the grid.
+    """The requested accuracy or the given grid, and the requested results.
 
     Parameters
     ----------
@@ -64,9 +66,9 @@ class Request:
     scheme : {"hermite", "backward_euler"}
         Scheme for a Kelvin solid: cubic cells, or the time steps of the papers.
     with_errors : bool
-        Whether errors are requested on a given grid.
+        Whether to estimate the errors for a Kelvin solid on a given grid. In all other cases they are always estimated.
     contact : bool
-        Whether contact fraction and contact slope are requested. They need finer grids than the other results.
+        Whether contact fraction and contact slope are requested. These need finer grids than the other results.
     """
 
     accuracy: float = 0.01
@@ -100,8 +102,8 @@ def solve(
     Steady
         A case that misses the accuracy on the finest grid keeps its results and errors.
     array, shape (4, cases)
-        Estimated absolute discretisation errors of `Steady.columns`. They are infinite if a grid is given without
-        errors.
+        Estimated absolute discretisation errors of `Steady.columns`. They are infinite if a grid is given and
+        `with_errors` is False.
     """
     cases = Cases(deborah, loads)
     if terms is not None:
@@ -141,7 +143,7 @@ def _to_accuracy(line: RoughLine, cases: Cases, request: Request) -> tuple[Stead
 
 
 def _swept(line: RoughLine, cases: Cases, request: Request, levels: tuple[int, ...], accuracy: float) -> Refined:
-    """Solve cases by sweeps over whole lines; a search starts from the depth on the previous grid."""
+    """Solve cases by sweeps over whole lines. Each search for the depth starts from the depth on the previous grid."""
     depths = np.full(cases.loads.size, np.nan)
 
     def solve(level: int, some: IntArray) -> Solution:
@@ -155,7 +157,7 @@ def _swept(line: RoughLine, cases: Cases, request: Request, levels: tuple[int, .
 
 
 def _on_grid(line: RoughLine, cases: Cases, request: Request, oversampling: int, depths: FloatArray | None) -> Steady:
-    """Solve cases on a grid without estimated errors; the search starts from the given depths."""
+    """Solve cases on a grid, without an estimate of the errors; the search starts from the given depths."""
     nodes = line.points * oversampling
     if request.scheme == "hermite":
         return steady.steady_sliding(line.cubic(nodes), *cases, depths)
@@ -163,7 +165,7 @@ def _on_grid(line: RoughLine, cases: Cases, request: Request, oversampling: int,
 
 
 def _write(results: tuple[FloatArray, FloatArray, NDArray[np.int8]], cases: IntArray, found: Refined) -> None:
-    """Replace the results of cases that have missed the accuracy, if the new results meet it or have smaller errors."""
+    """Replace the results of some cases if the new results meet the accuracy or have smaller errors."""
     columns, errors, status = results
     better = (status[cases] != Outcome.CONVERGED) | found.met | (found.errors[0] < errors[0, cases])
     some = cases[better]
@@ -186,7 +188,7 @@ def _in_full_contact(
 
 
 def _unsolved(cases: Cases) -> tuple[FloatArray, FloatArray, NDArray[np.int8]]:
-    """Return arrays for results, errors and status."""
+    """Return arrays for results (NaN), errors (infinite) and status (invalid) of cases that are not solved yet."""
     columns = np.full((4, cases.loads.size), np.nan)
     return columns, np.full_like(columns, np.inf), np.full(cases.loads.size, Outcome.INVALID, np.int8)
 

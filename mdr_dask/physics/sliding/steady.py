@@ -36,7 +36,7 @@ from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 
 ITERATIONS = 200
 PATIENCE = 20  # after this number of sweeps the search bisects the interval that contains the depth
-LOST = 1e-13  # smallest rise of the line where contact begins, relative to the depth, that rounding errors allow
+LOST = 1e-13  # if the line rises less than this fraction of the depth where contact begins, rounding errors dominate
 TRAIL = 5  # entries of a trail: log depth, log load, slope d(log depth) / d(log load), its change, Deborah number
 LATTICE_BITS = 20  # depths are searched on a lattice of relative spacing 2**-LATTICE_BITS: see `_solve`
 
@@ -96,7 +96,9 @@ class _Swept(NamedTuple):
 def _solve(
     line: _Swept, deborah: float, load: float, trail: FloatArray, sums: FloatArray, places: Places
 ) -> tuple[float, bool]:
-    """Return the largest lattice depth that carries at most the load, and whether it was found; write `sums` for it.
+    """Return the largest lattice depth that carries at most the load, and whether it was found.
+
+    The sums at this depth are written to `sums`.
 
     The carried load is a convex, increasing function of the depth. The depth at which a tangent of this function
     reaches the given load is therefore an upper bound of the solution. Another upper bound is the depth at which full
@@ -188,8 +190,8 @@ def steady_sliding(
     Parameters
     ----------
     line : CubicLine
-        From :func:`~mdr_dask.physics.surfaces.cubic_line.periodic_line` or `indented_line`; the body moves along it in
-        the order of the nodes.
+        From :func:`~mdr_dask.physics.surfaces.cubic_line.periodic_line` or `indented_line`. An element of the
+        foundation passes the nodes in their order.
     deborah : array, shape (cases,)
         v tau / L.
     loads : array, shape (cases,)

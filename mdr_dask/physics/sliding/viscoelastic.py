@@ -1,7 +1,7 @@
 """Steady sliding of any linear viscoelastic foundation along a rough line or under an indenter.
 
-`viscoelastic_sweep` moves an element once along the line. Here Newton's method finds the depth, and for a periodic line
-the stretches of the Prony terms that repeat after one period.
+`viscoelastic_sweep` moves an element once along the line. In this module, Newton's method finds the depth. For a
+periodic line it also finds the stretches of the Prony terms at the start, which must repeat after one period.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from mdr_dask.physics.sliding.viscoelastic_sweep import CLOSED, Passage, Travell
 from mdr_dask.physics.solids import LinearSolid, recovery
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
-TOLERANCE = 1e-11  # last step of Newton's method relative to the depth; larger than rounding errors
+TOLERANCE = 1e-11  # largest last step of Newton's method, relative to the depth; it is larger than rounding errors
 LINEAR = 1e-10  # relative residual of the linear equations of a step; much smaller than the error after the step
 SWEEPS = 80
 DEEPEST_STEP = 0.7  # largest relative decrease of the depth in a step under an indenter, so that it stays positive
-SHORTEST = 1e-9  # cells: Prony terms with a smaller tau v are added to the dashpot, a term with a tenth of this tau v
+SHORTEST = 1e-9  # cells: faster Prony terms (smaller tau v) are merged with the dashpot to one term: see `_travelling`
 BALANCE = 1e-3  # largest relative error of the carried load in a converged solution
 ORDER = 2.0  # order of convergence without extrapolation; extrapolation raises it unless few cells are in contact
 
@@ -37,8 +37,8 @@ class ViscoelasticSteady:
     Parameters
     ----------
     values : array, shape (4,)
-        F_x / (4 G_inf) in the unit of height squared; penetration of the mean line, or under an indenter of the height
-        0; fraction of the line in contact; rms slope of the part of the line in contact.
+        F_x / (4 G_inf), in the unit of height squared; penetration of the mean line (under an indenter: of the height
+        0); fraction of the line in contact; rms slope of the part of the line in contact.
     errors : array, shape (4,)
         Estimated absolute discretisation errors of the values.
     status : Outcome
@@ -64,8 +64,8 @@ def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float
     Parameters
     ----------
     line : CubicLine
-        The line, of which only the heights at the nodes are used, with straight lines between them. The number of cells
-        must be a multiple of four, so that every fourth node describes the same line.
+        The line. Only its heights at the nodes are used, with straight lines between them. The number of cells must be
+        a multiple of four, because the line is also solved with every second and every fourth node.
     solid : LinearSolid
         The material. Its relaxation times are in units of L / v: they are the Deborah numbers tau_m v / L.
     load : float
@@ -121,12 +121,12 @@ class ViscoelasticCase:
         self.sweeps = 0
 
     def on(self, height: FloatArray, periodic: bool) -> Solution:
-        """Solve the case on the next finer grid; extrapolate from this and the previous grid, if there is one.
+        """Solve the case on the next finer grid, and extrapolate from this grid and the previous grid, if there is one.
 
         Parameters
         ----------
         height : array, shape (nodes,)
-            Heights; a periodic line begins at its highest node, which all grids share, and repeats it at the end.
+            Heights. A periodic line begins and ends at its highest node, which all grids share.
         periodic : bool
             Whether the line is periodic.
 
@@ -150,7 +150,7 @@ class ViscoelasticCase:
         result = values.copy()
         if self._before is not None:
             change = values - self._before
-            extrapolated = np.abs(change) <= np.abs(values)  # so that no sign changes
+            extrapolated = np.abs(change) <= np.abs(values)  # larger changes might reverse a sign
             result[extrapolated] += change[extrapolated] / 3
             result[FRACTION] = min(max(result[FRACTION], 0.0), 1.0)
         self._before = values
@@ -220,7 +220,7 @@ class Swept(NamedTuple):
 def follow(
     direction: FloatArray, swept: Swept, periodic: bool, product: FloatArray, workspace: FloatArray
 ) -> None:  # pragma: no cover
-    """Write the changes of the integrals of the stretches e_m and of u over the line for given changes of the unknowns.
+    """Write how given changes of the unknowns change the integrals of the stretches e_m and of u over the line.
 
     A contact or free recovery of fixed length changes the stretches linearly. The places where contact begins and ends
     shift as well, but this has an effect of second order only, because u is continuous at these places.
@@ -382,7 +382,7 @@ def solve_sliding(
     unknown: FloatArray,
     totals: FloatArray,
 ) -> tuple[bool, int, bool]:  # pragma: no cover
-    """Find the depth that carries the load, and for a periodic line the stretches that repeat after one period.
+    """Find the depth that carries the load and, for a periodic line, the stretches that repeat after one period.
 
     In the steady state the integral of the stress is equal to the integral of u, so that the load prescribes the
     integral of u. The strain is a convex, increasing function of the unknowns (in contact it is the larger of two
@@ -401,7 +401,7 @@ def solve_sliding(
     solid : Travelling
         The solid.
     tolerance : float
-        The iteration ends when a step, relative to the depth, is at most this.
+        Largest last step of the iteration, relative to the depth.
     unknown : array, shape (terms + 1,), input and output
         First guess, replaced by the solution: the stretches e_m at the first node, then the depth.
     totals : array, shape (6,), output
@@ -441,7 +441,7 @@ def solve_sliding(
             # all stretches change by the change of the depth, because the strains of the dashpots do not change
             residual[:] = 1.0
             follow(residual, swept, False, product, workspace)
-            # the load is the integral of the stress: u behind the line is unknown if its end is in contact
+            # the load is the integral of the stress here: if the end of the line is in contact, u behind it is unknown
             step[terms] = max((strain_area - totals[1]) / product[terms], -DEEPEST_STEP * unknown[terms])
         largest = 0.0
         for j in range(size):

@@ -1,9 +1,10 @@
 """Sweep of a linear viscoelastic foundation along a line of straight cells, exact inside every cell.
 
 Lengths are in cells of the length dx, stresses in units of the static modulus. An element in contact at a node has the
-displacement u = w, the penetration at the node. The stretch e_m = u - a_m of Prony term m is the displacement minus
-that of the dashpot of the term; it follows de_m/ds = du/ds - e_m / deborah_m with deborah_m = tau_m v / dx and the
-travelled distance s. In contact the stretches have closed forms. A free element recovers as a sum of exponential modes.
+displacement u = w, the penetration at the node. The stretch of Prony term m is e_m = u - a_m, where a_m is the
+displacement of the dashpot of this term. The stretch obeys de_m/ds = du/ds - e_m / deborah_m, with deborah_m = tau_m v
+/ dx and the travelled distance s. In contact the stretches have closed forms. A free element recovers as a sum of
+exponential modes.
 Contact can begin and end at any place inside a cell.
 """
 
@@ -149,7 +150,7 @@ def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[f
 def _next_contact(
     place: float, node: int, modes: FloatArray, times: FloatArray, penetration: FloatArray, last: int
 ) -> float:  # pragma: no cover
-    """Return the place where an element that is free from `place` on meets the line again, or -1 if it does not.
+    """Return the place where an element that is free from `place` on meets the line again, or -1 if it never does.
 
     The search begins in the cell that ends at `node`. After a separation this must be the next cell, because a convex
     strain that separates from a straight cell does not meet the same cell again.
@@ -281,9 +282,9 @@ def _contact(
     Returns
     -------
     place, strain, pressure, left
-        The place where the contact or the line ends, strain and remaining stress at this place, and whether the contact
-        ends there. The stretches are in ``workspace[0]``, and ``workspace[2, 0]`` is the end of the next cell in which
-        contact can begin.
+        The place where the contact or the line ends; strain and remaining stress at this place; whether the contact
+        ends there. The stretches are written to ``workspace[0]``, and the end of the next cell in which contact can
+        begin to ``workspace[2, 0]``.
     """
     terms, last = moduli.size, penetration.size - 1
     e, following = workspace[0], workspace[9]
