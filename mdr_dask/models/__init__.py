@@ -1,4 +1,4 @@
-"""The models by name; a model is imported only when a campaign names it.
+"""Find a model by its name; a model is imported only when a campaign names it.
 
 There are three kinds of models: those of this package (`NAMES`), those that other installed packages declare in the
 entry point group `GROUP`, and objects ``package.module:NAME`` of the user.
@@ -36,7 +36,7 @@ def names() -> tuple[str, ...]:
 
 
 def load(name: str) -> Model[Any]:
-    """Return the model with a name.
+    """Return the model of this name.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def load(name: str) -> Model[Any]:
     Raises
     ------
     ModelError
-        If there is no model with this name, or the object with this name is not a model.
+        If there is no model of this name, or if the object of this name is not a model.
     """
     if name in NAMES:
         model: Model[Any] = import_module(f"mdr_dask.models.{name}").MODEL
@@ -90,7 +90,7 @@ def _own(name: str, entry: EntryPoint, module: str) -> Model[Any]:
 
 
 def _guarded(model: str, what: str, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return a function of a user's model with checks.
+    """Add checks to a function of a user's model.
 
     An exception in the function, or an estimate that is not a number, becomes a ModelError.
     """

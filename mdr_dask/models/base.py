@@ -19,7 +19,7 @@ from mdr_dask.errors import distinguishable
 
 
 class Status(IntEnum):
-    """The state of one case in one realisation; the values of the ``status`` array of a store."""
+    """The state of one case in one realisation, as stored in the ``status`` array of a store."""
 
     MISSING = 0
     DONE = 1
@@ -44,14 +44,14 @@ class Parameters(BaseModel):
 
     A subclass may declare more about its parameters:
 
-    * `renamed`: names of parameters and outputs of earlier versions. Each has a text for the message that says what to
-      write now.
-    * `alternatives`: groups of alternatives. A user gives exactly one member of each group. A member is a tuple of
-      parameters that are given together; a dot separates the names of nested parameters.
+    * `renamed`: names that parameters and outputs had in earlier versions, each with a text that says what to write
+    now.
+    * `alternatives`: groups of alternatives, of which a user gives exactly one member each. A member is a tuple of
+    parameters that are given together; in the path of a nested parameter, a dot separates the names.
     * `overrides`: parameters that replace another parameter, each with the name of the replaced parameter.
     * `settings`: parameters that set the resolution of the solver or the points to store, not the physical problem.
-    * `requires`: parameters that have an effect only if another parameter has a certain value, with the name and the
-      value of this other parameter.
+    * `requires`: parameters that have an effect only if another parameter has a certain value. Each is listed with the
+    name and the value of that other parameter.
     """
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
@@ -111,24 +111,24 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     Parameters
     ----------
     unit : str
-        The coherent SI unit of the value, ``"1"`` for a pure number.
+        The coherent SI unit of the value; ``"1"`` for a pure number.
     description : str
         Meaning of the parameter in one line.
     usual : str
-        A common value with its unit, ``"10 MPa"``, for ``mdr-dask init``. ``check`` asks the user about a number
-        without a unit that differs from this value by more than three decades. Further values after commas,
-        ``"2 GPa, 200 HV"``, name other units in which people write the quantity.
+        A common value with its unit, such as ``"10 MPa"``, for ``mdr-dask init``. If a number without a unit differs
+        from this value by more than three decades, ``check`` asks the user about it. Further values after commas, as in
+        ``"2 GPa, 200 HV"``, show other units in which people write the quantity.
     **bounds
         ``default``, ``gt``, ``ge``, ``lt``, ``le`` and other arguments of :func:`pydantic.Field`.
 
     Returns
     -------
     pydantic field
-        Used as ``length: float = quantity("m", "length of the line", gt=0)``.
+        Field for a declaration such as ``length: float = quantity("m", "length of the line", gt=0)``.
     """
 
     def to_si(value: Any, info: ValidationInfo) -> Any:
-        """Convert a text such as ``20 mm`` to SI with the converter in the context; keep names such as ``auto``."""
+        """Convert a text such as ``20 mm`` to SI by the converter in the context; keep names such as ``auto``."""
         if info.context is None:
             return value
         convert = info.context["to_si"]
@@ -179,19 +179,19 @@ CANONICAL_BITS = 44
 def canonical(number: ArrayLike) -> Any:
     """Return dimensionless numbers, rounded to `CANONICAL_BITS` bits.
 
-    So numbers that differ only by rounding errors become equal.
+    Numbers that differ only by rounding errors thus become equal.
     """
     mantissa, exponent = np.frexp(number)
     return np.ldexp(np.rint(np.ldexp(mantissa, CANONICAL_BITS)), exponent - CANONICAL_BITS)
 
 
 def deferred(module: str, name: str) -> Callable[..., Any]:
-    """Return a function that is imported when it is first called, so that declarations import quickly.
+    """Return a function that is imported at its first call, in order that declarations import quickly.
 
     Parameters
     ----------
     module, name : str
-        Module and name of the function: ``"mdr_dask.models.ehl_line.solve"``, ``"compute"``.
+        Module and name of the function, such as ``"mdr_dask.models.ehl_line.solve"`` and ``"compute"``.
     """
 
     def call(*arguments: Any) -> Any:
@@ -210,10 +210,10 @@ class Output:
     Parameters
     ----------
     name, unit, long_name : str
-        Name, SI unit and meaning in the store; a pure number has the unit ``"1"``.
+        Name, SI unit and meaning of the output in the store; a pure number has the unit ``"1"``.
     dims : tuple of str
-        Dimensions of the output of a single case, such as ``("radius",)``; ``Model.coordinates`` gives their
-        coordinates.
+        Dimensions of the output for a single case, such as ``("radius",)``. ``Model.coordinates`` gives the coordinates
+        of these dimensions.
     default : bool
         Whether the output is computed if the campaign names no outputs.
     has_error : bool
@@ -222,14 +222,14 @@ class Output:
     comment : str
         A limitation of the output, stored as its attribute ``comment``.
     scatter : str
-        Name of another output that estimates the standard error from a single realisation. This other output is stored
+        Name of another output: the standard error of this output, estimated from a single realisation. It is stored
         together with the errors.
     floor : float
         A value in `unit`, for outputs that can normally be zero. If the output is smaller, its error is relative to
         `floor` instead of the value. An accuracy a allows the error ``a * max(abs(value), floor)``.
     allow_nan : bool
-        Whether NaN and infinity are normal values. If not, a case of a user's own model with NaN or infinity has
-        failed.
+        Whether NaN and infinity are normal values. If they are not, a case of a user's own model that gives NaN or
+        infinity counts as failed.
     """
 
     name: str
@@ -252,15 +252,15 @@ class Output:
 
 @dataclass(frozen=True)
 class Number:
-    """A dimensionless number of the cases of a model, for tables and conditions.
+    """A dimensionless number of each case of a model, for tables and conditions.
 
     Parameters
     ----------
     name, meaning : str
         Name of the number, and its meaning in one line.
     formula : str
-        A formula of parameters (nested names joined by ``_``), outputs and other numbers, for
-        `mdr_dask.questions.expression`.
+        A formula for `mdr_dask.questions.expression`. It may contain parameters (names of nested ones joined by ``_``),
+        outputs and other numbers.
     """
 
     name: str
@@ -279,7 +279,7 @@ class Coordinate:
 
 @dataclass(frozen=True)
 class Block(Generic[P]):
-    """A rectangle of cases and realisations: one Dask task, one chunk of every array, one atomic write.
+    """A rectangle of cases and realisations: one Dask task, one chunk of every array, and one atomic write.
 
     Parameters
     ----------
@@ -287,7 +287,8 @@ class Block(Generic[P]):
         The fixed parameters. For a varied parameter, this set has the value of an arbitrary case; use `column` for the
         values of all cases.
     columns : mapping of str to array, shape (cases,)
-        The varied parameters by dotted path (``velocity``, ``indenter.angle``), one value for each case, in SI units.
+        The varied parameters by dotted path (such as ``velocity`` or ``indenter.angle``), with one value for each case
+        in SI units.
     cases : int
         Number of cases.
     realisations : tuple of int
@@ -297,8 +298,8 @@ class Block(Generic[P]):
     outputs : tuple of str
         Names of the arrays to compute, including the companions that hold errors.
     accuracy : float or None
-        Largest relative discretisation error allowed for every output that has a companion (see `Output.floor`); None
-        if the campaign states no accuracy.
+        Largest relative discretisation error that is allowed for every output with a companion (see `Output.floor`).
+        None if the campaign states no accuracy.
     """
 
     parameters: P
@@ -349,11 +350,11 @@ class Result:
     Parameters
     ----------
     values : dict of str to array, shape (cases, realisations, ...)
-        The requested arrays, NaN where a case failed.
+        The requested arrays; NaN where a case failed.
     status : int8 array, shape (cases, realisations)
         Values of `Status`.
     messages : dict of (case, realisation position) to str
-        The reason why a result failed, or warnings about a result that did not fail.
+        For a failed result, the reason for the failure; for other results, warnings.
     solves : int
         Number of solutions computed; several cases may share one solution.
     """
@@ -378,8 +379,8 @@ class Model(Generic[P]):
     name : str
         Name for the key ``model`` of a campaign file.
     version : int
-        Version number, increased when a change of the code changes results. A store can be extended only by the version
-        that created it.
+        Version number. It is increased when a change of the code changes results. Only the version that created a store
+        can extend it.
     summary : str
         One line for ``mdr-dask models``.
     parameters : type
@@ -390,22 +391,23 @@ class Model(Generic[P]):
         A pure function. The value of a case depends on its parameters, the seed and its realisation, but not on the
         other cases of the block. The function does not raise an exception for a case that fails.
     seconds : callable, Block -> float
-        Estimated computing time of `compute` in seconds. The function must be fast, so it is vectorised over the cases.
+        Estimated computing time of `compute` in seconds. The function must be fast; it should use array operations over
+        the cases.
     whole : tuple of str
         Parameters whose axes are not divided among blocks, because cases along these axes share work. If a block
         becomes too large, the axis of the last parameter in this list is divided first.
     coordinates : callable, Parameters -> dict of str to Coordinate
         Coordinates of the dimensions of outputs other than case and realisation.
     distinct : callable, Block -> int, optional
-        Number of different solutions among the cases of a block, for ``check``; None if every case has its own
-        solution.
+        Number of different solutions among the cases of a block, for ``check``. Without this function, every case
+        counts as one solution.
     units : callable, Parameters -> dict of str to str
         Units of outputs and parameters that differ from the declared units, for example in a dimensionless campaign.
     memory : callable, Block -> float
         Estimated peak memory of `compute` in bytes, without the memory of the outputs.
     notes : callable, sequence of Parameters -> tuple of str
-        Notes for ``check`` about a study. The argument has the parameter sets of the study in which one axis at a time
-        is varied. Notes about a nested parameter set come from its own method `notes`.
+        Notes for ``check`` about a study. The argument contains parameter sets of the study that vary one axis at a
+        time. Notes about a nested parameter set come from the method `notes` of that set.
     compiling : float
         Time in seconds to compile the kernels of the model when it first runs on a machine.
     numbers : tuple of Number
@@ -434,11 +436,11 @@ class Model(Generic[P]):
         return {output.name: output.error for output in self.outputs if output.has_error}
 
     def output(self, name: str) -> Output:
-        """Return the output or companion with a name; raise KeyError if there is no output with this name."""
+        """Return the output or companion of this name; raise KeyError if there is none."""
         return {output.name: output for output in (*self.outputs, *self.companions.values())}[name]
 
     def with_companions(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Return the given names and the names of their scatter outputs.
+        """Return the given names of outputs, and the names of the outputs that are their `scatter`.
 
         Each name is followed by the name of its companion if the output has one.
         """

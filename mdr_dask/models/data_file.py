@@ -14,14 +14,14 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.tables import decoded, described
 
-#: File size in bytes. For files of this size and larger files, there are no notes about the columns.
+#: Size of a file in bytes, from which on there are no notes about its columns.
 LARGEST_TABLE = 10**7
 
 
 class DataFile(BaseModel):
     """A file that a campaign names.
 
-    The digest of the file is stored when the campaign is read, and compared when the file is used.
+    When the campaign is read, the digest of the file is stored. When the file is used, its digest must be the same.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -60,12 +60,12 @@ class DataFile(BaseModel):
             raise DataError(f"{self.name}: {problem}") from None
 
     def notes(self) -> tuple[str, ...]:
-        """Return a note with the columns of a table and their ranges; no note for other files."""
+        """Return a note with the columns of a table and their ranges. For other files, return no note."""
         return _notes_of_file(self) if Path(self.path).stat().st_size < LARGEST_TABLE else ()
 
 
 def check_in_campaign(info: ValidationInfo, check: Callable[[], object]) -> None:
-    """Call a function if a campaign is read; its DataError becomes the ValueError that pydantic expects."""
+    """Call a function while a campaign is read; convert its DataError to the ValueError that pydantic expects."""
     if info.context is not None:
         try:
             check()

@@ -1,4 +1,4 @@
-"""The parameters of a case that are numbers, by the names of their coordinates in a store."""
+"""Find the parameters of a case that are numbers, by the names of their coordinates in a store."""
 
 from __future__ import annotations
 

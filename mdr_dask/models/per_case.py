@@ -1,6 +1,6 @@
 """Make the function `compute` of a model from a function that solves one case.
 
-This is the shortest way to a model of your own.
+This is the easiest way to define a model of your own.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.models.base import Block, Result, Status
 
-#: Time in seconds after which a case raises TimeoutError, in a process that handles the alarm signal; None for no
-#: limit.
+#: Time in s after which a case raises TimeoutError; None for no limit. The limit applies only in a process that handles
+#: the alarm signal.
 time_limit: float | None = None
 
 Solve = Callable[[Any, np.random.Generator], Mapping[str, ArrayLike]]
@@ -30,16 +30,16 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
     Parameters
     ----------
     solve : callable, (parameters, random generator) -> mapping of output to number or array
-        Receives the parameters of one case, in SI units, and the random generator of a realisation; all cases of a
-        realisation have the same random numbers. Returns every output of the model by name. If an output has an error,
+        Receives the parameters of one case in SI units, and the random generator of a realisation. All cases of a
+        realisation get the same random numbers. Returns every output of the model by name. If an output has an error,
         the error is returned as ``<output>_error``. A case has failed if `solve` raises any exception, even SystemExit,
         or if an error is negative. It has also failed if an output is missing, is not a real number or an array of real
         numbers, is not finite (unless declared with ``allow_nan=True``), or has a shape other than the declared one.
 
     Notes
     -----
-    If the outputs of two cases differ in shape, the function raises an exception. The runner then computes the cases
-    one by one and compares each with the declared shapes.
+    If the outputs of two cases differ in shape, the returned function raises an exception. The runner then computes the
+    cases one by one and compares the shapes of each case with the declared shapes.
     """
 
     def compute(block: Block[Any]) -> Result:
@@ -96,7 +96,7 @@ def reason(error: BaseException) -> str:
     """Return the type and the text of an exception, as the reason why a case failed."""
     try:
         text = str(error)
-    except Exception:  # the method that gives the text may itself be faulty
+    except Exception:  # the method that returns the text of the exception may itself fail
         text = ""
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
@@ -140,7 +140,7 @@ def _is_real(item: Any) -> bool:
 def _gathered(
     name: str, found: Mapping[tuple[int, int], Mapping[str, NDArray[np.float64]]], shape: tuple[int, int]
 ) -> NDArray[np.float64]:
-    """Return one output of all cases, NaN where a case failed."""
+    """Return one output of all cases; NaN where a case failed."""
     arrays = {place: outputs[name] for place, outputs in found.items()}
     extra = {array.shape for array in arrays.values()} or {()}
     if len(extra) > 1:

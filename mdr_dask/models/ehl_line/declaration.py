@@ -17,8 +17,8 @@ STEEL = 210e9 / (2 * (1 - 0.3**2))
 #: Relative error of the films if the campaign states no accuracy.
 ACCURACY = 1e-3
 
-#: Each dimensionless number with the dimensional quantity that can replace it, and the further parameters that this
-#: quantity needs.
+#: Each dimensionless number, the dimensional quantity that can replace it, and the further parameters that the
+#: dimensional quantity requires.
 _PAIRS = (
     ("load_parameter", "line_load", ("radius",)),
     ("speed_parameter", "mean_velocity", ("radius", "viscosity")),
@@ -176,7 +176,7 @@ def groups(lookup: Callable[[str], Any]) -> tuple[Any, Any, Any]:
 
 
 def positions(parameters: EhlLineParameters) -> FloatArray:
-    """Return the positions of film and pressure in half widths."""
+    """Return the positions at which film and pressure are stored, in half widths of the contact."""
     return np.linspace(parameters.profile_start, parameters.profile_end, parameters.profile_points)
 
 
@@ -195,7 +195,7 @@ def seconds(block: Block[EhlLineParameters]) -> float:
 
 
 def memory(_: Block[EhlLineParameters]) -> float:
-    """Return the memory, in bytes, of a solution on the finest grid: about three matrices of 1281 x 1281 numbers."""
+    """Return the memory in bytes of a solution on the finest grid: about three matrices of 1281 x 1281 numbers."""
     return 3.0 * 8 * 1281**2
 
 

@@ -29,7 +29,8 @@ from mdr_dask.physics.lubrication.line_contact import (
 )
 from mdr_dask.physics.outcome import Outcome
 
-#: Outputs that are positions; their unit is the half width, and their errors are relative to the half width.
+#: Outputs that are positions. Their unit is the half width of the contact, and their errors are relative to this half
+#: width.
 _POSITIONS = {"minimum_position", "rupture_position", "spike_position"}
 
 

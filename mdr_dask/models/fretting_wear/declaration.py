@@ -73,7 +73,7 @@ def profile_columns(file: NamedFile) -> tuple[FloatArray, FloatArray]:
 
 
 Indenter = Annotated[Parabola | Cone | Power | RoundedCone | Table, Field(discriminator="shape")]
-#: Bodies that are not power laws; each indentation depth needs its own image.
+#: Bodies that are not power laws; for these, each indentation depth needs its own one-dimensional image.
 Pressed = RoundedCone | Table
 
 #: The parameter that gives the size of a body in a dimensional campaign.
@@ -94,7 +94,7 @@ _OSCILLATION = ("effective_shear_modulus", "friction", "amplitude")
 
 
 class FrettingWear(Parameters):
-    """Parameters of fretting wear, or, if a `path` is given, of sliding wear.
+    """Parameters of fretting wear; if a `path` is given, they describe sliding wear.
 
     A campaign without moduli is dimensionless.
     """

@@ -1,6 +1,7 @@
 """Conversion of the parameters of a block to dimensionless numbers for every case and realisation.
 
-These numbers are the exponent n, the image g_c at the stick border, and the number of cycles N.
+These numbers are the exponent n of the body, the value g_c of its one-dimensional image at the stick border, and the
+dimensionless number of cycles N.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from mdr_dask.models.parts.indenter import RoundedCone
 if TYPE_CHECKING:
     from mdr_dask.physics.mdr.revolution import TableProfile
 
-LEAST = 1e-60  # units of length, height and force must lie between LEAST and 1 / LEAST, so that cubes do not overflow
+#: Units of length, height and force must lie between LEAST and 1 / LEAST; their cubes then do not overflow.
+LEAST = 1e-60
 MOST_CYCLES = 1e12  # largest N; wear has ended long before this N
 
 
@@ -30,7 +32,8 @@ MOST_CYCLES = 1e12  # largest N; wear has ended long before this N
 class Numbers:
     """The input of the physics for every case and realisation, and the units of the cases; shape (cases, realisations).
 
-    `level` is g_c = 1 - eta, the image at the stick border; `advance` is the factor that converts cycles to N.
+    `level` is g_c = 1 - eta, the value of the image at the stick border. `advance` is the factor that converts cycles
+    to N.
     """
 
     exponent: FloatArray
@@ -44,14 +47,14 @@ class Numbers:
 
 
 def indenters(block: Block[FrettingWear]) -> list[Indenter]:
-    """Return the indenter of every case, or one indenter if only its numbers vary between the cases."""
+    """Return the indenter of every case; return a single indenter if the cases differ only in its numbers."""
     if isinstance(block.parameters.indenter, Pressed) and any(path.startswith("indenter") for path in block.columns):
         return [block.case(case).indenter for case in range(block.cases)]
     return list(block.columns["indenter"]) if "indenter" in block.columns else [block.parameters.indenter]
 
 
 def _power_laws(block: Block[FrettingWear]) -> tuple[FloatArray, FloatArray]:
-    """Return coefficient and exponent of every case; a number that is not given is NaN."""
+    """Return coefficient and exponent of the body of every case; NaN if they are not given."""
     none = np.nan, np.nan
     coefficient, exponent = np.array(
         [none if isinstance(one, Pressed) else one.power_law() for one in indenters(block)]
@@ -80,7 +83,7 @@ def _column(block: Block[FrettingWear], name: str) -> FloatArray:
 
 
 def _scatter(block: Block[FrettingWear]) -> FloatArray:
-    """Return standard normal numbers for friction, amplitude and wear coefficient, shape (realisations, 3)."""
+    """Return standard normal random numbers for friction, amplitude and wear coefficient, shape (realisations, 3)."""
     return np.array(
         [
             np.random.Generator(np.random.Philox(np.random.SeedSequence(block.seed, spawn_key=(r,)))).standard_normal(3)
@@ -90,7 +93,7 @@ def _scatter(block: Block[FrettingWear]) -> FloatArray:
 
 
 def _factor(block: Block[FrettingWear], name: str, normal: FloatArray) -> FloatArray:
-    """Return log-normal factors with mean one, shape (cases, realisations)."""
+    """Return log-normal random factors with the mean 1, shape (cases, realisations)."""
     width = np.sqrt(np.log1p(_column(block, name) ** 2))[:, None]
     return np.asarray(np.exp(width * normal - 0.5 * width**2))
 
@@ -98,7 +101,7 @@ def _factor(block: Block[FrettingWear], name: str, normal: FloatArray) -> FloatA
 def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str]]:
     """Return n, g_c, N and the units a0, d0, E* d0 a0 of every case, and messages about cases that cannot be solved.
 
-    For sliding g_c is 0, and N is the dimensionless path s.
+    For sliding wear, g_c is 0 and N is the dimensionless path s.
     """
     with np.errstate(all="ignore"):
         numbers, messages = _reduced(block)
@@ -150,7 +153,7 @@ def _first_contact(
     modulus: FloatArray,
     messages: dict[tuple[int, int], str],
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a0 and d0 of the cases; add a message if the table of a measured body ends before the contact radius."""
+    """Return contact radius a0 and depth d0 of the cases; add a message if the table of a body ends before a0."""
     from mdr_dask.physics.mdr import power_law_contact as contact
 
     depth, force = _column(block, "depth"), _column(block, "normal_force")
@@ -203,7 +206,7 @@ def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: di
 
 
 def notes(sets: Sequence[FrettingWear]) -> tuple[str, ...]:
-    """Return the reasons why cases of a study will fail, as far as they follow from the parameters without scatter."""
+    """Return reasons why cases of a study will fail, as far as they follow from parameters without random scatter."""
     texts: list[str] = []
     for parameters in sets:
         scatter = dict.fromkeys(("friction_scatter", "amplitude_scatter", "wear_coefficient_scatter"), 0.0)

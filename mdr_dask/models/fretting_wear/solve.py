@@ -1,6 +1,6 @@
 """Solution of a block of fretting wear.
 
-Each different combination of body, stick radius and rule is solved once for all numbers of cycles.
+Each different combination of body, stick radius and wear rule is solved once for all numbers of cycles.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from mdr_dask.physics.wear.worn import Worn, virgin_load
 
 #: Outputs that have a closed form; the closed forms are computed for many cases at once.
 _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border")
-#: Names of outputs, and the attributes of `Worn` that have the same meaning but another name. The output cannot be
-#: called `normal_force`, because a parameter has this name.
+#: Names of outputs with the corresponding attributes of `Worn`, which have another name. The output cannot be called
+#: `normal_force`, because a parameter already has this name.
 _RENAMED = {"contact_force": "normal_force"}
-#: Error of the profile, divided by eta d0, for which the evolution is solved: `_USUAL` if the campaign states no
-#: accuracy; no solution uses a value below `_FINEST`.
+#: Requested error of the profile, divided by eta d0, when the evolution is solved. It is `_USUAL` if the campaign
+#: states no accuracy, and never below `_FINEST`.
 _USUAL, _FINEST = 1e-3, 3e-6
-#: If the campaign states an accuracy, the first solution uses `_FIRST` times the accuracy as this error. If an output
-#: misses the accuracy, the next solution uses a smaller error, by the factor `_FINER`.
+#: If the campaign states an accuracy, the first solution requests the error `_FIRST` times the accuracy. If an output
+#: then misses the accuracy, the next solution requests `_FINER` times this error.
 _FIRST, _FINER = {"depth": 0.2, "force": 0.6}, 0.25
 
 #: Indices (case, realisation) in a block.
@@ -108,7 +108,7 @@ def seconds(block: Block[FrettingWear]) -> float:
 
 
 def _followed(hold: str, accuracy: float) -> float:
-    """Return the estimated time, in seconds, of one evolution and its errors, without the evaluation at single N."""
+    """Return the estimated time in s of one evolution and its errors, without the time to evaluate it at single N."""
     if hold == "force":
         return 0.09 * float(max(COARSEST_OF_MOVING / accuracy, 1.0) ** 1.1)
     return 0.012 * float((_USUAL / accuracy) ** 0.6)
@@ -138,7 +138,7 @@ def _sizes(parameters: FrettingWear, name: str) -> tuple[int, ...]:
 
 
 def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
-    """Multiply the outputs by the units of length, height and force of each case; dimensionless cases have units 1."""
+    """Multiply outputs by the units of length, height and force of each case; units are 1 in dimensionless cases."""
     units = {
         "contact_radius": numbers.length,
         "stick_border": numbers.length,
@@ -158,8 +158,8 @@ def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
 def _is_plain(block: Block[FrettingWear]) -> bool:
     """Return whether closed forms are sufficient for a block.
 
-    They exist for power-law bodies, constant depth without a history, the limit or the fast rule, and outputs that are
-    numbers.
+    They are sufficient if the body is a power law, the depth is constant without a history, the limit or the fast rule
+    is requested, and all outputs are single numbers.
     """
     simple = set(block.columns.get("wear_rule", [block.parameters.wear_rule])) <= {"limit", "fast"}
     depth = set(block.columns.get("hold", [block.parameters.hold])) == {"depth"}
@@ -174,7 +174,7 @@ def _is_plain(block: Block[FrettingWear]) -> bool:
 def _solve_plain(
     block: Block[FrettingWear], numbers: Numbers, values: dict[str, FloatArray], good: NDArray[np.bool_]
 ) -> int:
-    """Compute the limiting profiles or fast rules of all power-law cases together.
+    """Compute all cases of a block together, by the closed forms of the limiting profile or of the fast rule.
 
     Return the number of different cases.
     """
@@ -196,7 +196,7 @@ def _solve_plain(
 
 
 def _distinct(rows: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Return the different columns of an array and, for each column of the array, its index among them."""
+    """Return the different columns of an array, and for each column the index of its equal among them."""
     if rows.shape[1] == 0:
         return rows, np.zeros(0, dtype=np.intp)
     order = np.lexsort(rows)
@@ -270,7 +270,7 @@ def _missed(records: Sequence[Worn], block: Block[FrettingWear], places: FloatAr
 def _solves_of(task: Task, wanted: Collection[tuple[float, float]]) -> int:
     """Return the number of solutions of a task.
 
-    It is one if a single time integration gives all N, or if the result does not depend on N.
+    The number is one if a single time integration gives all N, or if the result does not depend on N.
     """
     marched = task.rule == "sliding" or (task.rule == "exact" and not task.blocks)
     return 1 if marched or task.rule == "limit" else len(wanted)
@@ -326,7 +326,7 @@ def _first_resolution(accuracy: float | None, hold: str) -> float:
 def _contacts(
     task: Task, wanted: Sequence[tuple[float, float]], block: Block[FrettingWear], places: FloatArray
 ) -> list[tuple[Sequence[Worn], str]]:
-    """Solve a task for all its pairs (N, xi), and repeat pairs whose outputs miss the accuracy at a finer resolution.
+    """Solve a task for all its pairs (N, xi); solve pairs whose outputs miss the accuracy again at a finer resolution.
 
     Return the contacts, each with a message about the outputs that miss the accuracy at the last resolution. The final
     resolution of a result depends only on its own case. Results with the same resolution are solved together.
@@ -347,7 +347,7 @@ def _contacts(
 def _solved(
     task: Task, wanted: Sequence[tuple[float, float]], accuracy: float, *, errors: bool
 ) -> list[Sequence[Worn]]:
-    """Return the contact for every (N, xi) at an accuracy; for a history, the contacts after every block."""
+    """Return the contact for every (N, xi) at an accuracy; for a history, return the contacts after every block."""
     profile, force = task.profile, task.hold == "force"
     if task.blocks:
         return [_loaded(task, profile, errors=errors)] * len(wanted)

@@ -27,7 +27,7 @@ from mdr_dask.physics.lubrication.oil import OILS, Oil
 Positive = Annotated[float, Field(gt=0)]
 #: Contact modulus of steel on steel in Pa, with E = 210 GPa and nu = 0.3 for both bodies.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
-#: Number of shortest waves around a roller, if neither shortest_wavelength nor points are given.
+#: Number of the shortest waves that fit around a roller, if neither shortest_wavelength nor points are given.
 WAVES = 100_000
 #: Positions of the profiles, in half widths of the contact.
 POSITIONS = np.linspace(-1.5, 1.5, 1501)
@@ -161,7 +161,7 @@ class MixedLubrication(Parameters):
         grids: tuple[int, ...]
         if points == "auto":
             grids = points_for(modes)
-        elif points < 4 * modes:  # half of the points do not resolve the shortest wave
+        elif points < 4 * modes:  # the coarser grid, with half of the points, does not resolve the shortest wave
             grids = (points,)
         else:
             grids = (points // 2, points)
@@ -294,7 +294,7 @@ DRAWN = {output.name for output in OUTPUTS if output.dims}
 
 
 def coordinates(parameters: MixedLubrication) -> dict[str, Coordinate]:
-    """Return the coordinates of the outputs: angles of a trace, and positions of the profiles in half widths."""
+    """Return the coordinates of the outputs: angles of a trace, and positions of profiles in half contact widths."""
     angles = 2 * np.pi * np.arange(parameters.trace_points) / parameters.trace_points
     return {
         "angle": Coordinate(angles, "rad", "rolling angle"),

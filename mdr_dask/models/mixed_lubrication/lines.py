@@ -13,12 +13,13 @@ from mdr_dask.models.parts.surface import Surface, lines_of
 
 #: Largest number of points of a line.
 MOST_POINTS = 10**7
-#: Points per shortest wave on the coarsest lines, and number of doublings, if the accuracy determines the points.
+#: If the accuracy determines the number of points: points per shortest wave on the coarsest lines, and number of
+#: doublings.
 LEAST_PER_WAVE, DOUBLINGS = 2.5, 3
 
 
 def points_for(modes: int) -> tuple[int, ...]:
-    """Return the numbers of points on which lines with `modes` shortest waves are solved, increasing."""
+    """Return the increasing numbers of points on which lines with `modes` shortest waves are solved."""
     from scipy.fft import next_fast_len
 
     least = min(next_fast_len(int(np.ceil(LEAST_PER_WAVE * modes)), real=True), MOST_POINTS)
@@ -65,8 +66,8 @@ class _Random:
     def lines(self, seed: int, realisation: int, points: int) -> FloatArray:
         """Return the least-squares splines of both lines, shape (2, points).
 
-        Both lines take their phases in turn from one random stream. So a shorter shortest wavelength does not change
-        the longer waves.
+        Both lines take their phases in turn from one random stream, from the longest wave to the shortest. Therefore
+        the longer waves stay the same if shorter waves are added.
         """
         from mdr_dask.physics.surfaces.roughness import phase_factors
         from mdr_dask.physics.surfaces.splines import closest
@@ -141,7 +142,7 @@ class Measured:
 
     @property
     def points(self) -> tuple[int, int]:
-        """Number of every second point, and of all points; both lines are cut to an even number of points."""
+        """Numbers of points on the coarse and the fine grid; both lines are cut to an even number of points."""
         half = min(line_of(file).height.size for file in (self.file_1, self.file_2)) // 2
         return half, 2 * half
 
@@ -157,14 +158,14 @@ class Measured:
         return ""
 
     def combined_rms(self) -> float:
-        """Return the rms height of both lines together, in m, or in the unit of the scaled lines."""
+        """Return the rms height of both lines together, in m or in the unit of scaled lines."""
         return float(np.sqrt(sum(np.mean(line**2) for line in self._pair())))
 
     def lines(self, seed: int, realisation: int, points: int) -> FloatArray:
         """Return the interpolating splines of both lines, shape (2, points), on all points or on every second point.
 
-        Each line begins at a random point of its ring. With the slide-roll ratio S, the contact passes 1 + S/2 times
-        the length of line 1, and 1 - S/2 times the length of line 2, in one revolution at the mean velocity. Means over
+        Each line begins at a random point of its ring. In one revolution at the mean velocity, the contact passes 1 +
+        S/2 times the length of line 1 and 1 - S/2 times the length of line 2; S is the slide-roll ratio. Means over
         realisations are therefore unbiased only if both lines begin at random points.
         """
         from mdr_dask.physics.surfaces.splines import through_heights
@@ -175,7 +176,7 @@ class Measured:
         return np.array([through_heights(np.roll(line, roll)[:: self.points[-1] // points]) for line, roll in rings])
 
     def _pair(self) -> tuple[FloatArray, FloatArray]:
-        """Return the lines without mean and tilt, so that the step where the ends of a line meet is small."""
+        """Return the lines without mean and tilt; the step where the ends of a line meet is then small."""
         from mdr_dask.physics.surfaces.measured import detrended, rms_height
 
         lines = [detrended(line_of(file).height[: self.points[-1]], "line") for file in (self.file_1, self.file_2)]

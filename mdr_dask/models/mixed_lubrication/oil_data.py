@@ -68,7 +68,7 @@ class OilData(Parameters):
     def two_viscosities(self) -> tuple[float, float, float, float]:
         """Two temperatures in K, each followed by the kinematic viscosity in m^2/s.
 
-        The viscosities are given, or follow from the fit to the table.
+        The viscosities are those of the campaign, or follow from the fit to the table.
         """
         if self.viscosities is not None:
             found = _fitted(self.viscosities, self.density, self.density_temperature)
@@ -107,14 +107,14 @@ class OilData(Parameters):
 
 
 class _Fit(NamedTuple):
-    """The fit to a table: ascending temperatures in K, constants of the law, relative deviations of the viscosities."""
+    """The fit to a table: ascending temperatures in K, constants of the law, relative deviations of viscosities."""
 
     temperature: FloatArray
     constants: tuple[float, float]
     departures: FloatArray
 
     def at(self, temperature: float) -> float:
-        """Return the kinematic viscosity by the law in m^2/s."""
+        """Return the kinematic viscosity in m^2/s according to the law."""
         return float(kinematic_viscosity(temperature, *self.constants))
 
 

@@ -151,7 +151,7 @@ def _shared_load(
 def _film_of(
     case: MixedLubrication, viscosity: float, alpha: float, accuracy: float
 ) -> tuple[Callable[[float], Film], str]:
-    """Return a function that gives the film for its load share, and a warning if the formula is outside its range."""
+    """Return a function from the load share of the film to the film, and a warning if the formula is out of range."""
     E_star, radius = case.contact_modulus, _radius(case)
     velocity = case.rotation_speed * case.roller_radius
     line_load = case.normal_force / case.roller_width
@@ -200,7 +200,7 @@ def fixed_values(operation: Operation) -> dict[str, float]:
     }
     errors = dict.fromkeys(values, 0.0)
     if error > 0:
-        # error of the asperity load: its change if the film is thinner by the film's error
+        # the error of the asperity load is its change if the film is thinner by the error of the film
         asperities = Asperities(operation.rms, operation.case.longest(), operation.case.contact_modulus)
         loaded = asperities.pressure(film * (1 - error)) / _mean_pressure(operation.case)
         errors = {

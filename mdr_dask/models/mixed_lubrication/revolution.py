@@ -15,10 +15,10 @@ from mdr_dask.physics.lubrication import breakthrough, film_formulas
 from mdr_dask.physics.lubrication.clusters import find_clusters
 from mdr_dask.physics.surfaces.splines import heights
 
-#: Parts of a revolution; the scatter between the parts gives the standard error.
+#: Number of parts of a revolution; the scatter between the parts gives the standard error.
 PARTS = 16
-#: Windows per window width on the coarsest lines, in rolling with creep. Windows at a quarter of this distance have
-#: nearly the same contact.
+#: Number of windows per window width on the coarsest lines, in rolling with creep. Two windows at a quarter of this
+#: distance have nearly the same contact.
 WINDOWS = 4
 
 
@@ -74,7 +74,7 @@ def revolve(operation: Operation, lines: FloatArray) -> Revolution:
     if creep == 0:
         clusters = find_clusters(lines.sum(axis=0), operation.level, spacing, operation.strength)
         contact: NDArray[np.int32] | IntArray = breakthrough.contact_lengths(clusters, width, case.edge_rule)
-    else:  # on finer lines there are more windows, so that the changes include the error of the window positions
+    else:  # finer lines have more windows, and the changes between grids thus include the error of the window positions
         stride = max(1, int(operation.width / operation.length * operation.source.points[0] / WINDOWS))
         contact = _windows(operation, lines, np.arange(0, points, stride))
     parts = max(1, min(PARTS, int(operation.length / (2 * operation.width))))
@@ -99,7 +99,7 @@ def values(operation: Operation, revolution: Revolution, errors: FloatArray) -> 
     operation : Operation
     revolution : Revolution
     errors : array, shape (2,)
-        Errors of the probability and of the length in m.
+        Error of the probability, and error of the length in m.
     """
     specific, length = operation.case.resistivity / operation.squares, revolution.length
     of_probability, off = errors.tolist()

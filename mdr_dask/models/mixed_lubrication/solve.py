@@ -23,18 +23,19 @@ LEAST_FILM_RATIO = 0.5
 #: Outputs that follow from the length in contact, and all outputs that need the rough lines.
 _OF_LENGTH = {"contact_length", "contact_conductance", "contact_resistance", *DRAWN}
 _OF_LINES = {"breakthrough_probability", "revolution_error", *_OF_LENGTH}
-#: Outputs that can be zero, each with a magnitude. If the output is smaller, its error is relative to this magnitude.
-#: The magnitude of the contact length is divided by the width of the contact.
+#: Outputs that can be zero, each with a magnitude. If the output is smaller than this, its error is relative to the
+#: magnitude. The magnitude for the contact length is given in widths of the contact.
 _FLOORS = {"asperity_load_share": 1.0, "breakthrough_probability": 0.1, "contact_length": 0.01}
 #: Lower bound of the order of convergence of probability and length in the spacing of the points. The splines converge
-#: faster, but single clusters break on one grid and not on the next, and contact begins between two windows.
+#: faster, but a single cluster may break the layer on one grid and not on the next, and contact may begin between two
+#: windows.
 _ORDER = 1
 
 
 def compute(block: Block[MixedLubrication]) -> Result:
     """Return the values of a block; one realisation is one revolution of the rollers with random lines.
 
-    Cases that differ in load, speed, temperature, rms height or layer use the same lines in each realisation.
+    In each realisation, cases that differ only in load, speed, temperature, rms height or layer use the same lines.
     """
     result = _empty(block)
     groups: dict[Source, list[tuple[int, Operation]]] = {}
@@ -130,7 +131,7 @@ def _realise(
 
     floors = [_FLOORS["breakthrough_probability"], _FLOORS["contact_length"]][: 1 + with_length]
     points = source.points
-    if block.accuracy is None:  # two grids with errors, otherwise one
+    if block.accuracy is None:  # two grids if errors are requested, otherwise one
         points = points[:2] if any(f"{name}_error" in block.outputs for name in _OF_LINES) else points[:2][-1:]
     accuracy = block.accuracy or np.inf
     errors = refine(solve, len(members), points, accuracy, _ORDER, floors=floors).errors
@@ -138,7 +139,7 @@ def _realise(
         of_length = errors[-1, k] * operation.width if with_length else np.nan
         numbers = values(operation, found[k], np.array([errors[0, k], of_length]))
         length, found_length = operation.width * _FLOORS["contact_length"], numbers["contact_length"]
-        # conductance and resistance have the relative error of the length
+        # conductance and resistance have the same relative error as the length
         floors_here = {
             "breakthrough_probability": _FLOORS["breakthrough_probability"],
             "contact_length": length,

@@ -1,8 +1,8 @@
-"""The check whether results meet the accuracy of a campaign, and the message if they do not; equal for all models.
+"""For all models: check whether results reach the accuracy of a campaign, and write a message if they do not.
 
 The relative error of an output is its error divided by its value. For a profile or a history, it is the largest error
-divided by the largest value. For an output that can be zero, the model gives a floor, which is an absolute value. If
-the output is smaller than the floor, the error is divided by the floor.
+divided by the largest value. For an output that can be zero, the model gives a floor in the unit of the output. If the
+output is smaller than the floor, the error is divided by the floor.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def relative_errors(
         Results and their absolute errors, by the name of the output. Entries are ignored where the result or the error
         is NaN.
     floors : mapping of str to array, shape (cases,), or float
-        Absolute values by the name of the output. If the result is smaller, its error is relative to this value.
+        Floors by the name of the output. If the result is smaller than its floor, its error is relative to the floor.
     """
     found = {}
     for name, value in values.items():

@@ -24,9 +24,9 @@ TEXT = (".csv", ".txt", ".dat", ".xyz", ".asc", ".tsv", ".grd", ".prn", ".xlsx")
 SAME = 0.01
 """Relative difference up to which two lengths count as equal, because numbers in files are rounded."""
 LEAST_LINES = 3
-"""Smallest number of rows and columns of a table of heights that counts as a map."""
+"""A table of heights counts as a map if it has at least this many rows and columns."""
 MOST_COLUMNS = 6
-"""Largest number of columns in a file that holds a line scan or a table of x, y, z; a map has more columns."""
+"""A file with at most this many columns holds a line scan or a table of x, y and z; a map has more columns."""
 
 
 class Units(NamedTuple):
@@ -42,14 +42,14 @@ class Units(NamedTuple):
 
 
 class Recorded(NamedTuple):
-    """A recorded map, NaN where points are missing, and remarks on how it was read."""
+    """A recorded map with NaN for missing points, and remarks on how the map was read."""
 
     surface: SurfaceMap
     remarks: tuple[str, ...]
 
 
 class Scan(NamedTuple):
-    """Positions and heights of a line scan, m, and remarks on how it was read."""
+    """Positions and heights of a line scan in m, and remarks on how the scan was read."""
 
     position: FloatArray
     height: FloatArray
@@ -57,7 +57,7 @@ class Scan(NamedTuple):
 
 
 class _Grid(NamedTuple):
-    """Heights in the unit of the file, with rows along x, and the steps along x and y in the unit of the positions."""
+    """Heights in the unit of the file, in rows along x, and the steps along x and y in the unit of the positions."""
 
     rows: FloatArray
     steps: tuple[float | None, float | None] = (None, None)
@@ -160,7 +160,7 @@ def dimensions(file: DataFile) -> int:
 
 
 def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[float, float]]:
-    """Return the unit of the heights and the spacings along x and y, all in m, as stated by the file or the user."""
+    """Return the unit of the heights in m and the spacings along x and y in m, as stated by the file or the user."""
     height = _one_unit(file, "unit", grid.stated.height, units.height)
     position = _one_unit(file, "x_unit", grid.stated.position, units.position)
     metre = _metre(file, position, "x_unit") if position else _implied_unit(file, grid.steps, units)
@@ -191,7 +191,7 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
 
 
 def _implied_unit(file: DataFile, steps: tuple[float | None, float | None], units: Units) -> float | None:
-    """Return the unit of the positions in m, a power of ten that follows from the spacing stated by the user.
+    """Return the unit of the positions in m: the power of ten that follows from the spacing stated by the user.
 
     Return None if no power of ten agrees with this spacing.
     """
@@ -210,7 +210,7 @@ def _implied_unit(file: DataFile, steps: tuple[float | None, float | None], unit
 
 
 def _one_unit(file: DataFile, option: str, stated: str, given: str) -> str:
-    """Return the unit stated by the file or by the user; raise DataError if both state units and these differ."""
+    """Return the unit stated by the file or by the user; raise DataError if their units differ."""
     if stated and given and abs(_metre(file, stated, option) / _metre(file, given, option) - 1) > SAME:
         raise DataError(
             f"{file.name}: the file states {stated}, got {given!r}: leave out `{option}` or correct the file"
@@ -227,7 +227,7 @@ def _metre(file: DataFile, unit: str, option: str) -> float:
 
 
 def _channel(file: DataFile) -> Any:
-    """Return the main channel of a file, read by SurfaceTopography, or None for text that this module reads.
+    """Return the main channel of a file, as read by SurfaceTopography; return None for text that this module reads.
 
     This module reads text files in which SurfaceTopography finds no unit.
     """
@@ -328,7 +328,7 @@ def _without_positions(file: DataFile, rows: FloatArray, stated: Units, remarks:
 
 
 def _stated(file: DataFile, head: list[str], first: str) -> Units:
-    """Return the units and spacings stated in the lines before the heights, or in a corner cell such as ``y [um]``.
+    """Return the units and spacings stated before the heights: in lines, or in a corner cell such as ``y [um]``.
 
     A line that names heights or positions and ends in a unit of length states the unit of this quantity. A line that
     names a spacing states the value of the spacing.
@@ -346,7 +346,7 @@ def _stated(file: DataFile, head: list[str], first: str) -> Units:
         if number and names & {"spacing", "pitch", "pixel", "step", "dx", "dy", "distance"}:
             key = "spacing_y" if names & {"y", "dy"} and not names & {"x", "dx"} else "spacing"
             found.setdefault(key, {})[f"{words[-2]} {words[-1]}"] = line
-        elif not number and bool(along) != bool(upwards):  # a line that names heights and positions lists the columns
+        elif not number and bool(along) != bool(upwards):  # a line that names both is the row of column names
             found.setdefault("position" if along else "height", {})[words[-1]] = line
         elif not number and "unit" in names:
             found.setdefault("height", {})[words[-1]] = line
@@ -420,7 +420,7 @@ def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
 
 
 def _surfer(file: DataFile, lines: list[str]) -> _Grid:
-    """Return the grid of a Surfer text: DSAA, numbers of points, ranges of x, y and z, then rows in ascending y."""
+    """Return the grid of a Surfer text: DSAA, numbers of points, ranges of x, y and z, and rows in ascending y."""
     import numpy as np
 
     try:
@@ -434,7 +434,7 @@ def _surfer(file: DataFile, lines: list[str]) -> _Grid:
 
 
 def _esri(file: DataFile, lines: list[str]) -> _Grid:
-    """Return the grid of an ESRI text: names with numbers, then rows in descending y."""
+    """Return the grid of an ESRI text, which has names with numbers, followed by rows in descending y."""
     import numpy as np
 
     head = {
@@ -461,9 +461,9 @@ COORDINATES = (
 
 
 def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame) -> tuple[tuple[int, str], ...]:
-    """Return index and unit of the columns x, y and z of a table, from their names; empty if a column is missing.
+    """Return index and unit of the columns named x, y and z in a table; empty if one of these columns is missing.
 
-    Without names, x, y and z are the three columns that do not hold row numbers.
+    If the table has no names, x, y and z are the three columns that do not hold row numbers.
     """
     try:
         sheet = read_sheet("\n".join(lines[: first + 10]), file.name)
@@ -502,9 +502,10 @@ def _scattered(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame
 
 
 def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]:
-    """Return positions and heights, m, of a table.
+    """Return positions and heights of a table in m.
 
-    The columns are found by their names, or, without names, by their numbers. Heights alone need a spacing.
+    The columns are found by their names. If the table has no names, they are found by their numbers. A table of heights
+    alone needs a spacing.
     """
     import numpy as np
 

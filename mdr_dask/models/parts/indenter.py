@@ -1,4 +1,4 @@
-"""Parameters of indenters. The model of fretting wear makes the sizes optional and adds measured profiles."""
+"""Parameters of indenters. In the model of fretting wear, sizes are optional, and there are also measured profiles."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Plane(Parameters):
     shape: Literal["plane"] = "plane"
 
     def line(self) -> None:
-        """Return None, because a plane has no shape besides the roughness."""
+        """Return None, because a plane has no shape apart from the roughness."""
 
 
 class _PowerLaw(Parameters):

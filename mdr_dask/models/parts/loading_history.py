@@ -76,7 +76,7 @@ class Oscillation(_History):
 
 
 class TableFile(_History):
-    """Velocity and load from a table, interpolated linearly between its rows; two rows with equal times give a jump."""
+    """Velocity and load from a table, interpolated linearly between rows; two rows with the same time give a jump."""
 
     shape: Literal["table"]
     file: NamedFile = Field(description="table with the columns time and velocity, and optionally force")
@@ -105,9 +105,9 @@ def _check_rows(times: tuple[float, ...], velocities: tuple[float, ...], forces:
 
 
 def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> tuple[tuple[float, float], list[Piece]]:
-    """Return velocity and normal force before t = 0, and the pieces of the history from t = 0 on.
+    """Return velocity and normal force before t = 0, and the pieces of the history after t = 0.
 
-    The last piece has no end.
+    The last piece continues for ever.
 
     Raises
     ------

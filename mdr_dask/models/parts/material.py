@@ -56,7 +56,7 @@ class PronySeries(Parameters):
 
 
 class PowerLaw(Parameters):
-    """A Prony series whose loss modulus is a power of the frequency."""
+    """A Prony series fitted to a solid whose loss modulus is a power of the frequency."""
 
     static_modulus: float = quantity("Pa", "shear modulus under slow deformation", usual="3 MPa", gt=0)
     loss_modulus: float = quantity("Pa", "loss modulus G'' at the given frequency", usual="1 MPa", gt=0)
@@ -69,7 +69,7 @@ class PowerLaw(Parameters):
 
 
 KINDS = ("kelvin", "standard_solid", "prony", "power_law", "dma_table")
-SOFTEST, STIFFEST = 100.0, 1e12  # range of the shear moduli of solids in Pa, from a gel to above diamond
+SOFTEST, STIFFEST = 100.0, 1e12  # range of the shear moduli of solids in Pa, from a gel to more than diamond
 LAWS = ("wlf", "arrhenius", "shift_factors")
 
 
@@ -153,9 +153,9 @@ def _shift(material: Material) -> float | None:
 
 
 def _vertical(material: Material) -> float:
-    """Return b_T of the material's temperature for moduli from a table, and 1 for other materials.
+    """Return the vertical factor b_T at the material's temperature for moduli from a table; 1 for other materials.
 
-    Moduli at this temperature are those of the curve divided by b_T.
+    The moduli at this temperature are the moduli of the curve, divided by b_T.
     """
     table, temperature = material.dma_table, material.temperature
     if table is None or temperature is None:
@@ -218,7 +218,7 @@ def fit_error(material: Material | None) -> float:
 
 
 def frequencies(material: Material) -> tuple[float, float] | None:
-    """Return the range of angular frequency, rad/s, of a power law or a table at the material's temperature."""
+    """Return the range of angular frequency in rad/s of a power law or a table at the material's temperature."""
     fit = _fit_of(material)
     if fit is None:
         return None
@@ -227,7 +227,7 @@ def frequencies(material: Material) -> tuple[float, float] | None:
 
 
 def fit_notes(material: Material | None) -> tuple[str, ...]:
-    """Return a note with the error of the Prony series fitted to a power law or a table, if a series was fitted."""
+    """Return a note with the error of a Prony series that was fitted to a power law or a table."""
     fit = None if material is None else _fit_of(material)
     if material is None or fit is None:
         return ()

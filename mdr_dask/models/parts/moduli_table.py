@@ -21,10 +21,10 @@ from mdr_dask.models.parts.temperature import Law
 from mdr_dask.tables import Read, TableError, read_sheet, read_table
 from mdr_dask.units import shown
 
-#: Names of columns that hold moduli in tension; the names are first simplified by `plain`.
+#: Pattern for the names of columns that hold moduli in tension. It is applied to names simplified by `plain`.
 _IN_TENSION = re.compile(r"(?<!\w)e(?:'|1|[ _]?stor|$)|young|tensile|tension")
 SAME_TEMPERATURE = 1.0  # largest difference, in K, between temperatures that count as equal
-#: Largest gap between the moduli of neighbouring curves, in decades, that the scatter of an instrument can explain.
+#: Largest gap in decades between the moduli of neighbouring curves that the scatter of an instrument can explain.
 APART = 0.02
 
 
@@ -78,11 +78,12 @@ class Moduli:
     Parameters
     ----------
     omega, storage, loss : array, shape (points,)
-        Angular frequency, rad/s, and moduli, Pa: shear moduli from `one_curve`, otherwise as measured.
+        Angular frequency in rad/s and moduli in Pa. Curves from `one_curve` have shear moduli, other curves the moduli
+        as measured.
     temperature : float or None
-        Temperature of the curve, K; None if the table has no temperatures.
+        Temperature of the curve in K; None if the table has no temperatures.
     measured : tuple of float or None
-        Lowest and highest temperature of the table, K.
+        Lowest and highest temperature of the table in K; None if it has no temperatures.
     superposed : str
         A text that describes how the curves of several temperatures were superposed; empty for one temperature.
     """
@@ -152,9 +153,9 @@ def _levels(temperature: FloatArray) -> tuple[IntArray, FloatArray]:
 
 
 def vertical_factor(chosen: ModulusTable, temperature: FloatArray, reference: float) -> FloatArray:
-    """Return b_T = rho0 T0 / (rho T), by which moduli at a temperature in K are multiplied to obtain them at T0.
+    """Return b_T = rho0 T0 / (rho T): moduli at a temperature T in K, times b_T, are moduli at the reference T0 in K.
 
-    T0 is the reference in K. The factor is 1 with `vertical: none`.
+    The densities at T0 and T are rho0 and rho. With `vertical: none`, the factor is 1.
     """
     from mdr_dask.physics.superposition.master_curve import known_rise
 
@@ -172,7 +173,7 @@ def _vertical(chosen: ModulusTable) -> str:
 
 @lru_cache(maxsize=16)
 def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
-    """Return log10 of horizontal and vertical shift factors of each temperature, and a text about these factors.
+    """Return log10 of the horizontal and the vertical shift factor of each temperature, and a text about the factors.
 
     With these factors the curves overlap at the reference temperature.
     """
@@ -199,7 +200,7 @@ def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
 
 
 def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, reference: float) -> str:
-    """Return a text with the largest difference between shift factors from the curves and shift factors from a law."""
+    """Return a text with the largest difference between the shift factors of the curves and those of a law."""
     if law is None:
         return ""
     try:
@@ -214,7 +215,7 @@ def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, referenc
 
 
 def _require_overlap(storage: FloatArray, member: IntArray, levels: FloatArray) -> None:
-    """Raise DataError if there is a gap between the moduli of two curves, which no horizontal shift can close."""
+    """Raise DataError if there is a gap between the moduli of two curves, because no horizontal shift can close it."""
     low, high = (
         np.array([find(storage[member == number]) for number in range(levels.size)]) for find in (np.min, np.max)
     )

@@ -1,4 +1,4 @@
-"""Parameter sets that a user can give as a file name, without options."""
+"""Parameter sets that a user can give as a mere file name."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from mdr_dask.models.base import Parameters
 
 
 class NamedByFile(Parameters):
-    """A parameter set with a field `file` or `files`; a file name in its place means this file with default options."""
+    """A parameter set with a field `file` or `files`; a mere file name means this file with default options."""
 
     model_config = ConfigDict(json_schema_extra={"bare_name": True})
 

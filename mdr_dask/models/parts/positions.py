@@ -18,13 +18,13 @@ OUTER = 3
 BREAK = 3.0
 """Bend between a line of positions and the lines beside it, over the largest bend between lines of heights."""
 FAR_ALONE = 10.0
-"""A single number is not a height if its distance from all other heights exceeds this many times their range."""
+"""A number that occurs once is not a height if its distance from all other heights exceeds this times their range."""
 FEW_LEVELS = 10
 """A profile with at most this many different heights counts as designed, not measured."""
 
 
 class Outer(NamedTuple):
-    """Heights without lines of positions, the steps of the positions along x and y, and remarks on omitted lines."""
+    """Heights without the lines of positions, steps of the positions along x and y, and remarks on omitted lines."""
 
     rows: FloatArray
     steps: tuple[float | None, float | None]
@@ -34,7 +34,7 @@ class Outer(NamedTuple):
 def rising(lines: FloatArray) -> NDArray[np.bool_]:
     """Return which lines only rise or only fall.
 
-    Lines of positions and row numbers have this property; lines of rough heights do not.
+    Lines of positions and lines of row numbers have this property; lines of rough heights do not.
     """
     steps = np.diff(lines, axis=1)
     known = np.isfinite(steps)
@@ -86,7 +86,7 @@ def is_numbered(line: FloatArray) -> bool:
 
 
 def _common_step(lines: list[FloatArray], name: str) -> float | None:
-    """Return the common step of all lines of positions, or None if the lines hold point numbers only."""
+    """Return the common step of all lines of positions; None if the lines hold only the numbers of points."""
     steps = [regular(line)[1] for line in lines if not is_numbered(line)]
     if any(abs(step - steps[0]) > 0.01 * steps[0] for step in steps):
         apart = " and ".join(f"{step:.4g}" for step in steps)
@@ -137,12 +137,12 @@ def scattered(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, 
 
 
 def without_codes(height: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
-    """Replace numbers that cannot be heights by NaN, for example the code 9999 for missing points. Heights are in m.
+    """Replace numbers that cannot be heights, such as the code 9999 for missing points, by NaN. Heights are in m.
 
-    A number is replaced if it is the largest or the smallest, and if its distance from all other heights exceeds the
-    range of the other heights. If the number occurs only once, the distance must exceed `FAR_ALONE` times this range,
-    because a single deep groove is possible. No number is replaced if the other heights have at most `FEW_LEVELS`
-    different values, as on a grating.
+    A number is replaced if it is the largest or the smallest of all, and if its distance from the other heights exceeds
+    their range. If the number occurs only once, the distance must exceed `FAR_ALONE` times this range, because a single
+    deep groove is possible. No number is replaced if the other heights have at most `FEW_LEVELS` different values, as
+    on a grating.
     """
     height = np.where(np.isfinite(height), height, np.nan)
     found: list[str] = []

@@ -20,7 +20,7 @@ class Generated:
 
     hurst: float
     points: int
-    rolloff: float  # harmonic number, the length divided by the roll-off wavelength; 0 for no roll-off
+    rolloff: float  # length of the line divided by the roll-off wavelength; 0 for no roll-off
     longest: float
     is_random = True
 
@@ -59,8 +59,8 @@ def _slope(line: Generated) -> float:
 class OfSurface:
     """Lines with the spectrum of a measured surface, in units of their length and rms height.
 
-    Realisation r uses the file with the index r modulo n, if the surface has n files. The scatter between files is
-    therefore a part of the scatter between realisations, and the mean over realisations is a mean over files.
+    If the surface has n files, realisation r uses the file with the index r modulo n. Therefore the scatter between
+    realisations includes the scatter between files, and the mean over realisations is also a mean over files.
     """
 
     surface: Surface
@@ -104,11 +104,11 @@ class Measured:
 
     @property
     def points(self) -> int:
-        """Nyquist points: the number of samples of the line."""
+        """Number of Nyquist points, which is the number of samples of the line."""
         return int(line_of(self.profile).height.size)
 
     def height(self) -> float:
-        """Return the unit of height in m, which is the rms height, or the length of the line if the line is flat."""
+        """Return the unit of height in m: the rms height, or the length of the line if the line is flat."""
         line = line_of(self.profile)
         return float(line.height.std()) or line.length
 

@@ -103,11 +103,11 @@ class SlidingBody(Parameters):
         return ""
 
     def largest_force(self) -> float:
-        """Return the largest normal force, N."""
+        """Return the largest normal force in N."""
         return self.normal_force
 
     def wavelengths(self) -> tuple[float, float]:
-        """Return the shortest and the longest wavelength of the line, m."""
+        """Return the shortest and the longest wavelength of the line in m."""
         if self.surface is not None and self.surface.profile is not None:
             line = line_of(self.surface.profile)
             return 2 * line.length / line.height.size, line.length
@@ -120,7 +120,7 @@ class SlidingBody(Parameters):
 
 
 def frequency_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
-    """Return notes that compare the frequencies q v of a study with the range of the law or table of each material."""
+    """Return notes that compare the frequencies q v of a study with the range of data of each material."""
     velocities = [one.velocity for one in sets]
     waves = [one.wavelengths() for one in sets]
     low = 2 * math.pi * min(velocities) / max(longest for _, longest in waves)

@@ -35,14 +35,14 @@ STATUS = np.array(
     dtype=np.int8,
 )
 """The status that is stored for each outcome of a solver."""
-LEAST = 1e-100  # products of three numbers between LEAST and 1 / LEAST do not overflow or underflow
+LEAST = 1e-100  # a product of three numbers between LEAST and 1 / LEAST does not overflow or underflow
 
 
 @dataclass(frozen=True)
 class Setting:
     """The roughness, the shape and the Prony terms that some cases share, in dimensionless form.
 
-    The shape of a plane is None; the Prony terms of a Kelvin solid are None.
+    The shape is None for a plane. The Prony terms are None for a Kelvin solid.
     """
 
     roughness: Roughness
@@ -52,21 +52,22 @@ class Setting:
 
 @dataclass(frozen=True)
 class SlidingProblems:
-    """The cases of a block as dimensionless numbers, on which alone the dimensionless solution depends.
+    """The cases of a block as dimensionless numbers. The dimensionless solution depends only on these numbers.
 
     Parameters
     ----------
     settings : list of Setting
         The different combinations of line, shape and solid.
     which : int array, shape (cases,)
-        Index into `settings` for every case, -1 for a case that cannot be solved.
+        Index into `settings` for every case; -1 for a case that cannot be solved.
     loads : array, shape (cases,)
         Dimensionless load F_N / (4 G_inf L h), with the static shear modulus G_inf.
     deborah : array, shape (cases,)
-        eta v / (G_inf L): the Deborah number v tau / L of a Kelvin body.
+        eta v / (G_inf L), with the viscosity eta and the velocity v. For a Kelvin body, this is the Deborah number v
+        tau / L.
     length, height : array, shape (cases,)
-        L and h in m, the units of length and height. L is the length of the line; h is the rms height, or L if there is
-        no roughness.
+        L and h in m, the units of length and of height. L is the length of the line; h is the rms height, or equal to L
+        if there is no roughness.
     faults : dict of int to str
         Messages about cases that cannot be solved, by the index of the case.
     """
@@ -90,7 +91,7 @@ class SlidingProblems:
             yield self.settings[self.which[sound[k]]], members
 
     def different(self, members: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Return the different pairs of Deborah number and load among some cases, and the index of the pair of each."""
+        """Return the different pairs (Deborah number, load) of some cases, and for each case the index of its pair."""
         pairs, which = np.unique(self.deborah[members] + 1j * self.loads[members], return_inverse=True)
         return pairs.real.copy(), pairs.imag.copy(), which
 
@@ -163,7 +164,7 @@ def _without_units(body: Shape | None, length: float, height: float) -> Shape | 
 
 
 def _travelling(term: tuple[FloatArray, FloatArray] | None, velocity: float, length: float) -> PronyTerms | None:
-    """Return Prony terms with relaxation times divided by L / v, the time in which the body slides by L, or None."""
+    """Return Prony terms with relaxation times divided by L / v, the time to slide by L; None if there are no terms."""
     from mdr_dask.physics.sliding.problem import PronyTerms
 
     if term is None:
@@ -209,7 +210,7 @@ def _lines(
     height = np.where(flat, length, height)
     with np.errstate(all="ignore"):
         ends = [canonical(length / _numbers(block, name)) for name in ("rolloff_wavelength", "longest_wavelength")]
-    corners = [np.where(np.isnan(end), 0.0, end) for end in ends]  # 0 if there is no limit
+    corners = [np.where(np.isnan(end), 0.0, end) for end in ends]  # 0 if no wavelength limit is given
     surfaces, which_surface = each(block, "surface")
     columns = _numbers(block, "hurst"), _numbers(block, "points").astype(np.int64), *corners
     own_length = [length] if any(surface is not None for surface in surfaces) else []
@@ -244,9 +245,9 @@ def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArr
     Returns
     -------
     static, viscosity : array, shape (cases,)
-        Static modulus, Pa, and viscosity of the dashpot, s.
+        Static modulus in Pa; and viscosity of the dashpot in s, because it is divided by the static modulus.
     terms : list
-        Moduli and relaxation times, s, of the Prony terms of every different solid; None for a Kelvin solid.
+        Moduli and relaxation times in s of the Prony terms of every different solid; None for a Kelvin solid.
     which : int array, shape (cases,)
         Index of the solid of every case.
     """

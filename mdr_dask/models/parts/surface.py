@@ -1,4 +1,4 @@
-"""A measured surface in a campaign, given by its spectrum, by maps, by scans, or by a line that is used unchanged."""
+"""A measured surface of a campaign, given by its spectrum, by maps, by scans, or by a line that is used as it is."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Surface(Parameters):
         return self
 
     def without_spectrum(self) -> tuple[str, ...]:
-        """Return one sentence for each file without an isotropic spectrum, with the reason."""
+        """Return, for each file without an isotropic spectrum, a sentence with the reason."""
         if self.map is None:
             return ()
         return tuple(reason for file in self.map.files if (reason := anisotropic(self.map, file)))
@@ -131,7 +131,7 @@ def spectra_of(surface: Surface) -> tuple[Spectrum, ...]:
 
 
 def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
-    """Return a spectrum between the cut-offs; without a short cut-off, it ends where noise begins."""
+    """Return a spectrum between the cut-offs; if no short cut-off is given, the spectrum ends where noise begins."""
     spectrum = found.spectrum
     ends = surface.longest_wavelength or 0.0, surface.shortest_wavelength or 0.0
     if surface.extrapolate:
@@ -157,7 +157,7 @@ def _beyond(name: str, wavelength: float, which: str, end: float) -> str:
 
 @lru_cache(maxsize=64)
 def lines_of(surface: Surface, length: float, modes: int) -> tuple[FloatArray, ...]:
-    """Return the amplitudes, m, of the lines that represent a surface in the method, one line for each file.
+    """Return the amplitudes in m of the lines that replace a surface in the method, one line for each file.
 
     Raises
     ------

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
 CUT_ERROR = 0.05  # relative error of every point of a tabulated spectrum of straight profiles
-MOST_ANISOTROPY = 0.25  # a surface up to this anisotropy counts as isotropic; its slopes differ by less than 1/5
-STRIPES = 10.0  # power of waves along an axis, relative to an isotropic surface, above which a map has stripes
+MOST_ANISOTROPY = 0.25  # a surface counts as isotropic up to this; its slopes in two directions differ by less than 1/5
+STRIPES = 10.0  # a map has stripes if waves along an axis have over this times the power on an isotropic surface
 FORM = 0.9  # if a parabola explains more than this fraction of the mean square, the heights contain a form
 MOST_OUTLIERS = 0.05  # largest fraction of outliers; if there are more, they count as parts of the surface
 
@@ -49,7 +49,7 @@ class Found(NamedTuple):
     spectrum : Spectrum
         C2D within the range of the data.
     resolution : float
-        Wavelength, m, below which there is only noise; 0 if no noise was found.
+        Wavelength in m below which there is only noise; 0 if no noise was found.
     remarks : tuple of str
         Remarks about missing points, outliers and stripes, and about changes of the data.
     """
@@ -132,7 +132,7 @@ class MapFiles(Files):
 
 
 def is_spectrum(text: str) -> bool:
-    """Return whether a text begins with names of columns of a spectrum: two names, or one of several letters."""
+    """Return whether a text begins with column names of a spectrum: two names, or one name of several letters."""
     try:
         sheet = read_sheet("\n".join(text.splitlines()[:20]), "")
     except DataError:
@@ -188,7 +188,7 @@ def line_of_scan(scans: ScanFiles, file: DataFile) -> MeasuredLine:
 
 
 def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
-    """Return warnings if a line may contain the form of a part, or have heights in a wrong unit."""
+    """Return warnings if a line may contain the form of the measured part, or if its heights may have a wrong unit."""
     import numpy as np
 
     place = np.linspace(-1, 1, line.height.size)
@@ -198,7 +198,7 @@ def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
 
 
 def _form(level: FloatArray, curved: FloatArray) -> tuple[str, ...]:
-    """Return a warning if a parabola explains most of the levelled heights, because they contain the form of a part."""
+    """Return a warning if a parabola explains most of the levelled heights: they then contain the form of the part."""
     import numpy as np
 
     square, rest = (float(np.nanmean((height - np.nanmean(height)) ** 2)) for height in (level, curved))
@@ -279,7 +279,7 @@ class LevelledMap(NamedTuple):
     Parameters
     ----------
     height_rms, height_mean : float
-        Sq and Sa of the measured points, m: the rms and the mean absolute height.
+        Sq and Sa of the measured points in m: the rms height and the mean absolute height.
     spectrum : MapSpectrum
         Spectrum of the windowed map, with missing points filled.
     remarks : tuple of str

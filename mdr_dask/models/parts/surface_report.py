@@ -41,8 +41,9 @@ UNITS = {
 }
 """Columns of a report and their units. A value is NaN if a file does not determine the quantity.
 
-Sq and Sa are the rms and the mean absolute height of the levelled map, and Pq the rms height of the levelled profile,
-all without a window. Gradient, slopes and anisotropy are computed from the windowed heights.
+Sq and Sa are the rms height and the mean absolute height of the levelled map. Pq is the rms height of the levelled
+profile. These three are computed without a window. Gradient, slopes and anisotropy are computed from the windowed
+heights.
 """
 
 
@@ -60,7 +61,7 @@ class FileReport(NamedTuple):
     bins : Cut
         C2D in logarithmic bins with relative errors.
     cuts : dict of str to (array, array)
-        Wave numbers and C_cut, m^3, for each direction of straight profiles; empty for a table.
+        Wave numbers and spectrum C_cut in m^3 of straight profiles, for each direction; empty for a table.
     law : SelfAffine or None
         The fitted power law; None if no power law fits.
     """
@@ -130,10 +131,10 @@ def _of_scan(
 
 
 def mean_spectrum(spectra: tuple[Spectrum, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the wave numbers of the first spectrum, the mean C2D of all spectra, and its relative standard error.
+    """Return the wave numbers of the first spectrum, the mean C2D of all spectra, and the relative error of the mean.
 
-    The error is NaN for a single spectrum. Outside its own range of wave numbers, a spectrum is not included in the
-    mean.
+    The error is the standard error; it is NaN for a single spectrum. At each wave number, the mean includes only the
+    spectra that have this wave number in their range.
     """
     q = spectra[0].wavenumber
     each = np.array([spectrum.at(q) for spectrum in spectra])

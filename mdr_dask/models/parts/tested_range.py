@@ -14,7 +14,7 @@ from mdr_dask.models.parts.sliding_body import SlidingBody
 from mdr_dask.models.parts.sliding_problem import Setting
 
 LARGEST_LOAD = 1.0
-"""Largest tested F_N / (E* L h), with E* = 4 G of an incompressible solid.
+"""Largest tested load F_N / (E* L h); E* = 4 G for an incompressible solid.
 
 At higher loads the line comes much closer to full contact than the surface that it represents.
 """
@@ -57,7 +57,7 @@ def beyond_tested(setting: Setting, loads: FloatArray, fractions: FloatArray) ->
     loads : array, shape (cases,)
         F_N / (4 G_inf L h); for a history, its largest value.
     fractions : array, shape (cases,)
-        Length in contact divided by the length of the line; for a history, its largest value. NaN if it is unknown.
+        Length in contact divided by the length of the line; for a history, its largest value. NaN where it is unknown.
     """
     if setting.body is not None or not isinstance(setting.roughness, OfSurface):
         return {}

@@ -20,9 +20,9 @@ from mdr_dask.physics.sliding.problem import Request, solve
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 ACCURACY = 0.01  # relative accuracy if the campaign does not give an accuracy
-USUAL_ON_PLANES, USUAL = 2, 16  # nodes per Nyquist point on the finest grid that cases usually need
+USUAL_ON_PLANES, USUAL = 2, 16  # nodes per Nyquist point on the finest grid that is usually needed
 BYTES_A_NODE = 150  # peak memory of a line and one case on this line, bytes per node; measured: 20 to 130 bytes
-SECONDS_A_NODE = 1e-8  # time in which a sweep passes a node, s, order of magnitude
+SECONDS_A_NODE = 1e-8  # time in s that a sweep needs for a node, order of magnitude
 
 #: Outputs that have errors, and the corresponding columns of a steady state.
 OUTPUTS = dict(
@@ -139,7 +139,7 @@ class _Group:
     def _messages(
         self, steady: Steady, values: dict[str, FloatArray], errors: dict[str, FloatArray]
     ) -> Iterator[tuple[int, str]]:
-        """Yield reasons of failures, outputs that miss the accuracy, and members outside the tested loads."""
+        """Yield messages about failures, outputs that miss the accuracy, and members beyond the tested loads."""
         status = steady.status[self.which]
         for k in np.flatnonzero(status != Outcome.CONVERGED):
             yield int(k), Outcome(int(status[k])).sentence
@@ -165,19 +165,19 @@ def _lines(block: Block[SlidingFriction], setting: Setting) -> int:
 
 
 def seconds(block: Block[SlidingFriction]) -> float:
-    """Return the computing time of a block, s: an order of magnitude, from the number of nodes that sweeps pass."""
+    """Return the order of magnitude of the computing time of a block in s, from the number of nodes in all sweeps."""
     problems, nodes = sliding_problems(block), 0.0
     for setting, case, members in _groups(block, problems):
         solves = problems.different(members)[0].size
         visits = 1 if setting.terms is None else 4 * (4 + len(setting.terms.moduli))  # sweeps per case
         grid = 2 if case.oversampling == "auto" else case.oversampling
-        # to generate a line takes the time of about ten sweeps; half a sweep per case, because most grids are coarse
+        # generating a line takes as long as about ten sweeps; a sweep counts half, because most grids are coarser
         nodes += _lines(block, setting) * setting.roughness.points * grid * (10 + 0.5 * solves * visits)
     return 1e-4 + SECONDS_A_NODE * nodes
 
 
 def memory(block: Block[SlidingFriction]) -> float:
-    """Return the estimated peak memory of a block, bytes: one line on the finest grid that its cases usually need."""
+    """Return the estimated peak memory of a block in bytes: one line on the finest grid that is usually needed."""
     problems, nodes = sliding_problems(block), 0.0
     for setting, case, _ in _groups(block, problems):
         grid = case.oversampling

@@ -21,7 +21,7 @@ TIMES = tuple(float(f"{time:.4g}") for time in np.geomspace(1e-4, 20, 54))
 
 
 class VelocityJump(SlidingBody):
-    """A viscoelastic body that slides over a rough line under a normal force; its velocity jumps from v_1 to v_2."""
+    """A viscoelastic body that slides over a rough line; its velocity jumps from v_1 to v_2, or follows a history."""
 
     settings: ClassVar[frozenset[str]] = frozenset({"oversampling", "steps_per_decade"})
     rms_roughness: float | None = quantity("m", "rms height h of the roughness", usual="2 um", default=None, gt=0)
@@ -60,7 +60,7 @@ class VelocityJump(SlidingBody):
         return self
 
     def largest_force(self) -> float:
-        """Return the largest normal force of the history, N."""
+        """Return the largest normal force of the history in N."""
         (_, before), history = pieces(self.protocol, self.velocity, self.normal_force, self.velocity_change)
         return max(before, *(max(piece.force) + piece.swing[1] for piece in history))
 
@@ -75,7 +75,7 @@ class VelocityJump(SlidingBody):
         return kelvin(self.shear_modulus, self.relaxation_time)
 
     def time_unit(self) -> float:
-        """Return tau, s, the unit of stored times: the longest relaxation time of the Prony terms and the dashpot."""
+        """Return the unit of stored times in s: tau, the longest relaxation time of the Prony terms and the dashpot."""
         solid = self.solid()
         return float(max([solid.viscosity / solid.static_modulus, *solid.times]))
 

@@ -1,4 +1,4 @@
-"""Solve a block of cases: jumps of a plane Kelvin body by the march of the depth, other cases by `elements`."""
+"""Solve a block of cases: jumps of a plane Kelvin body by a march of the depth in time, other cases by `elements`."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ from mdr_dask.physics.transients.elements.loading_history import Trace, trace
 from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
 ACCURACY = 0.01  # relative accuracy of steady friction and of the jump, if the campaign does not give an accuracy
-# computing time in seconds, order of magnitude: of a jump, per node and step per decade; of a history, per square of
-# the number of nodes
+# computing time in s, order of magnitude: for a jump, multiplied by the number of nodes and the steps per decade; for a
+# history, multiplied by the square of the number of nodes
 SECONDS_MARCHED, SECONDS_FOLLOWED = 2e-8, 3.5e-8
 FLAT = 1e-12  # a line is flat if its rms height is at most this fraction of its largest absolute height
 HISTORY_ORDER = 2  # order of convergence of the results of a history in cell size and time step
@@ -57,7 +57,7 @@ TRANSIENT = ("friction_coefficient", "indentation_depth")
 
 @dataclass(frozen=True)
 class _Found:
-    """Dimensionless outputs of some cases and their errors: friction divided by h / L, depth divided by h."""
+    """Dimensionless outputs of some cases and their errors. Friction is divided by h / L, and depth by h."""
 
     values: dict[str, FloatArray]
     errors: dict[str, FloatArray]
@@ -155,7 +155,7 @@ class _Group:
         return solves
 
     def _messages(self, found: _Found) -> Iterator[tuple[int, str]]:
-        """Yield the reasons of failures, the outputs that miss the accuracy, and the cases outside the tested range."""
+        """Yield messages about failures, outputs that miss the accuracy, and cases outside the tested range."""
         for k in np.flatnonzero(found.outcome != Outcome.CONVERGED):
             outcome = Outcome(int(found.outcome[k]))
             more = ": fewer points or a shorter time" if outcome == Outcome.TOO_MANY_STEPS else ""
@@ -168,7 +168,7 @@ class _Group:
         yield from beyond_tested(self.setting, self.largest_loads, found.contact).items()
 
     def _floor(self, found: _Found, name: str) -> FloatArray:
-        """Return the floor of the relative error of an output: 0, or the largest friction of the case.
+        """Return the floor for the relative error of an output: 0 or the largest friction of the case.
 
         The largest friction is used if the output is zero within its error, for example the friction of a body at rest.
         """
@@ -208,7 +208,7 @@ class _Marched(_Group):
     def different(self) -> tuple[FloatArray, FloatArray, IntArray]:
         """Loads and Deborah numbers of the different cases, and the index of the case of every member.
 
-        The cases are sorted by velocity, so that the barriers of the line are computed once for each Deborah number.
+        The cases are sorted by velocity. The barriers of the line are then computed only once for each Deborah number.
         """
         before = self.problems.deborah[self.members]
         change = np.asarray(self.block.column("velocity_change"), dtype=np.float64)[self.members]
@@ -235,7 +235,7 @@ class _Followed(_Group):
     """One case that is computed from the motion of all elements: any history, solid and indenter."""
 
     def found(self, waves: Waves) -> tuple[_Found, int]:
-        """Solve the case on a quarter, half and all of the nodes, with time steps in proportion to the cell size."""
+        """Solve the case on a quarter, half and all of the nodes; time steps are proportional to the cell size."""
         nodes = waves.points * self.oversampling
         grids = [nodes // every for every in (4, 2, 1) if nodes % every == 0 and nodes // every >= waves.points]
 
@@ -245,7 +245,7 @@ class _Followed(_Group):
             values = [friction[None], np.array([found.after]), found.depth[None], np.array([found.contact])]
             return Solution(values, np.array([found.outcome], np.int8))
 
-        # errors of depths are relative to the rms height (1 here) if the depth is smaller
+        # if a depth is smaller than the rms height (1 here), its error is relative to the rms height
         refined = refine(solve, 1, grids, 0.0, HISTORY_ORDER, floors=[0.0, 0.0, 1.0, 0.0], shared=False)
         friction, after, depth, contact = refined.values
         error, after_error, depth_error, _ = refined.errors[:, 0]
@@ -295,7 +295,7 @@ def distinct(block: Block[VelocityJump]) -> int:
 
 
 def seconds(block: Block[VelocityJump]) -> float:
-    """Return the computing time of a block, s, estimated from the numbers of nodes and moments."""
+    """Return the computing time of a block in s, estimated from the numbers of nodes and moments."""
     total = 1e-3
     for group in _groups(block, sliding_problems(block)):
         nodes = group.setting.roughness.points * group.oversampling
