@@ -1,4 +1,4 @@
-"""The class `Plot`: a figure by name, with a function that makes it from the series of a store."""
+"""The class `Plot`: a named figure, with a function that makes the figure from the series of a store."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ class Plot:
     name : str
         Name on the command line: ``mdr-dask plot STORE NAME``.
     models : tuple of str
-        Models whose stores the figure can be drawn from; an empty tuple means all models.
+        Models from whose stores the figure can be drawn; an empty tuple means all models.
     summary : str
         One line: the quantities on both axes.
     draw : callable, mapping of str to Dataset -> Figure
         Takes the groups of a store by the name of the series, as :class:`mdr_dask.fits.base.Fit` does, and returns a
-        :class:`mdr_dask.plots.figure.Figure`. For outputs against parameters, `mdr_dask.plots.view.draw` does this.
+        :class:`mdr_dask.plots.figure.Figure`. For outputs against parameters, use `mdr_dask.plots.view.draw`.
     fitted : bool
-        Whether the figure shows a fit, which takes long for a large study.
+        Whether the figure shows a fit. For a large study, a fit takes a long time.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Plot:
     fitted: bool = False
 
     def describe(self, groups: Mapping[str, xr.Dataset]) -> Figure:
-        """Return the figure as data, including texts with the numbers of failed and missing results.
+        """Return the figure as data, including texts that state how many results failed or are missing.
 
         Axes with one value are treated as fixed parameters.
 
@@ -69,7 +69,7 @@ class Plot:
         return figure
 
     def figure(self, groups: Mapping[str, xr.Dataset]) -> Drawn:
-        """Draw the figure with matplotlib; raises the errors of `describe`."""
+        """Draw the figure with matplotlib; raise the same errors as `describe`."""
         from mdr_dask.plots.render import render
 
         drawn = render(self.describe(groups))
@@ -85,7 +85,7 @@ def _squeezed(data: xr.Dataset) -> xr.Dataset:
 
 
 def _without_value(groups: Mapping[str, xr.Dataset]) -> list[str]:
-    """Return texts with the numbers of results that have no value, one text for each reason, such as failed."""
+    """Return a text for each reason why results have no value, such as failure, with the number of these results."""
     states = [data["status"].to_numpy() for data in groups.values() if "status" in data]
     total = sum(state.size for state in states)
     reasons = {Status.FAILED: "failed", Status.NOT_CONVERGED: "did not converge", Status.MISSING: "are missing"}
@@ -94,13 +94,13 @@ def _without_value(groups: Mapping[str, xr.Dataset]) -> list[str]:
 
 
 def provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:
-    """Return the origin of a figure that a command drew, for its table."""
+    """Return the origin of a figure that was drawn by a command; it is written into the table of the figure."""
     origin = {"mdr_dask": f"{__version__}, figure {name}", "command": command}
     return origin | {f"store {url}": _campaign_of(store.attributes(url)) for url in urls}
 
 
 def origin_of(name: str, groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
-    """Return the origin of a figure that was drawn from Python, for its table."""
+    """Return the origin of a figure that was drawn from Python; it is written into the table of the figure."""
     campaigns = dict.fromkeys(_campaign_of(data.attrs) for data in groups.values())
     return {"mdr_dask": f"{__version__}, figure {name}", "study": "; ".join(campaigns)}
 

@@ -26,10 +26,11 @@ Points = NDArray[np.intp]
 
 
 def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
-    """Return measured points with the band of the study, their residuals, and the density of each unknown.
+    """Return a figure of measured points with the band of predictions, residuals, and the density of each unknown.
 
-    Bars are 95 % intervals of the errors of measurement, the band is the 95 % interval of the posterior. A density is
-    grey if the data do not determine the unknown. Further panels show the products of unknowns that are determined.
+    The bars are 95 % intervals of the errors of measurement; the band is the 95 % interval of the posterior. A density
+    is grey if the data do not determine the unknown. Further panels show products of undetermined unknowns that the
+    data determine.
     """
     found, series, data = _first(groups)
     varied = found.measured.conditions
@@ -61,7 +62,7 @@ def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.D
 
 
 def _curves(found: fit.Calibration, main: str, data: xr.Dataset) -> dict[str, Points]:
-    """Return groups of points that differ only in the condition `main`, by label; many groups are merged into one."""
+    """Return groups of points that differ only in the condition `main`, by label; too many groups become one group."""
     others = {name: each for name, each in found.measured.conditions.items() if name != main}
     rows = np.stack(list(others.values()), axis=1) if others else np.zeros((found.measured.values.size, 1))
     places, which = np.unique(np.round(rows, 12), axis=0, return_inverse=True)
@@ -165,7 +166,7 @@ def _density(found: fit.Calibration, name: str, values: FloatArray, how: labels.
 
 
 def of_whole_cells(ends: FloatArray, across: FloatArray, place: FloatArray, width: float) -> FloatArray:
-    """Return edges of bins that contain equal numbers of cells, because unequal numbers would look like peaks."""
+    """Return edges of bins that contain equal numbers of cells; unequal numbers would look like peaks."""
     low, high = int(place.argmin()), int(place.argmax())
     cell = width * (across[high] - across[low]) / (place[high] - place[low])
     start = across[low] - cell / 2

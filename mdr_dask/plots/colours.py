@@ -38,7 +38,7 @@ def colour(number: int) -> str:
 
 
 def line_and_marker(number: int) -> tuple[str, str]:
-    """Return line and marker of a curve; they differ between curves if the style is grey or if it defines them."""
+    """Return line and marker of a curve. They differ between curves if the style is grey, or if it defines them."""
     from matplotlib.colors import to_rgb
 
     greys = all(len(set(to_rgb(each))) == 1 for each in _cycle("color") or COLOURS)
@@ -48,7 +48,7 @@ def line_and_marker(number: int) -> tuple[str, str]:
 
 
 def bar(label: str, values: Any, log: bool | None = None) -> Bar:
-    """Return the colour bar of some values; by default it is logarithmic if the values are geometric."""
+    """Return the colour bar of some values; by default it is logarithmic if a logarithmic axis suits the values."""
     values = np.asarray(values, dtype=np.float64)
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
@@ -65,7 +65,7 @@ def scale(of: Bar) -> tuple[Colormap, Normalize]:
 
 
 def shade(of: Bar, value: float) -> str:
-    """Return the colour of a value on a colour bar."""
+    """Return the colour that a colour bar gives to a value."""
     from matplotlib.colors import to_hex
 
     how, norm = scale(of)

@@ -1,4 +1,4 @@
-"""Curves of a series: the parameters that a figure varies, the parameters that it fixes, and means with intervals."""
+"""Curves of a series: parameters that a figure varies, parameters that it fixes, and means with intervals."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mdr_dask.models.base import Status
 from mdr_dask.plots import colours, labels
 from mdr_dask.plots.figure import Bar, Key, Mean
 
-#: Dimensions that belong to an output and are not axes of a study, for data without a status.
+#: Dimensions that belong to an output and are not axes of a study; used for data without the array ``status``.
 OWN = {"relaxation_times", "radius", "position", "angle", "block", "regime"}
 #: Largest number of parameters in a title; the table beside the figure lists all of them.
 MOST_FIXED = 8
@@ -45,9 +45,9 @@ class Family(NamedTuple):
     held : dict of str to DataArray
         Parameters that are fixed at one value.
     left_out : list of str
-        Sentences about the values that are not drawn, one for each axis.
+        Sentences about values that are not drawn, one for each axis.
     varying : tuple of str
-        In a sampled design, the other parameters that change from point to point.
+        Other parameters that change from point to point, in a sampled design.
     """
 
     curves: list[Curve]
@@ -71,7 +71,7 @@ def mean(data: xr.Dataset, output: str) -> Mean:
 
 
 def meaning_of_bars(data: Iterable[xr.Dataset], outputs: Sequence[str]) -> str:
-    """Return a text for the title that explains bars and bands."""
+    """Return a text for the title, which explains bars and bands."""
     groups = [*data]
     most = max((each.sizes.get("realisation", 1) for each in groups), default=1)
     grid = any(aggregation.companion(each, name) is not None for each in groups for name in outputs if name in each)
@@ -80,7 +80,7 @@ def meaning_of_bars(data: Iterable[xr.Dataset], outputs: Sequence[str]) -> str:
 
 
 def axes_of(data: xr.Dataset, output: str) -> list[str]:
-    """Return the dimensions of an output that are axes of the study, without the realisations."""
+    """Return the dimensions of an output that are axes of the study; the dimension of realisations is not included."""
     if "status" in data:
         cases = {str(dim) for dim in data["status"].dims}
     else:
@@ -105,7 +105,7 @@ def parameters_along(data: xr.Dataset, dim: str) -> list[str]:
 
 
 def hold(data: xr.Dataset, dims: Sequence[str]) -> tuple[xr.Dataset, list[str]]:
-    """Return a series with axes fixed at their middle values, and a text for each fixed axis with several values."""
+    """Fix axes at their middle values; return the series, and a text for each fixed axis with several values."""
     places = {dim: data.sizes[dim] // 2 for dim in dims}
     sentences = [_only_one(data, dim, place) for dim, place in places.items() if data.sizes[dim] > 1]
     return data.isel(places), sentences
@@ -118,7 +118,7 @@ def _only_one(data: xr.Dataset, dim: str, place: int) -> str:
 
 
 def thin(data: xr.Dataset, dim: str, most: int) -> tuple[xr.Dataset, list[str]]:
-    """Return a series with at most `most` evenly spread values along an axis, and a text about the values left out."""
+    """Return a series with at most `most` evenly spread values along an axis, and a text about omitted values."""
     size = data.sizes[dim]
     if size <= most:
         return data, []
@@ -181,7 +181,7 @@ def family(data: xr.Dataset, output: str, along: str, by: str = "") -> Family:
 
 
 def with_one_legend(families: Mapping[str, Family]) -> tuple[list[str], list[str]]:
-    """Return the largest set of series that have the same legend and colour bar, and a text about the other series."""
+    """Return the names in the largest set of series with equal legend and colour bar, and a text about other series."""
     groups: dict[Any, list[str]] = {}
     for name, one in families.items():
         groups.setdefault((tuple(one.keys), one.bar), []).append(name)
@@ -193,7 +193,7 @@ def with_one_legend(families: Mapping[str, Family]) -> tuple[list[str], list[str
 
 
 def _most_shown(data: xr.Dataset, others: list[str]) -> list[str]:
-    """Return the axis for colours, and perhaps one for line styles, that together show the most curves."""
+    """Return the axis for colours, and possibly an axis for line styles, so chosen that most curves are shown."""
     few = len(colours.LINES)
     pairs = [[one, two] for one in others for two in others if two != one and data.sizes[two] <= few]
     choices = [*([dim] for dim in others), *pairs]
@@ -242,7 +242,7 @@ def _split(data: xr.Dataset, dims: list[str], joined: bool) -> tuple[list[Curve]
 
 
 def needed(curve: xr.Dataset) -> xr.Dataset:
-    """Return a curve without the values of an adaptive axis that were not needed."""
+    """Return a curve without those values of an adaptive axis that did not need to be computed."""
     if "status" not in curve:
         return curve
     spared = (curve["status"] == Status.NOT_NEEDED).all("realisation")
@@ -250,7 +250,7 @@ def needed(curve: xr.Dataset) -> xr.Dataset:
 
 
 def _names(part: xr.Dataset, dims: Sequence[str]) -> list[str]:
-    """Return the labels of one curve: its values of the parameters that vary along some axes."""
+    """Return the labels of one curve, with its values of the parameters that vary along some axes."""
     axes = part.attrs.get("axes", [])
     found = []
     for dim in dims:
@@ -261,7 +261,7 @@ def _names(part: xr.Dataset, dims: Sequence[str]) -> list[str]:
 
 
 def scalars(data: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Return the parameters of a series that have one value and an effect."""
+    """Return the parameters of a series that have a single value and have an effect."""
     requires = models.load(data.attrs["model"]).parameters.requires if "model" in data.attrs else {}
     idle = {name for name, (other, value) in requires.items() if value not in _given(data, other)}
     kept = {str(name): value for name, value in data.coords.items() if value.ndim == 0 and name != "realisation"}
@@ -274,7 +274,7 @@ def _given(data: xr.Dataset, name: str) -> list[Any]:
 
 
 def fixed_by_all(held: Sequence[Mapping[str, xr.DataArray]]) -> dict[str, xr.DataArray]:
-    """Return the parameters that all families have at the same value."""
+    """Return the parameters that have the same value in all families."""
     first = held[0] if held else {}
     return {
         name: value
@@ -289,7 +289,7 @@ def fixed_by_all(held: Sequence[Mapping[str, xr.DataArray]]) -> dict[str, xr.Dat
 def fixed_text(held: Mapping[str, xr.DataArray], data: xr.Dataset) -> str:
     """Return the text of the fixed parameters for a title.
 
-    Axes of the study come first, because their value was chosen by the figure or by ``--select``. Fixed parameters that
+    Axes of the study come first, because the figure or ``--select`` chose one of their values. Fixed parameters that
     have a symbol follow.
     """
     axes = [str(axis["name"]) for axis in data.attrs.get("axes", [])]
@@ -303,13 +303,13 @@ def _is_known(value: xr.DataArray) -> bool:
 
 
 def parameters_of(data: xr.Dataset) -> dict[str, Any]:
-    """Return the parameters of a series as stored, including those that are words (names of rules and shapes)."""
+    """Return the parameters of a series as stored; they include words, such as names of rules and shapes."""
     found: dict[str, Any] = json.loads(data.attrs.get("parameters", "{}"))
     return found
 
 
 def parameters_at(case: xr.Dataset) -> dict[str, Any]:
-    """Return the parameters of one case: the parameters of its series, with the values of the axes for this case."""
+    """Return the parameters of one case: those of its series, with the values of the axes for this case."""
     parameters = parameters_of(case)
     for axis in case.attrs.get("axes", []):
         *above, last = axis["path"].split(".")

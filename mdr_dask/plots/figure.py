@@ -19,7 +19,7 @@ from mdr_dask.plots.labels import plain
 #: Columns of a table before and after the columns of the parameters.
 FIRST = ("panel", "curve", "what")
 LAST = tuple(f"{name}{end}" for name in ("x", "y", "value") for end in ("", "_low", "_high"))
-#: Entry of the column ``what`` for results of a study; the entry for a law is its name.
+#: Entry of the column ``what`` for results of a study. The entry for a law is the name of the law.
 DATA = "data"
 Kind = Literal["curve", "law", "band", "dots", "map", "absent"]
 
@@ -39,17 +39,17 @@ class Axis:
     Parameters
     ----------
     label : str
-        Label with its unit; symbols as mathtext between dollars.
+        Label with unit. Symbols are mathtext between dollar signs.
     log : bool
         Whether the axis is logarithmic.
     ticks : sequence of (float, str)
         Positions and texts of the ticks, for an axis whose values are words.
     low, high : float, optional
-        Limits of the axis; None for the limits of the data.
+        Limits of the axis. With None, they follow from the data.
     quantity : str
         Name of the parameter or output on the axis; empty if the axis shows a derived quantity.
     reverse : bool
-        Whether values increase downwards or to the left.
+        Whether values increase in the reverse direction: downwards or to the left.
     """
 
     label: str
@@ -92,14 +92,14 @@ class Trace:
         ``dots`` (coloured by ``value``), ``map`` (cells coloured by ``value``), ``absent`` (marks at the lower edge of
         the panel).
     data : Dataset
-        ``x``, ``y`` and ``value`` in the units of the axes, with ``_low`` and ``_high`` if their intervals are known;
-        the coordinates are the parameters of each point, in SI.
+        ``x``, ``y`` and ``value`` in the units of the axes, with ``_low`` and ``_high`` if their intervals are known.
+        The coordinates are the parameters of each point in SI.
     what : str
         ``data``, the name of a law, or the reason why cases have no value.
     label : str
         Name of the curve.
     colour, line, marker : str
-        Names as in matplotlib; an empty text means no line or no marker.
+        Names as in matplotlib. With an empty text, there is no line or no marker.
     bars : bool
         Whether intervals are drawn as bars instead of a band.
     """
@@ -114,7 +114,7 @@ class Trace:
     bars: bool = False
 
     def column(self, name: str) -> FloatArray:
-        """Return one variable of all points as a flat array, broadcast to the shape of the trace."""
+        """Return one variable as a flat array with an entry for every point of the trace."""
         whole = self.data[name].broadcast_like(self.data[self._widest]).transpose(*self.data[self._widest].dims)
         return np.asarray(whole.values, dtype=np.float64).ravel()
 
@@ -135,7 +135,7 @@ class Trace:
 class Panel:
     """One panel: its axes and the traces in it.
 
-    `keys` are the entries of the legend. If it is empty and there is no colour bar, the traces are the entries.
+    `keys` holds the entries of the legend. If there are no keys and no colour bar, the traces are the entries.
     """
 
     x: Axis
@@ -161,9 +161,9 @@ class Figure:
     panels : list of Panel
         The panels. They fill rows from left to right; with `stack`, they fill columns from left to right.
     subject : str
-        The subject, for the title.
+        Subject of the figure, for the title.
     fixed : str
-        Text with the fixed parameters.
+        Text that lists the fixed parameters.
     bars : str
         Explanation of bars and bands.
     left_out : list of str
@@ -243,11 +243,11 @@ def columns(of: xr.Dataset | xr.DataArray | None = None, **values: Any) -> xr.Da
     Parameters
     ----------
     of : Dataset or DataArray, optional
-        Its scalar coordinates, and its coordinates along the dimensions of the values, become the parameters of the
-        points.
+        Source of the parameters of the points: its scalar coordinates, and its coordinates along the dimensions of the
+        values.
     **values
-        ``x``, ``y`` and ``value``. A `Mean` also gives the ends of its interval. A plain array gets the dimensions of a
-        labelled array of the same shape.
+        ``x``, ``y`` and ``value``. A `Mean` adds the ends of its interval. A plain array gets the dimensions of a
+        labelled array that has the same shape.
     """
     parts: dict[str, Any] = {}
     for name, value in values.items():
@@ -271,12 +271,12 @@ def columns(of: xr.Dataset | xr.DataArray | None = None, **values: Any) -> xr.Da
 
 
 def _apart(name: Any) -> str:
-    """Return the name of a parameter for a table; it is changed if the table has another column of this name."""
+    """Return the name of a parameter for a table; the name is changed if the table has another column of this name."""
     return f"parameter {name}" if name in (*FIRST, *LAST) else str(name)
 
 
 def edges(centres: FloatArray, log: bool) -> FloatArray:
-    """Return the edges of cells around the values of an axis, halfway between the values, or their logarithms."""
+    """Return edges of cells around the values of an axis, halfway between the values or between their logarithms."""
     if centres.size == 1:
         half = 0.5 * (abs(float(centres[0])) or 1.0)
         return np.array([centres[0] - half, centres[0] + half])

@@ -23,13 +23,13 @@ BEFORE, JUMP, AFTER = (f"friction_coefficient_{name}" for name in ("before", "ju
 FRICTION = "friction_coefficient"
 TIME = "relaxation_times"
 DRIVEN = {"velocity": "m/s", "normal_force": "N"}
-#: Duration that is shown before the history begins, as a fraction of the duration shown.
+#: Time span that is shown before the history begins, as a fraction of the time span of the history shown.
 LEAD = 0.08
 STEADY = "steady state at the end"
 
 
 def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
-    """Return friction against time, with velocity and normal force if they change; each series has a column."""
+    """Return a figure of friction (and velocity and force if they change) against time; a column for each series."""
     needed = (BEFORE, JUMP, FRICTION)
     found = {name: data for name, data in groups.items() if all(output in data for output in needed)}
     if not found:
@@ -82,7 +82,7 @@ def _column(name: str, data: xr.Dataset, one: curves.Family) -> list[Panel]:
 
 
 def _trace(case: xr.Dataset, last: float) -> xr.Dataset:
-    """Return friction before the history, just after its start, and during it."""
+    """Return friction before the history, just after its start, and during the history."""
     before = curves.mean(case, BEFORE)
     at_once = case.assign({JUMP: (case[BEFORE] + case[JUMP]).assign_attrs(case[JUMP].attrs)})
     errors = [aggregation.companion(case, name) for name in (BEFORE, JUMP)]
@@ -98,7 +98,7 @@ def _trace(case: xr.Dataset, last: float) -> xr.Dataset:
 
 
 def loading_history(case: VelocityJump, last: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return times in relaxation times, up to `last`, with the velocity in m/s and the normal force in N."""
+    """Return times up to `last` in units of the relaxation time, velocities in m/s and normal forces in N."""
     unit = case.time_unit()
     (speed, force), parts = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
     found = [np.array([[-LEAD * last, 0.0], [speed, speed], [force, force]])]

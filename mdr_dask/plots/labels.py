@@ -14,7 +14,7 @@ from mdr_dask.errors import DataError
 from mdr_dask.plots import page
 from mdr_dask.units import conversion
 
-#: Labels of parameters with a symbol; other parameters are labelled by their name.
+#: Labels of the parameters that have a symbol. The label of any other parameter is its name.
 SYMBOLS: Mapping[str, str] = {
     "normal_force": "normal force $F_N$",
     "line_load": "line load $w$",
@@ -52,7 +52,7 @@ _MATHTEXT = {r"\bd_mu_(\w+)": r"$\\Delta\\mu_{\1}$", r"\bmu_(\w+)": r"$\\mu_{\1}
 
 
 class Quantity(NamedTuple):
-    """A symbol with the unit shown; a value in SI becomes ``value * factor + offset`` in that unit."""
+    """A symbol and the unit shown in figures; a value in SI becomes ``value * factor + offset`` in this unit."""
 
     symbol: str
     unit: str
@@ -67,8 +67,9 @@ class Quantity(NamedTuple):
 def chosen_units(groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
     """Return the unit in which figures show every quantity of some series.
 
-    A parameter is shown in the unit of the campaign files if all of them use the same one. Other quantities are shown
-    in the SI unit with the prefix that brings the largest value between 1 and 1000, temperatures in degrees Celsius.
+    A parameter is shown in the unit of the campaign files if all of them use the same unit. Temperatures are otherwise
+    shown in degrees Celsius, other quantities in the SI unit with the prefix that brings the largest value between 1
+    and 1000.
     """
     written = [written_units(str(data.attrs.get("campaign", ""))) for data in groups.values()]
     found: dict[str, str] = {}
@@ -120,7 +121,7 @@ def quantity(name: str, values: xr.DataArray) -> Quantity:
 
 
 def meaning(values: xr.DataArray, name: str) -> str:
-    """Return the long name of an output without the explanation in brackets, with symbols as mathtext."""
+    """Return the long name of an output with symbols as mathtext, but without its explanation in brackets."""
     words = re.split(r"[;,] | \(", str(values.attrs.get("long_name", name.replace("_", " "))))[0]
     for ascii_form, symbol in _MATHTEXT.items():
         words = re.sub(ascii_form, symbol, words)
@@ -146,7 +147,7 @@ def with_unit(symbol: str, unit: str) -> str:
 
 
 def printed_unit(unit: str) -> str:
-    """Return a unit as it is printed: raised powers, ``um`` as µm, ``degC`` as °C."""
+    """Return a unit as it is printed: with raised powers, with µm for ``um`` and °C for ``degC``."""
     unit = re.sub(r"\bu(?=(m|s|N|Pa|W|rad)\b)", "µ", unit)
     unit = re.sub(r"\bpercent\b", "%", re.sub(r"\bdeg(?=C?\b)", "°", unit))
     return re.sub(r"\^(-?\d+)", r"$^{\1}$", unit)
@@ -171,7 +172,7 @@ def plain(text: str) -> str:
 
 
 def is_geometric(values: Any) -> bool:
-    """Return whether numbers belong on a logarithmic axis: positive, and spread over more than a factor of ten."""
+    """Return whether numbers suit a logarithmic axis: all are positive, and they span more than a factor of ten."""
     values = np.asarray(values, dtype=np.float64)
     values = values[np.isfinite(values)]
     return bool(values.size and values.min() > 0 and values.max() > 10 * values.min())

@@ -16,10 +16,10 @@ from mdr_dask.models.ehl_line import groups
 from mdr_dask.physics.lubrication.film_formulas import PAN_HAMROCK_CENTRAL, PAN_HAMROCK_MINIMUM
 from mdr_dask.physics.sliding import laws
 
-#: Outputs that some laws need as input.
+#: Names of the outputs that some laws need as input.
 NEEDED = ("rms_slope", LEVELS[0])
 FILMS = {"central_film": PAN_HAMROCK_CENTRAL, "minimum_film": PAN_HAMROCK_MINIMUM}
-#: Output of the steady coefficient of friction, by model.
+#: Name of the output that is the steady coefficient of friction, by model.
 STEADY = {"sliding_friction": "friction_coefficient", "velocity_jump": LEVELS[0]}
 #: Parameters of a Kelvin body on a generated line.
 LINE = {"shear_modulus", "relaxation_time", "rms_roughness", "length", "hurst", "points"}
@@ -33,7 +33,7 @@ class Law(NamedTuple):
 
 
 def law_of(data: xr.Dataset, output: str) -> Law | None:
-    """Return the law of an output that applies to a series, or None."""
+    """Return the law for an output that applies to a series; None if there is no such law."""
     model = data.attrs.get("model")
     if model == "ehl_line" and output in FILMS and "inlet" not in data.coords:
         return Law("Pan and Hamrock", lambda part: xr.DataArray(FILMS[output](*groups(part.coords.get))))
@@ -51,14 +51,14 @@ def law_of(data: xr.Dataset, output: str) -> Law | None:
 def along(data: xr.Dataset, name: str, count: int = 200) -> xr.Dataset:
     """Return the data of a curve at many values of its parameter, so that a law can be drawn as a smooth line.
 
-    The data are unchanged if an output that the law needs varies along the curve.
+    If an output that the law needs varies along the curve, the data are returned unchanged.
 
     Parameters
     ----------
     data : Dataset
-        Data of one curve: nothing but `name` varies.
+        Data of one curve, along which only `name` varies.
     name : str
-        The parameter.
+        Name of the parameter.
     count : int
         Number of values.
     """

@@ -1,4 +1,4 @@
-"""Figures of a master curve: the curves as measured, the merged curve, the shift factors."""
+"""Figures of a master curve: the curves as measured, the merged curve and the shift factors."""
 
 from __future__ import annotations
 

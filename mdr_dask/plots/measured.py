@@ -16,9 +16,9 @@ from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Figure, Key, Mean, Panel, Trace, columns
 from mdr_dask.units import shown
 
-#: Largest relative difference at which a measured condition counts as equal to the value of a curve or panel.
+#: Largest relative difference up to which a measured condition counts as equal to the value of a curve or panel.
 SAME = 1e-3
-#: Half width of a 95 % interval in standard errors.
+#: Half width of a 95 % interval, in standard errors.
 HALF = 1.96
 NAME = "measured"
 
@@ -26,7 +26,7 @@ NAME = "measured"
 def with_points(
     groups: Mapping[str, xr.Dataset], figures: Mapping[str, Plot], file: str
 ) -> tuple[dict[str, xr.Dataset], dict[str, Plot]]:
-    """Return the series with a table of measurements, and the figures with the measured points added.
+    """Add a table of measurements to the series, and its points to the figures; return both.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
 
 
 def _apart(measured: Measured, data: xr.Dataset) -> list[str]:
-    """Return a sentence if all measured points lie above or below all results of a study."""
+    """Return a sentence if all measured points lie above all results of a study, or below all of them; else nothing."""
     study = data[measured.output].to_numpy()
     low, high = (
         find(study[np.isfinite(study)], initial=start) for find, start in ((np.min, np.inf), (np.max, -np.inf))
@@ -121,7 +121,7 @@ def _differing(curves: list[xr.Dataset]) -> set[str]:
 
 
 def _at(curve: xr.Dataset, measured: Measured, along: str) -> np.ndarray:
-    """Return which points have the conditions of a curve."""
+    """Return which measured points have the conditions of a curve."""
     here = np.ones(measured.values.size, dtype=bool)
     for name, values in measured.conditions.items():
         if name != along and name in curve.coords and curve[name].ndim == 0:

@@ -1,4 +1,4 @@
-"""The appearance of figures that the user requests: printed size, title, units and style."""
+"""The appearance that the user requests for figures: printed size, title, units and style."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from typing import Any
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.units import to_si
 
-#: Sizes of letters and lines in points for a figure with a requested size, which is printed without scaling.
+#: Sizes of letters and lines, in points, for a figure whose size was requested. Such a figure is printed without
+#: scaling.
 LETTERS: dict[Any, Any] = {
     "font.size": 8,
     "axes.labelsize": 8,
@@ -25,7 +26,7 @@ LETTERS: dict[Any, Any] = {
     "lines.linewidth": 1.0,
     "lines.markersize": 3,
 }
-#: Sizes of letters and lines for a figure on a screen.
+#: Sizes of letters and lines, in points, for a figure on a screen.
 SCREEN: dict[Any, Any] = {"legend.fontsize": 8, "lines.linewidth": 1.2, "lines.markersize": 4}
 #: `INCH`: length of an inch in metres. `LEAST`, `MOST`: smallest and largest width and height of a figure in metres.
 INCH = 0.0254
@@ -39,15 +40,15 @@ class Page:
     Parameters
     ----------
     width, height : float, optional
-        Size in inches; without a height, the height follows from the content.
+        Size in inches. With None for the height, the height follows from the content.
     title : str, optional
-        The title; None for the default: a description on a screen, no title if a size is requested.
+        Title. With None, the figure has a description as its title, or no title if a size was requested.
     units : mapping of str to str
-        Units by the name of a quantity.
+        Requested units by the name of the quantity.
     used : set of str
         Names of the quantities that figures have shown so far.
     cycle : tuple of mappings
-        Colours, lines and markers of successive curves, from the style.
+        Colours, lines and markers of successive curves, as the style defines them.
     """
 
     width: float | None = None
@@ -58,7 +59,7 @@ class Page:
     cycle: tuple[Mapping[str, str], ...] = ()
 
     def unit(self, name: str) -> str | None:
-        """Return the requested unit of a quantity, or None for the unit of the store."""
+        """Return the requested unit of a quantity; None if no unit was requested."""
         self.used.add(name)
         return self.units.get(name)
 
@@ -68,14 +69,15 @@ _PAGE: ContextVar[Page | None] = ContextVar("page", default=None)
 
 @contextmanager
 def drawing_for(page: Page, style: str | None = None) -> Iterator[None]:
-    """Draw figures for a page.
+    """Draw the figures of a ``with`` statement for a page.
 
     Parameters
     ----------
     page : Page
         Size, title and units.
     style : str, optional
-        A style file of matplotlib, or the name of a style; the settings of the style take precedence over the page.
+        A style file of matplotlib, or the name of a style. Settings of the style take precedence over those of the
+        page.
 
     Raises
     ------
@@ -100,7 +102,7 @@ def drawing_for(page: Page, style: str | None = None) -> Iterator[None]:
 
 @contextmanager
 def with_units(units: Mapping[str, str]) -> Iterator[None]:
-    """Show quantities in these units, except quantities for which the user requested another unit."""
+    """Within a ``with`` statement, show quantities in these units unless the user requested another unit."""
     token = _PAGE.set(replace(current(), units={**units, **current().units}))
     try:
         yield
@@ -109,12 +111,12 @@ def with_units(units: Mapping[str, str]) -> Iterator[None]:
 
 
 def current() -> Page:
-    """Return the page for which figures are drawn at present."""
+    """Return the page for which figures are currently drawn."""
     return _PAGE.get() or Page()
 
 
 def size(text: str) -> tuple[float, float | None]:
-    """Return width and height in inches from a text such as ``85mm``, a width alone, or ``85x60mm``.
+    """Return width and height in inches from a text such as ``85x60mm``, or ``85mm`` for the width alone.
 
     Raises
     ------

@@ -1,7 +1,8 @@
 """Draw a figure with matplotlib: panels, legend, colour bars and title, without overlaps at any width.
 
-The height follows from the content unless the user requested a height. Legends are below the panels and colour bars
-beside the panels. Labels that would overlap are broken into lines, and ticks that would overlap are thinned out.
+The height follows from the content unless the user requested a height. Legends are below the panels, and colour bars
+are beside the panels. Labels that would overlap are broken into several lines, and ticks that would overlap are thinned
+out.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ from mdr_dask.plots.figure import Axis, Bar, Figure, Key, Panel, Trace, edges
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Widths in inches: of a single panel on a screen, of a panel next to another panel, and the least width of a panel in
-#: a figure whose width was requested.
+#: Widths in inches. `ALONE`: a single panel on a screen. `BESIDE`: a panel next to another panel. `LEAST_PANEL`: the
+#: narrowest panel in a figure whose width was requested.
 ALONE, BESIDE, LEAST_PANEL = 6.4, 4.2, 2.2
 #: `LEAST_HEIGHT`: least height of a panel in inches. `MOST_COLUMNS`: largest number of panels in a row.
 LEAST_HEIGHT, MOST_COLUMNS = 1.3, 3
@@ -45,7 +46,7 @@ DPI, PRINTED_DPI = 150, 300
 
 
 class Drawn(MplFigure):
-    """A matplotlib figure with its description; a notebook displays it at the end of a cell."""
+    """A matplotlib figure with its description; it is displayed if it is the last value of a notebook cell."""
 
     def __init__(self, description: Figure, **options: Any) -> None:
         super().__init__(**options)
@@ -59,7 +60,7 @@ class Drawn(MplFigure):
         return stream.getvalue()
 
     def table(self) -> pd.DataFrame:
-        """Return a table of all points that are drawn: see `mdr_dask.plots.figure.Figure.table`."""
+        """Return a table of all points that are drawn; see `mdr_dask.plots.figure.Figure.table`."""
         return self.description.table()
 
     def save(self, path: str | Path) -> None:
@@ -68,7 +69,7 @@ class Drawn(MplFigure):
         Raises
         ------
         DataError
-            If there already is a table of that name that does not belong to a figure.
+            If a file with the name of the table already exists and is not the table of a figure.
         """
         beside = table_beside(path)
         self.savefig(path, dpi=DPI if page.current().width is None else PRINTED_DPI)
@@ -78,7 +79,7 @@ class Drawn(MplFigure):
 
 
 def table_beside(path: str | Path) -> Path:
-    """Return the path for the table of a figure; raise DataError if another table already has this path."""
+    """Return the path for the table of a figure; raise DataError if a table that is not of a figure has this path."""
     beside = Path(path).with_suffix(".csv")
     if beside.exists() and not beside.read_bytes().startswith(b"# mdr_dask"):
         raise DataError(f"{beside} exists and was not written beside a figure; choose another name for the figure")
@@ -132,7 +133,7 @@ def _axes(figure: Drawn, description: Figure, rows: int, columns: int) -> list[A
 
 
 def _share_labels(places: list[Axes], panels: list[Panel]) -> None:
-    """Remove the label of an axis if the panel below (horizontal axis) or on the left (vertical axis) has the same."""
+    """Remove an axis label that the panel below (horizontal axes) or on the left (vertical axes) also has."""
     at = {}
     for axes, panel in zip(places, panels, strict=True):
         place = axes.get_subplotspec()
@@ -171,7 +172,7 @@ def _finish_axis(axes: Axes, name: str, axis: Axis) -> None:
 
 
 def _log_ticks(axis: Any) -> None:
-    """Put ticks at 1, 2 and 5 times powers of ten on an axis of less than two decades, with plain numbers."""
+    """On an axis of less than two decades, put ticks with plain numbers at 1, 2 and 5 times powers of ten."""
     from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter
 
     low, high = sorted(np.abs(axis.get_view_interval()))
@@ -209,7 +210,7 @@ def _curve(axes: Axes, trace: Trace, _: Panel) -> None:
 
 
 def _lengths(value: Any, low: Any, high: Any) -> Any:
-    """Return the lengths of error bars downwards and upwards, 0 if they are unknown."""
+    """Return the lengths of error bars downwards and upwards; 0 if the error is unknown."""
     return np.nan_to_num(np.clip([value - low, high - value], 0, None), nan=0.0, posinf=0.0)
 
 
@@ -249,7 +250,7 @@ _DRAW = {"curve": _curve, "law": _curve, "band": _band, "dots": _dots, "map": _m
 
 
 def _bars(figure: Drawn, places: list[Axes], panels: list[Panel]) -> None:
-    """Draw the colour bars; if all panels have the same colour bar, it is drawn once."""
+    """Draw the colour bars; if all panels have the same colour bar, draw it once."""
     from matplotlib.cm import ScalarMappable
 
     beside: dict[Bar, list[Axes]] = {}
@@ -322,7 +323,7 @@ def _handle(key: Key) -> Any:
 def _legend(figure: Drawn, keys: list[Key]) -> float:
     """Draw one legend below all panels, with as many columns as fit, and return its height in inches.
 
-    With a requested height, entries that do not fit are left out.
+    If a height was requested, entries that do not fit are left out.
     """
     width, height = figure.get_size_inches()
     size = mpl.rcParams["legend.fontsize"]
@@ -345,7 +346,7 @@ def _legend(figure: Drawn, keys: list[Key]) -> float:
 
 
 def _fit(figure: Drawn, places: list[Axes]) -> None:
-    """Break labels into lines that are no longer than their axes, and thin out ticks that overlap."""
+    """Break labels into lines that are not longer than their axes, and thin out ticks that overlap."""
     for _ in range(2):
         figure.draw_without_rendering()
         changed = False
@@ -371,7 +372,7 @@ def _fit(figure: Drawn, places: list[Axes]) -> None:
 
 
 def _thin(figure: Drawn, axis: Any, name: str) -> bool:
-    """Leave out every second tick of an axis until the texts do not overlap; return whether any was left out."""
+    """Remove every second tick of an axis until the texts do not overlap; return whether any tick was removed."""
     from matplotlib.ticker import FixedLocator, FuncFormatter
 
     renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]

@@ -1,4 +1,4 @@
-"""Sobol indices with their intervals."""
+"""The figure of Sobol indices with their intervals."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from mdr_dask.plots import colours, labels
 from mdr_dask.plots.figure import Axis, Figure, Mean, Panel, Trace, columns
 
 NAMES = {"first": "first order: alone", "total": "total: with interactions"}
-#: Vertical distance between the two indices of one input, in rows.
+#: Vertical distance between the two indices of one input, as a fraction of a row.
 APART = 0.25
 
 
 def sensitivity(indices: xr.Dataset) -> Figure:
-    """Return the figure of both Sobol indices of every input, from `mdr_dask.fits.sensitivity.sobol_indices`."""
+    """Return the figure of both Sobol indices of every input, computed by `mdr_dask.fits.sensitivity`."""
     inputs = [str(name) for name in indices["parameter"].to_numpy()]
     ticks = [(float(k), labels.SYMBOLS.get(name, name.replace("_", " "))) for k, name in enumerate(inputs)]
     y = Axis("", ticks=ticks, low=-0.6, high=len(inputs) - 0.4, reverse=True)

@@ -1,4 +1,4 @@
-"""The figure of a measured surface: its spectrum with a power law, and the spectra of the line and of straight cuts."""
+"""The figure of a measured surface: its spectrum with a power law, and the spectra of its line and straight cuts."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ METHOD = r"line of the method, $\pi q\,C^{2D}$"
 
 
 def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...]) -> Figure:
-    """Return the figure: C2D of every file with its power law; C1D of the line of a campaign and of straight cuts.
+    """Return the figure: C2D of every file with a power law, and C1D of the line of a campaign and of straight cuts.
 
     Parameters
     ----------
     reports : tuple of FileReport
         Statistics of each file.
     spectra : tuple of Spectrum
-        For each file, the spectrum that a campaign uses: between the cut-offs, without noise.
+        Spectrum of each file as a campaign uses it: between the cut-offs and without noise.
     """
     q = Axis("wave number $q$ [rad/m]", log=True)
     areal = Panel(q, Axis("$C^{2D}$ [m$^4$]", log=True))
@@ -60,7 +60,7 @@ def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...])
 
 
 def _areal(report: FileReport, used: Spectrum, colour: str, file: xr.Dataset) -> list[Trace]:
-    """Return C2D of a file: all values, means in bins with errors, the part that a campaign uses, and the power law."""
+    """Return traces of C2D of a file: all values, means in bins with errors, the part that is used, the power law."""
     spectrum, bins = report.found.spectrum, report.bins
     raw = columns(file, x=spectrum.wavenumber, y=spectrum.density)
     there = bins.density > 0

@@ -1,6 +1,6 @@
-"""Any output of any model against its parameters: curves, maps, and main effects.
+"""Figures of any output of any model against its parameters: curves, maps and main effects.
 
-A `View` describes a figure, and `draw` makes it.
+A `View` describes such a figure, and `draw` makes it.
 """
 
 from __future__ import annotations
@@ -23,10 +23,11 @@ from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 #: `MOST_PANELS`: largest number of panels of one figure. `LONGEST_WORD`: largest number of characters in one line of
 #: the text at a tick.
 MOST_PANELS, LONGEST_WORD = 6, 20
-#: For main effects of a sampled study: smallest number of cases in a bin, and largest numbers of bins, of parameters,
-#: and of cases that are drawn as points.
+#: For main effects of a sampled study: `IN_A_BIN` is the smallest number of cases in a bin. `MOST_BINS`, `MOST_EFFECTS`
+#: and `MOST_POINTS` are the largest numbers of bins, of parameters, and of cases that are drawn as points.
 IN_A_BIN, MOST_BINS, MOST_EFFECTS, MOST_POINTS = 8, 10, 12, 5000
-#: Marks for cases without a value, and for cases whose mean lacks some realisations and may therefore be biased.
+#: Marks for cases without a value, and for cases in which some realisations have no value; the mean of the other
+#: realisations may be biased.
 MARKS = {
     Status.FAILED: ("x", "failed"),
     Status.NOT_CONVERGED: ("+", "did not converge"),
@@ -42,23 +43,23 @@ class View:
     Parameters
     ----------
     outputs : str or tuple of str
-        Outputs, or errors of outputs; several outputs are drawn in panels one above the other.
+        Names of outputs, or of errors of outputs. Several outputs are drawn in panels one above the other.
     over : str or tuple of str
-        The parameter on the horizontal axis; two parameters for a map, no parameter for the main effects of all
-        parameters.
+        The parameter on the horizontal axis. With two parameters, the figure is a map; with no parameter, it shows the
+        main effects of all parameters.
     by : str
         The parameter that colours show.
     panels : str
         The parameter in which panels differ.
     log : str, optional
-        Letters of the logarithmic axes, out of ``x``, ``y`` and ``z`` (colours). By default, the axes whose numbers are
-        positive and span more than a factor of ten.
+        Letters of the logarithmic axes, out of ``x``, ``y`` and ``z`` (colours). By default, an axis is logarithmic if
+        its numbers are positive and span more than a factor of ten.
     single : bool
         Whether the first realisation is drawn instead of the mean over realisations.
     apart : bool
-        Whether every curve has its own panel, for curves that would hide each other.
+        Whether every curve has its own panel; this suits curves that would hide each other.
     guides : mapping of str to mapping of float to str
-        Horizontal lines in the panels of an output, with their names.
+        Horizontal lines for the panels of an output: the value and the name of each line, by the name of the output.
     """
 
     outputs: str | tuple[str, ...]
@@ -88,14 +89,14 @@ class View:
 
 
 class _Part(NamedTuple):
-    """The series of one panel, by name, and the title of the panel."""
+    """The series in one panel by their names, and the title of the panel."""
 
     title: str
     series: dict[str, xr.Dataset]
 
 
 def figure_of(view: View) -> Plot:
-    """Return the figure of a view, named after its output."""
+    """Return the figure of a view; its name is the name of the output."""
     over = " and ".join(view.along) or "every parameter that varies"
     return Plot(view.names[0], (), f"{view.names[0]} against {over}", lambda groups: draw(groups, view))
 
@@ -106,7 +107,7 @@ def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
     Raises
     ------
     DataError
-        If no series can be drawn as requested; the message has the reason for each series.
+        If no series can be drawn as requested. The message gives the reason for each series.
     """
     figures, shown, reasons = [], [], []
     for view, output in [(each, name) for each in views for name in each.names]:
@@ -201,7 +202,7 @@ def _places(data: xr.Dataset, name: str) -> xr.DataArray:
 
 
 def _axis(name: str, arrays: list[xr.DataArray], view: View, which: str) -> Axis:
-    """Return the axis of a parameter, linear or logarithmic, or with words as ticks."""
+    """Return the axis of a parameter: linear, logarithmic, or with words as ticks."""
     first = arrays[0]
     own = name in curves.OWN and first.attrs.get("units", "1") == "1"
     label = labels.meaning(first, name) if own else labels.label(name, first)
@@ -225,7 +226,7 @@ def _lines(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     panels = [_panel(part, each, view, output, x) for part, each in zip(parts, families, strict=True)]
     first = next(iter(found.values()))
     log = view.is_log("y", np.concatenate([_values(panel) for panel in panels]))
-    log &= view.log is not None or not labels.quantity(output, first[output]).offset  # no logarithm of degrees Celsius
+    log &= view.log is not None or not labels.quantity(output, first[output]).offset  # by default not for degC
     y = Axis(labels.label(output, first[output]), log, quantity=output)
     for panel in panels:
         panel.y = y
@@ -259,8 +260,8 @@ def _guides(levels: Mapping[float, str], panel: Panel) -> list[Trace]:
 def _parts(found: Mapping[str, xr.Dataset], view: View, output: str) -> tuple[list[_Part], list[str]]:
     """Return the contents of the panels.
 
-    There is one panel for each value of the parameter `view.panels`, or one panel for all series, or one panel for each
-    series if there are too many curves for one panel.
+    If the view has a parameter `view.panels`, there is one panel for each of its values. Otherwise there is one panel
+    for all series, or one for each series if a single panel would have too many curves.
     """
     if view.panels:
         return _by_value(found, view)
@@ -332,7 +333,7 @@ def _panel(part: _Part, families: Mapping[str, curves.Family], view: View, outpu
 
 
 def _coloured(families: Mapping[str, curves.Family]) -> list[tuple[curves.Curve, curves.Family]]:
-    """Return the curves of a panel with their families; with several series, curves get new colours and markers."""
+    """Return the curves of a panel with their families; curves of several series get new colours and markers."""
     every = [(name, curve, one) for name, one in families.items() for curve in one.curves]
     if len(families) == 1:
         return [(curve, one) for _, curve, one in every]
@@ -358,7 +359,7 @@ def _keys(families: Mapping[str, curves.Family]) -> list[Key]:
 
 def _law(curve: curves.Curve, law: laws.Law, along: str, output: str) -> Trace:
     fine = laws.along(curve.data, along)
-    with np.errstate(invalid="ignore"):  # a failed case has no rms slope
+    with np.errstate(invalid="ignore"):  # the rms slope of a failed case is NaN
         value = labels.quantity(output, curve.data[output]).of(law.value(fine))
     label = ", ".join(part for part in (law.name, curve.label) if part)
     data = columns(fine, x=_places(fine, along), y=value)
@@ -374,7 +375,7 @@ def _counted(data: xr.Dataset, output: str) -> xr.Dataset:
 
 
 def _absent(curve: curves.Curve, x: xr.DataArray, output: str, marked: dict[str, str]) -> list[Trace]:
-    """Return marks at the lower edge of a panel for cases in which some realisations have no value, with reasons."""
+    """Return marks at the lower edge of a panel, with reasons, for cases in which some realisations have no value."""
     data = curve.data
     if "status" not in data:
         return []
@@ -400,7 +401,7 @@ def _absent(curve: curves.Curve, x: xr.DataArray, output: str, marked: dict[str,
 
 
 def _map(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
-    """Draw an output against two parameters: the cells of a grid, or the cases of a sampled study as points."""
+    """Draw an output against two parameters: a grid as cells, or the cases of a sampled study as points."""
     if view.by or (view.panels and len(found) > 1):
         raise DataError("expected a map of one series, without --by: the colours are the values")
     parts, left_out = _by_value(found, view) if view.panels else _by_series(found)
@@ -477,7 +478,7 @@ def _effects(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure
 
 
 def _means(data: xr.Dataset, output: str, name: str) -> tuple[xr.DataArray, Mean]:
-    """Return the mean over all other axes for every value of one axis."""
+    """Return the mean for every value of one axis, averaged over all other axes."""
     rest = [dim for dim in curves.axes_of(data, output) if dim != name]
     error = aggregation.companion(data, output)
     pair = data[output].mean(rest), None if error is None else abs(error).mean(rest)
@@ -485,7 +486,7 @@ def _means(data: xr.Dataset, output: str, name: str) -> tuple[xr.DataArray, Mean
 
 
 def _bins(data: xr.Dataset, output: str, name: str, dim: str) -> tuple[xr.DataArray, Mean]:
-    """Return means over groups of cases of a sampled study, which are sorted by one parameter and then divided."""
+    """Sort the cases of a sampled study by one parameter, divide them into groups, and return the group means."""
     cases = aggregation.mean(data[output])
     cases = cases.mean([each for each in cases.dims if each != dim]).dropna(dim)
     if not cases.size:
