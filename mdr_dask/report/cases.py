@@ -1,4 +1,4 @@
-"""Means and errors of all cases of a study, for figures on the page whose axes the reader chooses."""
+"""Means and errors of all cases of a study. The page uses them for figures whose axes the reader chooses."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ from mdr_dask.plots import curves, labels
 from mdr_dask.report.figures import Json, numbers
 from mdr_dask.report.words import markup, plain
 
-#: Largest number of cases of one series on the page; in a larger series, values of the longest axes are left out.
+#: Largest number of cases of one series on the page. If a series has more cases, values of its longest axes are left
+#: out.
 MOST_CASES = 4000
 
 
 def thinned(data: xr.Dataset) -> tuple[xr.Dataset, list[str]]:
-    """Load at most `MOST_CASES` cases, with evenly spread values of the longest axes.
+    """Load at most `MOST_CASES` cases; if there are more, load evenly spread values of the longest axes.
 
-    Return these cases, and texts about the omitted values.
+    Return the loaded cases, and texts about the omitted values.
     """
     dims, left_out = [str(dim) for dim in data["status"].dims if dim != "realisation"], []
     while (cases := math.prod(data.sizes[dim] for dim in dims)) > MOST_CASES:
@@ -41,9 +42,10 @@ def cases_of(groups: Mapping[str, xr.Dataset], left_out: Mapping[str, list[str]]
     Returns
     -------
     list of dict
-        For each series: ``axes`` and ``outputs`` with labels, and ``reduced``, texts on values of axes that are left
-        out. Columns have a number for each case: ``at`` holds the varied parameters in the units of figures; ``value``,
-        ``low``, ``high``, ``lines`` (standard error) and ``grid`` (grid error) belong to each output.
+        For each series: ``axes`` and ``outputs`` with their labels, and ``reduced``, a list of texts about omitted
+        values of axes. There are also columns with a number for each case: ``at`` has a column for each varied
+        parameter, in the unit of the figures; each output has the columns ``value``, ``low``, ``high``, ``lines``
+        (standard error) and ``grid`` (grid error).
     """
     found = [_series(name, data, left_out[name]) for name, data in groups.items()]
     return [series for series in found if series["outputs"] and series["axes"]]
@@ -79,7 +81,7 @@ def _named(name: str, values: xr.DataArray) -> Json:
 
 
 def _column(values: Any, dims: tuple[Any, ...], shape: xr.DataArray) -> list[Any]:
-    """Return values along some dimensions for every case."""
+    """Repeat values along some dimensions so that every case has a value, and return them as a list."""
     along = xr.DataArray(np.asarray(values), dims=dims)
     return numbers(along.broadcast_like(shape).transpose(*shape.dims).to_numpy().ravel())
 

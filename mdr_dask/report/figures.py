@@ -1,4 +1,4 @@
-"""Figures as data for the page: a `mdr_dask.plots.figure.Figure` as JSON."""
+"""Figures as data for the page: convert a `mdr_dask.plots.figure.Figure` to JSON."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from mdr_dask.report.words import markup
 
 #: Largest number of points of one figure on the page; longer curves are thinned out.
 MOST_POINTS = 20_000
-#: `DIGITS`: digits of a number on the page. `SHADES`: number of colours of a colour bar.
+#: `DIGITS`: number of significant digits on the page. `SHADES`: number of colours of a colour bar.
 DIGITS, SHADES = 9, 17
 
 Json = dict[str, Any]
@@ -27,7 +27,7 @@ Json = dict[str, Any]
 def drawn_of(
     figures: Mapping[str, Plot], groups: Mapping[str, xr.Dataset], provenance: Any
 ) -> Iterator[Json | tuple[str, str]]:
-    """Yield every figure as data; if a study lacks the data for a figure, yield its name and the reason instead."""
+    """Yield every figure as data; if a study lacks the results for a figure, yield its name and the reason instead."""
     for name, each in figures.items():
         try:
             figure = each.describe(groups)
@@ -44,7 +44,8 @@ def figure_data(name: str, summary: str, figure: Figure, origin: Mapping[str, st
     -------
     dict
         ``panels`` with labels and scales, ``traces`` with the columns of their points, ``scales`` of colours,
-        ``parameters`` with labels and units, and the texts of the figure. Labels are HTML, all other texts are plain.
+        ``parameters`` with labels and units, and the texts of the figure. Labels are HTML; all other texts are plain
+        text.
     """
     every = [(k, panel, trace) for k, panel in enumerate(figure.panels) for trace in panel.traces]
     total = sum(trace.column("x").size for *_, trace in every)

@@ -1,8 +1,8 @@
 """The page: one HTML file that contains all data and scripts, with a content security policy.
 
 The template escapes text from a store. Data are stored as a block of JSON that browsers do not run. The content
-security policy allows only the scripts of this package, which it identifies by their digests. So nothing in a store can
-become a script.
+security policy allows only the scripts of this package and identifies them by their digests. Therefore nothing in a
+store can run as a script.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def page(studies: Sequence[Study]) -> str:
 
 
 def policy() -> str:
-    """Return the content security policy: the scripts of the page by their digests, and no network."""
+    """Return the content security policy; it allows the scripts of the page by their digests, and no network."""
     digests = [base64.b64encode(hashlib.sha256(asset(name).encode()).digest()).decode() for name in SCRIPTS]
     scripts = " ".join(f"'sha256-{digest}'" for digest in digests)
     return "; ".join(
@@ -73,7 +73,7 @@ def policy() -> str:
 
 
 def harmless(data: Any) -> str:
-    """Return data as JSON that cannot close the script element that contains it."""
+    """Return data as JSON in a form that cannot end the HTML script element around it."""
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026").replace("\u2028", "\\u2028")
 

@@ -1,4 +1,4 @@
-"""A study packed for publication: one zip file that is a Zarr store."""
+"""Pack a study for publication: one zip file that is itself a Zarr store."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from mdr_dask.report.page import page
 from mdr_dask.report.study import Study, read_study
 from mdr_dask.store import CHECKSUMS, PUBLISHED
 
-#: Files that are compressed in the zip; chunks are compressed already.
+#: Endings of files that are compressed in the zip. Chunks are not, because they are compressed already.
 TEXTS = (".json", ".jsonl", ".html", ".txt", ".yaml", ".csv", ".sha256")
 
 
@@ -30,9 +30,9 @@ def publish(url: str, target: Path) -> int:
     Parameters
     ----------
     url : str
-        Path or URL of the store, which must be undamaged and not in use.
+        Path or URL of the store. The store must be undamaged and not in use.
     target : Path
-        The zip.
+        Path of the zip file.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def _put(packed: zipfile.ZipFile, name: str, content: bytes) -> None:
 
 
 def _campaign(url: str, study: Study) -> tuple[bytes, dict[str, bytes]]:
-    """Return the campaign and the files that it names; files from other folders are renamed, also in the campaign."""
+    """Return the campaign and the files that it names; files from other folders get new names, also in the campaign."""
     text, found = study.campaign, {}
     for file in _named_files(url):
         name = PurePosixPath(str(file["name"]).replace("\\", "/"))
@@ -117,7 +117,7 @@ def _named_files(url: str) -> list[dict[str, str]]:
 
 
 def _environment() -> str:
-    """Return the installed packages with versions as a requirements file for pip, with Python and machine."""
+    """Return a requirements file for pip with the installed packages; comments give Python and the machine."""
     lines = [f"# Python {platform.python_version()}, {platform.platform()}, {os.cpu_count()} processors"]
     lines.append(f"# {datetime.now(UTC).isoformat(timespec='seconds')}; versions of each block: status/records")
     found = {str(one.metadata["Name"]): str(one.version) for one in distributions() if one.metadata["Name"]}

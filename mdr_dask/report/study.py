@@ -28,9 +28,9 @@ from mdr_dask.report.figures import Json, drawn_of
 from mdr_dask.report.subjects import Subject, subject_of
 from mdr_dask.units import seconds
 
-#: Largest number of rows of a table on the page; a note gives the command that prints all rows.
+#: Largest number of rows of a table on the page. If there are more, a note gives the command that prints all rows.
 MOST_ROWS = 60
-#: Largest number of values of an axis that are listed.
+#: At most this many values of an axis are listed.
 LISTED = 6
 
 
@@ -54,12 +54,12 @@ class Study:
     facts : dict of str to str
         Main facts about the study, by label.
     campaign, source : str
-        Text of the campaign file, and its name.
+        Text of the campaign file, and name of the file.
     understood, counts, machines, laws, errors : lists of Table
-        Tables of axes and fixed parameters, of the results in each state, of computers and versions, of fits, and of
-        the sources of errors.
+        Tables, in this order, of axes and fixed parameters, of the numbers of results in each state, of computers and
+        versions, of fits, and of the sources of errors.
     failures : list of Group
-        Messages of failed results and warnings, grouped.
+        Groups of equal messages of failed results, and of warnings.
     not_fitted, not_drawn : list of (name, reason)
         Laws and figures for which the study does not contain the data.
     figures, cases : list of dict
@@ -69,7 +69,7 @@ class Study:
     digests, rerun : dict of str to str, list of str
         Digests of the campaign and of the results, and commands that compute the study again.
     at_work : str
-        Text with the processes that are working on the study.
+        Text about the processes that are working on the study.
     """
 
     url: str
@@ -96,7 +96,7 @@ class Study:
 
 
 def read_study(url: str) -> Study:
-    """Read the content of a page about a study, finished or not.
+    """Read the content of a page about a study; the study may be unfinished.
 
     Raises
     ------
@@ -172,7 +172,7 @@ def _study(
 
 
 def _shows_no_errors(figure: Json) -> bool:
-    """Return whether a figure shows no errors; the page shows these figures last."""
+    """Return whether a figure shows no errors; the page shows figures without errors last."""
     return not any("y_low" in trace or "value_low" in trace for trace in figure["traces"])
 
 
@@ -270,7 +270,7 @@ def _machines(records: list[Json], held: Mapping[str, Any]) -> list[Table]:
 
 
 def _laws(url: str, model: str, groups: Mapping[str, xr.Dataset]) -> tuple[list[Table], list[tuple[str, str]]]:
-    """Return tables of the fits with intervals and verdicts, and the names of fits without data, with reasons."""
+    """Return tables of the fits with intervals and verdicts; and the fits for which data are missing, with reasons."""
     found: list[Table] = []
     missing: list[tuple[str, str]] = []
     for name, law in fits.available(model).items():
@@ -331,7 +331,7 @@ def _cell(value: xr.DataArray) -> str:
 
 
 def _errors(name: str, data: xr.Dataset) -> Iterator[Table]:
-    """Yield a table of the errors of the means: the parts from scatter of the realisations and from the grid."""
+    """Yield a table of the errors of the means, divided into errors by scatter of the realisations and by the grid."""
     rows = []
     for output in main_outputs(data):
         if "realisation" not in data[output].dims or set(data[output].dims) > set(data["status"].dims):

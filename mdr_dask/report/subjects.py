@@ -1,4 +1,4 @@
-"""Texts of the report on the method of each model: a paragraph, equations, papers, and the limits of the method."""
+"""Texts about the method of each model, for the report: a paragraph, equations, papers, and limits of the method."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Subject(NamedTuple):
     can, cannot : tuple of str
         Statements that the results support (`can`) and statements that the results do not support (`cannot`).
     page : str
-        The page of the documentation with more details.
+        The page of the documentation that gives more details.
     """
 
     method: str

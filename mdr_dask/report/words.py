@@ -1,11 +1,11 @@
-"""Labels of figures as HTML: mathtext with subscripts and superscripts, all other text unchanged."""
+"""Convert labels of figures to HTML: mathtext becomes subscripts and superscripts, all other text is unchanged."""
 
 from __future__ import annotations
 
 import re
 from html import escape
 
-#: Commands of mathtext in labels of this package, and the characters that replace them.
+#: Commands of mathtext that occur in labels of this package, and the characters that replace them.
 _CHARACTERS = {
     "alpha": "α",
     "beta": "β",
@@ -34,7 +34,7 @@ _INDEX = re.compile(r"([_^])(?:\{([^{}]*)\}|(.))")
 
 
 def markup(label: str) -> str:
-    """Return a label as HTML: ``$F_N$`` with N as a subscript, every other character unchanged.
+    """Return a label as HTML: for ``$F_N$``, N becomes a subscript; characters outside mathtext are unchanged.
 
     Only the parts between two dollars are read as mathtext. The only HTML elements in the result are ``sub`` and
     ``sup``.
