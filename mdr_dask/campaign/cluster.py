@@ -23,7 +23,7 @@ def load_cluster(path: FilePath) -> dict[str, Any]:
     Raises
     ------
     CampaignError
-        With every problem of the file, by line.
+        If the file has problems. The message lists all of them by line.
     """
     document = parse(read_text(path), str(path))
     data = document.data if isinstance(document.data, dict) else {}

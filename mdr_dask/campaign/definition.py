@@ -13,7 +13,7 @@ from mdr_dask.models.base import Parameters
 from mdr_dask.models.data_file import DataFile
 
 _DIGITS = 14
-#: Number of significant digits to which values of an axis are compared; values that agree are computed once.
+#: Number of significant digits to which the values of an axis are compared. Values that agree are computed only once.
 SAME_DIGITS = 12
 #: Largest number of values that `Axis.some` returns, for checks that would take too long with all values.
 SOME = 64
@@ -29,7 +29,7 @@ class Spread:
     whole: bool
 
     def at(self, shares: Any) -> list[float]:
-        """Return the values at fractions (0 to 1) of the interval, rounded to 14 digits so that decades are exact."""
+        """Return the values at fractions (0 to 1) of the interval, rounded to 14 digits to make powers of ten exact."""
         if self.geometric:
             values = self.low * (self.high / self.low) ** shares
         else:
@@ -68,13 +68,13 @@ class Axis:
     name : str
         Name of its coordinate in the store: the path with ``_`` for ``.``.
     dim : str
-        Its dimension in the store: `name` in a grid, ``case`` in a study in which parameters vary together.
+        Its dimension in the store: `name` in a grid, or ``case`` in a study whose parameters vary together.
     values : tuple
         Checked values in SI, in the order of the file: numbers, names, or whole parameter sets.
     labels : tuple of str or None
-        Names in the store for values that are not numbers.
+        Names of the values in the store if the values are not numbers. None for numbers.
     unit : str or None
-        SI unit, ``"1"`` for pure numbers, None for names.
+        SI unit, ``"1"`` for pure numbers. None if the values are names.
     long_name : str
         The parameter's meaning.
     refinement : Refinement or None
@@ -106,7 +106,7 @@ class Series:
     name : str
         Name of its Zarr group; empty for a campaign without series, whose arrays are at the root.
     parameters : Parameters
-        The parameters, each varied parameter with the first value of its axis.
+        All parameters. A varied parameter has the first value of its axis.
     axes : tuple of Axis
         The axes, in the order of the file.
     """
@@ -123,7 +123,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """The largest accepted error, relative to the value and absolute; an error within one of both is accepted.
+    """The largest accepted relative and absolute error. An error is accepted if it is within either of them.
 
     `place` is the position of the tolerance in the campaign file.
     """
@@ -142,7 +142,8 @@ class Refinement:
     spread : Spread
         The interval of the axis, with the scale on which outputs are interpolated.
     until : mapping of str to Tolerance
-        Largest accepted interpolation error of each output; relative errors refer to the largest value along the axis.
+        Largest accepted interpolation error of each output. A relative error refers to the largest value of the output
+        along the axis.
     at_most : int
         Largest number of values.
     """
@@ -159,11 +160,12 @@ class Replication:
     Parameters
     ----------
     at_least, at_most : int
-        Number of realisations of the first round, and the largest number.
+        Number of realisations in the first round, and largest number of realisations in all rounds together.
     until : mapping of str to Tolerance
         Largest accepted standard error of the mean of each output.
     answers : mapping of str to Tolerance
-        Largest accepted half width of the 95 % interval of each fitted constant, by the name ``fit.constant``.
+        Largest accepted half width of the 95 % interval of each fitted constant. The keys have the form
+        ``fit.constant``.
     """
 
     at_least: int
@@ -198,13 +200,13 @@ class Campaign:
     store : str
         Path (relative to the working directory) or URL of the store.
     blocks : mapping of str to int
-        Chunk lengths set in the file, by dimension; all other lengths are chosen automatically.
+        Lengths of chunks that the file sets, by dimension. All other lengths are chosen automatically.
     text, source : str
         Text of the campaign file, and its path.
     remarks : tuple of str
-        Questions about bare numbers far from the usual values, each with its place.
+        Questions about numbers without a unit that are far from the usual values, each with its position in the file.
     measured : DataFile or None
-        Table of measurements of an output, for the fit ``calibration``.
+        Table of measured values of an output, for the fit ``calibration``. None if the campaign has no table.
     """
 
     name: str

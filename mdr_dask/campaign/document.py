@@ -48,7 +48,7 @@ class Document:
     _keys: dict[Path, Node] = field(default_factory=dict)
 
     def place(self, path: Path) -> Place:
-        """Return the position of the value at a path, or of the mapping or list that lacks this value."""
+        """Return the position of the value at a path or, if it is missing, of the mapping or list around it."""
         while path not in self._nodes and path:
             path = path[:-1]
         return self._at(self._nodes[path]) if path in self._nodes else Place(self.source, 1, 1)
@@ -62,7 +62,7 @@ class Document:
         self.problems.add(self.key_place(path) if key else self.place(path), dotted(path), what)
 
     def flow(self, path: Path) -> str:
-        """Return the value at a path as YAML on one line, scalars as in the file."""
+        """Return the value at a path as YAML on one line. Numbers and texts are written as in the file."""
         return _flow(self._nodes[path])
 
     def _at(self, node: Node) -> Place:
@@ -86,9 +86,9 @@ def read_text(path: str | FilePath) -> str:
 
 
 def parse(text: str, source: str) -> Document:
-    """Return the document in a YAML 1.2 text; `source` is the name of the text in messages.
+    """Return the document in a YAML 1.2 text. Messages call the text `source`.
 
-    The problems of the document are syntax errors, duplicate keys, keys that are not strings, and unknown tags.
+    Syntax errors, duplicate keys, keys that are not strings, and unknown tags become problems of the document.
     """
     document = Document(source, text)
     problems = document.problems
@@ -143,7 +143,7 @@ def _hint(text: str, index: int) -> str:
 
 
 def _is_indented_otherwise(lines: list[str]) -> bool:
-    """Return whether the last two lines begin in different columns although the first does not end with a colon."""
+    """Return whether the last two lines begin in different columns although the earlier one has no colon at its end."""
     written = [line for line in lines if line.strip() and not line.lstrip().startswith("#")][-2:]
     if len(written) < 2 or written[0].rstrip().endswith(":"):
         return False
@@ -152,7 +152,7 @@ def _is_indented_otherwise(lines: list[str]) -> bool:
 
 
 class _EndlessError(Exception):
-    """Ends the reading of a document that is too large or contains itself, after this problem was reported."""
+    """Raised to stop reading a document that is too large or contains itself, after this problem was reported."""
 
 
 class _Reader:

@@ -34,14 +34,14 @@ realisations: 1                     # independent rough lines, or scatter, of ea
 
 parameters:
 """
-#: `_COMMENTS`: column in which comments begin. `_LONGEST`: number of characters up to which a value is written out.
+#: `_COMMENTS`: column in which comments begin. `_LONGEST`: values with more characters than this are not written out.
 _COMMENTS, _LONGEST = 36, 60
 _EXAMPLE_FILE = "table.csv"
 _BOUNDS = ("gt", "ge", "lt", "le")
 
 
 def draft(name: str, model: Model[Any], file: str) -> str:
-    """Return the text of a campaign that passes every check, unless the model needs a file.
+    """Return the text of a campaign. It passes every check, unless the model needs a data file.
 
     `name` is the name of the model in a campaign, and `file` the name of the campaign file, for its comments.
     """
@@ -72,7 +72,7 @@ def _entries(parameters: type[Parameters]) -> Iterator[str]:
 
 
 def _needed(parameters: type[BaseModel]) -> set[str]:
-    """Return the required parameters, and the first parameter of each group of alternatives, with dotted names."""
+    """Return the dotted names of the required parameters, and of the first parameter of each group of alternatives."""
     ways = getattr(parameters, "alternatives", ())
     return {*fields.required(parameters), *(name for each in ways for name in each[0])}
 
@@ -95,7 +95,7 @@ def _choices(info: FieldInfo) -> list[str]:
 
 
 def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str]:
-    """Return examples of a value as text: one example, or one for each structure that the value may have."""
+    """Return examples of a value as text: one for each structure that the value may have, or a single one."""
     info = parameters.model_fields[name]
     kinds = list(fields.structures(info))
     if inner:
@@ -107,7 +107,7 @@ def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str
 
 
 def _structures(kind: type[BaseModel], inner: set[str]) -> list[str]:
-    """Return a structure on one line, once for each of its alternatives."""
+    """Return the texts of a structure on one line, one text for each of its alternatives."""
     ways = next(iter(getattr(kind, "alternatives", ())), ())
     wanted = [{*fields.required(kind), *way} for way in ways] or [_needed(kind)]
     open_keys = [key for key in kind.model_fields if key not in fields.fixed(kind)]
@@ -139,7 +139,7 @@ def _scalar(parameters: type[BaseModel], name: str) -> str:
 
 
 def _inside(info: FieldInfo) -> float:
-    """Return a number within the bounds of a field: 1 if 1 is within the bounds."""
+    """Return a number within the bounds of a field. It is 1 if the bounds allow 1."""
     bounds = {key: getattr(part, key) for part in info.metadata for key in _BOUNDS if hasattr(part, key)}
     low = bounds.get("ge", bounds.get("gt", -math.inf))
     high = bounds.get("le", bounds.get("lt", math.inf))

@@ -33,7 +33,7 @@ def expand(
     directory: str,
     outputs: Sequence[str],
 ) -> tuple[tuple[Series, ...], tuple[str, ...]]:
-    """Return the series of a campaign without problems, and questions about numbers without a unit.
+    """Return the series of a campaign that have no problems, and questions about numbers without a unit.
 
     `directory` is the folder to which the names of files are relative, and `outputs` are the names of the requested
     outputs. Every problem of parameters, ranges and tables is added to the problems of the document.
@@ -91,7 +91,10 @@ class _Expansion:
     def _require_places(
         self, base: Parameters, axis: Axis, origin: Origin, model: Model[Any], outputs: Sequence[str]
     ) -> None:
-        """Report an axis that changes the coordinates of an output, because all cases share one array."""
+        """Report a problem if an axis changes the coordinates of an output.
+
+        All cases share one array, so they must have the same coordinates.
+        """
         wanted = [model.output(name) for name in outputs]
         if not any(output.dims for output in wanted):
             return
@@ -153,16 +156,21 @@ class _Expansion:
     def _grid_values(
         self, base: Parameters | None, variations: Sequence[Variation], index: int, broken: set[Path]
     ) -> list[Any] | None:
-        """Return the values of one axis, checked with the first values of all other axes; None if a value is wrong."""
+        """Return the checked values of one axis, or None if a value is wrong.
+
+        The values are checked together with the first values of all other axes.
+        """
         one = variations[index]
         known = _checked(base, self._substituted(self.data, variations, 0), {one.path[0]})
-        elsewhere = broken | {other.path for other in variations if other is not one}  # reported by their own axes
+        elsewhere = broken | {
+            other.path for other in variations if other is not one
+        }  # their problems are reported by their own axes
         last = self._validate(known, [one], len(one.items) - 1, elsewhere)
         independent = fields.is_independent(self.parameters, one.path, self.data)
         values: list[Any] = []
         seen, sound = set(), None not in (base, last)
         for position, item in enumerate(one.items):
-            if item.inner and (not sound or independent):  # valid if both ends of the range are valid
+            if item.inner and (not sound or independent):  # such a value is valid if both ends of the range are
                 values.append(item.value)
                 continue
             checked = base if position == 0 else self._validate(known, [one], position, elsewhere)
@@ -186,7 +194,10 @@ class _Expansion:
     def _case_values(
         self, base: Parameters | None, variations: Sequence[Variation], broken: set[Path]
     ) -> list[list[Any] | None]:
-        """Return the checked values of every varied parameter, case by case; if a case is wrong, None for each."""
+        """Return the checked values of every varied parameter in all cases.
+
+        If a case is wrong, return None for every parameter.
+        """
         known = _checked(base, self.data, {one.path[0] for one in variations})
         cases = range(min((len(one.items) for one in variations), default=0))
         sizes = [[item.value for item in one.items] for one in variations]
@@ -264,7 +275,7 @@ class _Expansion:
     def _refined(
         self, axes: Sequence[Axis], variations: Sequence[Variation], model: Model[Any], outputs: Sequence[str]
     ) -> Iterator[Axis]:
-        """Yield the axes, each adaptive axis with its refinement."""
+        """Yield the axes. An adaptive axis gets its refinement."""
         for axis, one in zip(axes, variations, strict=True):
             if one.written and one.spread:
                 found = refinement(self.document, one.written, one.spread, model, outputs)

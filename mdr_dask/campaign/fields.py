@@ -59,7 +59,7 @@ def members(annotation: Any) -> tuple[Any, ...]:
 
 
 def holds_list(info: FieldInfo) -> bool:
-    """Return whether a list in this field is a single value; in other fields a list varies the parameter."""
+    """Return whether a list is one value of this field; in other fields, a list contains the values of an axis."""
     kinds = [get_origin(kind) or kind for kind in members(info.annotation)]
     return any(isinstance(kind, type) and issubclass(kind, Sequence) and kind is not str for kind in kinds)
 
@@ -76,10 +76,10 @@ def structures(info: FieldInfo) -> tuple[type[BaseModel], ...]:
 
 
 def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
-    """Return the parameter set of a mapping: the one with the same fixed keys, such as ``shape: cone``.
+    """Return the parameter set that a mapping describes, from its fixed keys such as ``shape: cone``.
 
-    If several sets fit, the set with most keys of the mapping is returned; among equal sets, the set whose fields most
-    of the misspelt keys resemble.
+    If several sets fit, return the one that has most of the keys of the mapping. If several have the same number of
+    them, return the one whose fields resemble most of the keys; in this way, misspelt keys count too.
     """
     if not isinstance(value, dict):
         return None
@@ -101,7 +101,7 @@ def _likeness(kind: type[BaseModel], value: Mapping[Any, Any]) -> tuple[int, int
 
 
 def fixed(kind: type[BaseModel]) -> dict[str, Any]:
-    """Return the fields of a parameter set that have one possible value, with that value."""
+    """Return the fields of a parameter set that have only one possible value, each with this value."""
     return {
         key: get_args(info.annotation)[0]
         for key, info in kind.model_fields.items()
@@ -121,7 +121,7 @@ def written(kind: type[BaseModel], values: Mapping[str, str]) -> str:
 
 
 def owner(parameters: type[BaseModel], path: Path, data: Any) -> tuple[type[BaseModel], str] | None:
-    """Return the parameter set and the name of the field at a path into the data; None if there is no such field."""
+    """Return the parameter set and the name of the field at a path in the data, or None if there is no such field."""
     kind: type[BaseModel] | None = parameters
     for depth, part in enumerate(path):
         if kind is None or not isinstance(part, str) or part not in kind.model_fields:
@@ -134,7 +134,7 @@ def owner(parameters: type[BaseModel], path: Path, data: Any) -> tuple[type[Base
 
 
 def is_independent(parameters: type[BaseModel], path: Path, data: Any) -> bool:
-    """Return whether the check of the field at a path needs no other parameters, only the bounds of the field."""
+    """Return whether the field at a path can be checked by its bounds alone, without other parameters."""
     pairs = (owner(parameters, path[:depth], data) for depth in range(1, len(path) + 1))
     decorators = [kind.__pydantic_decorators__ for kind in (parameters, *(pair[0] for pair in pairs if pair))]
     return not any(
@@ -144,7 +144,10 @@ def is_independent(parameters: type[BaseModel], path: Path, data: Any) -> bool:
 
 
 def choices(parameters: type[BaseModel], path: Path) -> tuple[str, ...]:
-    """Return how a nested parameter may be written: ``indenter: {shape: power, ...}`` for the path of its exponent."""
+    """Return how the structure of a nested parameter may be written.
+
+    For the path of the exponent of an indenter, for example, this is ``indenter: {shape: power, ...}``.
+    """
     name, *rest = path
     if name not in parameters.model_fields or not rest:
         return ()
@@ -177,6 +180,6 @@ def yaml_text(value: Any) -> str:
 
 
 def unit_at(parameters: type[BaseModel], path: Path, data: Any) -> str | None:
-    """Return the SI unit of the field at a path into the data; None if the field is not a quantity."""
+    """Return the SI unit of the field at a path in the data, or None if the field is not a quantity."""
     found = owner(parameters, path, data)
     return unit_of(*found) if found else None

@@ -1,4 +1,4 @@
-"""Read a campaign from a dictionary, which may hold numpy and pint numbers and paths; messages have no line numbers."""
+"""Read a campaign from a dictionary. Its values may be numbers of numpy, quantities of pint and paths."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from mdr_dask.errors import CampaignError
 def of_keys(source: Mapping[str, Any]) -> Campaign:
     """Read a campaign from the keys of a campaign file; raise CampaignError with every problem.
 
-    Values are written as in a file, or are arrays and numbers of numpy, pandas or xarray, ranges, paths, or pint
-    quantities. Numbers of numpy are rounded to 14 digits as in a range, so that ``np.linspace`` gives the same values
-    as ``{linear: [a, b, n]}``.
+    Values may be written as in a file. They may also be arrays and numbers of numpy, pandas or xarray, ranges of
+    Python, paths, or quantities of pint. Messages have no line numbers. Numbers of numpy are rounded to 14 digits, like
+    the values of a range in a file. So ``np.linspace(a, b, n)`` gives the same values as ``{linear: [a, b, n]}``.
     """
     text = json.dumps({"name": "study", **{str(key): _plain(value) for key, value in source.items()}}, indent=1)
     try:
@@ -43,7 +43,7 @@ def _plain(value: Any) -> Any:
     if hasattr(value, "magnitude") and hasattr(value, "units"):
         return _quantity(_plain(value.magnitude), f"{value.units:~}")
     if isinstance(value, np.floating):
-        return tidy(float(str(value)), whole=False)  # the text of a float32, such as 0.1, is the number that was meant
+        return tidy(float(str(value)), whole=False)  # the number that was meant is the text of a float32, such as 0.1
     if isinstance(value, np.generic):
         return value.item()
     array = value if isinstance(value, np.ndarray) else getattr(value, "values", None)

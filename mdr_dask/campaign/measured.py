@@ -19,12 +19,12 @@ from mdr_dask.tables import Line, Sheet, read_sheet, read_table
 from mdr_dask.units import shown
 
 ERROR = "standard_error"
-#: Names of errors in a heading. They stand before or after the name of an output, or alone in a heading.
+#: Names of errors in a heading, such as ``std``. They stand before or after the name of an output, or alone.
 _ERROR = re.compile(
     r"(?<!\w)(?:(?:std|standard)? ?(?:dev|deviation|err|error|abw|abweichung|fehler)|uncertainty|std|sd|se)(?!\w)"
     r"|[σ±]|\+ ?/?"
 )
-#: Size in bytes of the largest table that is stored with a study.
+#: Largest size of a table of measured points, in characters. The table is stored with the study.
 LARGEST = 10**6
 #: Conditions are equal if their relative difference is at most this.
 SAME = 1e-6
@@ -45,13 +45,13 @@ class Measured:
     values : array, shape (points,)
         The measured values, in SI.
     errors : array, shape (points,), or None
-        Standard errors of the values, if the table has them.
+        Standard errors of the values; None if the table does not contain them.
     conditions : dict of str to array, shape (points,)
-        The values of the parameters at each measurement, in SI, by the name of the parameter's coordinate.
+        The values of the parameters at each measured point, in SI, by the names of their coordinates in the store.
     lines : tuple of Line
         The line of each measurement in the table.
     remark : str
-        Text on unused columns and on rows without a number; empty if all columns and rows are used.
+        A text that names unused columns and counts rows that lack a number; empty if all columns and rows are used.
     """
 
     source: str
@@ -73,10 +73,10 @@ def read_measured(
     text, source : str
         The table and the name of its file.
     conditions, outputs : mapping of str to str
-        SI units of the quantities that a column may contain, by the names of the quantities in a store.
+        SI units of the conditions and of the outputs that the table may contain, by their names in the store.
     structures : iterable of str
-        Names of nested parameter sets. If only one set has a parameter ``temperature``, for example, the column of this
-        parameter may have the short name ``temperature``.
+        Names of nested parameter sets, such as ``solid``. If only one of these sets has a parameter ``temperature``,
+        for example, the table may call its column ``temperature`` instead of ``solid_temperature``.
 
     Raises
     ------
@@ -111,11 +111,12 @@ def read_measured(
 
 
 def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...], str]:
-    """Return the headings of the errors of the last column in `columns`, and the unit of this column.
+    """Return the headings of the errors of the output, and the unit that these errors have if they state none.
 
-    The unit is empty if the errors have a unit.
+    The output is the last of `columns`. If the headings of the errors state no unit, the unit is that of the output;
+    otherwise it is empty.
 
-    A heading without the name of a quantity, such as ``std``, belongs to the nearest column before it.
+    A heading without the name of a quantity, such as ``std``, means the error of the nearest known column before it.
     """
     output, headings, given, before = columns[-1], [], "", None
     for name, unit in zip(sheet.names, sheet.units, strict=True):
@@ -133,14 +134,14 @@ def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...],
 
 
 def _short_names(names: Sequence[str], structures: Iterable[str]) -> dict[str, list[str]]:
-    """Return, for each nested parameter, its name without the name of its structure, if this name is unique."""
+    """Return for each nested parameter its name without the name of its structure, if this short name is unique."""
     short = [(name, name.removeprefix(f"{one}_")) for one in structures for name in names if name.startswith(f"{one}_")]
     called = [*names, *(inner for _, inner in short)]
     return {name: [inner] for name, inner in short if called.count(inner) == 1}
 
 
 def require_readable(text: str, source: str, model: str, outputs: Sequence[str], series: Sequence[Series]) -> None:
-    """Raise DataError if a table fits no series of a campaign, with the reason for the first series."""
+    """Raise DataError if a table fits no series of a campaign; the message gives the reason for the first series."""
     if len(text) > LARGEST:
         size, most = distinguishable(len(text) / 1e6, LARGEST / 1e6)
         raise DataError(f"{source}: expected a table of at most {most} MB, got {size} MB")
@@ -155,7 +156,7 @@ def require_readable(text: str, source: str, model: str, outputs: Sequence[str],
 
 
 def notes(campaign: Campaign) -> tuple[str, ...]:
-    """Return notes on the table for each series: its output, conditions, unknowns, and rows outside the study."""
+    """Return notes on the measured points for each series: output, conditions, unknowns, and rows outside the study."""
     table = campaign.measured
     notes_found = []
     for series in campaign.series if table else ():
@@ -200,7 +201,7 @@ def _sentences(found: Measured, model: str, series: Series, units: Mapping[str, 
 
 
 def _reach(name: str, series: Series, conditions: Iterable[str]) -> dict[str, tuple[float, float]]:
-    """Return the smallest and the largest value of each condition in a study; both are equal for a fixed parameter."""
+    """Return the smallest and the largest value of each condition in a study; for a fixed parameter they are equal."""
     held = {key: (value, value) for key, (value, _, _) in numbers_of(series.parameters).items()}
     coordinates = models.load(name).coordinates(series.parameters)
     held |= {key: (float(each.values.min()), float(each.values.max())) for key, each in coordinates.items()}
@@ -209,7 +210,10 @@ def _reach(name: str, series: Series, conditions: Iterable[str]) -> dict[str, tu
 
 
 def unknowns(campaign: Campaign) -> tuple[str, ...]:
-    """Return the axes of a campaign that have no column in its table of measured points; none without a table."""
+    """Return the axes of a campaign that have no column in its table of measured points.
+
+    If the campaign has no table, return no axes.
+    """
     table = campaign.measured
     if table is None:
         return ()
@@ -228,7 +232,7 @@ def _unknown(measured: Measured, series: Series) -> list[str]:
 
 
 def _of_series(name: str, outputs: Sequence[str], series: Series) -> tuple[dict[str, str], dict[str, str], list[str]]:
-    """Return the units of conditions and outputs of a series, and its structures of parameters."""
+    """Return the units of conditions and outputs of a series, and the names of its nested parameter sets."""
     model = models.load(name)
     special = model.units(series.parameters)
     conditions = {key: unit for key, (_, unit, _) in numbers_of(series.parameters).items()}

@@ -17,8 +17,8 @@ from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.units import expected, likely, spelt
 
-#: Function that adds a problem. Its arguments are the path in the data, the message, and whether the problem concerns
-#: the key instead of the value.
+#: Function that adds a problem. Its arguments are the path in the data, the message, and a truth value: whether the key
+#: at this path is wrong, and not the value.
 Report = Callable[[Path, str, bool], None]
 
 _BOUNDS = {"greater_than": ("gt", "above"), "greater_than_equal": ("ge", "of at least")}
@@ -37,7 +37,10 @@ _KINDS = {
 
 
 def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, report: Report) -> None:
-    """Report every error of ``kind.model_validate(data)``; the errors of all branches of a union become one message."""
+    """Report every error of ``kind.model_validate(data)``.
+
+    If a value fits none of the types of a union, its errors for all these types become one message.
+    """
     groups: dict[Path, list[ErrorDetails]] = {}
     for details in error.errors(include_url=False):
         if _is_of_another_branch(details, kind, data):
@@ -51,7 +54,10 @@ def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, repo
 
 
 def path_into(data: Any, details: ErrorDetails) -> Path:
-    """Return the path of an error into the data: its ``loc`` without the names of union branches."""
+    """Return the path in the data to the value with an error.
+
+    It is the ``loc`` of the error without the names that pydantic adds for the types of a union.
+    """
     path: Path = ()
     location = details["loc"]
     for depth, part in enumerate(location):
@@ -66,7 +72,7 @@ def path_into(data: Any, details: ErrorDetails) -> Path:
 
 
 def _is_of_another_branch(details: ErrorDetails, kind: type[BaseModel], data: Any) -> bool:
-    """Return whether an error belongs to a structure other than the structure that the keys of the value select."""
+    """Return whether an error belongs to another structure than the one that the keys of the value select."""
     path: Path = ()
     value = data
     for part in details["loc"]:
@@ -112,7 +118,7 @@ def _report_group(path: Path, group: list[ErrorDetails], kind: type[BaseModel], 
 
 
 def _entry(value: Any, what: str) -> Path:
-    """Return the index of the list entry that a message quotes."""
+    """Return the path from a list to the entry that a message quotes; it is empty if there is no such entry."""
     entries = value if isinstance(value, list) else []
     return tuple(index for index, entry in enumerate(entries) if what.endswith(f"got {entry!r}"))[:1]
 
@@ -131,7 +137,7 @@ def _hint(group: list[ErrorDetails], value: Any) -> str:
 
 
 def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return a hint to a unit that may be missing after a number out of bounds."""
+    """Return a hint that a unit may be missing after a number that is out of bounds."""
     value, info, unit = value_at(data, path), _field(kind, path, data), fields.unit_at(kind, path, data)
     usual = fields.usual(info) if info else ()
     if not isinstance(value, int | float) or group[0]["type"] not in _BOUNDS:
@@ -143,7 +149,7 @@ def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel]
 
 
 def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return a hint on how to write the mapping or list that a parameter needs, if only a word was given."""
+    """Return a hint how to write the mapping or list that a parameter needs, if only a word was given."""
     value, info = value_at(data, path), _field(kind, path, data)
     if not info or not isinstance(value, str):
         return ""
@@ -161,7 +167,7 @@ def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
 
 
 def _of_file(info: FieldInfo) -> list[str]:
-    """Return the names of the entries in the structures of a field whose value is the name of a file."""
+    """Return the keys in the structures of a field whose value is the name of a file."""
     inner = [entry for one in fields.structures(info) for entry in one.model_fields.items()]
     named = (DataFile, NamedByFile)
     return [
@@ -230,7 +236,7 @@ def _quantity(path: Path, kind: type[BaseModel], data: Any) -> str:
 
 
 def _unknown(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return the message about an unknown key, with its new name if it was renamed, or with the nearest known key."""
+    """Return the message about an unknown key: its new name if it was renamed, otherwise the nearest known key."""
     around = _structure_around(path, kind, data)
     instead = getattr(around, "renamed", {}).get(path[-1])
     if instead:

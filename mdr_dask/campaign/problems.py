@@ -25,7 +25,7 @@ class Place:
 
 @dataclass(frozen=True, order=True)
 class Problem:
-    """A problem: its position, the key that it concerns, and the message."""
+    """A problem: its position, the key to which it belongs, and the message."""
 
     place: Place
     where: str
@@ -46,7 +46,7 @@ class Problems:
         return bool(self._found)
 
     def add(self, place: Place, where: str, what: str) -> None:
-        """Add a problem, unless there already is a problem for the same key at the same position."""
+        """Add a problem, unless there is already one for the same key at the same position."""
         self._found.setdefault((place, where), Problem(place, where, what))
 
     def raise_if_any(self) -> None:

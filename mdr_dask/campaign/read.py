@@ -27,13 +27,13 @@ def load(path: str | FilePath) -> Campaign:
     Parameters
     ----------
     path : str or Path
-        The YAML file; paths in it are relative to its folder.
+        The YAML file. Names of files in it are relative to its folder.
 
     Raises
     ------
     CampaignError
-        With every problem of the file, by line: ``force.yaml:12:12: parameters.hurst: expected a number of at most 1,
-        got 1.2``.
+        If the file has problems. The message lists all of them by line: ``force.yaml:12:12: parameters.hurst: expected
+        a number of at most 1, got 1.2``.
     """
     return loads(read_text(path), str(path), str(FilePath(path).parent))
 
@@ -53,7 +53,7 @@ def loads(text: str, source: str, directory: str) -> Campaign:
     Raises
     ------
     CampaignError
-        With every problem of the text, by line.
+        If the text has problems. The message lists all of them by line.
     """
     document = parse(text, source)
     if not isinstance(document.data, dict):
@@ -100,7 +100,7 @@ def loads(text: str, source: str, directory: str) -> Campaign:
 
 
 def _spec(document: Document, directory: str) -> tuple[CampaignSpec, set[str]]:
-    """Return the checked keys, with default values for wrong keys, and the names of the wrong keys."""
+    """Return the checked keys, in which wrong keys have default values, and the names of the wrong keys."""
     wrong: set[str] = set()
 
     def report(path: Path, what: str, key: bool) -> None:

@@ -101,7 +101,10 @@ def alternatives_of(model: Model[Any]) -> list[str]:
 
 
 def output_rows(model: Model[Any]) -> list[dict[str, str]]:
-    """Return name, unit, own dimensions, whether computed by default, and meaning of every output of a model."""
+    """Return a row for every output of a model.
+
+    It contains name, unit, own dimensions, whether the output is computed by default, and its meaning.
+    """
     return [
         {
             "output": output.name,

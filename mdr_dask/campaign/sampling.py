@@ -1,4 +1,4 @@
-"""Cases that are not a grid: drawn from intervals, or read from a table."""
+"""Cases that do not form a grid: they are drawn from intervals, or read from a table."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ _NOT_A_HEADING = "expected the name of a parameter, perhaps with a unit in brack
 
 
 def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Variation, ...]:
-    """Return the parameters with one value for each point of a design, drawn from their intervals.
+    """Return the varied parameters with the values of a design: one value of each for every point of the design.
 
-    `seed` is the seed of the scrambling. A longer Sobol sequence begins with the points of a shorter one.
+    The values are drawn from the intervals of the parameters, and `seed` makes the drawing repeatable. A longer Sobol
+    sequence begins with the points of a shorter one.
     """
     import numpy as np
     from scipy.stats import qmc
@@ -48,7 +49,10 @@ def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Va
 
 
 def _exchanged(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return for each pair of points a and b: a, b, and for every input a copy of a with this input taken from b."""
+    """Return the points of the design of Saltelli from pairs of points a and b.
+
+    For each pair these are a, b, and for every input a copy of a in which this input is taken from b.
+    """
     import numpy as np
 
     number, inputs = first.shape
@@ -68,11 +72,13 @@ def tabled(
     problems: Problems,
     remarks: list[str],
 ) -> tuple[Variation, ...] | None:
-    """Return the parameters that a CSV file varies line by line, or None if there is a problem.
+    """Return the parameters with the values in the columns of a CSV file, one case in each line.
 
-    `name` is the name of the file, relative to `directory`, and `origin` its place in the campaign. `data` are the
-    values of the other parameters as read from the campaign file. `problems` receives misspelt columns, units and
-    missing cells; `remarks` receives a sentence about the columns that are not parameters.
+    Return None if there is a problem.
+
+    `name` is the name of the file, relative to `directory`, and `origin` the position of this name in the campaign.
+    `data` are the values of the other parameters as read from the campaign file. `problems` receives misspelt columns,
+    units and missing cells; `remarks` receives a sentence about the columns that are not parameters.
     """
     path = Path(directory, name)
     try:
@@ -107,7 +113,10 @@ def tabled(
 
 
 def _is_unused(heading: str, entries: Iterable[str], parameters: type[Parameters]) -> bool:
-    """Return whether a column is not a parameter; a column of numbers with a similar name is a misspelt parameter."""
+    """Return whether a column is unused, because it is not a parameter.
+
+    A column of numbers whose name is similar to that of a parameter counts as a misspelt parameter instead.
+    """
     if heading.split(".")[0] in parameters.model_fields:
         return False
     has_numbers = any(isinstance(_value(entry, ""), int | float) for entry in entries)

@@ -21,7 +21,8 @@ _QUANTITY_REFERENCE = {"$ref": "#/$defs/quantity"}
 def json_schema() -> Schema:
     """Return the JSON schema (draft 2020-12) of campaign files of all models.
 
-    It accepts every valid file and refuses unknown keys, wrong types and numbers out of bounds; units are not checked.
+    It accepts every valid file. It refuses unknown keys, wrong types and numbers out of bounds, but does not check
+    units.
     """
     root = _readable(CampaignSpec.model_json_schema())
     definitions = {**root.pop("$defs"), **_ranges()}
@@ -41,9 +42,10 @@ def json_schema() -> Schema:
 
 
 def parameters_schema(parameters: type[Parameters], references: str = "#/$defs/{model}") -> Schema:
-    """Return the schema of the ``parameters`` of a model: each is a value, a list or a range.
+    """Return the schema of the key ``parameters`` for a model. Each parameter is a value, a list or a range.
 
-    `references` is the JSON reference to schemas of nested parameter sets, with ``{model}`` for the name of the set.
+    `references` is the JSON reference to the schema of a nested parameter set; ``{model}`` stands for the name of the
+    set.
     """
     own: Schema = _readable(parameters.model_json_schema(ref_template=references))
     own.pop("required", None)

@@ -1,4 +1,4 @@
-"""The tolerances of a campaign, checked against its outputs."""
+"""Read the tolerances of a campaign, and check that they fit its outputs."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ def tolerances(
 
 
 def is_of_fit(name: str, model: Model[Any]) -> bool:
-    """Return whether a name is meant as a fitted constant such as ``zone_one.alpha``, rather than a misspelt output."""
+    """Return whether a name means a fitted constant, such as ``zone_one.alpha``, and is not a misspelt output."""
     return "did you mean" not in did_you_mean(name, [output.name for output in model.outputs])
 
 
 def answers(document: Document, path: Path, given: Mapping[str, Written]) -> dict[str, Tolerance]:
-    """Return the tolerances of fitted constants, by the name ``fit.constant``; a number with ``%`` is relative."""
+    """Return the tolerances of fitted constants by ``fit.constant``; a number with ``%`` is relative."""
     found = {}
     for name, written in given.items():
         constant = name if "." in name else f"{name}.{name}"

@@ -27,7 +27,7 @@ DECADE = 10.0
 
 @dataclass(frozen=True)
 class Origin:
-    """The place where a value is written, for messages: the name of its key, its position, and its path if any."""
+    """The place where a value is written, for messages: name of its key, position, and path if it has one."""
 
     name: str
     place: Place
@@ -35,7 +35,10 @@ class Origin:
 
 
 class Item(NamedTuple):
-    """One value of a varied parameter, as written or in SI; `inner` is True for values between the ends of a range."""
+    """One value of a varied parameter, as written or in SI.
+
+    `inner` is true if the value lies between the ends of a range.
+    """
 
     value: Any
     origin: Origin
@@ -62,7 +65,7 @@ class Variation:
     written: Path = ()
 
     def drawn(self, shares: Any) -> Variation:
-        """Return this variation with the values at fractions (0 to 1) of its interval."""
+        """Return this variation with values at the given fractions (0 to 1) of its interval."""
         assert self.spread is not None
         return replace(self, items=tuple(Item(value, self.origin) for value in self.spread.at(shares)))
 
@@ -77,15 +80,15 @@ def find(
     """Return the varied parameters, in the order of the data, and report wrong ranges and empty lists.
 
     `data` are the values of the parameters as read from the file, and `paths` their paths in the document. If `drawn`
-    is true, values are drawn from the ranges, which then have no number of values. The variation of a parameter with a
-    problem has neither values nor an interval.
+    is true, values will be drawn from the ranges, so a range is written without a number of values. If a parameter has
+    a problem, its variation has neither values nor an interval.
     """
     search = _Search(document, parameters, data, drawn)
     return tuple(found for name, value in data.items() for found in search.below((name,), value, paths[name]))
 
 
 class _MalformedError(Exception):
-    """Ends the reading of a range after a problem of the range was reported."""
+    """Raised to stop reading a range after a problem of the range was reported."""
 
 
 @dataclass(frozen=True)
@@ -231,9 +234,11 @@ class _Search:
 
 
 def spaced(spread: Spread, count: int) -> list[float]:
-    """Return `count` values from one end of an interval to the other; the ends are exact, inner values have 14 digits.
+    """Return `count` values from one end of an interval to the other.
 
-    In an interval of whole numbers each value appears once, so that there may be fewer than `count`.
+    The ends are exact, and the values between them are rounded to 14 digits.
+
+    In an interval of whole numbers each value appears only once, so there may be fewer than `count` values.
     """
     inner = spread.at(np.arange(1, count - 1) / (count - 1))
     ends = [tidy(end, spread.whole, exact=True) for end in (spread.low, spread.high)]

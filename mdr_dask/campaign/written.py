@@ -1,4 +1,4 @@
-"""The numbers of a campaign file as they are written: their units, and questions about numbers without a unit."""
+"""Find the units in which the numbers of a campaign file are written, and ask about numbers without a unit."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def written_units(text: str) -> dict[str, str]:
     Parameters
     ----------
     text : str
-        The text of a campaign file; if it cannot be read, no units are returned.
+        The text of a campaign file. If it cannot be read, the result is empty.
 
     Returns
     -------
     dict of str to str
-        Units by the name of the parameter's coordinate: ``{"rotation_speed": "rpm", "indenter_radius": "mm"}``.
+        Units by the names of the coordinates of the parameters: ``{"rotation_speed": "rpm", "indenter_radius": "mm"}``.
     """
     whole = parse(text, "").data
     data = whole if isinstance(whole, dict) else {}
@@ -47,7 +47,7 @@ def questions(
     paths: Mapping[str, Path],
     units: Mapping[str, str],
 ) -> Iterator[str]:
-    """Yield a question for each parameter with a number without a unit that may have been meant in another unit.
+    """Yield a question for each parameter with a number without a unit that may not be meant in SI.
 
     `data` are the values of the parameters as read from the file, and `paths` their paths in the document. `units` are
     the units that differ from the declared units of parameters, as in a dimensionless campaign.
@@ -74,7 +74,10 @@ def _question(value: float, unit: str, usual: tuple[str, ...]) -> str:
 
 
 def _scalars(value: Any, field: Path, at: Path) -> Iterator[tuple[Path, Path, Any]]:
-    """Yield parameter, position and value of every number and text; a list or range belongs to the varied parameter."""
+    """Yield the parameter, the position and the value of every number and every text.
+
+    The entries of a list or range belong to the parameter that they vary.
+    """
     if isinstance(value, dict):
         for key, inner in value.items():
             if key in RANGES and isinstance(inner, list):
