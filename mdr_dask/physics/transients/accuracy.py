@@ -1,9 +1,9 @@
-"""Velocity jumps on the grids that an accuracy needs, with estimated errors.
+"""Velocity jumps solved to a requested accuracy, with estimated errors.
 
 The steady states before and after a jump, and the instant of the jump, are solved on finer and finer grids
-(:mod:`mdr_dask.physics.refine`). The transient between them is marched on one grid, and is taken as the difference from
-the steady state on that grid. The transient is then accurate even if it is much smaller than the friction. Its error is
-estimated by a second march on half as many nodes with half as many steps.
+(:mod:`mdr_dask.physics.refine`). The transient between them is marched on one grid. Only its difference from the steady
+state on the same grid is used, so that the transient is accurate even if it is much smaller than the friction. Its
+error is estimated by a second march on half as many nodes with half as many steps.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from mdr_dask.physics.transients.velocity_jump import Jump, MarchRequest, Path, 
 FINEST = 64  # largest number of nodes per Nyquist point in steady states
 ORDER = 2  # lower bound of the order of convergence of the steady states
 CAUTION = 2 * SAFETY  # safety factor of steady states: contacts of a few nodes change irregularly from grid to grid
-TRANSIENT = SAFETY  # safety factor of a transient, which converges at first order: single asperities enter contact
+TRANSIENT = SAFETY  # safety factor of a transient; it converges at first order, because single asperities enter contact
 
 
 class Levels(NamedTuple):
@@ -92,14 +92,14 @@ def solve_jumps(
         v_1 tau / L and v_2 tau / L.
     accuracy : float or None
         Allowed relative error of the quantities in `Levels`. The error of a depth that is smaller than h is relative to
-        h. If neither an accuracy nor errors are requested, this is None, and the steady states are solved on the grid
-        of the march.
+        h. With None, the steady states are solved on the grid of the march only; this is allowed if no error estimates
+        are requested.
     oversampling : int
         Nodes per Nyquist point in the march, an even number; the steady states use at least as many nodes.
     march : MarchRequest or None
         Times and accuracy of the march; None if the transient is not requested.
     with_errors : bool
-        Whether the error of the transient is requested. This requires an accuracy.
+        Whether to estimate the error of the transient. This requires an accuracy.
     """
     cases, grid = loads.size, oversampling
     guesses = np.full((cases, 2), np.nan)
@@ -156,9 +156,9 @@ def _change(
 ) -> FloatArray:
     """Return the largest differences of drag and of depth between two paths at and after every given time.
 
-    The paths are the same march on two grids. From each path, the steady state on the same grid is subtracted. The
-    paths are compared at the given times and at all time steps of the fine path. The differences are infinite if there
-    is no path on the coarse grid.
+    The paths are the same march on two grids. The steady state on the same grid is subtracted from each path. The paths
+    are compared at the given times and at all time steps of the fine path. If there is no path on the coarse grid, the
+    differences are infinite.
     """
     if coarse is None:
         return np.full((2, times.size), np.inf)

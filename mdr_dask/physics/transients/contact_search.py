@@ -1,27 +1,27 @@
 """Find the contact patches at one instant after a velocity jump.
 
-The search visits the cells of the line one by one, from the highest point on and in the direction in which the elements
-move. It records where contact last ended and where free elements may have separated (`FreeRecovery`). The force on an
-element in contact is lift + h + D h', where D is the Deborah number v tau in cells, and the lift is the depth plus its
-rate. In each cell that is examined:
+The search visits the cells of the line one by one. It starts at the highest point and follows the direction in which
+the elements move. It records where contact last ended and where free elements may have separated (`FreeRecovery`). The
+force on an element in contact is lift + h + D h', where D is the Deborah number v tau in cells, and the lift is the sum
+of the depth and the rate of the depth. In each cell that is examined:
 
 * Inside a patch, contact ends where the force falls through zero, or where free elements arrive with a displacement
   larger than the depth plus the height of the line (contact is then lost although the contact force is positive).
 * Outside a patch, contact begins where the line rises above the free elements and the force would be positive.
 
-A patch is added to the sums when its end is found. Most cells can be skipped because of three bounds, which are
-rigorous: no contact is missed.
+A patch is added to the sums when its end is found. Most cells can be skipped because of three bounds. The bounds are
+rigorous, so that no contact is missed.
 
-* A cell in contact is skipped under two conditions. The force was positive everywhere in the cell while the elements
-  that are now further along the line passed it. And the displacement u of free elements cannot exceed w = depth + h
-  there. Along the line u' = (drift - u) / D, so that u stays below w wherever w + D h' exceeds the largest drift (see
-  `free_recovery`).
+* A cell in contact is skipped under two conditions. First, the force was positive everywhere in the cell while the
+  elements that are now further along the line passed the cell. Second, the displacement u of free elements cannot
+  exceed w = depth + h in the cell. Along the line u' = (drift - u) / D, so that u stays below w wherever w + D h'
+  exceeds the largest drift (see `free_recovery`).
 * A free cell is skipped if its highest point is below a lower bound of the displacement of the free elements. The bound
   is computed along the line from the last known displacement and the least drift.
 * A free cell is also skipped if its gap is wider than any gap that can have opened since the elements separated,
-  because the cell was then out of contact all the time. It is skipped until the line has approached by the width of the
-  gap. The gap closes at most at the rate of the depth plus the largest drift. The integral of this rate over time is
-  the *approach*.
+  because the cell was then out of contact all the time. The cell is skipped until the line has approached by the width
+  of the gap. The gap closes at most at the rate of the depth plus the largest drift. The integral of this rate over
+  time is called the *approach*.
 
 Elements that travel more than a whole period of the line can pass the highest point out of contact. In that case the
 search is repeated with the places of separation of the previous period.
@@ -145,7 +145,7 @@ class Workspace(NamedTuple):
 def workspace_for(patches: int, barriers: Barriers, below: FloatArray) -> Workspace:
     """Return a workspace with a capacity of four times the given number of patches, plus 4096.
 
-    `below` is the increase of depth, for each cell, up to which the cell certainly stays out of contact.
+    For each cell, `below` is the increase of the depth up to which the cell certainly stays out of contact.
     """
     start, end = np.empty((2, 4 * patches + 4096))
     bounds = PathBounds(*np.empty((5, WINDOWS)))
@@ -161,9 +161,10 @@ class Motion(NamedTuple):
 
     Parameters
     ----------
-    rise, fall : float
-        Largest mean rate at which the lift has risen from any earlier moment until now, and largest rate at which the
-        lift has fallen between two successive moments.
+    rise : float
+        Largest mean rate at which the lift has risen from an earlier moment until now.
+    fall : float
+        Largest rate at which the lift has fallen between two successive moments.
     deepest, highest : float
         Largest depth and largest lift so far.
     passes_top : bool
@@ -446,8 +447,8 @@ def _examine(search: Search, i: int, contact: bool, found: int) -> tuple[bool, i
 def _contact_end(search: Search, cell: Cell, x: float) -> tuple[float, float, bool, bool]:
     """Return where contact ends in a cell from x on, the place from which elements are free, and two flags.
 
-    The first flag is True if contact ends because free elements arrive with a displacement beyond the line, the second
-    flag if the force falls to zero. Both are False if contact does not end in the cell.
+    The first flag is True if contact ends because free elements arrive with a displacement beyond the line. The second
+    flag is True if the force falls to zero. If contact does not end in the cell, both are False.
     """
     now, scan, recovery, (c0, c1, c2, c3) = search.now, search.work.scan, search.work.recovery, cell.line
     place = NONE
@@ -575,7 +576,7 @@ def _add_edge(search: Search, place: float, steep: float, by_depth: float, openi
 
 @jit_inline_uncounted
 def _add_separation(search: Search, place: float) -> None:
-    """Add a place where the force falls to zero now, with the farthest such place since the jump."""
+    """Add a place where the force falls to zero now, and the farthest place where it may have done so since then."""
     now, recovery, highest = search.now, search.work.recovery, search.motion.highest
     i = min(int(place), search.n)
     h, slope, _ = height_at(now.track, i + 1.0)

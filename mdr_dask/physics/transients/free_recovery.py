@@ -27,9 +27,9 @@ from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted, last_until
 from mdr_dask.physics.transients.patches import History, Patches, Track, height_at
 
 ITERATIONS = 60  # largest number of iterations of Newton's method with bisection
-NEAR = 0.02  # cells: last Newton step towards a place of separation; the error is about the cube of this step
+NEAR = 0.02  # cells: largest last Newton step towards a place of separation; the error is about the cube of this step
 STRIDE = 2.0  # cells: longest step towards a place of separation
-MET = 1e-3  # cells: last step towards the place where contact begins; the error is about the cube of this step
+MET = 1e-3  # cells: largest last step towards the place where contact begins; the error is about the cube of this step
 CREST = 1e-3  # cells: resolution of the place in a cell where the gap between line and free elements is smallest
 FARTHEST = 200  # cells before x in which the place of separation is searched for in a stretch
 MARGIN = 64.0  # cells added to twice a distance when the window of a bound is chosen
@@ -62,7 +62,7 @@ class Instant(NamedTuple):
 class PathBounds(NamedTuple):
     """Bounds over windows of time that end now, shape (WINDOWS,) each.
 
-    During the shortest window the line travels `WINDOW` cells, and during every next window twice as many.
+    During the shortest window the line travels `WINDOW` cells. Each further window is twice as long as the one before.
 
     Parameters
     ----------
@@ -305,9 +305,10 @@ def gap_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float
 def contact_begin(
     now: Instant, recovery: FreeRecovery, low: float, high: float, x: float
 ) -> tuple[float, float, float, float]:
-    """Return where the line rises above free elements, and slope, depth derivative and rate of the gap there.
+    """Return where the line rises above free elements, and three properties of the gap at this place.
 
-    `x` is the first guess, between `low` and `high`.
+    The properties are the slope of the gap, its derivative with respect to the depth, and its rate. `x` is the first
+    guess, between `low` and `high`.
     """
     slope, by_depth, opening = 1.0, 1.0, 0.0
     for _ in range(ITERATIONS):

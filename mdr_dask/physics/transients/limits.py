@@ -43,13 +43,14 @@ class PreparedLine(NamedTuple):
 
     @classmethod
     def of(cls, line: CubicLine) -> PreparedLine:
-        """Return a line with its cells, blocks and track, without barriers."""
+        """Prepare a line. Its barriers are computed later, when they are needed."""
         cells = cut(line)
         return cls(cells, blocks_of(cells), track_of(cells), {})
 
     def barriers(self, deborah: float) -> Barriers:
-        """Return the barriers at a Deborah number in cells, and store them, because successive cases often need the
-        same.
+        """Return the barriers at a Deborah number in cells.
+
+        They are stored, because successive cases often have the same Deborah number.
         """
         if deborah not in self.known:
             if len(self.known) >= max(KEPT_CELLS // self.cells.mean.size, KEPT_SPEEDS):
@@ -66,7 +67,9 @@ class PreparedLine(NamedTuple):
 
 
 class SteadyLimits(NamedTuple):
-    """Steady states before and after a jump, and the instant of the jump; drags are F_x / (4 G L), height^2 / length.
+    """Steady states before and after a jump, and the instant of the jump.
+
+    Drags are F_x / (4 G L), in the unit of height squared divided by the unit of length.
 
     Parameters
     ----------
@@ -78,8 +81,8 @@ class SteadyLimits(NamedTuple):
     depth : array, shape (2,)
         Steady depth before and after the jump.
     first, slower : Patches or None
-        Contact before the jump, and contact in steady sliding at the lower velocity; None if a steady state was not
-        found.
+        Contact before the jump, and contact in steady sliding at the lower of both velocities. Both are None if a
+        steady state was not found.
     contact : array, shape (2,)
         Fraction of the line in contact in steady sliding before and after the jump.
     outcome : Outcome

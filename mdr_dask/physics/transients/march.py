@@ -29,7 +29,7 @@ TRIALS = 80  # largest number of Newton steps for the depth at one moment
 ORDER = 3  # order of the backward differentiation
 EXACT = 1e-11  # relative error of the load below which no Newton step is needed
 NEWTON_LOAD = 0.03  # largest relative error of the load before the last Newton step
-SETTLED = 1.5  # a march ends when depth and drag meet `Finish` from some time until this factor times that time
+SETTLED = 1.5  # a march ends when depth and drag have met `Finish` from a time t until this factor times t
 LEFT_LIMITS = -1  # outcome of a march whose depth leaves the interval for which the reachable cells are known
 
 
@@ -95,7 +95,10 @@ class Marching(NamedTuple):
 
 
 class Trajectory(NamedTuple):
-    """Time, log(1 + t / onset), depth and its rate, drag and its rate at every moment, from just after the jump on."""
+    """Time, log(1 + t / onset), depth and its rate, drag and its rate at every moment.
+
+    The first moment is just after the jump. Rates are derivatives with respect to t / tau.
+    """
 
     time: FloatArray
     place: FloatArray
@@ -107,7 +110,7 @@ class Trajectory(NamedTuple):
 
 @jit_uncounted
 def _drag_rate(sums: FloatArray, stiff: float, step: float) -> float:
-    """Return the rate of the drag at constant load: growing patches add load, and the lift falls to compensate.
+    """Return the rate of the drag at constant load. Growing patches add load; the lift falls to compensate for it.
 
     `step` is the last Newton step of the depth. It also changes the rate of the depth, and therefore the growth of the
     patches at their edges.
@@ -165,10 +168,10 @@ def _balance(
 
 @jit_uncounted
 def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
-    """Return the weights a and b of the rate of the depth, a d + b, at moment `now` of a march with a known first rate.
+    """Return the weights a and b of the rate of the depth, a d + b, at moment `now` of a march.
 
     The weights are those of backward differentiation with respect to log(1 + t / onset). As a function of this variable
-    the relaxation is smooth, and the steps are equal.
+    the relaxation is smooth, and the steps are equal. The first step uses the known rate just after the jump instead.
     """
     time, place, depth = found.time, found.place, found.depth
     if now == 1:

@@ -195,18 +195,18 @@ def keeps_pressed(track: Track, barriers: Barriers, deborah: float, i: int, lift
 
 @jit_uncounted
 def released(track: Track, first: Patches, barriers: Barriers, deborah: float, rate: float, sums: FloatArray) -> None:
-    """Add up the forces just after a jump: contact continues where the force is positive at the new rates.
+    """Add up the forces just after a jump. Contact continues only where the force is positive at the new rates.
 
     Parameters
     ----------
     track, first : Track, Patches
-        The line, and the state before the jump; displacements and depth are the same just after the jump.
+        The line, and the contact before the jump. Displacements and depth do not change at the jump.
     barriers : Barriers
         Barriers at the new Deborah number.
     deborah, rate : float
         New Deborah number, and new rate of the depth.
     sums : array, shape (SUMS,)
-        Written: load and drag, divided by 4 G dx; length in contact, which is also the derivative of the load with
+        Results: load and drag, divided by 4 G dx; length in contact, which is also the derivative of the load with
         respect to the rate; and integral of the slope over the length in contact.
     """
     sums[:] = 0.0

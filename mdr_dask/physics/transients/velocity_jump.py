@@ -27,8 +27,10 @@ ONSET = 0.5  # time after which the steps grow in a constant ratio, divided by t
 ROOT = 10.0  # the first step is smaller by this factor if the velocity falls, because contact then grows as sqrt(t)
 # NEWTON and SETTLED are divided by the number of steps per decade
 NEWTON = 0.2  # largest last Newton step, divided by the change of depth; the error is about the square of the step
-SETTLED = 0.04  # distances of depth and drag from the steady values at the end of a march, divided by their changes
-OF_ACCURACY = 0.1  # distance of the drag from its steady value that is always near enough, divided by its allowed error
+SETTLED = (
+    0.04  # distances from the steady depth and drag at which a march ends, divided by the changes of depth and drag
+)
+OF_ACCURACY = 0.1  # distance from the steady drag that is always small enough, divided by the allowed error of the drag
 NEGLIGIBLE = 1e-5  # smallest change of depth that is used in these ratios, divided by the mean displacement
 # the march has failed if, after LONG relaxation times, the drag differs from the steady drag by more than
 # NOT_STEADY[0] times the range of the drag plus NOT_STEADY[1] times the steady drag
@@ -54,8 +56,8 @@ class MarchRequest(NamedTuple):
         Steps per factor of ten in time.
     accuracy : float
         Allowed error of the friction relative to the steady friction after the jump. A transient that is smaller than
-        this error is not marched. A march ends when drag and depth are near enough to the steady values; a tenth of
-        this error is always near enough.
+        this error is not marched. A march ends when drag and depth are close enough to the steady values; for the drag,
+        a tenth of this error is always close enough.
     """
 
     times: FloatArray
@@ -71,7 +73,7 @@ class Path(NamedTuple):
     ----------
     time : array, shape (moments,)
     values, rates : array, shape (2, moments)
-        The first rate of the drag is NaN because it is unknown.
+        Drag and depth, and their derivatives with respect to time. The first rate of the drag is unknown and is NaN.
     falls : bool
         Whether the velocity falls.
     """
@@ -85,8 +87,8 @@ class Path(NamedTuple):
         """Return drag and depth at increasing times, shape (2, times); after the last moment they are equal to `after`.
 
         Between moments both are cubic in log(1 + t / t_1), where t_1 is the first moment after the jump. Before t_1
-        both change in proportion to the time, or, if the velocity falls, to the square root of the time, because
-        contact then grows behind every patch.
+        both change in proportion to the time. If the velocity falls, both change in proportion to the square root of
+        the time instead, because contact then grows behind every patch.
         """
         power = 0.5 if self.falls else 1.0
         moments, wanted = (self.time / self.time[1]) ** power, (times / self.time[1]) ** power
@@ -272,7 +274,10 @@ class _Relaxation(NamedTuple):
         return path, Outcome.CONVERGED
 
     def begun(self, interval: tuple[float, float]) -> tuple[Marching, Trajectory, Workspace]:
-        """Return a march whose depth stays in an interval, its trajectory with the first moment, and its workspace."""
+        """Return the constants of a march whose depth stays in an interval, its trajectory and its workspace.
+
+        The trajectory contains the first moment.
+        """
         line, limits, stepping = self.line, self.limits, self.stepping
         assert limits.first is not None
         assert limits.slower is not None

@@ -1,7 +1,7 @@
 """One element of a viscoelastic foundation during one step: moved at constant speed, or recovering without force.
 
-`terms` contains the strains of the dashpots of the Prony terms of all elements, shape (n, terms), and i is the index of
-one element: passing an index is faster than slicing.
+In all functions, `terms` contains the strains of the dashpots of the Prony terms of all elements, shape (n, terms), and
+i is the index of one element. An index is passed, because this is faster than slicing.
 
 Units: the static modulus is 1, heights are in any unit, lengths in the length of the line, all times in the same unit.
 """
@@ -207,9 +207,10 @@ def release(
 def free_after(
     solid: Foundation, lapse: Lapse, u0: float, part: float, leaves: float, terms: FloatArray, i: int
 ) -> float:
-    """Return the displacement after a duration of an element that is pressed to `leaves` for a part of it, then free.
+    """Return the displacement of an element at the end of a duration.
 
-    The strains of the element after the duration are written to `lapse.strains`; `terms` is not changed.
+    During the fraction `part` of the duration the element is moved to the displacement `leaves`; then it is free. The
+    strains of the element at the end are written to `lapse.strains`; `terms` is not changed.
     """
     strains, decay, fades = lapse.strains, lapse.part_decay, lapse.part_fades
     for m in range(solid.times.size):
@@ -251,7 +252,7 @@ def advance(
     """
     if w1 > after:
         rest, fades = lapse.time, lapse.fades
-        if not touching:  # contact begins where the line, relative to the free element, reaches zero
+        if not touching:  # contact begins when the gap vanishes, which is taken as linear in time
             part = (u0 - w0) / ((u0 - w0) + (w1 - after)) if u0 > w0 else 0.0
             fading(solid, part * lapse.time, lapse.part_decay, lapse.part_fades)
             u0 = recover(solid, u0, terms, i, lapse.part_decay, lapse.modes) if part > 0 else u0

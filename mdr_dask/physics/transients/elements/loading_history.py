@@ -191,8 +191,9 @@ def follow_line(
     """Compute the motion of every element of a linear foundation under a line during a loading history.
 
     During a step an element in contact moves at constant speed, and a free element recovers by the modes of the solid.
-    Contact begins inside a step when the gap vanishes, and ends when the force vanishes. The load determines the mean
-    displacement, whichever elements are in contact, so that the depth is the root of a convex function.
+    Contact begins inside a step when the gap vanishes, and ends when the force vanishes. The load alone determines the
+    mean displacement; it does not matter which elements are in contact. Therefore the depth is the root of a convex
+    function.
 
     Parameters
     ----------
@@ -220,7 +221,7 @@ MOST_STEPS = 400_000  # largest number of steps in one piece of a history
 CELLS = 6.0  # largest travel in a step, cells
 PART = 0.12  # largest step, as a fraction of the duration of a ramp or of the period of an oscillation
 FIRST = 0.012  # first step, as a fraction of the longest step or of the unit of time, whichever is smaller
-NEARLY = 1e-2  # a moment that is nearer to a requested time than this fraction of a step is left out
+NEARLY = 1e-2  # a moment is left out if its distance from a requested time is less than this fraction of a step
 ROUNDING = 1e-12  # relative difference of times that counts as a rounding error
 
 
@@ -333,8 +334,8 @@ def trace(
     line, solid
         As in :func:`~mdr_dask.physics.transients.elements.loading_history.follow_line`.
     before : tuple of float
-        Velocity and load until t = 0: the body slides steadily, or is at rest if the velocity is 0. Both may jump at t
-        = 0.
+        Velocity and load until t = 0. The body slides steadily until then, or is at rest if the velocity is 0. Velocity
+        and load may jump at t = 0.
     pieces : sequence of Piece
         Velocity and load from t = 0 on; the last piece has no end.
     times : array, shape (m,)

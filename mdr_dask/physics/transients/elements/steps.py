@@ -31,7 +31,7 @@ class Edges(NamedTuple):
     """Edges of contact in the cell before each element, at the last moment at which the edge followed from the force.
 
     `place` is the distance of the edge from the element in contact, in cells, or -1 if there is no edge. `gap` is the
-    gap at the neighbouring element out of contact at that moment.
+    gap, at that moment, at the other end of the cell, where the element is out of contact.
     """
 
     place: FloatArray
@@ -45,9 +45,10 @@ class Contact(NamedTuple):
     ----------
     gaps, slope : array
         Distance between the line and the position that an element would have without contact, and slope of the line.
-    pulls, force, power : array
-        Force of spring and Prony terms of an element that follows the line; written: the total force, and the product
-        of the total force and the slope.
+    pulls : array
+        Force of spring and Prony terms of an element that follows the line.
+    force, power : array, output
+        Total force of this element, and the product of this force and the slope.
     touching : bool array
     edges : Edges
     """
@@ -96,7 +97,7 @@ def under_elements(line: CubicLine, travel: float, under: FloatArray, slope_unde
 
 @jit
 def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) -> tuple[float, bool]:
-    """Return the depth d at which the mean displacement max(d + h, free) has a given value, and success.
+    """Return the depth d at which the mean displacement max(d + h, free) has a given value, and whether it was found.
 
     h is the height of the line at an element (`under`), and `free` the displacement of the element without contact. The
     mean is a convex, increasing function of d.
@@ -295,7 +296,7 @@ def mean_after(solid: Foundation, state: State, load: float, next_load: float, s
 def _load_instantly(
     solid: Foundation, state: State, under: FloatArray, load: float, depth: float
 ) -> tuple[float, bool]:
-    """Load elements without a dashpot instantly; return the depth and success."""
+    """Load elements without a dashpot instantly; return the depth, and whether it was found."""
     n, mean = under.size, 0.0
     for j in range(n):
         state.free[j] = at_rest(solid, state.terms, j)
@@ -433,7 +434,7 @@ def _step(
     guess: float,
     deborah: tuple[float, float],
 ) -> tuple[float, bool]:
-    """Move all elements through a step to a mean displacement; return the depth and success.
+    """Move all elements through a step to a mean displacement; return the depth, and whether it was found.
 
     `deborah` has v tau / L at the start and at the end of the step.
     """
@@ -460,8 +461,8 @@ def forces_now(
 
     Return the depth, its rate, the drag and the fraction of the line in contact.
 
-    Without a dashpot the depth is corrected so that the load is met. The depth from the mean displacement is less
-    accurate, because it follows from a sum over the elements.
+    Without a dashpot the depth is corrected until it carries the load. The depth that follows from the mean
+    displacement is less accurate, because this mean is a sum over the elements.
     """
     gaps, pulls = workspace.gaps, workspace.pulls
     for j in range(workspace.under.size):
