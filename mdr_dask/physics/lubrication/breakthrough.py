@@ -3,8 +3,9 @@
 The film ``h0`` separates the two lines; where the sum ``z`` of their heights exceeds the film, they overlap. A cluster
 is one connected interval of overlap, with the length ``D`` and the force ``F = E* int (z - h0) dx`` (eq. 5.5). A
 cluster breaks the layer if ``pi tau0 D^3/(12 F) < h_c`` (eq. 5.6), that is, if ``int (z - h0) dx > s D^3`` with the
-layer strength ``s = pi tau0/(12 E* h_c)``. tau0, E* and h_c enter only through s. Lines are closed (periodic) cubic
-splines, for which these integrals are exact. The contact is a window; one window begins at each node.
+layer strength ``s = pi tau0/(12 E* h_c)``. The shear strength tau0 of the layer, the contact modulus E* and the
+critical thickness h_c enter only through s. Lines are closed (periodic) cubic splines, for which these integrals are
+exact. The contact zone is a window of given width; one window begins at each node.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ PARTS = 64
 
 
 def layer_strength(shear_strength: ArrayLike, E_star: ArrayLike, thickness: ArrayLike) -> FloatArray:
-    """Return ``s = pi tau0/(12 E* h_c)`` in 1/m; a parabolic asperity breaks the layer if its curvature exceeds 12 s.
+    """Return ``s = pi tau0/(12 E* h_c)`` in 1/m. A parabolic asperity breaks the layer if its curvature exceeds 12 s.
 
     Parameters
     ----------
@@ -45,7 +46,7 @@ def layer_strength(shear_strength: ArrayLike, E_star: ArrayLike, thickness: Arra
 
 @jit
 def _counted(length: float) -> int:
-    """Return a length, given in spacings, as a whole number of parts of a spacing; at least one part."""
+    """Return a length, given in spacings, in units of 1/`PARTS` of a spacing: a whole number, at least 1."""
     return max(1, int(length * PARTS + 0.5))
 
 
@@ -70,7 +71,10 @@ def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> Non
 
 @jit
 def _add(jumps: NDArray[np.int32], at: int, number: int) -> None:
-    """Add `number` to the position `at` of the closed trace, like `_block`; `at` is at most one length outside."""
+    """Add `number` to the position `at` of the closed trace, like `_block`.
+
+    `at` may lie outside the trace by at most the length of the trace.
+    """
     points = jumps.size - 1
     at = at + points if at < 0 else at - points if at >= points else at
     jumps[at] += number
@@ -214,7 +218,7 @@ def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
 def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work: FloatArray) -> tuple[float, float]:
     """Return the length and the force of the part of a cluster beyond an edge of the window.
 
-    The cluster is followed by at most `most`, to the right if `most` is positive, and to the left otherwise.
+    The cluster is followed over at most the distance `most`: to the right if `most` is positive, else to the left.
     """
     overlap, found = work[:4], work[4:]
     direction = 1 if most > 0 else -1
@@ -319,8 +323,7 @@ def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> 
     points : int
         Points of each line.
     slide_roll_ratio : float
-        ``S = (v1 - v2)/u`` with the mean velocity u: the lines move by ``1 + S/2`` and ``1 - S/2`` times the
-        travel.
+        ``S = (v1 - v2)/u`` with the mean velocity u. The lines move by ``1 + S/2`` and ``1 - S/2`` times the travel.
 
     Returns
     -------
@@ -333,7 +336,7 @@ def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> 
 
 
 def contact_resistance(resistivity: ArrayLike, contact_length: ArrayLike) -> FloatArray:
-    """Return ``R_c = rho/L_cont`` in ohm (thesis eq. 5.1: parallel spots of equal material); infinite without contact.
+    """Return the resistance ``R_c = rho/L_cont`` in ohm of parallel spots (thesis eq. 5.1); infinite without contact.
 
     Parameters
     ----------

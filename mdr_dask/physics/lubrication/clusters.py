@@ -17,8 +17,8 @@ class Clusters(NamedTuple):
     Parameters
     ----------
     start, end : array, shape (n,)
-        Beginning and end of each cluster in spacings. A cluster across the seam of the closed line ends beyond the last
-        node.
+        Beginning and end of each cluster in spacings. If a cluster contains the seam of the closed line, its end lies
+        beyond the last node.
     total : array, shape (n,)
         Integral of ``z - h0`` over each cluster, in m times spacings.
     overlap : array, shape (points + 3,)

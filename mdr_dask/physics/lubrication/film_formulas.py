@@ -150,7 +150,7 @@ def dimensionless_groups(
 
 @dataclass(frozen=True)
 class FilmFormula:
-    """A regression ``h/R = factor W^load U^speed G^material`` and the ranges of the numbers to which it was fitted.
+    """A regression ``h/R = factor W^load U^speed G^material``, and the ranges of W, U and G in which it was fitted.
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ def limiting_films(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:
 
 
 def expected_film(M: float, L: float) -> float:
-    """Return an estimate of the film in units of ``a^2/R`` from the four limiting regimes, used as a first guess."""
+    """Return a first guess of the film in units of ``a^2/R``, estimated from the four limiting regimes."""
     rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(M, 0.5, L) * np.pi / (8 * M)
     return float(max(min(rigid_piezo, elastic_piezo), max(rigid_iso, elastic_iso)))
 
@@ -282,7 +282,7 @@ def regime(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> NDArray[np.intp]:
 
     Elastic flattening makes an isoviscous film thicker and a piezoviscous film thinner. So the isoviscous film is the
     thicker of its two limits, and the piezoviscous film is the thinner of its two limits. The limit that gives the
-    thicker of these two films determines the regime. Moes' interpolation formula has this limit for a sharp transition.
+    thicker of these two films determines the regime. For a sharp transition, Moes' formula gives the same regimes.
     """
     rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(W, U, G)
     isoviscous = np.where(elastic_iso > rigid_iso, 2, 0)

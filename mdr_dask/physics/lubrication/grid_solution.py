@@ -19,7 +19,7 @@ _SPIKE = 0.01
 #: Number of nodes on either side of a position that the interpolating polynomial uses. The minimum film on coarse grids
 #: needs three nodes on either side.
 _CUBIC, _QUINTIC = 2, 3
-#: Distance, as a fraction of a cell, by which the pressure on a grid ends too early if the film ends at a node.
+#: Distance, as a fraction of a cell, by which the computed pressure ends too far upstream if the film ends at a node.
 _TOO_EARLY = 0.035
 
 
@@ -27,10 +27,9 @@ _TOO_EARLY = 0.035
 class GridSolution:
     """Pressure in units of p0, and film in units of ``a^2/R``, at the nodes of one grid.
 
-    `central` is the film at ``X = 0``, and `spacing` is the ratio of the node spacing to the spacing given by the
-    density of nodes. The numerical method uses a pressure that is linear between
-    two nodes, so that its film sags between the nodes. Therefore :meth:`film_between` uses a polynomial through the
-    nodes.
+    `central` is the film at ``X = 0``. `spacing` is the distance between nodes divided by the distance that the density
+    of nodes gives. The numerical method uses a pressure that is linear between two nodes, so that its film sags between
+    the nodes. Therefore :meth:`film_between` uses a polynomial through the nodes.
     """
 
     nodes: FloatArray
@@ -77,9 +76,9 @@ class GridSolution:
 
     @cached_property
     def minimum(self) -> tuple[float, float]:
-        """Position and height of the minimum film, interpolated between the nodes around the lowest one.
+        """Position and height of the minimum film, interpolated between the nodes around the lowest node.
 
-        The polynomial is quintic, because the error of a cubic exceeds the remaining error of the grids.
+        The polynomial is quintic, because the interpolation error of a cubic exceeds the other errors of the solution.
         """
         i = int(np.clip(np.argmin(self.film), 1, self.film.size - 2))
         low, high = float(self.nodes[i - 1]), float(self.nodes[i + 1])
@@ -153,8 +152,8 @@ def expected(
 ) -> FloatArray:
     """Return the expected value of a quantity on a grid of another spacing.
 
-    With two earlier grids, the value is extrapolated with the second order of the error; with one, it is the value on
-    that grid.
+    If there are two earlier grids or more, the value is extrapolated from the last two, assuming an error of second
+    order in the spacing. If there is only one earlier grid, the value on this grid is returned.
     """
     last = np.asarray(reading(before[-1]))
     if len(before) == 1:

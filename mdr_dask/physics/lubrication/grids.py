@@ -67,13 +67,13 @@ def _placed(positions: FloatArray, density: FloatArray, number: FloatArray, want
 def aligned(
     positions: FloatArray, density: FloatArray, count: int, rupture: float, front: float = np.nan
 ) -> tuple[FloatArray, float]:
-    """Return nodes with a given density; the film ends at a node, and no node is within half a cell of the front.
+    """Return nodes with a given density; the film ends at a node, and the front lies near the middle of a cell.
 
-    The film ends somewhere inside a cell. The error of the film depends on this position by up to a tenth, and is least
-    if the film ends at a node. Therefore errors on different grids can be compared only if the film ends at a node on
-    every grid. Behind a sharp spike, the pressure falls within one or two cells, and the minimum film depends on the
-    position of these cells. Therefore the cells are made slightly wider or narrower, until the front lies in the middle
-    of a cell.
+    Without alignment, the film would end somewhere inside a cell. The error of the film varies by up to a tenth with
+    the position of this end in the cell, and is least if the film ends at a node. Errors on different grids can
+    therefore be compared only if the film ends at a node on every grid. Behind a sharp spike, the pressure falls within
+    one or two cells, and the minimum film depends on the position of these cells. Therefore the cells are made slightly
+    wider or narrower, so that the front lies near the middle of a cell.
 
     Parameters
     ----------
@@ -89,8 +89,8 @@ def aligned(
     Returns
     -------
     tuple of array and float
-        Ascending nodes, of which the last lies at or behind the last position; and the spacing of the nodes in cells of
-        the density.
+        Ascending nodes, of which the last lies at or behind the last position; and the spacing of the nodes divided by
+        the spacing that the density gives.
     """
     number = _cells(positions, density)
     reached = _cells_before(rupture, positions, density, number)
@@ -169,9 +169,9 @@ def second_derivative(nodes: FloatArray, values: FloatArray) -> FloatArray:
 def adapted_density(nodes: FloatArray, pressure: FloatArray, film: FloatArray, central_film: float) -> FloatArray:
     """Return the density of nodes that is suitable for a solution, shape (n,).
 
-    The flow error is of second order, so the density grows with the square root of the film's curvature divided by the
-    film. The deformation error is an integral over an element, so the density grows with the cube root of the
-    pressure's curvature. A least density provides nodes in the contact and in the inlet, and smoothing makes
+    The density has two terms. The error of the flow is of second order; its term is the square root of the curvature of
+    the film divided by the film. The error of the deformation is an integral over an element; its term is the cube root
+    of the curvature of the pressure. A least density provides nodes in the contact and in the inlet. Smoothing makes
     neighbouring cells similar.
     """
     length = max(1.0, float(np.sqrt(2 * central_film)))

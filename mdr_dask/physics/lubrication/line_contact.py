@@ -5,8 +5,8 @@ Hertz units: ``X = x/a``, ``P = p/p0``, ``H = h R/a^2`` (thesis eq. B.13), with 
 and an incompressible liquid the solution depends on two numbers only, Moes' M and L.
 
 The first solution on a coarse grid gives the density of nodes for all other grids. A case is then solved on grids of
-40, 80, 160, ... nodes with this density. The scheme is of second order, so two grids together give a value of third
-order; the changes of this value from grid to grid give the error (`mdr_dask.physics.refine`).
+40, 80, 160, ... nodes with this density. The scheme is of second order. Extrapolation from two grids gives a value of
+third order, and the changes of this value from grid to grid give the error (`mdr_dask.physics.refine`).
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ VISCOSITY_LAWS = ("barus", "roelands")
 
 #: Numbers of nodes of the grids. On the finest grid, a Newton step solves 1281 dense equations in about 0.1 s.
 NODES = (40, 80, 160, 320, 640, 1280)
-#: Order in the spacing of the values extrapolated from two grids, and ratio of the stated error to the last change of
-#: these values.
+#: `ORDER` is the order of convergence of the values extrapolated from two grids. `FACTOR` is the ratio of the stated
+#: error to the last change of these values.
 ORDER = 3.0
 FACTOR = SAFETY / (2.0**ORDER - 1)
 #: Number of nodes of the two grids that are solved to obtain the density of nodes.
@@ -44,10 +44,10 @@ ADAPTED_NODES = 161
 #: nodes; step limits of Newton's method. The second attempt takes small steps from a thick film on a fine grid; it is
 #: slow but hardly ever fails.
 ATTEMPTS = ((1.5, 0.2, 121, Pace(0.12, 80)), (2.5, 0.4, 361, Pace(0.05, 200)))
-#: Step limits on further grids. The first limits belong to an extrapolated initial guess; if this guess fails, the
-#: second limits are used from the previous solution.
+#: Step limits on further grids. The first limits are used with an extrapolated initial guess. If this fails, the
+#: solution on the previous grid is used as the initial guess, with the second limits.
 PACES = (Pace(0.12, 16), Pace(0.03, 250))
-#: Least stated error of a position, in cells of the grid.
+#: Smallest stated error of a position, in cells of the grid.
 PLACED = 0.1
 #: Distance, in cells of the coarser grid, within which the largest error of a profile is used, because the position of
 #: a steep front differs between the grids.
@@ -201,7 +201,7 @@ class LineSolution:
         return abs(float(np.trapezoid(self.finest.pressure, self.finest.nodes)) / (np.pi / 2) - 1)
 
     def estimate(self, reading: Reading) -> Estimate:
-        """Return a quantity that is evaluated on each grid, such as a traction, with its error."""
+        """Return a quantity, such as a traction, with its error; `reading` evaluates the quantity on one grid."""
         values = [_extrapolated(reading, *pair) for pair in _pairs(self.grids)]
         return Estimate(np.asarray(values[-1]), np.asarray(_error(values)))
 
@@ -356,13 +356,14 @@ def solve_film(
     readings : sequence of callable, GridSolution -> float or array
         Further quantities, or profiles at fixed positions, that must meet the accuracy.
     floors : sequence of float
-        For each reading, a magnitude. If the reading is smaller, its error is relative to this magnitude; 0 by default.
+        One magnitude for each reading, 0 by default. If the reading is smaller than this magnitude, its error is
+        relative to the magnitude instead of the reading.
 
     Returns
     -------
     LineSolution
-        If no film was found, the outcome is not CONVERGED and there is a reason. The `error` may exceed the
-        accuracy if the finest grid is reached, or if Newton's method fails on finer grids.
+        If no film was found, `outcome` and `reason` say why. The `error` may exceed the accuracy if the finest grid is
+        reached, or if Newton's method fails on finer grids.
 
     Examples
     --------

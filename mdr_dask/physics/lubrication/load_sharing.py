@@ -8,7 +8,7 @@ The asperities are represented by the springs of the MDR. A line as long as its 
 edges of this length; its springs of stiffness ``E* dx`` carry ``E* dx`` times their overlap. The contact consists of
 equal squares, so the mean pressure is ``E*/wavelength`` times the mean overlap of the two lines. The lines approach
 until the mean gap equals the film: ``<(d - z)+> = h``, where d is the distance of the mean lines, z the sum of both
-heights and h the film. Above two rms heights, d and h are nearly equal.
+heights and h the film. If h exceeds two rms heights, d and h are nearly equal.
 """
 
 from __future__ import annotations

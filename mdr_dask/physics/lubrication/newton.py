@@ -163,8 +163,8 @@ def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
 class Imbalance(NamedTuple):
     """Inflow minus outflow of every volume, shape (n,), and its derivatives, shape (n, 4).
 
-    Row i has the derivatives of the imbalance of volume i with respect to pressure and film at the nodes i - 2 to i +
-    1.
+    Row i contains the derivatives of the imbalance of volume i with respect to pressure and film at the four nodes from
+    i - 2 to i + 1.
     """
 
     value: FloatArray
@@ -238,8 +238,8 @@ def _fill_jacobian_row(
 def _fill_active(influence: FloatArray, P: FloatArray, found: Imbalance, active: NDArray[np.int64]) -> int:
     """Write the indices of the active nodes to `active`, and return their number.
 
-    An inner node is active, so that its pressure is unknown, if ``P + R/d > 0``, where d estimates the size of dR/dP at
-    this node.
+    The pressure at an active node is an unknown of the Newton step. An inner node is active if ``P + R/d > 0``, where d
+    estimates the size of dR/dP at this node.
     """
     R, by_pressure, by_film = found
     count = 0
@@ -347,8 +347,8 @@ def _take_step(
 ) -> tuple[float, float]:
     """Change P, H and the film at ``X = 0`` by the allowed fraction of a Newton step.
 
-    Return the film at ``X = 0`` and the relative size of the step: infinite if it was shortened, NaN if the film
-    closes.
+    Return the film at ``X = 0`` and the relative size of the step. The size is infinite if the step was shortened, and
+    NaN if the film closes.
     """
     share = _step_length(grid, P, H, step, change, clip)
     if not share > _LEAST_SHARE:

@@ -1,8 +1,8 @@
 """Friction of a lubricated line contact from the shear of its film.
 
 The film is computed for pure rolling and a Newtonian liquid of constant temperature; the shear stress follows from this
-film. This is a good approximation for small sliding velocities. Heat and shear thinning, which reduce film and
-traction, are neglected in the film.
+film. This is a good approximation for small sliding velocities. The film is computed without heating and shear
+thinning, which would make film and traction smaller.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def shear_stress(
 def sliding_coefficient(
     case: LineContact, grid: GridSolution, W: float, slide_roll_ratio: float, eyring_stress: float | None
 ) -> float:
-    """Return the integral of the shear stress at mid-film divided by the load; parameters: see :func:`shear_stress`."""
+    """Return the integral of the shear stress at mid-film, divided by the load; arguments as in `shear_stress`."""
     stress = shear_stress(case, grid, W, slide_roll_ratio, eyring_stress)
     return float(2 / np.pi * np.trapezoid(stress, grid.nodes))
 
