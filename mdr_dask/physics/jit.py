@@ -22,7 +22,7 @@ UNCOUNTED = OPTIONS | {"_nrt": False}  # without its runtime, numba does not cou
 def jit(function: Kernel) -> Kernel:
     """Compile a function of numbers and arrays, and store the machine code in numba's cache.
 
-    If the cache cannot be written or read, every process compiles the function again, which only costs time.
+    If the cache cannot be written or read, every process compiles the function again. This takes time, but is harmless.
     """
     return _cached(function, OPTIONS)
 
@@ -85,7 +85,10 @@ def _warn_once(problem: str) -> None:
 
 @jit_inline
 def last_until(values: Any, x: float, low: int, high: int) -> int:
-    """Return the largest index in [low, high) whose value is at most x, or `low` if no value is; the values ascend."""
+    """Return the largest index in [low, high) whose value is at most x; the values ascend.
+
+    If all values are above x, return `low`.
+    """
     while high - low > 1:
         middle = (low + high) // 2
         if values[middle] <= x:

@@ -15,7 +15,7 @@ from mdr_dask.arrays import FloatArray
 
 
 class Factors(NamedTuple):
-    """The triangular factors of the transpose of a matrix, and its row exchanges."""
+    """The triangular factors of the transpose of a matrix, and the row exchanges of the factorisation."""
 
     triangles: FloatArray
     pivots: NDArray[np.int32]

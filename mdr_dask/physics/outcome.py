@@ -26,7 +26,7 @@ class Outcome(IntEnum):
 
     @property
     def is_impossible(self) -> bool:
-        """Whether the parameters of the case are the reason of the failure, so that no finer grid can help."""
+        """Whether the parameters of the case are the reason for the failure, so that no finer grid can help."""
         return self in (Outcome.OUTSIDE_LINE, Outcome.INVALID)
 
 

@@ -1,9 +1,9 @@
 """Grid refinement: solve on a grid and on the next finer one, and estimate the error from the difference.
 
-Every solver that works on a grid uses this function. The number of cells doubles from one level to the next, so that
-the error of a solver of order p decreases by r = 2^p per level. Let c be the relative change of the results from the
-last level but one to the last level, and b the change from the level before. The relative error on the last level is
-estimated as
+Every solver that works on a grid uses `refine`. The number of cells doubles from one level to the next, so that the
+error of a solver of order p decreases by r = 2^p per level. Let c be the relative change of the results at the last
+refinement, from the last level but one to the last level, and b the relative change at the refinement before. The
+relative error on the last level is estimated as
 
     error = safety max( c / (r - 1),  b / (r (r - 1)) ) + e.
 
@@ -63,7 +63,7 @@ class Refined(NamedTuple):
     level : int array, shape (cases,)
         Level of the grid on which the result was computed.
     outcome : int8 array, shape (cases,)
-        Values of `Outcome`; ``Outcome(number).sentence`` gives the reason of a failure.
+        Values of `Outcome`; ``Outcome(number).sentence`` gives the reason for a failure.
     """
 
     values: list[FloatArray]
@@ -187,7 +187,7 @@ def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> Fl
 
 
 def _sizes(values: Sequence[FloatArray] | FloatArray, floors: FloatArray) -> FloatArray:
-    """Return the largest absolute value of every output and case, at least the floor; shape (outputs, cases)."""
+    """Return the largest absolute value of every output and case, or the floor if it is larger; (outputs, cases)."""
     return np.maximum([_largest(np.fmax(np.abs(value), 0.0)) for value in values], floors[:, None])
 
 

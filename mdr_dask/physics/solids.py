@@ -1,8 +1,8 @@
 """Linear viscoelastic solids: a spring, Prony terms and a dashpot in parallel; their moduli, fits and temperature laws.
 
-The stress due to a shear strain u is ``G_inf u + sum G_m (u - a_m) + eta du/dt``, where a_m is the strain of the
-dashpot of Prony term m, which follows ``da_m/dt = (u - a_m) / tau_m``. A solid without Prony terms is a Kelvin solid. A
-solid with one Prony term and no dashpot is a standard solid.
+The stress due to a shear strain u is ``G_inf u + sum G_m (u - a_m) + eta du/dt``. Here a_m is the strain of the dashpot
+of Prony term m; it obeys ``da_m/dt = (u - a_m) / tau_m``. A solid without Prony terms is a Kelvin solid. A solid with
+one Prony term and no dashpot is a standard solid.
 """
 
 from __future__ import annotations
@@ -74,7 +74,9 @@ def standard_solid(static_modulus: float, glass_modulus: float, relaxation_time:
 
 
 def prony(static_modulus: float, moduli: ArrayLike, times: ArrayLike, viscosity: float = 0.0) -> LinearSolid:
-    """Return a solid with Prony terms sorted by time; equal times are merged, terms of modulus 0 are left out.
+    """Return a solid with Prony terms, sorted by relaxation time.
+
+    Terms with equal times are merged, and terms of modulus 0 are left out.
 
     Parameters
     ----------
@@ -125,9 +127,9 @@ def complex_modulus(solid: LinearSolid, angular_frequency: ArrayLike) -> NDArray
 
 
 def relaxation_modulus(solid: LinearSolid, time: ArrayLike) -> FloatArray:
-    """Return G(t), Pa, the stress divided by the strain at the time t > 0, s, after a step of the strain.
+    """Return the relaxation modulus G(t) in Pa at times t > 0 in s after a step of the strain.
 
-    A dashpot does not contribute.
+    G(t) is the stress divided by the strain. A dashpot does not contribute.
     """
     elapsed = np.asarray(time, dtype=np.float64)
     terms = solid.moduli * np.exp(-elapsed[..., None] / solid.times)
@@ -331,8 +333,8 @@ def at_temperature(solid: LinearSolid, factor: float) -> LinearSolid:
 class Recovery:
     """Free recovery (zero stress) of a solid as a sum of decaying modes.
 
-    In mode k the strain at the time t is u = c_k exp(-t / lambda_k), and the stretch of Prony term m is u - a_m =
-    stretch[m, k] u, where a_m is the strain of the dashpot of the term.
+    In mode k, the strain at the time t is u = c_k exp(-t / lambda_k). The stretch of Prony term m in this mode is
+    u - a_m = stretch[m, k] u, where a_m is the strain of the dashpot of the term.
 
     Parameters
     ----------
@@ -351,7 +353,7 @@ class Recovery:
 
 
 def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
-    """Return the modes of free recovery of Prony terms with a spring of modulus 1.
+    """Return the modes of free recovery of a solid with the static modulus 1 and Prony terms.
 
     Parameters
     ----------
