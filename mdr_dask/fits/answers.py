@@ -110,7 +110,7 @@ def _scattered(data: xr.Dataset, scale: float) -> xr.Dataset:
 def still_wide(
     fit: Fit, constant: str, groups: Mapping[str, xr.Dataset], tolerance: Tolerance, at_most: int
 ) -> dict[str, xr.DataArray]:
-    """Return where an interval is too wide and more realisations may make it narrow enough, by series.
+    """Return for each series where an interval is too wide but may become narrow enough with more realisations.
 
     More realisations are useless if the half width due to scatter is already within the tolerance, and the total half
     width would still exceed the tolerance with `at_most` realisations.

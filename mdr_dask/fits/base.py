@@ -116,7 +116,7 @@ class Fitted:
     residuals : array, shape (1 + RESAMPLES + 2 groups, cases)
         Stack of data minus law.
     count : int
-        Realisations that were resampled.
+        Number of realisations that were resampled.
     """
 
     constants: FloatArray
@@ -154,7 +154,7 @@ def fitted(
     data : array, shape (1 + RESAMPLES + 2 groups, cases)
         Stack of the data.
     count : int
-        Realisations that were resampled.
+        Number of realisations that were resampled.
     stated : array, shape (p,), optional
         Constants that the source of the law states. A constant also counts as undetermined if the data would not
         determine it in a law with the stated constants.
@@ -209,7 +209,7 @@ def verdict(
     residuals : array, shape (1 + RESAMPLES + 2 groups, cases)
         Stack of the relative departures of the data from the law.
     count : int
-        Realisations that were resampled.
+        Number of realisations that were resampled.
     constants : int
         Number of constants fitted to these data.
     where : callable, int -> str, optional

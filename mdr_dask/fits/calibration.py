@@ -45,8 +45,9 @@ class Calibration:
     units : dict of str to str
         Units of the unknowns, the conditions and the output.
     contradicted : Residuals or None
-        None if the errors in the table explain the residuals. Otherwise these residuals; the posterior is then computed
-        with larger errors of measurement, which do explain the residuals. The intervals thus include the misfit.
+        The residuals, if the errors of measurement in the table do not explain them; otherwise None. In the case of
+        unexplained residuals, the posterior is computed with larger errors of measurement, which do explain the
+        residuals. The intervals thus include the misfit.
     """
 
     measured: Measured

@@ -177,7 +177,7 @@ def nonlinear(
     logs : array, shape (1 + RESAMPLES + 2 groups, cases)
         Stack of the data.
     count : int
-        Realisations that were resampled.
+        Number of realisations that were resampled.
     where : callable, int -> str
         Returns a description of a case.
 

@@ -74,7 +74,8 @@ def trend(scaled: FloatArray, conditions: Mapping[str, FloatArray]) -> tuple[flo
     """Return the probability that a trend of the residuals is due to chance, and the condition that shows the trend.
 
     For each condition, a parabola is fitted to the residuals against the rank of the condition. The smallest
-    probability of all conditions is multiplied by the number of conditions.
+    probability of all conditions is multiplied by the number of conditions, because the best of several tests is
+    chosen.
     """
     worst, along = 1.0, ""
     for name, values in conditions.items():

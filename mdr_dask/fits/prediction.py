@@ -228,7 +228,7 @@ def _long_enough(dataset: xr.Dataset, axis: str) -> FloatArray:
 
 
 def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the independent standard error, and the common modes of the scatter.
+    """Return the part of the standard error that is independent for each case, and the common modes of the scatter.
 
     The errors of the means of different cases are correlated, because all cases are computed on the same lines. The
     scatter is multiplied by a factor from Student's t, because a few lines do not determine it well.

@@ -137,7 +137,7 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
     error : array, shape (m,)
         Standard error of the mean.
     count : int
-        Realisations.
+        Number of realisations.
     expected : float
         Rate by eq. 4.12. It determines the fitted part of the trace, t' <= 8 / expected.
     """
@@ -345,7 +345,7 @@ def _power(x: FloatArray, rates: FloatArray, error: FloatArray, stated: float, c
     stated : float
         Power by eq. 4.12.
     count : int
-        Realisations.
+        Number of realisations.
     """
     power, factor, error_of_fit = np.full(1 + bootstrap.RESAMPLES, np.nan), np.nan, np.nan
     of_fitted = of_stated = f"not tested: {x.size} rates are known to a factor of 1.6, three are needed"

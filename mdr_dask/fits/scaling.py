@@ -100,7 +100,10 @@ def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> Floa
         Hurst exponent and number of Nyquist points of the line.
     """
     power = 2 * (1 - hurst)
-    longest, shortest = 1 / np.clip(fraction, 1e-300, 1.0), points / 2  # 2 pi / L_cont and q_max, both in 2 pi / L
+    longest, shortest = (
+        1 / np.clip(fraction, 1e-300, 1.0),
+        points / 2,
+    )  # 2 pi / L_cont and q_max, both in units of 2 pi / L
     if power < 1e-9:
         share = np.log(shortest / longest) / np.log(shortest)
     else:

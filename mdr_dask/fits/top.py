@@ -50,7 +50,7 @@ def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
     stack : array, shape (rows, velocities)
         Friction.
     count : int
-        Realisations.
+        Number of realisations.
     """
     for drop in TOPS:
         near = _about_the_top(stack[0], drop)

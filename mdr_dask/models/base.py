@@ -172,7 +172,7 @@ def notes_of(parameters: Any) -> tuple[str, ...]:
 
 
 #: Number of bits to which dimensionless numbers are rounded. Numbers with a relative difference below about 6e-14
-#: become equal in most cases, so that they share one solution.
+#: become equal in most cases and then share one solution.
 CANONICAL_BITS = 44
 
 

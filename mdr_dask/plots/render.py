@@ -120,7 +120,7 @@ def _columns(description: Figure) -> int:
 
 
 def _axes(figure: Drawn, description: Figure, rows: int, columns: int) -> list[Axes]:
-    """Return the axes of all panels: stacks from left to right, or rows of single panels."""
+    """Return the axes of all panels, arranged as stacks from left to right or as rows of single panels."""
     grid, stack = figure.subplots(rows, columns, squeeze=False, sharey=description.share_y), description.stack
     found = []
     for k in range(len(description.panels)):
@@ -300,7 +300,7 @@ def _width_of(figure: Drawn, text: str, size: Any) -> float:
 
 
 def _broken(figure: Drawn, text: str, width: float, size: Any) -> str:
-    """Break a text into lines of at most `width` inches; a value stays with its symbol and its unit."""
+    """Break a text into lines of at most `width` inches, but not between a value and its symbol or its unit."""
     joined = text.replace(" = ", "\u00a0=\u00a0")
     lines: list[str] = []
     for word in joined.split(" "):

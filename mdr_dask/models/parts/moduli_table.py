@@ -175,7 +175,7 @@ def _vertical(chosen: ModulusTable) -> str:
 def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
     """Return log10 of the horizontal and the vertical shift factor of each temperature, and a text about the factors.
 
-    With these factors the curves overlap at the reference temperature.
+    Curves that are shifted by these factors overlap at the reference temperature.
     """
     from mdr_dask.physics.superposition.master_curve import rereference, superpose
 

@@ -21,7 +21,7 @@ from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 ACCURACY = 0.01  # relative accuracy if the campaign does not give an accuracy
 USUAL_ON_PLANES, USUAL = 2, 16  # nodes per Nyquist point on the finest grid that is usually needed
-BYTES_A_NODE = 150  # peak memory of a line and one case on this line, bytes per node; measured: 20 to 130 bytes
+BYTES_A_NODE = 150  # peak memory per node in bytes, for a line and one case on it; measured: 20 to 130 bytes
 SECONDS_A_NODE = 1e-8  # time in s that a sweep needs for a node, order of magnitude
 
 #: Outputs that have errors, and the corresponding columns of a steady state.

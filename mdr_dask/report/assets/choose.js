@@ -1,5 +1,5 @@
 "use strict";
-// Any output against any axis: from the means of all cases to a figure that the reader chose.
+// Make a figure that the reader chose, of any output against any axis, from the means of all cases.
 (() => {
   const COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"];
   const VIRIDIS = ["#440154", "#481a6c", "#472f7d", "#414487", "#39568c", "#31688e", "#2a788e", "#23888e", "#1f988b", "#22a884", "#35b779", "#54c568", "#7ad151",
@@ -15,7 +15,7 @@
   };
   const middle = (values) => values[Math.floor(values.length / 2)];
 
-  // What can be chosen of some series, with the choices of before where they still exist.
+  // Return what the reader can choose for some series. Earlier choices are kept if they still exist.
   report.choices = (all, asked) => {
     const outputs = {};
     for (const series of all) Object.assign(outputs, series.outputs);
@@ -66,7 +66,7 @@
     return { ...base, ...y, kind: "curve", ...look, line: shared || open || pick(columns[choice.kind]).length < 2 ? "" : look.line };
   };
 
-  // The figure of a choice, in the form that figures drawn before have.
+  // Return the figure of a choice, in the same form as the figures that Python prepared.
   report.chosenFigure = (choice, title) => {
     const { output, over, by } = choice;
     const used = choice.used.filter((one) => over in one.axes);
@@ -111,7 +111,7 @@
       traces, scales: by && numeric && many ? [scale] : [], parameters };
   };
 
-  // The fields to choose with, above the figure that they make.
+  // Show the input fields for a choice above the figure of this choice.
   report.chooser = (host, all, title, Figure) => {
     const { element } = report;
     const fields = element("div", { class: "controls choose" });

@@ -1,12 +1,12 @@
 "use strict";
-// From the data of a figure to what Plotly draws.
+// Convert the data of a figure to the data and layout that Plotly draws.
 (() => {
   const MARKERS = { o: "circle", s: "square", "^": "triangle-up", v: "triangle-down", D: "diamond", d: "diamond", x: "x", "+": "cross", "|": "line-ns-open",
     ".": "circle", "*": "star", p: "pentagon", h: "hexagon" };
   const LINES = { "-": "solid", "--": "dash", ":": "dot", "-.": "dashdot" };
   const TICKS = [1, 2, 5];
 
-  // The name that a curve is shown or hidden by; a band goes with its law.
+  // Return the name by which a curve is shown or hidden. A band has the name of its law.
   report.key = (trace, spec) => {
     if (trace.spoken) return trace.spoken;
     const law = spec.traces.find((other) => other.what === trace.what && other.spoken && other.kind === "law");
@@ -15,7 +15,7 @@
 
   const at = (column, k) => (Array.isArray(column) ? column[k] : column);
 
-  // The points of a trace that the reader asked for: those whose parameters are the chosen ones.
+  // Return the indices of the points of a trace that have the parameter values chosen by the reader.
   const chosen = (trace, state) => {
     const kept = [];
     const asked = [...state.only].filter(([name]) => name in trace.of);
@@ -49,7 +49,7 @@
     return { type: "data", symmetric: false, array: part(high), arrayminus: part(low), thickness: 1, width: 2 };
   };
 
-  // Points without a value part a line in two.
+  // Points without a value interrupt a line.
   const withGaps = (trace, kept, texts) => {
     const points = kept.map((k, place) => ({ x: trace.x[k], y: trace.y[k], text: texts[place] }));
     for (const x of trace.gaps || []) points.push({ x, y: null, text: "" });
@@ -136,7 +136,7 @@
     ...(how.reversed ? { autorange: "reversed" } : {}),
   });
 
-  // Data and layout of one panel, as Plotly takes them.
+  // Return data and layout of one panel for Plotly.
   report.panel = (spec, number, state, palette) => {
     const panel = spec.panels[number];
     const data = [];

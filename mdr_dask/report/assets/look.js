@@ -1,10 +1,10 @@
 "use strict";
-// What the scripts of this page share: colours that can be told from the paper, numbers and texts.
+// Functions that the scripts of this page share: colours with enough contrast to the background, numbers and texts.
 const report = {};
 (() => {
   const LIGHT = { ink: "#1b1f24", soft: "#57606a", paper: "#ffffff", grid: "#e2e6ea", line: "#8b949e" };
   const DARK = { ink: "#e6e9ed", soft: "#a5adb6", paper: "#15181c", grid: "#2c3238", line: "#6e7681" };
-  const LEAST_CONTRAST = 3; // of lines and markers against the paper, as WCAG 2.1 asks of graphics
+  const LEAST_CONTRAST = 3; // of lines and markers to the background, as WCAG 2.1 requires for graphics
   const dark = matchMedia("(prefers-color-scheme: dark)");
 
   report.light = LIGHT;
@@ -29,7 +29,7 @@ const report = {};
     return "#" + from.map((value, k) => Math.round(value + part * (to[k] - value)).toString(16).padStart(2, "0")).join("");
   };
 
-  // A colour of a figure, moved towards the ink until it can be told from the paper.
+  // Return a colour of a figure, changed towards the text colour until its contrast to the background is sufficient.
   report.legible = (hex, palette) => {
     let found = hex;
     for (let part = 0.1; report.contrast(found, palette.paper) < LEAST_CONTRAST && part < 1; part += 0.1) found = mixed(hex, palette.ink, part);
@@ -47,7 +47,7 @@ const report = {};
     return text.includes("e") ? text.replace(/\.?0*e/, "e").replace("e+", "e") : text.includes(".") ? text.replace(/\.?0+$/, "") : text;
   };
 
-  // Elements are made one by one: no text of a store is ever read as markup.
+  // Create an element. Texts of a store become text nodes or attributes and are never read as markup.
   report.element = (tag, attributes = {}, ...children) => {
     const made = document.createElement(tag);
     for (const [name, value] of Object.entries(attributes)) {
@@ -58,7 +58,7 @@ const report = {};
     return made;
   };
 
-  // A label as elements: the page's own labels have sub and sup, and nothing else.
+  // Return a label as elements. Only sub and sup elements are kept, the only ones in labels of this page.
   report.labelled = (html) => {
     const parts = document.createDocumentFragment();
     const read = new DOMParser().parseFromString(html, "text/html").body;

@@ -1,10 +1,10 @@
 "use strict";
-// The page: figures with their controls, drawn when they come into view.
+// The page: figures with their controls. A figure is drawn when the reader scrolls to it.
 (() => {
   const { element } = report;
   const CONFIG = { displayModeBar: false, responsive: true, doubleClick: "reset" };
-  const SIZE = { width: 720, height: 460 }; // of a panel of a downloaded figure
-  const MOST_ROWS = 500; // of a table on the page; the file has all
+  const SIZE = { width: 720, height: 460 }; // of one panel in a downloaded figure, in pixels
+  const MOST_ROWS = 500; // of a table on the page; the downloaded file has all rows
   const MOST_CHOICES = 60;
   const LAST = ["x", "x_low", "x_high", "y", "y_low", "y_high", "value", "value_low", "value_high"];
   const figures = [];
@@ -19,7 +19,7 @@
       figures.push(this);
     }
 
-    // Take the data of a figure; what the reader chose stays chosen.
+    // Set the data of the figure. The choices of the reader stay in force.
     set(spec) {
       this.spec = spec;
       spec.varied = Object.keys(spec.parameters).filter((name) => this.values(name).length > 1);
@@ -66,7 +66,7 @@
       });
     }
 
-    // Which curves are shown: the legend, and boxes to tick.
+    // Return the legend, with check boxes that show or hide curves.
     curves() {
       const keys = new Map();
       for (const trace of this.spec.traces) {
@@ -130,7 +130,7 @@
       });
     }
 
-    // All panels as one picture on white, in rows of at most three.
+    // Return all panels as one SVG picture on white, in rows of at most three panels.
     async svg() {
       const count = this.plots.length;
       const columns = Math.min(count, count === 4 ? 2 : 3);
