@@ -112,13 +112,13 @@ def still_wide(
 ) -> dict[str, xr.DataArray]:
     """Return for each series where an interval is too wide but may become narrow enough with more realisations.
 
-    More realisations are useless if the half width due to scatter is already within the tolerance, and the total half
-    width would still exceed the tolerance with `at_most` realisations.
+    More realisations are useless in one case: the half width due to scatter alone is already within the tolerance, but
+    the total half width would exceed the tolerance even with `at_most` realisations.
 
     Raises
     ------
     FitError
-        As `half_widths`.
+        Under the same conditions as in `half_widths`.
     """
     found = half_widths(fit, constant, groups)
     wide = {name: is_wide(*both, tolerance) for name, both in found.items()}
@@ -192,7 +192,7 @@ def cases_behind(
 
 
 def _over(dims: list[str], flags: xr.DataArray) -> xr.DataArray:
-    """Return where any flag is set along the dimensions that are not in `dims`."""
+    """Return, over the dimensions `dims`, whether any flag is set along the other dimensions."""
     bare = flags.drop_vars(flags.coords)
     return bare.any([dim for dim in bare.dims if dim not in dims])
 

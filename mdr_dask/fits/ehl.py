@@ -29,7 +29,7 @@ def _logarithms(dataset: xr.Dataset, output: str) -> FloatArray:
 
 
 def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return constants, half widths of their 95 % intervals, and residuals of ln h against ln W, ln U, ln G."""
+    """Fit ln(h/R) linearly to ln W, ln U and ln G; return constants, half widths of 95 % intervals, and residuals."""
     from scipy.stats import t
 
     design = np.vstack([np.ones(table.shape[1]), table[:3]]).T

@@ -1,6 +1,8 @@
 """Fit the laws of steady sliding friction (thesis eqs. 3.11 to 3.18) to a store.
 
-`mdr_dask.bootstrap` defines the stacks from which intervals are computed.
+Symbols: mu is the coefficient of friction, F_N the normal force, v the velocity, L the length of the line and h its rms
+height, G the shear modulus and tau the relaxation time. `mdr_dask.bootstrap` defines the stacks from which intervals
+are computed.
 """
 
 from __future__ import annotations
@@ -69,7 +71,7 @@ KELVIN = ("shear_modulus", "relaxation_time", "rms_roughness", "length")
 
 
 def loads_and_velocities(data: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
-    """Return F_N / (G h L) and v tau slope / (sqrt 2 h) of all cases."""
+    """Return the load F_N / (G h L) and the velocity v tau slope / (sqrt 2 h) of all cases, both dimensionless."""
     require(data, *KELVIN)
     slope = spectral_slope(data)
     force = laws.force_number(data["normal_force"], data["shear_modulus"], data["rms_roughness"], data["length"])

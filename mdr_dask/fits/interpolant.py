@@ -51,7 +51,7 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     Notes
     -----
     To estimate the error of interpolation, every second value of each axis is left out and predicted from the other
-    values: first the odd values are left out, then the even values.
+    values: first the values with odd indices are left out, then those with even indices.
     """
     if "case" in dataset.dims:
         raise FitError("expected a grid, this is a sampled study: its cases have no axes")

@@ -137,7 +137,7 @@ def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> 
     likelihood : callable
         Takes places, shape (sets, unknowns), and returns logarithms of the likelihood, shape (sets, sizes of errors).
     unknowns : int
-        Dimensions of the cube.
+        Number of dimensions of the cube.
     """
     width = 1.0 / START[unknowns]
     axis = (np.arange(START[unknowns]) + 0.5) * width

@@ -30,7 +30,7 @@ from mdr_dask.fits.jumps import LAW, LEAST, LEVELS, MODELS, each_jump, jump_law,
 
 WINDOW = 8.0  # length of the fitted part of a trace, in units of 1 / (rate by eq. 4.12)
 FLOOR = 0.01  # assumed grid error at every moment, as a fraction of the largest value of the trace (docs/kinetics.md)
-GRID = 400  # rates that are tried, evenly spaced on a logarithmic scale
+GRID = 400  # number of rates that are tried, evenly spaced on a logarithmic scale
 
 TRUSTED = 0.5  # a rate is used to fit the power law if the half width of the interval of ln(rate) is below this
 SURE = 0.1  # added in quadrature to the error of ln(rate) in the weights, so that no single rate dominates the fit
@@ -77,7 +77,7 @@ def widths(time: FloatArray) -> FloatArray:
 
 
 def point_weights(time: FloatArray, trace: FloatArray, error: FloatArray) -> FloatArray:
-    """Return the weight of each moment of a mean trace: its duration over its variance.
+    """Return the weight of each moment of a mean trace: its duration divided by its variance.
 
     On a logarithmic grid, the early moments are dense and their neighbours carry the same information. Weights in
     proportion to the duration correct for this.
@@ -204,7 +204,8 @@ def _outputs(case: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
 def _fit_case(case: xr.Dataset) -> Relaxation | None:
     """Fit one exponential to a case; None for a case with too few realisations or without relaxation.
 
-    The error of mu includes the error of mu_2, which is therefore subtracted to obtain the error of mu - mu_2.
+    The error of mu includes the error of mu_2. Therefore the error of mu - mu_2 is the error of mu minus the error of
+    mu_2.
     """
     time, values, error = _outputs(case)
     before, jump, after = values[:, :3].T

@@ -100,10 +100,8 @@ def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> Floa
         Hurst exponent and number of Nyquist points of the line.
     """
     power = 2 * (1 - hurst)
-    longest, shortest = (
-        1 / np.clip(fraction, 1e-300, 1.0),
-        points / 2,
-    )  # 2 pi / L_cont and q_max, both in units of 2 pi / L
+    # wave numbers 2 pi / L_cont and q_max, both in units of 2 pi / L
+    longest, shortest = 1 / np.clip(fraction, 1e-300, 1.0), points / 2
     if power < 1e-9:
         share = np.log(shortest / longest) / np.log(shortest)
     else:
@@ -260,7 +258,7 @@ def _natural(knots: FloatArray, place: FloatArray) -> FloatArray:
 
 
 def _collapse(data: xr.Dataset) -> Variables:
-    """Shift the curves of friction against velocity of all loads onto one, in regions I to III."""
+    """Shift the curves of friction against velocity at all loads onto one common curve, in regions I to III."""
     table = table_of(data, spectral_slope(data), *loads_and_velocities(data))
     force, velocity = table.columns
     known = rising(force, velocity, np.nan_to_num(table.mean()), np.ones(force.size, dtype=bool))

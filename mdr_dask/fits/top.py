@@ -48,7 +48,7 @@ def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
     x : array, shape (velocities,)
         Logarithms of velocity, ascending.
     stack : array, shape (rows, velocities)
-        Friction.
+        Stack of friction.
     count : int
         Number of realisations.
     """
