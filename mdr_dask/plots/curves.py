@@ -193,7 +193,7 @@ def with_one_legend(families: Mapping[str, Family]) -> tuple[list[str], list[str
 
 
 def _most_shown(data: xr.Dataset, others: list[str]) -> list[str]:
-    """Return the axis for colours, and possibly an axis for line styles, so chosen that most curves are shown."""
+    """Return the axis for colours, and possibly an axis for line styles, that show as many curves as possible."""
     few = len(colours.LINES)
     pairs = [[one, two] for one in others for two in others if two != one and data.sizes[two] <= few]
     choices = [*([dim] for dim in others), *pairs]

@@ -79,7 +79,7 @@ class Drawn(MplFigure):
 
 
 def table_beside(path: str | Path) -> Path:
-    """Return the path for the table of a figure; raise DataError if a table that is not of a figure has this path."""
+    """Return the path for the table of a figure; raise DataError if a file that is no such table has this path."""
     beside = Path(path).with_suffix(".csv")
     if beside.exists() and not beside.read_bytes().startswith(b"# mdr_dask"):
         raise DataError(f"{beside} exists and was not written beside a figure; choose another name for the figure")

@@ -193,7 +193,7 @@ def _pressed_body(indenter: RoundedCone, depth: float) -> TableProfile:
 
 
 def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: dict[tuple[int, int], str]) -> None:
-    """Add a message for every case of gross slip, which only histories and sliding along a path allow."""
+    """Add a message for every case of gross slip; gross slip is allowed only in histories and along a sliding path."""
     if block.parameters.path is not None or block.parameters.history or "history" in block.columns:
         return
     for case, realisation in np.argwhere(~(numbers.level > 0.0)):

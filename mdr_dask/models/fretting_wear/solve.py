@@ -108,7 +108,7 @@ def seconds(block: Block[FrettingWear]) -> float:
 
 
 def _followed(hold: str, accuracy: float) -> float:
-    """Return the estimated time in s of one evolution and its errors, without the time to evaluate it at single N."""
+    """Return the estimated time in s of one evolution and its errors, without the time to evaluate it at each N."""
     if hold == "force":
         return 0.09 * float(max(COARSEST_OF_MOVING / accuracy, 1.0) ** 1.1)
     return 0.012 * float((_USUAL / accuracy) ** 0.6)
@@ -196,7 +196,7 @@ def _solve_plain(
 
 
 def _distinct(rows: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Return the different columns of an array, and for each column the index of its equal among them."""
+    """Return the different columns of an array, and for each column its index in this selection."""
     if rows.shape[1] == 0:
         return rows, np.zeros(0, dtype=np.intp)
     order = np.lexsort(rows)

@@ -82,7 +82,7 @@ def revolve(operation: Operation, lines: FloatArray) -> Revolution:
 
 
 def _windows(operation: Operation, lines: FloatArray, travels: ArrayLike) -> IntArray:
-    """Return the lengths in contact of the windows after given travels, in points."""
+    """Return the lengths in contact of the windows after given travels; the travels are in points."""
     spacing = operation.length / lines.shape[1]
     pair = breakthrough.Pair(lines[0], lines[1], operation.level, spacing, operation.strength)
     starts = breakthrough.creep_positions(travels, lines.shape[1], operation.case.slide_roll_ratio)

@@ -23,8 +23,8 @@ LEAST_FILM_RATIO = 0.5
 #: Outputs that follow from the length in contact, and all outputs that need the rough lines.
 _OF_LENGTH = {"contact_length", "contact_conductance", "contact_resistance", *DRAWN}
 _OF_LINES = {"breakthrough_probability", "revolution_error", *_OF_LENGTH}
-#: Outputs that can be zero, each with a magnitude. If the output is smaller than this, its error is relative to the
-#: magnitude. The magnitude for the contact length is given in widths of the contact.
+#: Outputs that can be zero, each with a magnitude. If an output is smaller than its magnitude, its error is relative to
+#: the magnitude. The magnitude for the contact length is given in widths of the contact.
 _FLOORS = {"asperity_load_share": 1.0, "breakthrough_probability": 0.1, "contact_length": 0.01}
 #: Lower bound of the order of convergence of probability and length in the spacing of the points. The splines converge
 #: faster, but a single cluster may break the layer on one grid and not on the next, and contact may begin between two

@@ -69,7 +69,7 @@ class PowerLaw(Parameters):
 
 
 KINDS = ("kelvin", "standard_solid", "prony", "power_law", "dma_table")
-SOFTEST, STIFFEST = 100.0, 1e12  # range of the shear moduli of solids in Pa, from a gel to more than diamond
+SOFTEST, STIFFEST = 100.0, 1e12  # range of the shear moduli of solids in Pa, from a gel to stiffer than diamond
 LAWS = ("wlf", "arrhenius", "shift_factors")
 
 
