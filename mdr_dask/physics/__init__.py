@@ -1,4 +1,4 @@
-"""The numerics: arrays in, arrays out, with numpy, scipy and numba only.
+"""The numerical methods. They take and return arrays, and use numpy, scipy and numba only.
 
 The lowest layer contains `outcome` (how a solver ended), `jit` (compilation of kernels), `linear` (linear systems,
 solved by one thread) and `solids` (linear viscoelastic solids). The packages `mdr` and `surfaces` form the next layer,

@@ -4,9 +4,9 @@ Hertz units as in :mod:`mdr_dask.physics.lubrication.deformation`. The film obey
 
     d/dX( rho H^3/eta dP/dX ) = K d(rho H)/dX,   K = (3 pi^2/4) U/W^2,
 
-in finite volumes around the nodes. Cavitation is the complementarity ``P >= 0``, ``R <= 0``, ``P R = 0`` of the
-pressure P and the flow balance R of each volume. The load ``int P dX = pi/2`` is the last equation. The unknowns are
-the nodal pressures and the film at ``X = 0``, called the central film.
+in finite volumes around the nodes. Cavitation is described by the complementarity conditions ``P >= 0``, ``R <= 0`` and
+``P R = 0``, with the pressure P and the flow balance R of each volume. The load ``int P dX = pi/2`` is the last
+equation. The unknowns are the nodal pressures and the film at ``X = 0``, called the central film.
 """
 
 from __future__ import annotations
@@ -298,7 +298,7 @@ def _fill_imbalance(grid: Grid, P: FloatArray, R: FloatArray, active: NDArray[np
 
 @jit
 def _add_deformation(influence: FloatArray, P: FloatArray, H: FloatArray) -> None:
-    """Add the deformation by the pressures P to H.
+    """Add the deformation that the pressures P cause to the film H.
 
     Four rows are summed at a time, so that the processor can compute the sums in parallel.
     """

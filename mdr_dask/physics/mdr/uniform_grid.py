@@ -80,7 +80,7 @@ class UniformGrid:
         return float(2.0 * np.trapezoid(load[:k], self.nodes[:k]) + last)
 
     def depth(self, image: FloatArray, force: float, guess: float | None = None) -> float:
-        """Return the depth at which the image carries a force, by Newton steps on a convex function."""
+        """Return the depth at which the image carries a force, by Newton's method; the force is convex in the depth."""
         depth = float(np.max(image[: max(int(self.nodes.size * 0.4), 2)])) if guess is None else guess
         for _ in range(60):
             slope = 2.0 * max(self.edge(image, depth), self.spacing)

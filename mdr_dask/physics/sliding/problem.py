@@ -165,7 +165,7 @@ def _on_grid(line: RoughLine, cases: Cases, request: Request, oversampling: int,
 
 
 def _write(results: tuple[FloatArray, FloatArray, NDArray[np.int8]], cases: IntArray, found: Refined) -> None:
-    """Replace the results of some cases if the new results meet the accuracy or have smaller errors."""
+    """Store the results of cases that have no results yet, or whose new results meet the accuracy or are better."""
     columns, errors, status = results
     better = (status[cases] != Outcome.CONVERGED) | found.met | (found.errors[0] < errors[0, cases])
     some = cases[better]

@@ -303,7 +303,7 @@ def newton_step(
 
     After division of its rows by `scale`, the matrix of derivatives is the identity plus an operator that is smooth as
     a function of the relaxation time. The singular values of such an operator decrease fast, so that four to seven
-    products are enough for any number of terms.
+    products of the matrix and a vector are enough for any number of terms.
 
     Parameters
     ----------

@@ -24,18 +24,20 @@ EXPANSION = 6e-4
 OFFSET = (0.02 / np.log(10), np.log(2))
 """Prior of the standard deviation of the vertical offset common to all channels of a curve.
 
-Median, decades, and standard deviation of the natural logarithm: 2 %, uncertain by a factor of two. Specimens are
-clamped again for each temperature, and their dimensions are known to about one per cent.
+The numbers are the median, in decades, and the standard deviation of the natural logarithm. They describe an offset of
+about 2 %, uncertain by a factor of two. Specimens are clamped again for each temperature, and their dimensions are
+known to about one per cent.
 """
 
 FREE = (0.03, 1.5)
 """Prior of the standard deviation of the steps of free vertical factors about their mean.
 
-Median, decades, and standard deviation of the natural logarithm: 0.03 decades, uncertain by a factor of about five.
+The numbers are the median, in decades, and the standard deviation of the natural logarithm. They describe a step of
+about 0.03 decades, uncertain by a factor of about five.
 """
 
 DETERMINED = 0.5
-"""A step counts as not determined if its standard deviation exceeds this fraction of its prior standard deviation."""
+"""The curves do not determine a step if its standard deviation exceeds this fraction of its prior value."""
 
 Vertical = Literal["none", "modulus", "compliance", "free"]
 
@@ -121,7 +123,7 @@ def superpose(
     seed: int = 0,
     kelvin: ArrayLike | None = None,
 ) -> Superposition:
-    """Find the shifts for which the curves are parts of one smooth curve, with their uncertainty.
+    """Find the shifts for which the curves are parts of one smooth curve, and the uncertainty of these shifts.
 
     The shifts, the smooth curve, the scatter and the vertical offsets have a joint probability density (module
     `posterior`). Draws are taken from this density. Results are means over the draws, and intervals include the

@@ -82,7 +82,7 @@ def first_guess(curves: Curves) -> FloatArray:
 
 
 def laid_out(curves: Curves, shifts: FloatArray) -> Curves:
-    """Return the same curves with a spline that covers them after shifting, with a margin."""
+    """Return the same curves with a spline that covers the shifted curves and a margin on both sides."""
     moved = curves.x + np.append(0.0, shifts)[curves.member]
     return replace(curves, splines=int(np.ceil((np.ptp(moved) + 2 * MARGIN) * CELLS)) + 3)
 

@@ -79,7 +79,7 @@ def _off_neighbours(height: FloatArray) -> FloatArray:
 
 
 def require_points(surface: SurfaceMap) -> None:
-    """Raise DataError if an axis has fewer than `LEAST_POINTS` points, or if more than `MOST_MISSING` are missing."""
+    """Raise DataError if an axis has too few points, or if the fraction of missing points exceeds `MOST_MISSING`."""
     height = surface.height
     if height.ndim != 2 or min(height.shape) < LEAST_POINTS:
         raise DataError(f"expected a map of {LEAST_POINTS} x {LEAST_POINTS} points or more, got {height.shape}")

@@ -84,7 +84,7 @@ class Resolution(NamedTuple):
         return min(0.1 * self.accuracy, 1e-3) * ROUGHER**self.rougher
 
     def panels(self, near: int) -> Panels:
-        """Return panels of partial slip, with `near` more halvings at the inner border than at the edge."""
+        """Return panels of partial slip, with `near` additional halvings at the inner border."""
         digits = -np.log10(self.accuracy)
         # with fewer halvings, the error of the panels at the moving edge would make the steps very short
         levels = max(round(2.7 * digits - 3.3), 2)
@@ -142,7 +142,7 @@ def exact(
     Returns
     -------
     list of Worn
-        The contacts in the order of `amounts`. A contact does not depend on the other amounts.
+        The contacts in the order of `amounts`. The result for one amount does not depend on the other amounts.
 
     Raises
     ------

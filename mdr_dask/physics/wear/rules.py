@@ -63,7 +63,8 @@ class Quadrature(NamedTuple):
 class Bracket(NamedTuple):
     """Interval that contains the root of a falling function: its ends, and the values of the function at the ends.
 
-    `newer` is -1 if the value at the lower end was computed last, 1 if that at the higher end was, and 0 at the start.
+    `newer` is -1 if the value at the lower end is the newer one, 1 if the value at the higher end is, and 0 at the
+    start.
     """
 
     low: float

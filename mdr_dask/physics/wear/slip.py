@@ -52,8 +52,8 @@ class VirginBody(NamedTuple):
     square, width : float
         c^2 and 1 - c^2.
     first, step, coefficients : float, float, array of shape (4, k)
-        The slip of the virgin body, s0(r) = (2/pi) int_c^r (g0 - g_c) / (eta sqrt(r^2 - x^2)) dx: first knot, knot
-        spacing and coefficients of a cubic spline of ln s0 as a function of ln q.
+        First knot, knot spacing and coefficients of a cubic spline of ln s0 as a function of ln q. The slip of the
+        virgin body is s0(r) = (2/pi) int_c^r (g0(x) - g0(c)) / (eta sqrt(r^2 - x^2)) dx.
     """
 
     square: float
