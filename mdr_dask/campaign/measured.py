@@ -113,8 +113,8 @@ def read_measured(
 def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...], str]:
     """Return the headings of the errors of the output, and the unit that these errors have if they state none.
 
-    The output is the last of `columns`. If the headings of the errors state no unit, the unit is that of the output;
-    otherwise it is empty.
+    The output is the last of `columns`. The returned unit is that of the output. It is empty if a heading of the errors
+    states a unit.
 
     A heading without the name of a quantity, such as ``std``, means the error of the nearest known column before it.
     """

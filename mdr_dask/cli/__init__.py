@@ -40,7 +40,7 @@ class Commands(click.Group):
     """A group whose help lists its commands by purpose."""
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the commands of each group with a line of help, and the names of all other commands."""
+        """Write the commands of each group, each with one line of help, and then the names of all other commands."""
         limit = formatter.width - 20
         for title, names in GROUPS.items():
             with formatter.section(title):
@@ -50,7 +50,7 @@ class Commands(click.Group):
             formatter.write_text(f"{', '.join(others)}; each with --help")
 
     def invoke(self, context: click.Context) -> Any:
-        """Run a command. It is no error if a program such as ``head`` stops reading the output."""
+        """Run a command. If a program such as ``head`` stops reading the output, this is no error."""
         try:
             result = super().invoke(context)
             sys.stdout.flush()

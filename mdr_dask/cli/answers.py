@@ -1,4 +1,7 @@
-"""Print the table that answers a question, or write it to a file; rows are written as soon as they are computed."""
+"""Print the table that answers a question, or write it to a file.
+
+Rows are written as soon as they are computed.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +32,9 @@ FILES = (".csv", ".json", ".jsonl", ".parquet", ".nc", ".zarr")
 
 
 def print_answer(answer: Table, form: str, limit: int, join: bool) -> None:
-    """Print a table: at most `limit` rows in aligned columns, or all rows as CSV, as JSON or as one JSON object a line.
+    """Print a table in aligned columns, as CSV, as JSON, or as one JSON object per line.
+
+    Aligned columns have at most `limit` rows, the other forms all rows.
 
     If `join` is true, each mean and its errors are printed in one column.
     """
@@ -60,7 +65,10 @@ def write_answer(answer: Table, path: Path) -> int:
 
 
 def check_target(path: Path) -> None:
-    """Raise an error for an unknown suffix, for the store of a study, and for Parquet without pyarrow."""
+    """Raise an error if a table cannot be written to a path.
+
+    This is so if the suffix is unknown, if there is the store of a study, and for Parquet without pyarrow.
+    """
     from mdr_dask.store import is_study
 
     require_suffix(path, FILES)
@@ -105,8 +113,8 @@ def _print_frame(frame: pd.DataFrame, answer: Table, join: bool) -> None:
 def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
     """Join each mean and its errors, ``0.1234 +- 0.0005 +- 0.0001``, or its interval, ``0.1234 (0.1220, 0.1240)``.
 
-    An error is left out if it is unknown in all rows, or zero except for rounding in all rows. The returned text names
-    the errors that are not left out.
+    An error is left out if it is unknown in all rows, or if it is zero or a rounding error in all rows. The returned
+    text names the errors that are printed.
     """
     known = {name for name, values in columns.items() if any(map(_is_known, values))}
     joined: dict[str, list[Any]] = {}

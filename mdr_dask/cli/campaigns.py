@@ -71,7 +71,10 @@ def _indented(path: str) -> str:
 
 
 def _parameter(row: dict[str, str]) -> str:
-    """Return the meaning, unit, default and allowed values of a parameter; nested entries have lines of their own."""
+    """Return the meaning, unit, default and allowed values of a parameter.
+
+    Parameters nested in it are not described here, because each has a line of its own.
+    """
     words = [word for word in row["allowed"].split(" or ") if not word.startswith("{")]
     default = f"default {row['default']}" if row["default"] not in ("", "required") else row["default"]
     short = re.sub(r"\[([^\]]{9})[^\]]{30,}, ([^,\]]*)\]", r"[\1..., \2]", default)
@@ -79,7 +82,10 @@ def _parameter(row: dict[str, str]) -> str:
 
 
 def _output(row: dict[str, str]) -> str:
-    """Return the meaning, unit and dimensions of an output, and whether it is computed by default and has an error."""
+    """Return the meaning, unit and dimensions of an output.
+
+    The text also says whether the output is computed by default, and whether it has an error.
+    """
     along = row["dimensions"] and f"along {row['dimensions']}"
     missing = "" if row["default"] == "yes" else "only if requested"
     return "; ".join(filter(None, [_with_unit(row), along, missing, row["error"] and "with error"]))
@@ -167,7 +173,7 @@ def check(campaigns: tuple[Path, ...], form: str | None) -> None:
 
 
 def ask(campaign: Campaign) -> None:
-    """Print the questions about bare numbers."""
+    """Print the questions about numbers without a unit."""
     for question in campaign.remarks:
         say(question, err=True)
 

@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from mdr_dask.plots.base import Plot
     from mdr_dask.plots.figure import Figure
 
-#: Options that apply only to figures of outputs; the axes of a named figure are fixed.
+#: Options that apply only to figures of outputs, because the axes of a named figure are fixed.
 OF_OUTPUTS = ("over", "by", "panels", "effects", "log")
 COMMAND = "mdr_dask.command"
 
 
 class Drawing(click.Command):
-    """A command that draws figures; the table next to each figure contains the command line."""
+    """A command that draws figures. It writes the data of each figure, with the command line, to a table next to it."""
 
     def parse_args(self, context: click.Context, arguments: list[str]) -> list[str]:
         """Store the command line as it was typed, then parse it."""
@@ -139,7 +139,7 @@ def _with_notes(figure: Plot, where: str, warnings: list[str]) -> Plot:
 
 
 def _warnings(urls: Sequence[str]) -> list[str]:
-    """Return the warnings of finished results; equal warnings appear once, with their number."""
+    """Return the warnings of finished results. Equal warnings appear once, with the number of results."""
     from mdr_dask import store as stores
     from mdr_dask.questions import progress
 
@@ -228,7 +228,7 @@ def _of_output(name: str, look: Mapping[str, Any]) -> Plot:
 
 
 def _groups(url: str, urls: Sequence[str], series: Sequence[str]) -> dict[str, xr.Dataset]:
-    """Return the groups of a store; their names include the store if several stores are drawn."""
+    """Return the groups of a store. If several stores are drawn, their names begin with the name of the store."""
     from mdr_dask import store as stores
     from mdr_dask.questions import selection
 
@@ -247,7 +247,10 @@ def _name_of(url: str, urls: Sequence[str], series: str) -> str:
 
 
 def _draw(figure: Plot, groups: Mapping[str, xr.Dataset], path: Path, origin: dict[str, str], one_of: bool) -> None:
-    """Draw a figure to a file, with its data in a table next to it; with --all, a failing figure is only reported."""
+    """Draw a figure to a file, with its data in a table next to it.
+
+    If the figure cannot be drawn, raise an error, or only print it if this is one of several figures (`one_of`).
+    """
     from mdr_dask.errors import DataError, FitError
 
     try:
@@ -279,7 +282,10 @@ def save(description: Figure, path: Path, origin: Mapping[str, str]) -> None:
 
 
 def _places(output: Path | None, names: Sequence[str], urls: Sequence[str], suffix: str, alone: bool) -> list[Path]:
-    """Return the file of each figure: the requested one for a single figure, or files in a folder."""
+    """Return the path of the file of each figure.
+
+    A single figure may have any path; several figures are written to a folder.
+    """
     folder = output or Path("figures")
     if alone and folder.suffix and not folder.is_dir():
         require_suffix(folder, FIGURES)

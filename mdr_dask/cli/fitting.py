@@ -102,7 +102,7 @@ def _print(result: xr.Dataset, group: str, form: str | None, limit: int) -> None
 
 
 def _print_constants(row: dict[str, Any], units: dict[str, str]) -> None:
-    """Print a table of constants with their 95 % and 68 % intervals, and below it the other results of the fit."""
+    """Print a table of the constants with their 95 % and 68 % intervals, and then the other results of the fit."""
     constants = [name for name in units if f"{name}_low_68" in units]
     columns: list[list[Any]] = [constants, *([row[name + end] for name in constants] for end in _ENDS.values())]
     print_aligned(["", *_ENDS, "unit"], [*columns, [units[name] for name in constants]])

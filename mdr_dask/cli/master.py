@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 
 
 PARTS = ("factors", "curve", "points")
-"""Parts of the result that can be printed: factors, the merged curve with its error, or all points after shifting."""
+"""Parts of the result that can be printed: shift factors, the merged curve with its error, or all shifted points."""
 
 LAWS = ("power", "arrhenius", "wlf")
 FAR, LEAST = 5.0, 0.002
-"""A point is reported if its distance from the merged curve exceeds FAR standard deviations and LEAST decades."""
+"""A point is reported if its distance from the merged curve exceeds both FAR standard deviations and LEAST decades."""
 
 KEPT = (".json", ".csv")
 
@@ -144,7 +144,7 @@ def _open(source: str, series: str | None, selections: tuple[str, ...]) -> xr.Da
 
 
 def _rows(frame: pd.DataFrame, selections: tuple[str, ...]) -> pd.DataFrame:
-    """Return the rows of a table whose columns have the selected values."""
+    """Return the rows of a table that have the selected values."""
     import numpy as np
     import xarray as xr
 
@@ -177,7 +177,7 @@ def _kept(source: str) -> xr.Dataset | None:
 
 
 def _print_table(curve: xr.Dataset, part: str, form: str) -> None:
-    """Print a part of the result; shifts by two variables have one table of factors each."""
+    """Print a part of the result. If curves are shifted by two variables, there are two tables of factors."""
     shown = []
     if part != "factors":
         dims = (part.removesuffix("s"),)
@@ -235,7 +235,7 @@ def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
 
 
 def _print_outliers(curve: xr.Dataset) -> None:
-    """Print the number of points farther from the curve than scatter explains, and the farthest point, if any."""
+    """Print the number of points that are farther from the curve than scatter explains, and the farthest of them."""
     import numpy as np
 
     x, y = np.log10(curve["point_abscissa"].to_numpy()), np.log10(curve["point_ordinate"].to_numpy())

@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Row = dict[str, Any]
-#: An error below this fraction of its mean counts as a rounding error.
+#: If the error of a mean is below this fraction of the mean, it counts as a rounding error.
 ROUNDING = 1e-13
-#: `GAP`: spaces between two columns of a table. `NARROWEST`: smallest width in characters for which tables are
-#: formatted.
+#: `GAP`: number of spaces between two columns of a table. `NARROWEST`: tables are formatted for at least this width, in
+#: characters, even if the terminal is narrower.
 GAP, NARROWEST = 2, 40
-#: Smallest width in characters to which a long text in the last column is wrapped.
+#: A long text in the last column is wrapped to at least this width, in characters.
 WRAPPED = 30
 #: Numbers below `_SMALL` or above `_LARGE` are printed with a power of ten.
 _SMALL, _LARGE = 1e-4, 1e6
@@ -84,9 +84,9 @@ def titled(name: str, unit: str) -> str:
 def print_aligned(titles: Sequence[str], columns: Sequence[Sequence[Any]], keys: int = 1, note: str = "") -> None:
     """Print columns side by side, within the width of the terminal.
 
-    A column with the same value in all rows is printed above the table, after `note`, and a column without any value is
-    named there. A single row that is too wide is printed as a list. A table that is too wide is printed in parts; each
-    part begins with the first `keys` columns, which identify a row.
+    The text `note` is printed above the table. It is followed by the columns that have the same value in all rows, and
+    by the names of columns without any value. If a table is too wide, it is printed in parts. Each part begins with the
+    first `keys` columns, which identify a row. A single row that is too wide is printed as a list.
     """
     rows = len(columns[0]) if columns else 0
     cells = [[short(value) for value in column] for column in columns]
@@ -126,7 +126,7 @@ def _print_table(titles: Sequence[str], cells: Sequence[Sequence[str]], keys: in
 
 
 def _parts(widths: Sequence[int], keys: int) -> list[list[int]]:
-    """Return the columns of each part of a table that is too wide; every part begins with the key columns."""
+    """Return the columns of each part of a table that is too wide. Every part begins with the key columns."""
     first, rest = list(range(keys)), list(range(keys, len(widths)))
     parts, part = [], list(first)
     for column in rest:
@@ -158,7 +158,7 @@ def _is_text(column: Sequence[str]) -> bool:
 
 
 def hanging(before: str, text: str) -> str:
-    """Join two texts; if the line is too long, the second text continues below its own first character."""
+    """Join two texts. If the line is too long, it is wrapped below the first character of the second text."""
     width = max(terminal_width() - len(before), NARROWEST // 2)
     if len(before) + len(text) <= terminal_width() or width <= NARROWEST // 2:
         return (before + text).rstrip()
@@ -167,7 +167,7 @@ def hanging(before: str, text: str) -> str:
 
 
 def _heading(title: str, width: int) -> list[str]:
-    """Return the lines of a heading: the name, broken after ``_`` or spaces to fit the column, and the unit."""
+    """Return the lines of a heading: first the name, wrapped after ``_`` or spaces to fit the column, then the unit."""
     name, unit = _name(title), _unit(title).strip()
     pieces = re.findall(r"[^_ ]+[_ ]*", name) or [name]
     lines = [""]
@@ -250,7 +250,7 @@ def with_interval(value: float, low: float = math.nan, high: float = math.nan) -
 
 
 def with_error(mean: float, *errors: float | None) -> str:
-    """Join a mean and its errors; an unknown error is printed as ``?``, a rounding error as 0."""
+    """Join a mean and its errors. An unknown error is printed as ``?``, and a rounding error as 0."""
     if not math.isfinite(mean) or not any(error is not None and math.isfinite(error) for error in errors):
         return short(mean)
     shown = ["?" if error is None or not math.isfinite(error) else _error(error, abs(mean)) for error in errors]
@@ -258,7 +258,7 @@ def with_error(mean: float, *errors: float | None) -> str:
 
 
 def is_rounding(errors: Sequence[Any], means: Sequence[Any]) -> bool:
-    """Return whether all known errors of means are zero except for rounding."""
+    """Return whether all known errors of means are zero or rounding errors."""
     pairs = [(error, mean) for error, mean in zip(errors, means, strict=True) if error is not None and mean is not None]
     return not any(abs(error) > ROUNDING * abs(mean) for error, mean in pairs)
 
@@ -276,7 +276,7 @@ def _number(value: float, digits: int) -> str:
 
 
 def short(value: Any) -> str:
-    """Return a value as a cell of a table; ``-`` for an unknown value."""
+    """Return a value as a cell of a table. An unknown value becomes ``-``."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return UNKNOWN
     return f"{value:.6g}" if isinstance(value, float) else printable(str(value)).replace("\n", " ")

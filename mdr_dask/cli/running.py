@@ -106,7 +106,7 @@ def _print_plan(study: Campaign, url: str, form: str | None) -> None:
 
 
 def _counted(study: Campaign, to_do: int) -> str:
-    """Return the name of the results that are counted if the run may add more, otherwise an empty text."""
+    """Return a text that says which results are counted, if the run may add more; otherwise an empty text."""
     if study.replication.goes_on:
         return "first round"
     is_adaptive = any(axis.refinement is not None for series in study.series for axis in series.axes)
@@ -174,6 +174,6 @@ def _print_failed(url: str, progress: Progress) -> None:
 
 
 def _shared(progress: Progress) -> str:
-    """Return a text with the fraction of results that shared the solution of another result; empty if no result did."""
+    """Return a text with the fraction of results that used the solution of another result; empty if there are none."""
     share = 1 - progress.solves / max(progress.done, 1)
     return f" ({share:.1%} of the results needed none of their own)" if progress.solves and share > 0 else ""

@@ -129,7 +129,10 @@ def _option(name: str) -> str:
 
 
 def _kind(file: str, options: dict[str, Any]) -> str:
-    """Return the kind of a file: spectra are recognised by the names of columns, maps and scans by their dimensions."""
+    """Return whether a file contains a map, a scan or a spectrum.
+
+    A spectrum is recognised by the names of its columns, maps and scans by their number of dimensions.
+    """
     from mdr_dask.models.data_file import DataFile
     from mdr_dask.models.parts.height_file import TEXT, dimensions
     from mdr_dask.models.parts.surface_files import is_spectrum

@@ -18,7 +18,7 @@ format_option = click.option(
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Make the folder of a new file; after an error, remove both again, and name the file in the error."""
+    """Make the folder of a new file. If writing fails, remove file and folder, and name the file in the error."""
     require_outside(path)
     there = path.exists()
     missing = [folder for folder in path.parents if not folder.exists()]
@@ -29,7 +29,7 @@ def writing(path: Path) -> Iterator[None]:
     except BaseException as error:
         if not there and path.exists():
             shutil.rmtree(path) if path.is_dir() else path.unlink()
-        with suppress(OSError):  # the folder could not be made, or is not empty
+        with suppress(OSError):  # the folder was not made, or is not empty
             for folder in missing:
                 folder.rmdir()
         if isinstance(error, OSError) and error.filename is None:
@@ -41,7 +41,7 @@ def require_outside(path: Path) -> None:
     """Raise UsageError for a file inside a store, because the store would then count as damaged."""
     groups = [folder for folder in path.absolute().parents if (folder / "zarr.json").is_file()]
     if groups:
-        from mdr_dask.store import is_study  # late, because it imports Zarr
+        from mdr_dask.store import is_study  # imported late, because it imports Zarr
 
         for folder in filter(is_study, map(str, groups)):
             raise click.UsageError(f"expected a file outside every store, got {str(path)!r} in the store {folder}")

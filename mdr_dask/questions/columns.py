@@ -15,9 +15,9 @@ from mdr_dask.errors import DataError, ModelError, did_you_mean
 from mdr_dask.models.base import Number, Status
 from mdr_dask.questions.expression import Value, evaluate, parse
 
-#: Names of the columns with the state of the results of a row, and with the number of its finished results.
+#: Names of two columns: the state of the results of a row, and the number of its finished results.
 STATUS, REALISATIONS = "status", "realisations"
-#: Name of the variable with the number of results in each state, for rows that combine several cases.
+#: Name of the variable with the number of results in each state. Rows that combine several cases have this variable.
 COUNTS = "state_counts"
 #: States of results that need no further work.
 COMPLETE = (Status.DONE, Status.NOT_NEEDED)
@@ -25,7 +25,10 @@ WORDS = np.array([state.name.lower() for state in Status], dtype=object)
 
 
 def numbers(dataset: xr.Dataset) -> dict[str, Number]:
-    """Return the dimensionless numbers of the model of a study by name; none if the model cannot be loaded."""
+    """Return the dimensionless numbers of the model of a study by name.
+
+    If the model cannot be loaded, the result is empty.
+    """
     try:
         return {number.name: number for number in models.load(str(dataset.attrs.get("model"))).numbers}
     except ModelError:
@@ -53,7 +56,7 @@ class Columns:
     Parameters
     ----------
     dataset : Dataset
-        A group of a study in any shape: as a grid, or with a dimension ``row``.
+        A group of a study, as a grid or with a dimension ``row``.
     """
 
     def __init__(self, dataset: xr.Dataset) -> None:
@@ -68,7 +71,7 @@ class Columns:
         return [*map(str, data.data_vars), *map(str, data.coords), *self._numbers, REALISATIONS]
 
     def find(self, name: str) -> xr.DataArray | None:
-        """Return a column with its unit (for an output, its mean over realisations); None if the name is unknown."""
+        """Return a column with its unit, or None if the name is unknown. The column of an output is its mean."""
         if name not in self._found:
             self._found[name] = None  # ends the recursion of a formula that refers to itself
             self._found[name] = self._make(name)
@@ -80,7 +83,7 @@ class Columns:
         Raises
         ------
         DataError
-            If there is no such column, or the study lacks a quantity in the formula of the column.
+            If there is no such column, or the study lacks a quantity that the formula of the column needs.
         """
         found = self.find(name)
         if found is None:
@@ -132,7 +135,7 @@ class Columns:
 
 
 def needed(dataset: xr.Dataset, names: Iterable[str]) -> list[str]:
-    """Return the outputs that columns need, including those in the formulas of dimensionless numbers."""
+    """Return the outputs that columns need, including the outputs in formulas of dimensionless numbers."""
     known, found = numbers(dataset), []
     for name in names:
         if name in dataset.data_vars:
@@ -152,7 +155,7 @@ def counts(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def states(dataset: xr.Dataset) -> xr.DataArray:
-    """Return the state of every row as text: ``failed`` for one result, ``2 failed, 1 missing`` for several."""
+    """Return the state of every row as text: ``failed`` for one result, ``2 failed, 1 missing`` for several results."""
     if STATUS in dataset and "realisation" not in dataset[STATUS].dims:
         status = dataset[STATUS]
         return status.copy(data=WORDS[status.to_numpy()]).drop_attrs()

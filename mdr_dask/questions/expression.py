@@ -28,7 +28,8 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
     "log": np.log,
     "log10": np.log10,
 }
-#: Relative difference up to which numbers count as equal, also in selections, because tables show six digits.
+#: Numbers up to this relative difference count as equal, in conditions and in selections, because tables show six
+#: digits.
 SAME = 1e-5
 _LONGEST = 500
 _NUMBER = re.compile(r"(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.])|(?<![\w.])\d+\.?\d*(?=[^\W\d_])")
@@ -62,7 +63,7 @@ class Value(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """Numpy's letter for the data type; reading it does not load a lazy array."""
+        """Numpy's letter for the data type. A lazy array is not loaded to find it."""
         return str((self.array if hasattr(self.array, "dtype") else np.asarray(self.array)).dtype.kind)
 
 
@@ -103,8 +104,8 @@ def parse(text: str) -> Expression:
 def evaluate(expression: Expression, find: Find, known: Sequence[str] = ()) -> Value:
     """Return the value of an expression.
 
-    `find` returns the values of a name in the SI unit ``attrs["units"]``, or None if there is no such name. `known` are
-    all names, for the hint in the message about an unknown name.
+    `find` returns the values of a name, or None if there is no such name. Their SI unit is in ``attrs["units"]``.
+    `known` are all names; the message about an unknown name suggests one of them.
 
     Raises
     ------
@@ -151,7 +152,7 @@ def _likely_mistake(text: str) -> str:
 
 
 def _name(node: ast.expr) -> str:
-    """Return the name in a node; dots of nested parameters become ``_``."""
+    """Return the name in a node. The dots in names of nested parameters become ``_``."""
     if isinstance(node, ast.Attribute):
         return f"{_name(node.value)}_{node.attr}"
     return node.id if isinstance(node, ast.Name) else ""
@@ -232,7 +233,7 @@ class _Evaluation:
         return _OPERATORS[type(op)](first.array, second.array)
 
     def _equal(self, left: ast.expr, right: ast.expr) -> Any:
-        """Compare numbers within `SAME`, or words; in a comparison with words, an unknown name counts as a word."""
+        """Compare numbers within `SAME`, or compare words; an unknown name compared with words counts as a word."""
         sides = [None if self._is_unknown(node) else self.value(node) for node in (left, right)]
         if any(side is not None and side.kind in "OUT" for side in sides):
             names = (_name(left), _name(right))

@@ -22,21 +22,21 @@ CASES = "cases"
 
 
 def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None = None) -> xr.Dataset:
-    """Average every output over the cases of each group, and keep the scatter over realisations.
+    """Average every output over the cases of each group, so that the scatter over realisations is kept.
 
-    The mean m of a group is the mean over its C cases of their means m_c, each case counted once. All cases share their
-    R realisations, so their means scatter together. Realisation r of a group is therefore ``m + R u_r``, where ``u_r``
-    is the sum over the cases c of ``(x_cr - m_c) / (n_c C)``. Here x_cr is the result of case c in realisation r, and
-    n_c is the number of realisations of case c. The mean and the standard error of these R numbers are the mean and the
-    standard error of the group, even if the numbers n_c differ. If every case has all R realisations, ``m + R u_r`` is
-    the mean of x_cr over the cases.
+    A group has C cases. Its mean m is the mean of the means m_c of its cases, with the same weight for each case. All
+    cases use the same R realisations (rough lines), so their results are correlated. Realisation r of a group is
+    therefore ``m + R u_r``, where ``u_r`` is the sum over the cases c of ``(x_cr - m_c) / (n_c C)``. Here x_cr is the
+    result of case c in realisation r, and n_c is the number of realisations of case c. The mean and the standard error
+    of these R numbers are the mean and the standard error of the group, even if the numbers n_c differ. If every case
+    has all R realisations, ``m + R u_r`` is the mean of x_cr over the cases.
 
     Parameters
     ----------
     dataset : Dataset
         A group of a study.
     by : sequence of str
-        Axes, or columns of a sampled study.
+        Names of axes, or of columns of a sampled study.
     kept : DataArray of bool, optional
         The cases to include; all by default.
 
@@ -78,7 +78,7 @@ def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None =
 
 @dataclass(frozen=True)
 class _Members:
-    """Indices of all cases, sorted by group, and the position of the first case of each group."""
+    """The indices of all cases, sorted by group, and the position of the first case of each group in this order."""
 
     order: NDArray[np.intp]
     starts: NDArray[np.intp]
@@ -89,7 +89,7 @@ class _Members:
         return np.diff(self.starts, append=self.order.size)
 
     def sums(self, values: NDArray[Any], dtype: type = float) -> NDArray[Any]:
-        """Return the sums over the cases of every group; the first dimension of the values is the case."""
+        """Return the sums of values over the cases of every group; the cases are the first dimension of the values."""
         if not self.order.size:
             return np.zeros((0, *values.shape[1:]), dtype)
         return np.asarray(np.add.reduceat(values[self.order], self.starts, axis=0, dtype=dtype))

@@ -26,7 +26,8 @@ PIECE = 2**20
 def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn) -> xr.Dataset:
     """Answer a question with lazy arrays; cases that do not meet the condition are NaN.
 
-    The arrays are statistics and the counts of states along ``state``, or single results and their ``status``.
+    The arrays are statistics, with the number of results in each state along ``state``, or single results with their
+    ``status``.
 
     Raises
     ------

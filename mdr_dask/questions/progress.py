@@ -23,7 +23,7 @@ class Group(NamedTuple):
     Attributes
     ----------
     series, kind, reason : str
-        The series, ``warning`` or the state of the results, and the message.
+        The series; the state of the results, or ``warning`` for results that are done; and the message.
     results : int
         Number of results.
     cases : str
@@ -50,7 +50,8 @@ def counts(url: str) -> list[dict[str, Any]]:
 def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the current messages of a series.
 
-    They come from the last attempt at each result, and are left out if the state of the result has changed since.
+    For each result, the message of the last attempt is used. It is left out if the state of the result has changed
+    since.
     """
     last: dict[tuple[int, ...], dict[str, Any]] = {}
     telling = [record for record in store.records(url, series) if record["messages"]]
@@ -65,7 +66,7 @@ def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]
 def grouped(found: Sequence[dict[str, Any]], studies: Mapping[str, xr.Dataset]) -> list[Group]:
     """Group messages that differ only in their numbers, in the order of their first appearance.
 
-    `studies` are the groups of the study by series, for the units of its axes.
+    `studies` are the groups of the study by series; they contain the units of the axes.
     """
     groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
     for message in found:

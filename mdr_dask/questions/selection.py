@@ -60,7 +60,10 @@ def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings
 def select_all(
     datasets: Mapping[str, xr.Dataset], selections: Sequence[str], tell: Tell = warnings.warn
 ) -> dict[str, xr.Dataset]:
-    """Apply selections to every series in which the selected parameter varies."""
+    """Apply each selection to every series in which the selected parameter varies.
+
+    If it varies in no series, apply the selection to the first series.
+    """
     chosen = dict(datasets)
     for text in selections:
         name, _ = _parsed(text)
@@ -71,7 +74,10 @@ def select_all(
 
 
 def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
-    """Keep the cases that meet a condition on means over realisations; other cases become NaN and *not needed*."""
+    """Keep the cases that meet a condition on means over realisations.
+
+    The results of all other cases become NaN, with the state *not needed*.
+    """
     truth = Columns(dataset).truth(condition)
     masked = {name: array.where(truth) for name, array in dataset.data_vars.items() if name != "status"}
     status = dataset["status"].where(truth, Status.NOT_NEEDED.value).astype(dataset["status"].dtype)
@@ -87,7 +93,7 @@ def where_all(groups: Mapping[str, xr.Dataset], condition: str) -> dict[str, xr.
 
 
 def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
-    """Return the group of a series; without a name, the only group."""
+    """Return the group of a series. With None, return the only group."""
     names = ", ".join(datasets)
     if series is None:
         if len(datasets) > 1:
@@ -99,7 +105,7 @@ def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
 
 
 def outputs(dataset: xr.Dataset, names: Sequence[str], tell: Tell | None = None) -> xr.Dataset:
-    """Keep the named outputs with their errors; without names, all outputs with one number for each result.
+    """Keep the named outputs with their errors. Without names, keep all outputs that have one number for each result.
 
     `tell` receives a sentence about the outputs that are left out because they have further dimensions.
     """
@@ -138,7 +144,7 @@ def _parsed(text: str) -> tuple[str, str]:
 
 
 def _axis(dataset: xr.Dataset, name: str) -> xr.DataArray:
-    """Return the values of an axis or parameter as a one-dimensional array; a fixed parameter gives one value."""
+    """Return the values of an axis or parameter as a one-dimensional array. A fixed parameter has one value."""
     from xarray import DataArray
 
     if name in dataset.dims and name not in dataset.coords:
@@ -157,7 +163,7 @@ def _axis(dataset: xr.Dataset, name: str) -> xr.DataArray:
 
 
 def _chosen(axis: xr.DataArray, name: str, wanted: str, tell: Tell) -> NDArray[np.bool_]:
-    """Return which values of an axis are selected."""
+    """Return a mask of the selected values of an axis."""
     values = axis.to_numpy()
     if values.dtype.kind not in "fiu":
         return _chosen_words([str(value) for value in values.tolist()], name, wanted)
@@ -199,7 +205,7 @@ def _words(text: str) -> list[str]:
 
 
 def _nearest(values: NDArray[Any], wanted: float, name: str, unit: str, tell: Tell) -> NDArray[np.bool_]:
-    """Return which value is nearest to a number; no value if the number lies outside the axis."""
+    """Return a mask of the value nearest to a number; it selects no value if the number lies outside the axis."""
     distance = np.abs(values - wanted)
     slack = SAME * max(abs(wanted), np.abs(values).max())
     if not values.min() - slack <= wanted <= values.max() + slack:
@@ -214,7 +220,7 @@ def _nearest(values: NDArray[Any], wanted: float, name: str, unit: str, tell: Te
 
 
 def _intervals(wanted: str, name: str, unit: str) -> Iterator[tuple[float, float]]:
-    """Yield the ends of every range of a selection; both ends are equal for a single value."""
+    """Yield the ends of every range of a selection. For a single value, both ends are equal."""
     pieces = [[end.strip() for end in piece.split("..")] for piece in wanted.split(",")]
     numbers = [end for piece in pieces for end in piece if end]
     bare = [_is_bare(end) for end in numbers]

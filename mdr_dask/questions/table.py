@@ -1,4 +1,4 @@
-"""Answers to a question as rows, computed box by box, so that the first rows of a large study are available quickly."""
+"""Answers to a question as rows. A study is read box by box, so that its first rows are available quickly."""
 
 from __future__ import annotations
 
@@ -37,23 +37,24 @@ class Question:
     Parameters
     ----------
     outputs : tuple of str
-        Names of outputs; without names, all outputs with one number for each result.
+        Names of outputs. If it is empty, all outputs that have one number for each result.
     selections : tuple of str
         Selections as in `mdr_dask.questions.selection.select`.
     where : str
-        A condition on means over realisations, or on single results if `statistics` is None.
+        A condition on means over realisations. If `statistics` is None, a condition on single results.
     group_by : tuple of str
-        Axes: one row for each combination of their values, averaged over all other axes.
+        Names of axes. There is one row for each combination of their values, averaged over all other axes.
     sort : tuple of str
         Columns or formulas by which rows are sorted; a leading ``-`` means descending. Missing values come last.
     columns : tuple of str
-        Axes, parameters, outputs, dimensionless numbers, ``status``, ``realisations``; by default all axes and outputs.
+        Axes, parameters, outputs, dimensionless numbers, ``status`` and ``realisations``. By default, all axes and
+        outputs.
     units : mapping of str to str
         Units of columns; all other columns are in SI.
     statistics : tuple of str, optional
-        Statistics over realisations; None for a table with one row for each result.
+        Statistics over realisations. With None, the table has one row for each result.
     written : bool
-        Whether axes and parameters that are not in `units` are given in the unit of the campaign file.
+        Whether axes and parameters that are not in `units` have the unit that the campaign file uses.
     """
 
     outputs: tuple[str, ...] = ()
@@ -71,8 +72,8 @@ class Question:
 class Table:
     """A table as a sequence of data frames, with the units of its columns.
 
-    `total` is the number of rows, or None if it is unknown before the last frame. `keys` is the number of leading
-    columns that identify a row.
+    `total` is the number of rows, or None if this number is known only after the last frame. `keys` is the number of
+    columns, from the left, that identify a row.
     """
 
     frames: Iterator[pd.DataFrame]
@@ -84,13 +85,14 @@ class Table:
 def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = warnings.warn) -> Table:
     """Answer a question about a group of a study with rows.
 
-    Rows are computed when their frame is read, in constant memory unless they are sorted. `limit` is the number of rows
-    that are needed, 0 for all. `tell` receives messages about the selection.
+    Rows are computed when their frame is read. The memory needed does not grow with the number of rows, unless they are
+    sorted. `limit` is the number of rows that will be read, or 0 if all will be read. `tell` receives messages about
+    the selection.
 
     Raises
     ------
     DataError
-        If a name is unknown, before any row is computed.
+        If a name is unknown. The error is raised before any row is computed.
     """
     maker = _Maker(dataset, question, tell)
     units = maker.units()
@@ -133,7 +135,7 @@ class _Maker:
         self.keys = 0
 
     def units(self) -> dict[str, str]:
-        """Return the units of the columns from one row; errors in the question are raised here."""
+        """Return the units of the columns, found by computing one row; errors in the question are raised here."""
         rows = self._rows(self._data, dict.fromkeys(self._dims, slice(0, 1)))
         self._kept(rows)
         self._keys(rows)
@@ -235,13 +237,13 @@ class _Maker:
 
 
 def _numbered(dataset: xr.Dataset) -> xr.Dataset:
-    """Assign the numbers from 0 to dimensions without values, such as the cases of a sampled study."""
+    """Assign the numbers 0, 1, 2, ... to dimensions without values, such as the cases of a sampled study."""
     bare = [dim for dim in dataset.dims if dim not in dataset.coords]
     return dataset.assign_coords({dim: np.arange(dataset.sizes[dim]) for dim in bare})
 
 
 def _flattened(array: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
-    """Return the columns of a statistic; intervals and quantiles have several."""
+    """Return the columns of a statistic. Intervals and quantiles have several columns."""
     if "bound" in array.dims:
         return {f"{name.removesuffix('interval')}{end}": array.isel(bound=k) for k, end in enumerate(("low", "high"))}
     if "quantile" in array.dims:
@@ -252,8 +254,8 @@ def _flattened(array: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
 def boxes(sizes: Mapping[str, int], most: int, chunks: Sequence[int] = ()) -> Iterator[dict[str, slice]]:
     """Divide a grid into boxes of at most `most` points, in the order of its rows.
 
-    The index of the last dimension in `sizes` varies fastest. `chunks` are the lengths of chunks of the store; boxes
-    longer than a chunk end at the end of a chunk.
+    The index of the last dimension in `sizes` varies fastest. `chunks` are the lengths of the chunks of the store.
+    Boxes that are longer than a chunk contain whole chunks.
     """
     dims, inner = list(sizes), 1
     cut = len(dims)

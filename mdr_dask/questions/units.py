@@ -12,10 +12,10 @@ from mdr_dask.units import conversion
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Suffixes of statistics that are values of the output, in its unit.
+#: Suffixes of statistics that are values of the output itself, such as its mean.
 _OF_OUTPUTS = ("mean", "interval", "quantile")
-#: Suffixes of statistics that are differences of values. They are converted without the zero point of a temperature
-#: scale.
+#: Suffixes of statistics that are differences between values of the output. When a temperature is converted, the zero
+#: point of the scale is not applied to them.
 _DIFFERENCES = ("error", "standard_deviation", "standard_error", "grid_error")
 
 
@@ -43,9 +43,9 @@ def as_written(study: xr.Dataset) -> dict[str, str]:
 
 
 def in_units(dataset: xr.Dataset, wanted: Mapping[str, str]) -> xr.Dataset:
-    """Convert variables and coordinates; an output is converted together with its statistics and errors.
+    """Convert variables and coordinates. An output is converted together with its statistics and errors.
 
-    `wanted` are units by the name of an axis, a parameter or an output, in any spelling of a campaign file.
+    `wanted` are units by the name of an axis, a parameter or an output. They may be spelt as in a campaign file.
 
     Raises
     ------
