@@ -206,8 +206,8 @@ def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
 def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
     """Return possible sizes of the error of measurement.
 
-    The smallest size is `LEAST` times the rms of the residuals. The largest size is the upper end of the one-sided 99.9
-    % interval that the residuals give for the error.
+    The smallest size is `LEAST` times the rms of the residuals. The residuals give a one-sided 99.9 % interval of the
+    error; its upper end is the largest size.
     """
     spare = max(1, count - unknowns)
     most = min(100.0, float(np.sqrt(count / (2 * gammaincinv(spare / 2, 0.001)))))
