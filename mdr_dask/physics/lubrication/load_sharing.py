@@ -19,8 +19,8 @@ from typing import NamedTuple
 
 from scipy.optimize import brentq
 
-#: Asperity load share below which the asperity load is neglected. This share would change the film by a quarter of this
-#: fraction.
+#: Load share of the asperities below which their load is neglected. A share of this size would change the film
+#: thickness by a quarter of this fraction.
 _NEGLIGIBLE = 1e-9
 #: Natural logarithm of the smallest load share of the film that is tried.
 _LEAST_LOGARITHM = -256.0

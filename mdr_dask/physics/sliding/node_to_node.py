@@ -1,4 +1,4 @@
-"""Steady sliding of a Kelvin foundation along a periodic line, for many cases at once; fast, but approximate in cells.
+"""Steady sliding of a Kelvin foundation along a periodic line: fast, for many cases at once, but approximate.
 
 All lengths are in cells: neighbouring nodes have the distance 1, and De = v tau is the Deborah number in cells. Inside
 a cell the penetration w = d + h is a cubic, which follows from heights and slopes at the two nodes (d is the depth, h
@@ -106,7 +106,7 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
     first : int
         Index of the first node, whose height is subtracted from all heights.
     stride : int
-        Ratio of the numbers of nodes.
+        Number of given nodes for each node of the coarser line.
     resolved : bool
         Whether the remaining nodes are close enough to use the given slopes. If False, slopes are computed from
         differences of heights.

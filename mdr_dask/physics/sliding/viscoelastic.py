@@ -183,7 +183,7 @@ def _travelling(solid: LinearSolid, cell: float) -> Travelling:
     """Return a solid with lengths in cells and stresses divided by the static modulus.
 
     One Prony term with a very short relaxation time replaces the dashpot and all terms that relax within a very small
-    fraction of a cell. It has the same viscosity.
+    fraction of a cell. Its viscosity is the sum of the viscosities that it replaces.
     """
     static = solid.static_modulus
     fast = solid.times < SHORTEST * cell

@@ -16,7 +16,9 @@ from mdr_dask.physics.surfaces import shapes
 
 NONE = 2.0  # result of `summit` if the cell has no maximum
 STEEPEST_RISE = 4 / 27  # largest rise of a cubic above its ends, divided by the sum of the slopes at the ends
-UNRESOLVED = 0.5  # relative difference of the mean squared slopes at nodes and in cells above which nodes are too few
+UNRESOLVED = (
+    0.5  # a line is not resolved if the mean squared slopes at nodes and in cells differ by this fraction or more
+)
 
 
 class CubicLine(NamedTuple):

@@ -67,7 +67,7 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
 
 
 def _off_neighbours(height: FloatArray) -> FloatArray:
-    """Return how far each inner point is from the mean of its two neighbours along an axis, for the closer axis.
+    """Return the distance of each inner point from the mean of its two neighbours, along x or y, whichever is smaller.
 
     The smaller distance is used because a point on a crest is close to its neighbours along the crest, but far from its
     neighbours across the crest.
@@ -95,7 +95,7 @@ def require_few_missing(missing: NDArray[np.bool_]) -> None:
 
 
 def filled(surface: SurfaceMap) -> SurfaceMap:
-    """Return a map with missing points filled by Laplace's equation: each is the mean of its four neighbours.
+    """Return a map in which each missing point is the mean of its four neighbours (Laplace's equation).
 
     Raises
     ------
@@ -223,9 +223,9 @@ class MapSpectrum:
         return averaged(*rings)
 
     def along(self, axis: int) -> Spectrum:
-        """Return the C2D of an isotropic surface whose MDR line has the spectrum of the straight profile along an axis.
+        """Return an isotropic C2D whose MDR line has the same spectrum as the straight profile along an axis.
 
-        The axis is 0 for x and 1 for y. This spectrum represents a grooved surface that slides along this axis.
+        The axis is 0 for x and 1 for y. The result represents a grooved surface that slides along this axis.
         """
         q, cut = self.cuts[axis]
         there = cut > ROUNDING * cut.max()

@@ -59,7 +59,7 @@ def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> 
 
 
 def steep_limit(bins: Cut) -> float:
-    """Return the wave number beyond which C2D falls more steeply than that of any roughness, or infinity."""
+    """Return the wave number beyond which C2D falls too steeply for roughness, or infinity if it never does."""
     wavenumber, density = bins.wavenumber, bins.density
     there = density > 0
     x, y = np.log(wavenumber[there]), np.log(density[there])

@@ -1,8 +1,8 @@
 """A closed line as a cubic spline with one coefficient per node.
 
-For coefficients c_k and the uniform cubic B-spline, the line between two nodes is ``a0 + a1 t + a2 t^2 + a3 t^3`` with
-t from 0 to 1 and the numbers returned by `piece`. The values of the line lie between the smallest and the largest of
-the four coefficients of this piece (de Boor, *A Practical Guide to Splines*, 1978, chapter IX).
+The splines are uniform and cubic. Between two nodes the line is ``a0 + a1 t + a2 t^2 + a3 t^3``, with t from 0 to 1;
+`piece` computes a0 to a3 from four coefficients of the spline. The values of the line in this piece lie between the
+smallest and the largest of these four coefficients (de Boor, *A Practical Guide to Splines*, 1978, chapter IX).
 """
 
 from __future__ import annotations

@@ -228,9 +228,9 @@ def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
     reachable : Reachable
         Its runs must contain all patches at this depth.
     work : Workspace
-        Written: the patches and `sums`. The sums are: load and drag, divided by 4 G dx; length in contact; integral of
-        the slope over the length in contact; derivatives of load and drag with respect to the depth; and the rates at
-        which load and drag change because patches grow.
+        The patches and `sums` are written to it. The sums are: load and drag, divided by 4 G dx; length in contact;
+        integral of the slope over the length in contact; derivatives of load and drag with respect to the depth; and
+        the rates at which load and drag change because patches grow.
 
     Returns
     -------
@@ -576,7 +576,10 @@ def _add_edge(search: Search, place: float, steep: float, by_depth: float, openi
 
 @jit_inline_uncounted
 def _add_separation(search: Search, place: float) -> None:
-    """Add a place where the force falls to zero now, and the farthest place where it may have done so since then."""
+    """Add a place where the force falls to zero now.
+
+    The entry also contains the farthest place where the force may have fallen to zero since the jump.
+    """
     now, recovery, highest = search.now, search.work.recovery, search.motion.highest
     i = min(int(place), search.n)
     h, slope, _ = height_at(now.track, i + 1.0)

@@ -28,7 +28,7 @@ class Track(NamedTuple):
     Parameters
     ----------
     height : array, shape (n + 2,)
-        Heights at the nodes relative to the highest point, which avoids rounding errors in light contacts.
+        Heights at the nodes minus the height of the highest point. In this form, light contacts have no rounding error.
     enter, leave, peak : array, shape (n + 1,)
         Slope at the start and at the end of each cell, and largest height in the cell; the last cell repeats the first
         cell.

@@ -308,7 +308,7 @@ def _scar_radius(rule: Rule, bracket: Bracket, quadrature: Quadrature) -> float:
 
 @jit
 def _limit_radius(rule: Rule, largest: float, quadrature: Quadrature) -> float:
-    """Return a(c), for a rule with the remaining fraction zero; NaN if it lies beyond the largest radius."""
+    """Return a(c) for a rule whose remaining fraction is zero. If a(c) exceeds the largest radius, return NaN."""
     _put_cuts(rule, quadrature.cuts)
     low, high = 1.0, min(1.5, largest)
     low_value, high_value = _scar_integral(rule, low, 0, quadrature), _scar_integral(rule, high, 0, quadrature)

@@ -38,7 +38,7 @@ BORDER_WEIGHT = 30.0
 BEYOND = 1.25
 #: Lower limit of q, so that its logarithm is finite.
 SMALLEST = 1e-30
-#: `_mean_angle` uses a series if (r1 - r2) / (r1 + r2) is below this value, where r1 and r2 are the values of
+#: `_piece` uses a series if (r1 - r2) / (r1 + r2) is below this value, where r1 and r2 are the values of
 #: sqrt(r^2 - b^2) at the two ends of a straight piece of the path.
 SHORT = 0.02
 _ABSCISSA, _WEIGHT = gauss(3)
@@ -407,7 +407,7 @@ def _fill_known(mesh: Mesh, body: VirginBody, past: Past, place: Place, result: 
         result[nodes + i] = worn
     first, last = math.sqrt(body.square + body.width * border), math.sqrt(body.square + body.width * place.border)
     step = body.width * (place.border - border) / (first + last)
-    # b d + int (1 - d) db, without the cancellation of b d and the first b d
+    # b d + int (1 - d) db along the path; the terms of the last step are combined to avoid cancellation
     result[2 * nodes] = first * place.depth + past.carried + step * (1.0 + 0.5 * (place.depth - depth))
 
 

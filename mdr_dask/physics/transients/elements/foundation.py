@@ -184,9 +184,9 @@ def release(
 ) -> tuple[float, float]:
     """Return the fraction of a duration after which an element in contact separates, and its displacement at that time.
 
-    The element follows the line, from the height w0 (above the undeformed surface) to w1, with the rates `rise0` and
-    `rise1`. The fraction is 1 if the element does not separate. The force is taken as linear in time, the height of the
-    line as cubic.
+    The element follows the line. Its displacement changes from w0 to w1; the rates at the start and at the end are
+    `rise0` and `rise1`. The fraction is 1 if the element does not separate. The force is taken as linear in time, and
+    the displacement as cubic.
     """
     begin = pull(solid, w0, terms, i) + solid.viscosity * rise0
     if begin <= 0:

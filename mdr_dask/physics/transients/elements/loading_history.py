@@ -68,9 +68,9 @@ def untouched(elements: int, terms: int) -> State:
 def steady_start(line: CubicLine, solid: Foundation, deborah: float, load: float) -> tuple[State, float, Outcome]:
     """Return the steady state of the elements at the nodes, sliding at constant speed under a constant load.
 
-    One element is moved along the line, period after period, until its state repeats, in steps of half a cell by the
-    method of :func:`follow_line`. The depth is found from the mean displacement, which increases with the depth. At
-    ``deborah = 0`` the elements are in equilibrium at rest under the load.
+    One element is moved along the line, period after period, until its state repeats. It moves in steps of half a cell,
+    by the method of :func:`follow_line`. The depth is found from the mean displacement, which increases with the depth.
+    At ``deborah = 0`` the elements are in equilibrium at rest under the load.
 
     Returns
     -------
