@@ -181,7 +181,7 @@ class FilmFormula:
         )
 
     def outside(self, W: float, U: float, G: float) -> str:
-        """Return a message that names those of W, U and G that are outside the range of the formula, or an empty string."""
+        """Return a message that names the numbers outside the range of the formula, or an empty string."""
         ranges = (("W", W, self.load_range), ("U", U, self.speed_range), ("G", G, self.material_range))
         outside = [
             f"{symbol} lies outside {low:g} to {high:g}"

@@ -81,7 +81,7 @@ class Problem(Protocol):
         """Return the virgin contact."""
 
     def memory(self, past: Sequence[Any], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """Return a function that computes the weighted sum of past accumulated values at the nodes from the unknowns."""
+        """Return a function that computes, from the unknowns, the weighted sum of past accumulated values at nodes."""
 
     def moment(self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Any]) -> Moment:
         """Return the moment at the end of a solved step."""
