@@ -1,10 +1,11 @@
 """The Zarr store of a study. Only this package uses Zarr.
 
-A group holds one array for every output, the array ``status`` (the ledger), and a coordinate for every parameter. The
-dimensions of the arrays are the axes, ``realisation``, and further dimensions of an output. The driver creates the
-arrays. The process that computes a block also writes it in this order: its record with the digest of every chunk, one
-whole chunk of every output, and its chunk of ``status``. Readers see consolidated metadata, which are replaced in one
-write.
+A group contains one array for every output, the array ``status`` (the ledger, which holds the state of every result),
+and a coordinate for every parameter. The dimensions of the arrays are the axes and ``realisation``. An output may have
+further dimensions. The process that started the run (the driver) creates the arrays. The process that computes a block
+also writes it, in this order: the record of the block, with the digest of every chunk; one whole chunk of every output;
+and the chunk of ``status``. Readers use only the metadata of the whole study in ``zarr.json``, which are replaced in
+one write.
 """
 
 from mdr_dask.store.blocks import Place, is_written, layout_mark, read_block, values, write_block

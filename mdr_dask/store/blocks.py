@@ -38,9 +38,9 @@ class Place:
     region : tuple of slice
         Slices of the block along (axes..., realisation).
     layout : str
-        The `layout_mark` of the store on the driver. A worker that finds a different mark writes nothing.
+        The `layout_mark` that the driver found in the store. A worker that finds a different mark writes nothing.
     lock : Lock
-        Lock of the run that computes the block.
+        Lock of the run to which the block belongs.
     """
 
     url: str
@@ -58,19 +58,21 @@ def write_block(
     status: NDArray[np.int8],
     record: Mapping[str, Any],
 ) -> None:
-    """Write a block: first its record, then one whole chunk of every output, and its chunk of the ledger last.
+    """Write a block: first its record, then one whole chunk of every output, and finally its chunk of the ledger.
 
-    The ledger alone decides which results of a block are done. The record is written first, because it holds the digest
-    of every chunk: the chunks of a task that was killed can then be identified.
+    Only the ledger states which results of a block are done. The record is written first, because it contains the
+    digest of every chunk. So if a task is killed while it writes, its chunks can be identified.
 
     Parameters
     ----------
     place : Place
-        Where to write it.
+        Where to write the block.
     attempt : int
-        Number of the attempt: how often the computation of the block has been started, including this time.
+        Number of the attempt, from 1: the number of times that the computation of the block was started, including this
+        one.
     values : mapping of str to float array
-        The outputs, each with the shape of the region and further dimensions last; empty if only the ledger changes.
+        The outputs. Each has the shape of the region, followed by its further dimensions. Empty if only the ledger
+        changes.
     status : int8 array, shape of the region
         The ledger of the block.
     record : mapping
@@ -122,7 +124,7 @@ def values(url: str, series: str, output: str) -> NDArray[np.float64]:
 
 
 def _opened(url: str, series: str, store: Store, names: Iterable[str] = ()) -> dict[str, Any]:
-    """Return the named arrays of a group; without names, the ledger and all outputs."""
+    """Return the named arrays of a group. Without names, return the ledger and all outputs."""
     held = document(url, series)
     if held is None:
         raise StoreError(f"{url}: removed since it was laid out")
@@ -133,7 +135,7 @@ def _opened(url: str, series: str, store: Store, names: Iterable[str] = ()) -> d
 
 @lru_cache(maxsize=64)
 def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
-    """Return the arrays of a group; they are cached as long as the layout stays the same."""
+    """Return the arrays of a group, which are cached as long as the layout stays the same."""
     found = layout_mark(url)
     if found != layout:
         raise StoreError(f"{url}: {_other_store(found)}")
@@ -142,7 +144,10 @@ def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
 
 @lru_cache(maxsize=64)
 def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict[str, Buffer]]:
-    """Return arrays in memory with the metadata of the stored arrays, and the dictionary of their encoded chunks."""
+    """Return arrays in memory with the metadata of the stored arrays, and a dictionary.
+
+    The dictionary contains the encoded chunks of what is written to the arrays.
+    """
     shown, encoded = _arrays(url, series, layout), dict[str, Buffer]()
     memory = zarr.storage.MemoryStore(encoded)
     empty = {name: array_of(_whole_chunks(array), memory, array.path) for name, array in shown.items()}
@@ -150,7 +155,7 @@ def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict
 
 
 def _whole_chunks(array: Any) -> dict[str, Any]:
-    """Return the metadata of an array with its shape rounded up to whole chunks, because a block may be larger."""
+    """Return the metadata of an array, with its shape rounded up to whole chunks."""
     shape = [-(-size // length) * length for size, length in zip(array.shape, array.chunks, strict=True)]
     return {**array.metadata.to_dict(), "shape": shape}
 
@@ -163,6 +168,6 @@ def _other_store(found: str | None) -> str:
 
 
 def layout_mark(url: str) -> str | None:
-    """Return a text that changes whenever a study is laid out again; None if there is no store."""
+    """Return a text that changes whenever a study is laid out again, or None if there is no store."""
     content = read_bytes(url, "zarr.json")
     return None if content is None else hashlib.blake2b(content, digest_size=16).hexdigest()

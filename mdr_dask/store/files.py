@@ -24,17 +24,17 @@ from mdr_dask.errors import MdrDaskError, StoreError
 
 T = TypeVar("T")
 
-#: Name under which readers find the results at the root of a store, if the store also has series.
+#: Name of the results at the root of a store that also has series.
 ROOT = "-"
-#: Folder of claims in a store whose file system, or server, has no locks.
+#: Folder with claims, which replace locks in a store on a server or on a file system without locks.
 CLAIMS = ".claims/"
-#: Files in the folder of a study whose first run was stopped before laying it out.
+#: Names of the files that a study may contain if its first run was stopped before the study was laid out.
 KEPT = ("zarr.json", "layout.json", CLAIMS.rstrip("/"))
 #: Number of simultaneous requests to a server.
 AT_ONCE = 64
-#: Seconds after which a request to a server fails if there is no answer.
+#: Time in s after which a request to a server fails if there is no answer.
 LONGEST_REQUEST = 120.0
-#: Number of threads that wait for the disk.
+#: Number of threads that flush files to the disk and wait until this is done.
 FLUSHERS = 8
 #: Version of the layout; stores of a later version are refused. Since version 2, records hold digests of all chunks.
 LAYOUT = 2
@@ -54,7 +54,7 @@ async def _answered(request: Awaitable[T]) -> T:
 
 
 class _RemoteStore(zarr.storage.FsspecStore):
-    """A store at a URL, whose requests fail if the server does not answer."""
+    """A Zarr store at a URL. Its requests fail if the server does not answer in time."""
 
     async def get(self, *arguments: Any, **options: Any) -> Any:
         return await _answered(super().get(*arguments, **options))
@@ -109,7 +109,7 @@ def read_bytes(url: str, name: str) -> bytes | None:
 
 
 def read_json(url: str, name: str) -> dict[str, Any] | None:
-    """Return the content of a JSON file, or None if there is no such file."""
+    """Return the content of a JSON file, or None if the file does not exist."""
     content = read_bytes(url, name)
     with guarded(url, f"reading {name}"):
         return None if content is None else parsed(content)
@@ -124,7 +124,7 @@ def parsed(content: bytes) -> Any:
 
 
 def read_many(url: str, files: Iterable[str]) -> Iterator[tuple[str, bytes | None]]:
-    """Yield name and content of many files in order; the content of a missing file is None.
+    """Yield the name and the content of many files, in the given order. The content of a missing file is None.
 
     Many files are requested from a server at the same time.
     """
@@ -148,7 +148,7 @@ def read_many(url: str, files: Iterable[str]) -> Iterator[tuple[str, bytes | Non
 
 
 def _content(file: str) -> bytes | None:
-    """Return the content of a file, or None if it is missing; with many files this is faster than `Path.read_bytes`."""
+    """Return the content of a file, or None if it is missing. This is faster than `Path.read_bytes`."""
     try:
         descriptor = os.open(file, os.O_RDONLY)
     except (FileNotFoundError, NotADirectoryError):
@@ -164,15 +164,16 @@ def _content(file: str) -> bytes | None:
 
 
 def write_bytes(url: str, name: str, content: bytes) -> None:
-    """Replace a file in one step, so that readers see the old content or the new one."""
+    """Replace a file in one step: readers see either the old content or the new content."""
     write_stages(url, [{name: content}])
 
 
 def write_stages(url: str, stages: Iterable[Mapping[str, bytes]]) -> None:
     """Write files in stages: each file is replaced in one step, after all files of the stages before it.
 
-    On a disk, all contents are first written and flushed under temporary names. Then the files of all stages except the
-    last stage get their final names, and their folders are flushed. Finally the files of the last stage get theirs.
+    On a disk, the contents of all files are first written and flushed under temporary names. Then the files of all
+    stages except the last one get their final names, and their folders are flushed. Finally the files of the last stage
+    get their final names.
     """
     stages = [stage for stage in stages if stage]
     path = local(url)
@@ -209,7 +210,7 @@ def _write_local(url: str, root: Path, stages: Sequence[Mapping[str, bytes]]) ->
                 made = {}
     except BaseException:
         for leftover in temporary.values():
-            with suppress(OSError):  # the first error is the one to report
+            with suppress(OSError):  # report only the first error
                 leftover.unlink()
         raise
 
@@ -226,7 +227,7 @@ def give_name(leftover: Path, target: Path) -> None:
 
 
 def _make(folder: Path) -> list[Path]:
-    """Make a folder and its missing parents; return the folders that got a new entry or may have got one."""
+    """Make a folder and its missing parents. Return the folders that have new entries, or may have new entries."""
     if folder.is_dir():
         return []
     above = [*_make(folder.parent), folder.parent]
@@ -235,7 +236,10 @@ def _make(folder: Path) -> list[Path]:
 
 
 def _flush(paths: Sequence[Path]) -> None:
-    """Wait until files and the entries of folders are on the disk; in threads, because a disk flushes many at once."""
+    """Wait until files, and the entries of folders, are on the disk.
+
+    This is done in threads, because a disk can flush several files at the same time.
+    """
     shares = (paths[first::FLUSHERS] for first in range(min(FLUSHERS, len(paths))))
     list(_flushers().map(_flush_in_turn, shares))
 
@@ -251,7 +255,9 @@ def flush(path: Path) -> None:
     try:
         os.fsync(descriptor)
     except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTSUP) or not path.is_dir():  # some cannot flush folders
+        if (
+            error.errno not in (errno.EINVAL, errno.ENOTSUP) or not path.is_dir()
+        ):  # some file systems cannot flush folders
             raise
     finally:
         os.close(descriptor)
@@ -262,7 +268,7 @@ def _flushers() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(FLUSHERS, thread_name_prefix="flush")
 
 
-if hasattr(os, "register_at_fork"):  # a forked process has a copy of the pool, but not its threads
+if hasattr(os, "register_at_fork"):  # a forked process has a copy of the pool without its threads
     os.register_at_fork(after_in_child=_flushers.cache_clear)
 
 
@@ -284,7 +290,7 @@ def create(url: str, name: str, content: bytes) -> bool:
 
 
 def conditional(url: str) -> bool:
-    """Return whether `create` is atomic: a local operation, or a single request to a server."""
+    """Return whether `create` is atomic: for local files, and for servers that create a file with a single request."""
     if local(url) is not None:
         return True
     from fsspec import AbstractFileSystem
@@ -318,7 +324,7 @@ def require_bucket(url: str) -> None:
 
 
 def sweep(url: str) -> None:
-    """Remove the temporary files of killed processes; call this only while holding the lock."""
+    """Remove the temporary files of killed processes. Call this only while no other run is active in the store."""
     path = local(url)
     if path is not None and path.is_dir():
         with guarded(url, "removing what a killed run left"):
@@ -350,20 +356,23 @@ def _raise_unless_gone(error: OSError) -> None:
 
 
 def group_name(series: str, member: str = "") -> str:
-    """Return the path of the group of a series, or of an array in it; without series, arrays are at the root."""
+    """Return the path of the group of a series, or of an array in this group. Arrays without series are at the root."""
     return "/".join(part for part in ("" if series == ROOT else series, member) if part)
 
 
 def chunk_name(series: str, array: str, block: Iterable[int], further: int = 0) -> str:
-    """Return the name of the chunk of a block; `further` is the number of dimensions that the ledger does not have."""
+    """Return the name of the chunk of a block in an array.
+
+    `further` is the number of dimensions of the array that the ledger does not have.
+    """
     return group_name(series, "/".join([array, "c", *map(str, block), *["0"] * further]))
 
 
 def digest(content: bytes) -> str:
     """Return the digest of a file.
 
-    A CRC would not distinguish chunks: each chunk ends with its own CRC, and the CRC of any bytes followed by their CRC
-    is the same constant.
+    A CRC cannot be used to distinguish chunks. Each chunk ends with the CRC of the bytes before it, and the CRC of
+    bytes followed by their own CRC is always the same number.
     """
     return hashlib.blake2b(content, digest_size=8).hexdigest()
 
@@ -375,7 +384,10 @@ def sealed(document: Mapping[str, Any]) -> bytes:
 
 
 def unsealed(line: bytes) -> dict[str, Any] | None:
-    """Return a document without its digest, or None if it is damaged. A document without a digest is not checked."""
+    """Return a document without its digest, or None if the document is damaged.
+
+    A document that has no digest is not checked.
+    """
     try:
         document: dict[str, Any] = parsed(line)
         stated = document.pop("digest", None)

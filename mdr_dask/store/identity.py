@@ -1,4 +1,4 @@
-"""Compare a campaign with the store that it extends: name all differences, and append new values to stored values."""
+"""Compare a campaign with the store that it resumes or extends, and append its new values to the stored values."""
 
 from __future__ import annotations
 
@@ -25,18 +25,20 @@ from mdr_dask.store.study import attributes, document, series_names
 
 @dataclass(frozen=True)
 class Stored:
-    """The part of a campaign that a store already holds.
+    """A campaign together with the results that a store already contains.
 
     Parameters
     ----------
     campaign : Campaign
-        The campaign, extended on every axis: first the stored values in their order, then the new values.
+        The campaign to lay out. Each axis has first the stored values in their order, then the new values of the
+        campaign.
     chunks : mapping of series name to chunk lengths
         Chunk lengths of the stored groups.
     realisations : int
         Number of stored realisations.
     places : mapping of series name to (mapping of dimension to int array)
-        For each stored group, the positions of the entries of the original campaign along each extended dimension.
+        For each stored group and each dimension, the positions of the values of the given campaign on the extended
+        axis.
     """
 
     campaign: Campaign
@@ -48,8 +50,8 @@ class Stored:
 def reconcile(url: str, campaign: Campaign) -> Stored:
     """Compare a campaign with the store that it resumes or extends.
 
-    If a store without series gets series, its first results stay at the root. A series of the campaign with the same
-    parameters and axes as these results is continued at the root.
+    A campaign with series may extend a store whose results have no series. These results stay at the root of the store.
+    If a series of the campaign has the same parameters and axes as these results, it is continued at the root.
 
     Parameters
     ----------
@@ -90,7 +92,7 @@ def reconcile(url: str, campaign: Campaign) -> Stored:
 
 
 def _require_version(url: str, campaign: Campaign) -> None:
-    """Raise StoreError if another version of the same model made the store, because their results must not mix."""
+    """Raise StoreError if another version of the model made the store, because their results must not be mixed."""
     held, version = attributes(url), models.load(campaign.model).version
     if held["model"] == campaign.model and held["model_version"] != version:
         program = held.get("versions", {}).get("mdr_dask", "another version")
@@ -131,7 +133,7 @@ def _arrays_at_root(url: str) -> set[str]:
 
 
 def _with_root(url: str, campaign: Campaign) -> Campaign:
-    """Return the campaign; a series that matches the results at the root of the store gets an empty name."""
+    """Return the campaign, in which a series that matches the results at the root of the store gets an empty name."""
     root = _group_attributes(url, "")
     if root is None or any(not series.name for series in campaign.series):
         return campaign
@@ -176,7 +178,7 @@ def _below_any(path: str, axes: Set[str]) -> bool:
 
 
 def _leaves(tree: Mapping[str, Any], prefix: str) -> dict[str, Any]:
-    """Flatten nested parameters to dotted paths; a named file is represented by its digest."""
+    """Flatten nested parameters to dotted paths. The value of a named file is its digest."""
     found: dict[str, Any] = {}
     for name, value in tree.items():
         if isinstance(value, Mapping) and not _is_file(value):
@@ -191,7 +193,7 @@ def _is_file(value: Any) -> bool:
 
 
 def _by_digest(value: Any) -> Any:
-    """Return a value in which each named file, also inside a list, is replaced by its digest."""
+    """Return a value in which each named file, even inside a list, is replaced by its digest."""
     if isinstance(value, list):
         return [_by_digest(each) for each in value]
     return value["sha256"] if _is_file(value) else value
@@ -200,7 +202,7 @@ def _by_digest(value: Any) -> Any:
 def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, IntArray]]:
     """Append the new entries of a series to the stored entries.
 
-    Return the extended series and, for each dimension, the positions of the original entries in it.
+    Return the extended series and, for each of its dimensions, the positions of the entries of the given series.
     """
     places = {}
     axes = []
@@ -221,7 +223,7 @@ def _axis(series: Series, path: str) -> Axis:
 
 
 def _entries(columns: list[list[Any]]) -> dict[tuple[str, int], int]:
-    """Return the position of every entry of a dimension, by the text of its values and a counter of equal entries.
+    """Return the position of every entry of a dimension; the keys are its values as text, and a counter of equal ones.
 
     Values that agree to `SAME_DIGITS` are equal. The counter is needed because sampled whole numbers may repeat a case.
     """
@@ -248,7 +250,7 @@ def _longer(series: Series, axis: Axis, stored: Mapping[str, Any], new: list[int
 
 
 def _restore(series: Series, path: str, plain: Any) -> Any:
-    """Return an axis value from its stored form; lists and mappings are validated by the field of the parameter set."""
+    """Return a value of an axis from its stored form; the field of the parameter validates lists and mappings."""
     if not isinstance(plain, Mapping | list):
         return plain
     *above, last = path.split(".")

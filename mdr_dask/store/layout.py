@@ -1,4 +1,4 @@
-"""Lay out a study: create or extend its arrays from templates, and make the new shape visible by one write."""
+"""Lay out a study: create or extend its arrays from templates. One write then makes the new shape visible."""
 
 from __future__ import annotations
 
@@ -41,18 +41,18 @@ from mdr_dask.store.files import (
 from mdr_dask.store.study import document, members_of, only_claimed
 from mdr_dask.version import __version__
 
-#: File with the record of the layout: the digests of all other files of the layout.
+#: File with the record of the layout, which contains the digests of all other files of the layout.
 RECORD = "layout.json"
-#: Length of the chunks of a coordinate.
+#: Number of values in a chunk of a coordinate.
 _COORDINATE_CHUNK = 4096
-#: Attributes that `_series_attributes` writes. If series are added to a store without series, these attributes stay at
-#: the root.
+#: Names of the attributes that `_series_attributes` returns. If series are added to a store without series, these
+#: attributes stay at the root.
 OF_SERIES = ("series", "parameters", "axes", "outputs", "blocks", "notes")
 _Coordinate = tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]
 
 
 def lay_out(url: str, layout: Sequence[Template]) -> None:
-    """Create the arrays of every template, or extend existing ones. Readers see either the old shape or the new one.
+    """Create the arrays of every template, or extend existing arrays. Readers see either the old shape or the new one.
 
     Files are written in this order: the record of the layout, which holds the digests of all following files; metadata
     and coordinates of arrays; the metadata of groups; and finally ``zarr.json``, the metadata of the study. This last
@@ -63,7 +63,7 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
     url : str
         Path or URL of the store.
     layout : sequence of Template
-        All groups; existing groups are extended at the ends of their dimensions.
+        The templates of all groups. Existing groups are extended at the ends of their dimensions.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def group_names(members: Mapping[str, Any]) -> list[str]:
 
 
 def metadata_files(root: Mapping[str, Any]) -> dict[str, bytes]:
-    """Return the metadata files of all groups and arrays, which follow from the metadata of the study."""
+    """Return the contents of the metadata files of all groups and arrays, computed from the metadata of the study."""
     members = root["consolidated_metadata"]["metadata"]
     names = group_names(members)
     groups = {name: group_document(members_of(members, name), members[name]["attributes"]) for name in names}
@@ -147,7 +147,7 @@ def metadata_files(root: Mapping[str, Any]) -> dict[str, bytes]:
 
 
 def coordinate_files(root: Mapping[str, Any], names: Iterable[str]) -> list[str]:
-    """Return the names that belong to chunks of coordinates, from the metadata of the study."""
+    """Return those of the names that belong to chunks of coordinates, according to the metadata of the study."""
     members = root["consolidated_metadata"]["metadata"]
     groups = {"": root["attributes"]} | {name: members[name]["attributes"] for name in group_names(members)}
     data = {group_name(name, array) for name, of in groups.items() for array in ("status", *of.get("outputs", ()))}
@@ -181,10 +181,10 @@ class LayoutRecord:
     Parameters
     ----------
     files : mapping of str to list of str
-        Digests of all versions of each file of the layout, the newest last. The record is written before these files.
-        A run may be killed between these writes, so a file may have any of the versions.
+        For each file of the layout, the digests of all its versions, the newest last. The record is written before
+        these files, and a run may be killed in between. So a stored file may have any of the versions.
     root : str
-        The newest ``zarr.json``, from which `mdr_dask.store.repair` restores this file.
+        The content of the newest ``zarr.json``, with which `mdr_dask.store.repair` restores this file.
     """
 
     files: Mapping[str, list[str]]
@@ -219,14 +219,17 @@ def layout_faults(url: str) -> Iterator[Finding]:
     is_older = content is not None and digest(content) in record.files["zarr.json"][:-1]
     for name, content in read_many(url, record.files):
         if content is None:
-            if not is_older:  # otherwise a run was stopped before it wrote this file
+            if not is_older:  # if zarr.json is older, a run was stopped before it wrote this file
                 yield Finding("missing", name, "part of the layout; --repair or the next run writes it again")
         elif digest(content) not in record.files[name]:
             yield Finding("damaged", name, "not what was written")
 
 
 def _signpost(members: Mapping[str, Any]) -> dict[str, str]:
-    """Return a comment for a study with series, because such a study looks empty when opened as one dataset."""
+    """Return an attribute for a study with series that says how to open it.
+
+    Without it, such a study would look empty when opened as one dataset.
+    """
     series = group_names(members)
     groups = " or ".join(f"group={name!r}" for name in sorted(series))
     text = f"the results of each series are in a group: open_datatree, or open_zarr with {groups}"
@@ -234,7 +237,7 @@ def _signpost(members: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _arrays_and_coordinates(template: Template) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """Return the metadata of all arrays of a group by the name of the array, and the chunks of its coordinates."""
+    """Return the metadata of all arrays of a group, by their names, and the chunks of the coordinates of the group."""
     coordinates = _coordinates(template)
     files: dict[str, Any] = {}
     store = zarr.storage.MemoryStore(files)
@@ -281,7 +284,7 @@ def _create(
     dtype: str,
     attrs: dict[str, Any],
 ) -> None:
-    """Create an output or the ledger in a store in memory."""
+    """Create the array of an output, or the ledger, in a store in memory."""
     zarr.create_array(
         store,
         name=name,
@@ -389,7 +392,10 @@ def _plain(value: Any) -> Any:
 
 
 def group_document(members: Mapping[str, Any], attrs: Mapping[str, Any]) -> bytes:
-    """Return the metadata of a group and of its members as one file, so that one write makes a new shape visible."""
+    """Return the metadata of a group and of its members as the content of one file.
+
+    One write of this file makes a new shape visible.
+    """
     held = {
         "zarr_format": 3,
         "node_type": "group",

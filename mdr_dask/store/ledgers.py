@@ -1,4 +1,4 @@
-"""The ledger of a group: the array ``status``, and the file names of the chunks of blocks."""
+"""Read the ledger of a group (the array ``status``), and find the chunks of its blocks."""
 
 from __future__ import annotations
 
@@ -70,8 +70,8 @@ class Blocks:
 def ledger(url: str, series: str, shape: tuple[int, ...] | None = None) -> NDArray[np.int8]:
     """Return the current ``status`` array of a group.
 
-    If a `shape` is given, the array is padded with "missing" or cut to this shape. It may have to be cut, because the
-    run of another part may have extended the stored array.
+    If a `shape` is given, the array is padded with "missing" or cut to this shape. The stored array may be larger than
+    this shape if the run of another part has extended it.
     """
     metadata = document(url, series)
     if metadata is None:
@@ -92,7 +92,7 @@ def ledger(url: str, series: str, shape: tuple[int, ...] | None = None) -> NDArr
 
 
 def _read(url: str, blocks: Blocks, metadata: Mapping[str, Any]) -> NDArray[np.int8]:
-    """Read the ledger. Equal chunks are decoded only once: most chunks are equal, and decoding in Zarr is slow."""
+    """Read the ledger. Equal chunks are decoded only once, because most chunks are equal and decoding is slow."""
     different: dict[bytes | None, int] = {None: 0}
     names = (blocks.chunk("status", block) for block in blocks.indices)
     numbers = [different.setdefault(content, len(different)) for _, content in read_many(url, names)]
@@ -115,12 +115,12 @@ def _read(url: str, blocks: Blocks, metadata: Mapping[str, Any]) -> NDArray[np.i
 def require_sound(url: str, series: Sequence[str], to_run: bool = False) -> None:
     """Raise StoreError if the layout of a study is damaged or a chunk of a finished block is missing.
 
-    Only the layout and the ledger are read, no values; `mdr_dask.store.verify` compares every file with its digest. A
-    run writes missing files of the layout again, so missing files are no fault `to_run`. A store without the record of
-    the layout can be read, but its metadata and coordinates are not checked.
+    Only the layout and the ledger are read, not the values. `mdr_dask.store.verify` compares every file with its
+    digest. A run writes missing files of the layout again, so with `to_run` missing files are no fault. If a store has
+    no record of its layout, its metadata and coordinates are not checked.
     """
     faults = _faults(url, series, to_run)
-    if any(faults):  # check again: a run may have changed a file during the first check
+    if any(faults):  # check again, because a run may have changed a file during the first check
         first = list(itertools.islice(_faults(url, series, to_run), NAMED + 1))
         if first:
             more = ", and more" if len(first) > NAMED else ""
@@ -138,7 +138,9 @@ def _faults(url: str, series: Sequence[str], to_run: bool) -> Iterator[str]:
         if metadata["attributes"]["mdr_dask_layout"] < 2:  # version 0.1 wrote no chunk if all its values were NaN
             continue
         done = _has_done(ledger(url, name), blocks.lengths)
-        present = set(listed(url, group_name(name)))  # after the ledger, which is written after the values
+        present = set(
+            listed(url, group_name(name))
+        )  # list the chunks after reading the ledger, because a run writes the ledger last
         for array in list(blocks.further)[1:]:
             chunks = (blocks.chunk(array, tuple(block)) for block in np.argwhere(done).tolist())
             yield from (f"{chunk} is missing" for chunk in chunks if chunk not in present)

@@ -1,11 +1,13 @@
 """Locks: a store has one exclusive run, or several parts of a campaign at the same time.
 
 On a file system with locks, the operating system releases a lock when the process of the run ends for any reason. On
-other file systems and at URLs, a run makes a claim instead: a file that can only be created if it is missing. Its owner
-regularly writes a second file as a sign of life. Tasks of a run that has ended cannot write.
+other file systems and at URLs, a run makes a claim instead: it creates a file, which is only possible if the file does
+not exist. The owner of the claim regularly writes a second file as a sign of life. The tasks of a run that has ended
+cannot write any more.
 
-Every run first acquires the gate, a lock that is held for a short time only. Its holder can check which other runs are
-active. So a part and an exclusive run never start together, and one part lays out a study while the other parts wait.
+Every run first acquires another lock, the gate, and holds it only for a short time. Meanwhile it checks which other
+runs are active. So a part and an exclusive run cannot start at the same time. A part also acquires the gate to lay out
+a study, while the other parts wait.
 """
 
 from __future__ import annotations
@@ -47,18 +49,18 @@ try:
 except ImportError:  # this system has no such locks: runs make claims instead
     fcntl = None  # type: ignore[assignment]
 
-#: `BEAT`: seconds between two signs of life of a run with a claim. `SILENCE`: seconds without a sign of life after
+#: `BEAT`: time in s between two signs of life of a run with a claim. `SILENCE`: time in s without a sign of life after
 #: which the run counts as ended.
 BEAT = 10.0
 SILENCE = 60.0
-#: Largest number of times that the claims are listed. They are listed again if the last claim in the list was deleted
+#: Claims are listed at most this number of times. They are listed again if the last claim in the list was deleted
 #: before it could be read.
 LISTINGS = 10
-#: Seconds for which a process tries again to acquire a lock that is held. Another process may hold the lock only for an
-#: instant, to check whether it is free.
+#: Time in s for which a process tries to acquire a lock that another process holds. The other process may hold the lock
+#: only for an instant, to check whether it is free.
 GLANCE = 0.5
-#: `KNOCK`: seconds between two attempts to acquire the gate. `PATIENCE`: seconds of waiting after which a message is
-#: logged.
+#: `KNOCK`: time in s between two attempts to acquire the gate. `PATIENCE`: time in s of waiting after which a message
+#: is logged.
 KNOCK, PATIENCE = 0.1, 4.0
 #: Error numbers of a file system without locks, and error numbers of a read-only file system.
 NO_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP}
@@ -72,7 +74,7 @@ log = logging.getLogger("mdr_dask.store")
 
 @dataclass(frozen=True)
 class Lock:
-    """A lock that a run holds; its tasks need it to write.
+    """A lock that a run holds. The tasks of the run need it to write.
 
     Parameters
     ----------
@@ -81,9 +83,9 @@ class Lock:
     owner : str
         Unique identifier of the run; empty for a run that can only read.
     claim : int or None
-        Number of the claim, or None for a lock of the operating system.
+        Number of the claim. None for a lock of the operating system.
     begun : tuple of str
-        Blocks that `note_begun` recorded for earlier runs that crashed or were killed before these blocks ended.
+        Blocks that earlier runs had begun but not ended when they crashed or were killed, as recorded by `note_begun`.
     """
 
     name: str
@@ -117,9 +119,9 @@ class Part:
     def of(cls, position: int, count: int) -> Part:
         """Return the part that a block belongs to, from the position of the block among all blocks.
 
-        With n parts, the first n blocks are assigned to the parts 1, 2, ..., n, the next n blocks to 2, 3, ..., n, 1,
-        and so on. Without this shift, if an axis has n blocks, all blocks at one value of the axis would belong to the
-        same part.
+        With n parts, the first n blocks belong to the parts 1, 2, ..., n, the next n blocks to the parts 2, 3, ..., n,
+        1, and so on. Suppose that an axis has n blocks: without this shift, all blocks at the same position on the axis
+        would belong to the same part.
         """
         return cls((position + position // count) % count + 1, count)
 
@@ -133,7 +135,7 @@ def exclusive(url: str) -> Iterator[Lock]:
     StoreBusyError
         If another run or a part is active in the store; the message names it.
     StoreError
-        If locking fails. In a read-only store it does not fail: the lock then allows reading only.
+        If locking fails. In a read-only store it does not fail, but the lock allows only reading.
     """
     with ExitStack() as held:
         with gate(url):
@@ -156,9 +158,9 @@ def shared(url: str, part: Part) -> Iterator[Lock]:
     Raises
     ------
     StoreBusyError
-        If this part, a part of a division into another number of parts, or an exclusive run is active.
+        If this part is already active, or an exclusive run, or a part of a division into another number of parts.
     StoreError
-        If locking fails. In a read-only store it does not fail: the lock then allows reading only.
+        If locking fails. In a read-only store it does not fail, but the lock allows only reading.
     """
     with ExitStack() as held:
         with gate(url), acquire(url):
@@ -174,7 +176,7 @@ def shared(url: str, part: Part) -> Iterator[Lock]:
 
 @contextmanager
 def gate(url: str) -> Iterator[None]:
-    """Hold the gate of a study. Meanwhile no other run can start or lay the study out."""
+    """Hold the gate of a study. Meanwhile no other run can start, and no other run can lay out the study."""
     start, is_reported = time.monotonic(), False
     with ExitStack() as held:
         while True:
@@ -190,7 +192,7 @@ def gate(url: str) -> Iterator[None]:
 
 
 def at_work(url: str) -> tuple[str | None, list[Part]]:
-    """Return the active runs of a study: the holder of the exclusive lock or None, and the active parts.
+    """Return the holder of the exclusive lock of a study, or None, and the active parts.
 
     Nothing is written.
     """
@@ -198,7 +200,7 @@ def at_work(url: str) -> tuple[str | None, list[Part]]:
 
 
 def active_runs(url: str) -> list[str]:
-    """Return the active runs of a study as texts: the exclusive run, and the number and the numbers of active parts."""
+    """Return texts that describe the active runs of a study: the exclusive run, and the active parts."""
     runner, parts = at_work(url)
     found = [runner] if runner else []
     for count, alike in itertools.groupby(parts, key=lambda part: part.count):
@@ -216,7 +218,7 @@ def _ranges(numbers: list[int]) -> str:
 
 @contextmanager
 def acquire(url: str, name: str = "") -> Iterator[Lock]:
-    """Hold a lock of a study. If the store is read-only, the lock allows reading only.
+    """Hold a lock of a study. If the store is read-only, the lock allows only reading.
 
     Parameters
     ----------
@@ -256,7 +258,7 @@ def acquire(url: str, name: str = "") -> Iterator[Lock]:
 
 @contextmanager
 def while_locked(url: str, lock: Lock) -> Iterator[None]:
-    """Check that a run still holds its lock, and make the next run wait until this context has ended.
+    """Check that a run still holds its lock. Until this context ends, no other run can take over the lock.
 
     Raises
     ------
@@ -287,7 +289,7 @@ def while_locked(url: str, lock: Lock) -> Iterator[None]:
 
 
 def note_begun(url: str, lock: Lock, begun: list[str]) -> None:
-    """Record which blocks a run has begun; the next run needs them if this process crashes."""
+    """Record which blocks a run has begun. If this process crashes, the next run reads this record."""
     if lock.claim is None and local(url) is not None:
         content = "\n".join([_this_process(), *begun]) + "\n"
         with guarded(url, "noting a block"), _runner(url, lock).open("r+") as file:
@@ -300,13 +302,20 @@ def _lock_file(url: str, name: str = "") -> Path:
     path = Path(url.removeprefix("file://"))
     try:
         path = path.resolve()
-    except (OSError, RuntimeError, ValueError) as error:  # for example a link to itself, or a null character
+    except (
+        OSError,
+        RuntimeError,
+        ValueError,
+    ) as error:  # for example, the path is a link to itself or contains a null character
         raise StoreError(f"{url}: expected a path: {error}") from None
     return path.with_name(".".join(["", path.name, *filter(None, [name]), "lock"]))
 
 
 def _locked(file: Path) -> int:
-    """Lock a lock file and return its descriptor; a file that was deleted meanwhile is created and locked again."""
+    """Lock a lock file and return its descriptor.
+
+    If another process deletes the file meanwhile, it is created and locked again.
+    """
     give_up = time.monotonic() + GLANCE
     while True:
         if not file.parent.exists():
@@ -328,7 +337,7 @@ def _locked(file: Path) -> int:
 
 
 def _flock(descriptor: int, shared: bool = False) -> None:
-    """Acquire a lock of the operating system without waiting; raise BlockingIOError if it is held."""
+    """Acquire a lock of the operating system without waiting. If another process holds it, raise BlockingIOError."""
     if fcntl is None:
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
     fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
@@ -385,7 +394,7 @@ def _busy(url: str, who: str) -> StoreBusyError:
 
 
 def _holder(url: str, name: str = "") -> str:
-    """Return the process that holds a lock, as text for messages."""
+    """Return a text for messages that names the process that holds a lock."""
     names = [_read_claim(url, _claim(name, number)).get("who", "") for number in _numbers(url, name)]
     for runner in _runners(url, name) if local(url) is not None else ():
         with suppress(OSError):
@@ -408,9 +417,9 @@ def _runners(url: str, name: str) -> list[Path]:
 
 @contextmanager
 def _registered(url: str, name: str) -> Iterator[Lock]:
-    """Write a runner file, which names the holder of a lock, and remove the runner files of earlier holders.
+    """Write a file that names the holder of a lock (the runner file), and remove the runner files of earlier holders.
 
-    Tasks hold a shared lock on the runner file while they write.
+    While a task writes, it holds a shared lock on the runner file of its run.
     """
     begun: list[str] = []
     for runner in _runners(url, name):
@@ -426,7 +435,7 @@ def _registered(url: str, name: str) -> Iterator[Lock]:
 
 
 def _retire(url: str, runner: Path) -> list[str]:
-    """Remove the runner file of an ended run once none of its tasks is writing; return the blocks that it had begun."""
+    """Remove the runner file of an ended run when none of its tasks is writing; return the blocks that it had begun."""
     give_up = time.monotonic() + SILENCE
     with guarded(url, "removing the file of a run"), runner.open("rb+") as file:
         while True:
@@ -478,7 +487,9 @@ def _claimed(url: str, name: str) -> Iterator[Lock]:
 
     def live() -> None:
         while not ended.wait(BEAT):
-            with suppress(StoreError):  # the network may come back; blocks are only written while the claim is valid
+            with suppress(
+                StoreError
+            ):  # go on, because the network may come back; blocks are written only while the claim is valid
                 write_bytes(url, _life(name, number), json.dumps({"time": time.time()}).encode())
 
     alive = threading.Thread(target=live, daemon=True)
@@ -488,7 +499,7 @@ def _claimed(url: str, name: str) -> Iterator[Lock]:
     finally:
         ended.set()
         alive.join()
-        with suppress(StoreError):  # without a network the claim stays, and the next run replaces it
+        with suppress(StoreError):  # without a network the claim is not removed; the next run replaces it
             if _read_claim(url, _claim(name, number)).get("owner") == owner:
                 remove(url, [_claim(name, number), _life(name, number)])
 
@@ -499,7 +510,7 @@ def _make_claim(url: str, name: str, owner: str) -> int:
         standing = _numbers(url, name)
         if not standing or not _is_alive(url, name, max(standing)):
             break
-        if read_bytes(url, _claim(name, max(standing))) is not None:  # otherwise its owner has just ended
+        if read_bytes(url, _claim(name, max(standing))) is not None:  # if it is missing, its owner has just ended
             raise _busy(url, _read_claim(url, _claim(name, max(standing))).get("who", "another process"))
     else:
         raise _busy(url, "another process")
@@ -507,7 +518,7 @@ def _make_claim(url: str, name: str, owner: str) -> int:
     content = json.dumps({"owner": owner, "who": _this_process(), "time": time.time()}).encode()
     if not create(url, _claim(name, number), content):
         held = _read_claim(url, _claim(name, number))
-        if held.get("owner") != owner:  # it is ours if only the reply to the first request was lost
+        if held.get("owner") != owner:  # the claim is this run's own if only the reply to the request was lost
             raise _busy(url, held.get("who", "another process"))
     elif not name and (not conditional(url) or create(url, _claim(name, number), content)):
         log.warning(
@@ -518,7 +529,10 @@ def _make_claim(url: str, name: str, owner: str) -> int:
 
 
 def _is_alive(url: str, name: str, number: int) -> bool:
-    """Return whether the owner of a claim is active: its last sign of life is recent, or a new one appears soon."""
+    """Return whether the owner of a claim is active.
+
+    It is active if its last sign of life is recent, or if a new one appears soon.
+    """
     claim = _read_claim(url, _claim(name, number))
     last = _read_claim(url, _life(name, number)) or claim
     if time.time() - last.get("time", 0.0) <= SILENCE:

@@ -1,4 +1,4 @@
-"""The zip of a published study: list the files to pack, and verify a zip."""
+"""Find the files to pack into the zip of a published study, and verify such a zip."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ from mdr_dask.store.verification import CHECKSUMS, Inspection, of_store, verify
 
 
 def contents(url: str) -> Iterator[tuple[str, bytes]]:
-    """Yield name and content of every file of a store, except published files."""
+    """Yield the name and the content of every file of a store, except files that belong only to a publication."""
     for name, content in read_many(url, of_store(listed(url))):
         if content is not None:
             yield name, content
 
 
-#: Largest accepted compression ratio of a file. Chunks are compressed already, and compression reduces metadata to
-#: about a tenth.
+#: Largest accepted ratio of the size of a file to its size in the zip. Chunks are compressed already, so their ratio is
+#: about 1, and that of metadata is about 10.
 LARGEST_RATIO = 100
-#: File size below which any ratio is accepted, and size of the pieces in which files are read; both in bytes.
+#: `SMALL`: size of a file, in bytes, below which any ratio is accepted. `PIECE`: size, in bytes, of the pieces in which
+#: files are read.
 SMALL, PIECE = 2**20, 2**20
 
 
@@ -35,7 +36,8 @@ def verify_packed(path: Path) -> Inspection:
     Raises
     ------
     StoreError
-        If this program did not write the zip: if it is encrypted, uses another compression, or unpacks to a huge size.
+        If this program cannot have written the zip, because it is encrypted, uses another compression, or would unpack
+        to a huge size.
     """
     try:
         with zipfile.ZipFile(path) as packed, tempfile.TemporaryDirectory() as folder:
@@ -54,7 +56,7 @@ def verify_packed(path: Path) -> Inspection:
 
 
 def _checksums(path: Path, packed: zipfile.ZipFile) -> dict[str, str]:
-    """Check the table of contents, and return the expected checksum of every file."""
+    """Check the list of files in a zip, and return the expected checksum of every file."""
     for entry in packed.infolist():
         if entry.flag_bits & 1:
             raise StoreError(f"{path}: {entry.filename!r:.80} is encrypted, expected a zip of 'mdr-dask publish'")
@@ -73,7 +75,7 @@ def _checksums(path: Path, packed: zipfile.ZipFile) -> dict[str, str]:
 
 
 def _unpack(packed: zipfile.ZipFile, expected: dict[str, str], folder: Path) -> Iterator[Finding]:
-    """Unpack the files inside the store, and yield a finding for each file that is foreign, missing or damaged."""
+    """Unpack the files of the store into a folder, and yield a finding for each foreign, missing or damaged file."""
     there = packed.namelist()
     for name in sorted(set(there) - expected.keys() - {CHECKSUMS}):
         yield Finding("foreign", name, "it has no checksum" if _is_inside(name) else "a place outside the store")
@@ -92,7 +94,7 @@ def _is_inside(name: str) -> bool:
 
 
 def _extract(packed: zipfile.ZipFile, name: str, target: Path) -> str:
-    """Unpack a file piece by piece, and return its checksum; an empty text if it cannot be unpacked."""
+    """Unpack a file piece by piece, and return its checksum, or an empty text if it cannot be unpacked."""
     checksum = hashlib.sha256()
     target.parent.mkdir(parents=True, exist_ok=True)
     with target.open("wb") as file:

@@ -20,14 +20,14 @@ from mdr_dask.store.study import require_valid_file, series_names
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Groups larger than this number of bytes are read through Dask, which is several times slower but can handle groups
-#: that do not fit into memory.
+#: Groups larger than this, in bytes, are read through Dask. Dask is several times slower, but can handle groups that do
+#: not fit into memory.
 LAZY_BYTES = 2**30
 
 
 @contextmanager
 def readable(url: str) -> Iterator[None]:
-    """Turn errors of Zarr while arrays are loaded into a StoreError whose message is one sentence."""
+    """Turn the errors that Zarr raises for unreadable chunks into a StoreError whose message is one sentence."""
     try:
         yield
     except Exception as error:
@@ -37,7 +37,7 @@ def readable(url: str) -> Iterator[None]:
 
 
 def is_damage(error: Exception) -> bool:
-    """Return whether an error comes from Zarr or its codecs: a chunk cannot be read."""
+    """Return whether an error comes from Zarr or its codecs, which means that a chunk cannot be read."""
     *_, (innermost, _) = traceback.walk_tb(error.__traceback__)
     package = str(innermost.f_globals.get("__name__", "")).partition(".")[0]
     return not isinstance(error, OSError) and package in ("zarr", "numcodecs")
@@ -54,9 +54,9 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
     Returns
     -------
     dict of str to Dataset
-        Every group by the name of its series, with numeric axes in ascending order. The results of a study without
-        series have the name ``""``, or ``"-"`` if series were added later. Arrays are loaded when they are used. In a
-        group larger than `LAZY_BYTES` they are Dask arrays, which are reduced chunk by chunk.
+        Every group by the name of its series. The values of numeric axes are in ascending order. The results of a study
+        without series have the name ``""``, or ``"-"`` if series were added later. Arrays are loaded when they are
+        used. In a group larger than `LAZY_BYTES` they are Dask arrays, which are computed chunk by chunk.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
     dataset: xr.Dataset = opened(chunks=None)
     if dataset.nbytes > LAZY_BYTES:
         dataset = opened(chunks={})
-    # a lazy coordinate would be read again by every step of a reduction
+    # load coordinates now, because every step of a reduction would read a lazy coordinate again
     dataset = dataset.assign_coords({name: each.copy(data=each.to_numpy()) for name, each in dataset.coords.items()})
     for dim in dataset.dims:
         if (
@@ -93,13 +93,14 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
 def save(dataset: xr.Dataset, path: Path) -> None:
     """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``.
 
-    A lazy Dataset is written piece by piece. Lists in attrs become text.
+    A Dataset of lazy arrays is computed and written piece by piece. Lists in attrs become texts.
     """
     plain = dataset.copy()
     plain.attrs = {
         name: value if isinstance(value, str | int | float) and not isinstance(value, bool) else json.dumps(value)
         for name, value in dataset.attrs.items()
-        if value is not None and name != "mdr_dask_layout"  # without this attribute, no run can extend the copy
+        if value is not None
+        and name != "mdr_dask_layout"  # the copy lacks this attribute, so that no run can extend it
     }
     if path.suffix == ".nc":
         if find_spec("h5netcdf") is None:

@@ -1,7 +1,7 @@
 """Records of blocks: times, versions, messages, and the digest of every chunk.
 
-During a run, each block has its own record file. These files are merged from time to time, so that no folder holds a
-hundred thousand files.
+During a run, the record of each block is written to its own file. These files are merged from time to time, because a
+folder with a hundred thousand files would be slow.
 """
 
 from __future__ import annotations
@@ -55,7 +55,10 @@ def _is_message(message: Mapping[str, Any]) -> bool:
 
 
 def record(url: str, series: str, index: BlockIndex, attempt: int) -> dict[str, Any] | None:
-    """Return the record of an attempt at a block, or None if the record has no file of its own or is damaged."""
+    """Return the record of an attempt at a block.
+
+    Return None if the record is damaged, or has no file of its own (for example because it was merged).
+    """
     content = read_bytes(url, name_of(series, index, attempt))
     return None if content is None else decoded(content)
 
@@ -86,7 +89,7 @@ def records(url: str, series: str) -> Iterator[dict[str, Any]]:
 
 @lru_cache(maxsize=16)
 def _warn_of_damaged(url: str, count: int) -> None:
-    """Warn of damaged records, once for each store and number."""
+    """Log a warning of damaged records, only once for each store and number of such records."""
     log.warning("%s: %d damaged records are left out; 'mdr-dask verify %s' names them", url, count, url)
 
 
@@ -100,7 +103,7 @@ def attempts(url: str, series: str) -> dict[BlockIndex, int]:
 
 
 def kinds(url: str, series: Sequence[str]) -> dict[str, int]:
-    """Return how many blocks each kind of machine has computed."""
+    """Return the number of blocks that each kind of machine has computed."""
     last = {(name, tuple(r["block"])): r.get("kind") for name in series for r in records(url, name)}
     return dict(Counter(kind for kind in last.values() if kind is not None))
 
@@ -108,8 +111,8 @@ def kinds(url: str, series: Sequence[str]) -> dict[str, int]:
 def merge_records(url: str, series: str) -> None:
     """Merge the records of single blocks into files of many.
 
-    Records of attempts that were not written to the ledger are not merged. If two processes merge at the same time, or
-    a process is killed while merging, some records are in two files; readers use each record once.
+    The record of a block that is not in the ledger is not merged. If two processes merge at the same time, or if a
+    process is killed while merging, some records are in two files. Readers use each record only once.
     """
     prefix = folder(series)
     loose = [name for name in listed(url, prefix) if _LOOSE.fullmatch(name.removeprefix(prefix))]

@@ -18,7 +18,7 @@ class _Document(BaseModel):
 
 
 class _Codec(_Document):
-    """A codec of an array. Only codecs that this program writes are accepted, because others might run code."""
+    """A codec of an array. Only codecs that this program uses are accepted, because other codecs might run code."""
 
     name: Literal["bytes", "crc32c", "vlen-utf8", "zstd"]
 
@@ -84,7 +84,7 @@ class _Root(_Document):
 
 
 def faults(found: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the faults of the metadata of a group; contradictions between its parts only if every part is valid."""
+    """Yield the faults of the metadata of a group; if every part is valid, also contradictions between the parts."""
     attributes = found["attributes"]
     wrong = [*_unlike(_Root, found, ""), *_unlike(_Group if "axes" in attributes else _Study, attributes, "")]
     if not wrong:

@@ -20,7 +20,7 @@ _HINTS = {".yaml": "; 'mdr-dask run {}' runs a campaign", ".zip": "; unpack it f
 def document(url: str, series: str = "") -> Mapping[str, Any] | None:
     """Return the checked metadata of a group, or None if the group does not exist.
 
-    Do not change the result, which is cached.
+    The result is cached, so do not change it.
 
     Raises
     ------
@@ -49,19 +49,21 @@ def require_valid_file(url: str, series: str) -> None:
 
 
 def group_document_of(root: bytes, series: str) -> Mapping[str, Any] | None:
-    """Return the metadata of a group from the content of ``zarr.json``; None if there is no such group."""
+    """Return the metadata of a group from the content of ``zarr.json``, or None if there is no such group."""
     return _checked(root, group_name(series))[0]
 
 
 @lru_cache(maxsize=32)
 def _checked(content: bytes, group: str) -> tuple[dict[str, Any] | None, str | None]:
-    """Return the metadata of a study or of one of its groups, and the first fault in them or None."""
+    """Return the metadata of a study, or of one of its groups, and the first fault in these metadata, or None."""
     found = parsed(content)
     if not isinstance(found, dict) or not isinstance(found.get("attributes", {}), dict):
         return found, " is damaged"
     attributes = found.get("attributes", {})
     layout = attributes.get("mdr_dask_layout")
-    is_newer = isinstance(layout, int) and layout > LAYOUT  # `attributes` refuses a later layout with its own message
+    is_newer = (
+        isinstance(layout, int) and layout > LAYOUT
+    )  # do not check a later layout, which `attributes` refuses with its own message
     if "mdr_dask_layout" not in attributes or only_claimed(attributes) or is_newer:
         return None if group else found, None
     fault = next(faults(found), None)
@@ -71,7 +73,7 @@ def _checked(content: bytes, group: str) -> tuple[dict[str, Any] | None, str | N
 
 
 def _group(root: Mapping[str, Any], group: str) -> tuple[dict[str, Any] | None, str | None]:
-    """Return the metadata of a group, from the metadata of its study, and their first fault."""
+    """Return the metadata of a group, taken from those of its study, and the first fault in them, or None."""
     members = root["consolidated_metadata"]["metadata"]
     if members.get(group, {}).get("node_type") != "group":
         return None, None
@@ -87,7 +89,7 @@ def members_of(members: Mapping[str, Any], group: str) -> dict[str, Any]:
 
 
 def array_of(metadata: Mapping[str, Any], store: Store, path: str = "") -> Any:
-    """Return the Zarr array that belongs to metadata; this avoids the time to open a group."""
+    """Return the Zarr array with the given metadata. This is faster than opening the group."""
     return zarr.Array(zarr.AsyncArray(dict[str, Any](metadata), StorePath(store, path)))  # type: ignore[call-overload]
 
 
@@ -106,7 +108,7 @@ def exists(url: str) -> bool:
     Raises
     ------
     StoreError
-        If there is something other than a study.
+        If there is something else than a study.
     """
     refuse_file(url, "the folder of a store or nothing")
     path, found = local(url), _root_attributes(url)
@@ -131,7 +133,7 @@ def _root_attributes(url: str) -> dict[str, Any] | None:
 
 
 def only_claimed(found: Mapping[str, Any]) -> bool:
-    """Return whether the attributes are those of a study whose run was stopped before laying it out."""
+    """Return whether attributes are those of a study whose first run was stopped before the study was laid out."""
     return list(found) == ["mdr_dask_layout"]
 
 
@@ -141,7 +143,7 @@ def attributes(url: str) -> dict[str, Any]:
     Raises
     ------
     StoreError
-        If there is no study of mdr_dask at `url`, or one with a later layout.
+        If there is no study of mdr_dask at `url`, or if a later version with another layout wrote it.
     """
     refuse_file(url)
     found = _root_attributes(url)

@@ -46,7 +46,7 @@ IGNORED = ".partial"
 PUBLISHED = "published/"
 CHECKSUMS = f"{PUBLISHED}checksums.sha256"
 
-#: Digests of the chunks that each attempt at a block has written, by array, in the order of the attempts.
+#: For each attempt at a block, in order, the digests of the chunks that it has written, by the name of the array.
 History = list[Mapping[str, str]]
 
 
@@ -69,11 +69,11 @@ class Inspection:
     findings : list of Finding
         All faulty files.
     notes : list of str
-        Facts that are not damage, such as an interrupted run or an earlier version.
+        Messages about facts that are no damage, for example that a run was interrupted.
     groups : list of Group
         The groups of the store.
     files, blocks : int
-        Number of files, and number of blocks in the ledgers.
+        Number of files in the store, and number of blocks that are in the ledgers.
     """
 
     findings: list[Finding] = field(default_factory=list)
@@ -102,8 +102,9 @@ def verify(url: str) -> Inspection:
 def repair(url: str) -> tuple[Inspection, Inspection]:
     """Repair a store as far as possible, and return the inspections before and after the repair.
 
-    Metadata are written again. Damaged coordinates and damaged blocks are removed, so that the next run writes them
-    again. Damaged records, and foreign files among the chunks and records, are removed. Other foreign files are kept.
+    Damaged metadata are written again. Damaged coordinates and damaged blocks are removed, and the next run writes them
+    again. Damaged records, and foreign files in the folders of chunks and records, are removed. Other foreign files are
+    kept.
 
     Raises
     ------
@@ -125,14 +126,16 @@ def repair(url: str) -> tuple[Inspection, Inspection]:
         remove(url, [name for name in (RECORD, *coordinate_files(root, bad)) if name in bad])
         for group in found.groups:
             for block in sorted(group.bad_blocks):
-                remove(url, [group.blocks.chunk(name, block) for name in group.blocks.further])  # the ledger first
+                remove(
+                    url, [group.blocks.chunk(name, block) for name in group.blocks.further]
+                )  # this includes the ledger, which is removed first
             _remove_records(url, group)
             remove(url, group.foreign)
         return found, _inspect(url)
 
 
 def of_store(names: Iterable[str]) -> Iterator[str]:
-    """Yield the names of files that belong to a study; leave out files of a run or a publication."""
+    """Yield those of the names that belong to the study itself, and not to an active run or a publication."""
     for name in names:
         if not name.endswith(IGNORED) and not name.startswith((CLAIMS, PUBLISHED)):
             yield name
@@ -183,7 +186,7 @@ def _check_layout(url: str, found: Inspection, present: set[str]) -> set[str]:
 
 
 def _unrecorded_faults(url: str, root: Mapping[str, Any]) -> Iterator[Finding]:
-    """Yield the faults of metadata and coordinates that can be found without a record of the layout."""
+    """Yield the faults of metadata and coordinates that can be found although there is no record of the layout."""
     known = metadata_files(root)
     for name, content in read_many(url, known):
         if content is None:
@@ -266,9 +269,10 @@ def _check_blocks(url: str, group: Group, found: Inspection, present: set[str]) 
 
 
 def _histories(url: str, group: Group) -> tuple[dict[BlockIndex, History], set[BlockIndex]]:
-    """Return the digests of every block from its intact records, and the blocks that have a merged record.
+    """Return the digests of the chunks of every block, from intact records, and the blocks that have a merged record.
 
-    Only records of attempts that were written to the ledger are merged, so the ledger must contain these blocks.
+    Records are merged only when their block is in the ledger. So the ledger must contain the blocks with merged
+    records.
     """
     known: dict[tuple[BlockIndex, int], Mapping[str, str]] = {}
     merged = set()
@@ -312,10 +316,10 @@ def _faults(
 
 
 def _expected(history: History, status: str, name: str) -> set[str]:
-    """Return the digests that the chunk of an array may have, given the digest of the ledger of the same block.
+    """Return the digests that the chunk of an array may have; `status` is the digest of the ledger of the same block.
 
-    One of these attempts at the block wrote the chunk: the attempt that wrote this ledger; if that attempt did not
-    write the array, the last earlier attempt that did; or a later attempt that was killed before it wrote its ledger.
+    The chunk was written by the attempt that wrote this ledger or, if that attempt did not write the array, by the last
+    earlier attempt that did. It may also come from a later attempt that was killed before it wrote its ledger.
     """
     first = next((i for i, chunks in enumerate(history) if chunks.get("status") == status), len(history))
     found, last = set[str](), set[str]()
@@ -326,9 +330,9 @@ def _expected(history: History, status: str, name: str) -> set[str]:
 
 
 def _remove_records(url: str, group: Group) -> None:
-    """Remove files that contain damaged records, or records of damaged blocks.
+    """Remove the files that contain damaged records or records of damaged blocks.
 
-    The other records in these files are first copied to a new file.
+    All other records in these files are first copied to a new file.
     """
     series, bad = group.blocks.series, set(group.bad_records)
     found = [(name, line, decoded(line)) for name, line in lines(url, series)]
