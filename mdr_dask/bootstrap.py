@@ -32,8 +32,8 @@ NOTHING = -1000.0
 def weights(count: int) -> FloatArray:
     """Return how often each resample draws each realisation, shape (1 + RESAMPLES, count); the first row is all ones.
 
-    All cases use the same resamples, because realisations of the same number have the same rough line in all cases. The
-    difference between two cases is then computed for each resample.
+    All cases use the same resamples, because realisation number k has the same rough line in all cases. The difference
+    between two cases is then computed for each resample.
     """
     generator = np.random.Generator(np.random.Philox(0))
     drawn = generator.multinomial(count, np.full(count, 1 / count), RESAMPLES)
@@ -71,7 +71,7 @@ def complete(values: FloatArray) -> FloatArray:
 def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
     """Return values shifted up and down by their errors, one group of neighbours at a time, shape (2 groups, ...).
 
-    An infinite error shifts a value by its own size.
+    An infinite error shifts a value by the absolute value itself.
     """
     size = np.where(np.isinf(errors), values, errors)
     flat = np.abs(np.where(np.isfinite(size), size, 0.0)).ravel()
@@ -119,7 +119,7 @@ def _reach(shifts: FloatArray) -> FloatArray:
 def regrouped(stack: FloatArray) -> FloatArray:
     """Return a stack in which neighbouring cases are shifted by their errors together, with the same sign.
 
-    In the given stack, the error of each case has its own rows.
+    In the given stack, each case is shifted in separate rows, by its error alone.
     """
     shifts = stack[1 + RESAMPLES :] - stack[0]
     own = np.maximum(_reach(shifts), _reach(-shifts))

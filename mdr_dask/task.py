@@ -36,7 +36,7 @@ KIND = "MDR_DASK_KIND_OF_MACHINE"
 
 @dataclass(frozen=True)
 class Work:
-    """One task: everything that a worker needs to compute a block and write it.
+    """One task: everything that a worker needs to compute a block and to write it.
 
     Parameters
     ----------
@@ -73,7 +73,10 @@ class Work:
         return f"{self.place.series or '-'} {'.'.join(map(str, self.place.index))}"
 
     def halves(self) -> tuple[Work, ...]:
-        """Return two tasks with half of the results each, to be run one after the other; empty for a single result."""
+        """Return two tasks with half of the results each, to be run one after the other.
+
+        If the task has only one result, return no tasks.
+        """
         cells = np.flatnonzero(self.wanted)
         if cells.size < 2:
             return ()
@@ -371,7 +374,7 @@ def kind() -> str:
         return os.environ[KIND]
     from importlib.metadata import version
 
-    import scipy.linalg  # noqa: F401  (brings its own BLAS)
+    import scipy.linalg  # noqa: F401  (loads the BLAS library of SciPy)
     from llvmlite import binding
     from threadpoolctl import threadpool_info
 
@@ -386,7 +389,7 @@ def one_blas_thread() -> AbstractContextManager[object]:
 
     Results then do not depend on the number of threads, and each block uses one thread.
     """
-    import scipy.linalg  # noqa: F401  (brings a BLAS of its own, which must be there to be limited)
+    import scipy.linalg  # noqa: F401  (loads the BLAS library of SciPy, which must be loaded before it can be limited)
     from threadpoolctl import threadpool_limits
 
     limits: AbstractContextManager[object] = threadpool_limits(limits=1, user_api="blas")

@@ -99,12 +99,12 @@ class Axis:
 
 @dataclass(frozen=True)
 class Series:
-    """A group of the store: base parameters and the axes along which they vary.
+    """One series of a campaign, which is one group of the store: its parameters, and its axes.
 
     Parameters
     ----------
     name : str
-        Name of its Zarr group; empty for a campaign without series, whose arrays are at the root.
+        Name of the Zarr group. It is empty in a campaign without series, whose arrays are at the root of the store.
     parameters : Parameters
         All parameters. A varied parameter has the first value of its axis.
     axes : tuple of Axis

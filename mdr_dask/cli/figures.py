@@ -72,9 +72,9 @@ def plot(
 ) -> None:
     """Draw figures by name, or any output against any axis; without a name, list the figures.
 
-    The data of every figure are written to a table beside it, FIGURE.csv. If a study has more axes than a figure can
-    show, the other axes are fixed at one value, which is printed; --select chooses another value. Several stores can
-    be drawn in one figure.
+    The data of every figure are written to a table next to it, FIGURE.csv. If a study has more axes than a figure can
+    show, each further axis is fixed at one value, which is printed. Choose another value with --select. Several stores
+    can be drawn in one figure.
 
     \b
     mdr-dask plot results/quickstart.zarr velocity -o quickstart.png

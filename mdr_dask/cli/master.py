@@ -79,9 +79,10 @@ def master_curve(
 ) -> None:
     """Shift the curves of a store or a table into one master curve; print factors, errors and the laws they follow.
 
-    SOURCE is a store, a table (CSV with a row of names, perhaps one of units; - for standard input) or a result kept by
-    --keep, of which only the reference may change. A source that varies in velocity and in temperature gives a shift of
-    each. Storage and loss modulus of one test are shifted together, unless --of names one of them.
+    SOURCE is a store, a table (CSV with a row of names and perhaps a row of units; - for standard input), or a result
+    that --keep has written; for such a result, only the reference can be changed. If a source varies in velocity and in
+    temperature, there are shift factors for each of them. The storage and loss modulus of a test are shifted together,
+    unless --of names only one of them.
 
     \b
     mdr-dask master-curve results/force_master_curve.zarr --plot master.png

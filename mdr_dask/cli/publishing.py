@@ -43,7 +43,7 @@ def report(stores: tuple[str, ...], output: Path) -> None:
 def publish(store: str, output: Path) -> None:
     """Pack a study for publication: store, campaign, data files, page, environment and checksums.
 
-    The zip is itself a Zarr store. `verify` checks it as it is; `run` can extend it after unpacking.
+    The zip itself is a Zarr store. `verify` can check the zip directly; `run` can extend the study after unpacking.
 
     \b
     mdr-dask publish results/quickstart.zarr -o study.zip

@@ -92,8 +92,9 @@ def _print_counts(study: dict[str, Any], rows: list[dict[str, Any]], at_work: li
 def show(store: str, outputs: tuple[str, ...], statistic: tuple[str, ...], raw: bool, **asked: Any) -> None:
     """Show results as a table: means with their errors, or every realisation.
 
-    A mean is followed by the standard error of the realisations and the discretisation error. `status` is done, or how
-    many realisations are missing, failed or not_converged. What is the same in all rows is printed above the table.
+    A mean is followed by the standard error of the realisations and the discretisation error. `status` is done, or it
+    states how many realisations are missing, failed or not_converged. A column with the same value in all rows is
+    printed above the table.
 
     \b
     mdr-dask show results/quickstart.zarr friction_coefficient

@@ -47,7 +47,8 @@ def run(campaign: Path, dry_run: bool, log: Path | None, quiet: bool, form: str 
     """Run a campaign into its store: everything, or what is missing.
 
     After an interruption, run it again: finished results are kept, and only the rest is computed. Exit code 0: all
-    results are done; 1: some have failed, in this run or before; 2: the run was refused or could not go on.
+    results are done; 1: some results have failed, in this run or in an earlier one; 2: the run was refused or could not
+    go on.
 
     \b
     mdr-dask run campaigns/quickstart.yaml

@@ -53,9 +53,10 @@ def surface(
 ) -> None:
     """Print height parameters, slopes, Hurst exponent and resolution of a measured surface.
 
-    FILES are maps, scans, or tables of a spectrum, all of one surface. Sq and Sa (maps) and Pq (scans) are those of the
-    levelled heights; gradient, slopes and Hurst exponent come from the windowed spectrum. Intervals are 95 %. Rolloff
-    and cutoff are the wavelengths at which the power law ends, empty if it does not end within the data.
+    FILES are maps, scans, or tables of a spectrum, all of the same surface. Sq and Sa (maps) and Pq (scans) are
+    computed from the levelled heights. Gradient, slopes and Hurst exponent are computed from the windowed spectrum.
+    Intervals are 95 % intervals. Rolloff and cutoff are the wavelengths at which the power law ends. They are empty if
+    it does not end within the data.
 
     \b
     mdr-dask surface road.npy --spacing 2um --unit um --plot road.png -o c2d.csv

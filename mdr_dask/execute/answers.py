@@ -1,4 +1,4 @@
-"""Choose the cases of the next round if a campaign adds realisations until a fitted constant is known well enough."""
+"""Choose the cases that need more realisations, so that a fitted constant meets its tolerance."""
 
 from __future__ import annotations
 
@@ -24,7 +24,9 @@ FEWEST = 10
 def cases_that_narrow(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, taken: Sequence[IntArray]
 ) -> list[BoolArray]:
-    """Return the cases that need more realisations, because a constant that depends on them has too wide an interval.
+    """Return the cases that need more realisations.
+
+    These are the cases on which a fitted constant depends whose interval is too wide.
 
     Parameters
     ----------
@@ -32,7 +34,8 @@ def cases_that_narrow(
         The URL of the store, the stage of the campaign, the groups of the store, and the positions of the cases of the
         stage in the store.
     taken : sequence of int array
-        For each group, the number of realisations of every case that are used. Further stored realisations are ignored.
+        For each group, the number of realisations that are used of every case. Further realisations in the store are
+        ignored.
     """
     answers = stage.campaign.replication.answers
     if max(int(each.max()) for each in taken) < FEWEST:
@@ -56,7 +59,7 @@ def cases_that_narrow(
 
 
 def unanswered(url: str, stage: Stage, layout: Sequence[Template], taken: Sequence[IntArray]) -> Iterator[str]:
-    """Yield a sentence for every fitted constant that does not meet its tolerance."""
+    """Yield one sentence or more for every fitted constant that does not meet its tolerance."""
     answers = stage.campaign.replication.answers
     groups = _groups(url, stage, layout, taken)
     known = fits.available(stage.campaign.model)
@@ -81,11 +84,11 @@ def unanswered(url: str, stage: Stage, layout: Sequence[Template], taken: Sequen
 
 
 def _groups(url: str, stage: Stage, layout: Sequence[Template], taken: Sequence[IntArray]) -> dict[str, xr.Dataset]:
-    """Return the cases of a campaign by series; realisations beyond those in `taken` are NaN."""
+    """Return the cases of a campaign by series. Realisations beyond the number in `taken` are NaN."""
     opened, groups = store.datasets(url), {}
     for mesh, template, count in zip(stage.meshes, layout, taken, strict=True):
         name = template.series.name
-        data = opened[name if name in opened else next(iter(opened))]  # results without series
+        data = opened[name if name in opened else next(iter(opened))]  # the store has results without series
         counts = xr.DataArray(count, dims=template.dims[:-1], coords=_coordinates(template.series))
         counts = counts.sel({dim: data[dim] for dim in counts.indexes})
         here = {dim: data[dim].isin(list(own)).to_numpy() for dim, own in _coordinates(mesh.series).items()}

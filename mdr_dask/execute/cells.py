@@ -28,7 +28,7 @@ class Cells:
     wanted, spared : bool array, shape of the group
         Results to compute, and results to mark as not needed.
     kept, failed : int
-        Number of results of the round that are already in the store, and how many of these have failed.
+        Number of results of the round that are already in the store, and number of these that have failed.
     """
 
     template: Template
@@ -43,7 +43,7 @@ class Cells:
         return int(np.count_nonzero(self.wanted) + np.count_nonzero(self.spared))
 
     def seconds(self, index: BlockIndex) -> float:
-        """Return the estimated time of a block, in proportion to the results to compute in it."""
+        """Return the estimated time of a block in s, in proportion to the number of results to compute in it."""
         part = float(np.mean(self.wanted[self.template.region(index)]))
         return part * self.template.seconds(index) if part else 0.0
 
@@ -60,7 +60,8 @@ def find_cells(
     """Compare a round with the ledger.
 
     `asked` marks the cases of the stage and `needed` the cases that need the realisations of the round. `realisations`
-    is the first realisation of the round and the last plus one. `own` marks the results that belong to this part.
+    contains the number of the first realisation of the round, and the number of the last one plus 1. `own` marks the
+    results of this part; with None, the run computes all results.
     """
     status = store.ledger(url, template.series.name, template.shape)
     open_states = [Status.MISSING, Status.NOT_NEEDED]
@@ -79,7 +80,7 @@ def find_cells(
 
 
 def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]]:
-    """Yield for each group an array with the number of the part that computes each result; there are `count` parts."""
+    """Yield for each group an array with the number, from 1 to `count`, of the part that computes each result."""
     position = itertools.count()
     for template in layout:
         numbers = np.zeros(template.shape, dtype=np.int32)
@@ -89,7 +90,7 @@ def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]
 
 
 def tasks(url: str, groups: Iterable[Cells], lock: Lock) -> Iterator[Work]:
-    """Yield the tasks of a round one by one, so that only the submitted tasks exist at the same time."""
+    """Yield the tasks of a round one by one, so that only tasks that are submitted need memory."""
     laid_out = store.layout_mark(url)
     if laid_out is None:
         raise StoreError(f"{url}: removed since it was laid out")

@@ -1,8 +1,8 @@
 """Compute blocks in child processes of this machine, because a block may crash its process or take too long.
 
-A server process imports everything and forks one keeper for each child; the keeper forks the child. The child reads
-blocks from a pipe, computes them one after the other, and writes the outcomes. If the child dies, its keeper reports
-that and forks a new child within milliseconds.
+A server process imports all modules and forks one keeper process for each child. Each keeper forks its child. The child
+reads blocks from a pipe, computes them one after the other, and writes the outcomes to the pipe. If the child dies, its
+keeper reports this and forks a new child within milliseconds.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from mdr_dask import models
 from mdr_dask.errors import MachineError
 from mdr_dask.task import KIND, Outcome, Work, kind, run_block, write_off
 
-#: Code of the server process.
+#: Code that the server process runs.
 COMMAND = "import sys; from mdr_dask.execute.children import serve; serve(sys.argv[1], [int(x) for x in sys.argv[2:]])"
 #: Environment variables that limit the libraries for linear algebra to one thread, without importing these libraries.
 BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-#: A process is killed this number of seconds after the time limit of its case. A case in plain Python raises
-#: TimeoutError at the limit, before the process is killed.
+#: Time in s between the time limit of a case and the moment when its process is killed. A case in plain Python raises
+#: TimeoutError at the limit, so its process need not be killed.
 GRACE = 1.0
-#: After this number of results of a case have crashed, its other results are marked as failed.
+#: If this number of results of a case have crashed their process, the other results of the case are marked as failed.
 CONVICTED = 2
 
 
@@ -53,12 +53,12 @@ class Child:
     pipe: Connection
 
     def run(self, work: Work, limit: float | None = None) -> Outcome | Death:
-        """Compute a block in the child process; each result may take at most `limit` seconds.
+        """Compute a block in the child process. Each result may take at most `limit` seconds.
 
         Raises
         ------
         MdrDaskError
-            The error that the child raised, if the store cannot be written or the machine has a fault.
+            If the store cannot be written or the machine has a fault. The error is the one that the child raised.
         """
         try:
             self.pipe.send((work, limit))
@@ -82,7 +82,7 @@ class Child:
 
 @contextmanager
 def children(count: int, model: str) -> Iterator[list[Child]]:
-    """Start child processes for a model; at the end of the context, wait until each has finished its block."""
+    """Start child processes for a model. At the end of the context, wait until each of them has finished its block."""
     pipes = [Pipe() for _ in range(count)]
     numbers = [theirs.fileno() for _, theirs in pipes]
     path = os.pathsep.join(filter(None, sys.path))
@@ -99,10 +99,12 @@ def children(count: int, model: str) -> Iterator[list[Child]]:
 
 
 def compute_apart(child: Child, work: Work, limit: float | None = None) -> Iterator[tuple[Work, Outcome]]:
-    """Compute a block that may crash its process. If it does, its halves are computed, down to single results.
+    """Compute a block that may crash its process.
 
-    A single result that crashes its process has failed. After `CONVICTED` results of a case have crashed, its other
-    results are marked as failed without computing them.
+    If it crashes, its halves are computed separately, and so on down to single results.
+
+    A single result that crashes its process is marked as failed. If `CONVICTED` results of a case have crashed, the
+    other results of this case are marked as failed without computing them.
     """
     pieces, attempts = [work], itertools.count(work.attempt)
     crashed: Counter[int] = Counter()
@@ -128,9 +130,11 @@ def compute_apart(child: Child, work: Work, limit: float | None = None) -> Itera
 
 
 def serve(model: str, numbers: list[int]) -> None:
-    """Import the modules that blocks need, fork a keeper for each pipe, and return when all keepers have ended."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal sends Ctrl-C to all processes; only the driver reacts
-    with suppress(Exception):  # the first block reports this error
+    """Import the modules that blocks need, fork a keeper for each pipe, and wait until all keepers have ended."""
+    signal.signal(
+        signal.SIGINT, signal.SIG_IGN
+    )  # the terminal sends Ctrl-C to all processes, but only the driver reacts to it
+    with suppress(Exception):  # ignore an error here, because the first block will raise it again
         models.load(model)
     pipes = [Connection(number) for number in numbers]
     keepers = []
@@ -150,7 +154,7 @@ def serve(model: str, numbers: list[int]) -> None:
 
 
 def _keep(pipe: Connection) -> None:
-    """Fork a child that computes blocks, and a new one whenever it dies; return when the pipe is closed."""
+    """Fork a child that computes blocks, and a new child whenever the last one dies; return when the pipe is closed."""
     while True:
         child = os.fork()
         if child == 0:
@@ -171,7 +175,7 @@ def _describe(status: int) -> str:
 
 
 def _compute_blocks(pipe: Connection) -> None:
-    """Compute the blocks from a pipe in this process, until the other end is closed."""
+    """Compute in this process the blocks that arrive through a pipe, until the other end of the pipe is closed."""
     while True:
         try:
             request = pipe.recv_bytes()
@@ -188,7 +192,7 @@ def _compute_blocks(pipe: Connection) -> None:
 
 
 class _limited:  # noqa: N801
-    """Raise TimeoutError in a case of a plain Python model that takes too long."""
+    """Context in which a case of a plain Python model raises TimeoutError if it takes too long."""
 
     def __init__(self, limit: float | None) -> None:
         self._limit = limit

@@ -24,19 +24,20 @@ from mdr_dask.execute.resources import Resources
 from mdr_dask.execute.window import TaskWindow
 from mdr_dask.task import one_blas_thread
 
-#: Seconds to wait for the answer of a scheduler.
+#: Time in s to wait for the answer of a scheduler.
 SCHEDULER_PATIENCE = 10
-#: Address of the web page of a scheduler; only programs on this machine can open it.
+#: Address of the web page of a scheduler. Only programs on this machine can open this page.
 DASHBOARD = "127.0.0.1:0"
-#: Time in which an adaptive cluster should finish all waiting tasks. Dask starts as many workers as this requires. It
-#: is about the time of one block.
+#: Time in which an adaptive cluster should finish all waiting tasks. Dask starts as many workers as this requires. The
+#: time is about that of one block.
 TARGET_DURATION = "1s"
-#: Loggers whose messages explain why workers cannot be started; messages of the run quote them.
+#: Loggers whose messages explain why workers cannot be started. Messages of the run quote these messages.
 STARTING = ("distributed.deploy", "dask_jobqueue", "tornado")
 #: Loggers whose messages are discarded, because they only repeat errors that are reported anyway.
 ECHOES = ("distributed", "asyncio")
-#: Settings of a cluster on this machine. If one worker dies while it computes a block, the block is suspected to be the
-#: cause, and the nanny process restarts the worker. Profiling is off, because it takes 4 % of a core for each worker.
+#: Settings of a cluster on this machine. If a worker dies while it computes a block, Dask does not try the block again,
+#: but reports it to the run. The supervising process of the worker (the nanny) restarts the worker. Profiling is off,
+#: because it takes 4 % of a core for each worker.
 ON_THIS_MACHINE = {
     "distributed.deploy.lost-worker-timeout": "1 day",
     "distributed.scheduler.allowed-failures": 0,
@@ -46,7 +47,7 @@ ON_THIS_MACHINE = {
 
 
 class _LastMessage(logging.Handler):
-    """A handler that stores the last error message of a library, in one line."""
+    """A handler that keeps the last error message of a library as one line of text."""
 
     text = ""
 
@@ -70,7 +71,9 @@ def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
         for names, handler in ((ECHOES, logging.NullHandler()), (STARTING, message)):
             for logger in _loggers(names):
                 stack.enter_context(_redirected(logger, handler))
-        stack.enter_context(one_blas_thread())  # the workers of a client may be threads of this process
+        stack.enter_context(
+            one_blas_thread()
+        )  # the workers of a client that the user gives may be threads of this process
         most: int = 0
         replace_lost: Callable[[], None] = _nothing
         if resources.client is not None:
@@ -86,7 +89,7 @@ def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
             is_local = issubclass(cluster_class(plan["class"]), LocalCluster)
             stack.enter_context(dask.config.set(ON_THIS_MACHINE if is_local else {}))
             cluster = stack.enter_context(_started(plan))
-            if "scale" in plan and not is_local:  # Dask does not replace jobs that reach their wall time
+            if "scale" in plan and not is_local:  # Dask does not replace batch jobs that have reached their time limit
                 replace_lost = partial(cluster.scale, **plan["scale"])
             client, most = stack.enter_context(Client(cluster, set_as_default=False)), _most(plan)
         timeout = resources.case_timeout
@@ -94,7 +97,10 @@ def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
 
 
 def _require_guard() -> None:
-    """Raise ClusterError in a script without ``if __name__ == "__main__"``, because new processes import the script."""
+    """Raise ClusterError if a script without ``if __name__ == "__main__"`` starts a cluster.
+
+    New processes import the script, and would run it again.
+    """
     main = sys.modules.get("__main__")
     source = getattr(main, "__file__", None)
     frame = sys._getframe()
@@ -108,11 +114,11 @@ def _require_guard() -> None:
 
 
 def _nothing() -> None:
-    """Do nothing: the workers of this cluster are not replaced by a run."""
+    """Do nothing, because a run does not replace the workers of this cluster."""
 
 
 def _loggers(names: tuple[str, ...]) -> list[logging.Logger]:
-    """Return the named loggers and all loggers below them, because Dask adds handlers to these too."""
+    """Return the named loggers and all loggers below them. Dask adds handlers also to the latter."""
     below = [known for known in logging.root.manager.loggerDict for name in names if known.startswith(f"{name}.")]
     return [logging.getLogger(name) for name in (*names, *below)]
 
@@ -176,7 +182,7 @@ def cluster_class(name: str) -> type[Cluster]:
 
 
 def _closed_to_others(kind: type[Cluster], arguments: Mapping[str, Any], stack: ExitStack) -> dict[str, Any]:
-    """Add arguments that exclude other users, unless they are set: TLS, and a web page for this machine only."""
+    """Add arguments that keep other users out, unless they are set: TLS, and a web page for this machine only."""
     own = dict(arguments)
     if issubclass(kind, LocalCluster):
         own["dashboard_address"] = own.get("dashboard_address") or DASHBOARD
@@ -203,7 +209,7 @@ def _in_files(keys: Security, folder: Path) -> Security:
 
 
 def _most(plan: Mapping[str, Any]) -> int:
-    """Return the largest number of threads that a cluster file allows for an adaptive cluster; 0 for other clusters."""
+    """Return the largest number of threads of an adaptive cluster according to its file, or 0 for other clusters."""
     arguments = plan.get("arguments", {})
     adapt = plan.get("adapt", {})
     each = arguments.get("cores", 1) if "maximum_jobs" in adapt else arguments.get("threads_per_worker", 1)

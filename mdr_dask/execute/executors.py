@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from mdr_dask.execute.children import Child
     from mdr_dask.execute.window import TaskWindow
 
-#: Number of blocks submitted for each thread, so that no thread is idle.
+#: Number of blocks for each thread that are submitted at the same time, so that no thread is idle.
 AHEAD = 2
-#: Seconds for which a plain Python model is first computed in this process. Starting further processes pays off only
-#: for longer runs.
+#: Time in s for which a plain Python model is first computed in this process. Processes are started only for longer
+#: runs, because starting them takes time.
 SHORT = 2.0
 
 Compute = Callable[[Work], list[tuple[Work, Outcome]]]
@@ -46,7 +46,7 @@ class Executor(AbstractContextManager["Executor"]):
     Parameters
     ----------
     resources : Resources
-        Where to run.
+        Where to compute the blocks.
     model : str
         Name of the model.
     url : str
@@ -73,26 +73,26 @@ class Executor(AbstractContextManager["Executor"]):
         self._stack.close()
 
     def hold(self, lock: Lock) -> None:
-        """Set the lock of the run. Blocks that a crashed run had started will be computed in a child process."""
+        """Set the lock of the run. The blocks that a crashed run had begun will be computed in a child process."""
         self._lock = lock
         self._suspects, self._begun = set(lock.begun), set(lock.begun)
 
     def connect(self) -> None:
-        """Start the cluster or connect to it, if the resources name one; called before anything is written."""
+        """Start the cluster or connect to it, if the resources name one. Call this before anything is written."""
         if self._resources.remote and self._window is None:
             from mdr_dask.execute.clusters import task_window
 
             self._window = self._stack.enter_context(task_window(self._resources, self._tell))
 
     def __call__(self, works: Iterable[Work], settle: Settle) -> None:
-        """Compute blocks, and call `settle` for each block when it ends; blocks may end in any order."""
+        """Compute blocks, and call `settle` for each block when it ends. Blocks may end in any order."""
         remaining = iter(works)
         first = next(remaining, None)
         if first is None:
             return
         remaining = itertools.chain([first], remaining)
         with store.while_locked(self._url, self._lock):
-            pass  # raises StoreError in a read-only store
+            pass  # entering the context raises StoreError in a read-only store
         if self._resources.remote:
             self._on_cluster(remaining, settle)
             return
@@ -107,14 +107,14 @@ class Executor(AbstractContextManager["Executor"]):
             self._in_pool(ordinary, self._here, settle)
 
     def _without_suspects(self, works: Iterator[Work], settle: Settle) -> Iterator[Work]:
-        """Yield all blocks except those that a crashed run had started; compute these in a child process."""
+        """Yield all blocks except those that a crashed run had begun. These are computed here, in a child process."""
         for work in works:
             if (key := work.key) in self._suspects and self._may_fork:
                 sentence = f"an earlier run ended while it computed block {key}: it is computed in a process of its own"
                 self._tell(Event("block suspected", {"block": key}, sentence))
                 try:
                     outcomes = self._in_child(work)
-                except (ImportError, ModelError):  # the model exists in this process only
+                except (ImportError, ModelError):  # the child process cannot import the model
                     outcomes = self._here(work)
                 for part, outcome in outcomes:
                     settle(part, outcome)
@@ -159,7 +159,7 @@ class Executor(AbstractContextManager["Executor"]):
             self._note(work.key, is_begun=False)
 
     def _note(self, key: str, is_begun: bool) -> None:
-        """Record the blocks that are being computed, for the next run in case this process crashes."""
+        """Record which blocks are being computed. If this process crashes, the next run reads this record."""
         with self._noting:
             (self._begun.add if is_begun else self._begun.discard)(key)
             store.note_begun(self._url, self._lock, sorted(self._begun))
@@ -175,7 +175,7 @@ class Executor(AbstractContextManager["Executor"]):
             self._children.put(child)
 
     def _free_child(self) -> Child:
-        """Return an idle child process; all child processes are started when the first one is needed."""
+        """Return an idle child process. All child processes are started when the first of them is needed."""
         from mdr_dask.execute.children import children
 
         with self._noting:

@@ -10,24 +10,24 @@ from mdr_dask.task import Outcome
 
 @dataclass(frozen=True)
 class Progress:
-    """The state of a run, in results (a result is one case in one realisation).
+    """The state of a run, counted in results. A result is one case in one realisation.
 
     Parameters
     ----------
     total, kept, done, failed, not_needed : int
-        Numbers of results: `total` in all rounds so far; `kept` in the store before the run; `done`, `failed` (or not
-        converged) and `not_needed` in this run.
+        Numbers of results. `total` are those of all rounds so far, and `kept` those that were in the store before the
+        run. `done`, `failed` (including not converged) and `not_needed` are those that this run has written.
     kept_failed : int
         Number of failed results among `kept`.
     warned : int
         Number of results of this run that are done but have a warning, for example because they miss the accuracy.
     blocks, solves : int
-        Number of blocks and number of solutions that this run computed. Several results may share one solution.
+        Number of blocks and number of solutions that this run has computed. Several results may share one solution.
     estimated, finished : float
-        Seconds that the model estimates for all rounds so far, and for the finished blocks.
+        Time in s that the model estimates for all rounds so far, and for the finished blocks.
     compute_seconds, compile_seconds, write_seconds, wall_seconds : float
-        In seconds: time in models, its part that was spent compiling kernels, and time for writing, each summed over
-        threads; and time since the start of the run.
+        Times in s: for computing models; the part of it for compiling kernels; for writing; and since the start of the
+        run. The first three are sums over all threads.
     """
 
     total: int = 0
@@ -53,9 +53,9 @@ class Progress:
 
     @property
     def seconds_left(self) -> float | None:
-        """Estimated seconds to the end of this round, from the pace of finished blocks; None before the first block.
+        """Estimated time in s to the end of this round, from the pace of finished blocks; None before the first one.
 
-        The time for compiling kernels is not included in the pace.
+        The pace does not include the time for compiling kernels.
         """
         busy = self.compute_seconds + self.write_seconds
         if not (self.finished > 0 and busy > 0 and self.wall_seconds > 0):

@@ -9,22 +9,23 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Resources:
-    """The threads, processes or cluster that a run uses; by default all cores of this machine.
+    """The threads, processes or cluster that a run uses. By default, it uses all cores of this machine.
 
-    Compiled models are computed in threads by default, plain Python models in processes.
+    By default, compiled models are computed in threads, and plain Python models in processes.
 
     Parameters
     ----------
     threads : int or None
-        Number of threads of this process.
+        Number of threads of this process that compute blocks.
     workers : int or None
-        Number of processes of this machine to use instead of threads. Threads are used if the system cannot fork.
+        Number of processes of this machine that compute blocks, instead of threads. If the system cannot fork
+        processes, threads are used.
     scheduler : str or None
         Address of a running Dask scheduler, whose workers compute the blocks.
     cluster : mapping or None
         Description of a Dask cluster to start, as `mdr_dask.campaign.cluster.load_cluster` returns it.
     client : distributed.Client or None
-        A Dask client whose workers compute the blocks; it is not closed.
+        A Dask client whose workers compute the blocks. It stays open after the run.
     patience : float
         Seconds without any worker after which a run on a cluster ends with an error.
     case_timeout : float or None

@@ -1,8 +1,9 @@
-"""A run: stage after stage, round after round, until no result of the campaign is missing in its store.
+"""Run a campaign stage after stage and round after round, until no result is missing in its store.
 
-A stage is a campaign with the values that its adaptive axes have so far. A round adds realisations to the cases whose
-errors are still too large. Each stage and each round depends only on the results of the previous one, so a run can be
-repeated at any time.
+A stage is the campaign with the values that its adaptive axes have so far. In each stage, the first round computes the
+first realisations of all cases. Each further round adds realisations to the cases whose errors are still too large.
+Stages and rounds are determined by the results of the previous ones alone, so a run can be stopped and repeated at any
+time.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ from mdr_dask.replication import GROWTH, growth_needed, known_scatter, next_roun
 from mdr_dask.store import Lock, Part
 from mdr_dask.task import Outcome, Work
 
-#: Seconds between two checks of the progress of other parts, and between two messages about it.
+#: `LOOK`: time in s between two checks of the progress of other parts. `PAUSE`: time in s between two messages about
+#: it.
 LOOK, PAUSE = 1.0, 4.0
 
 
@@ -56,11 +58,11 @@ class _Round:
     layout : tuple of Template
         The shape of the store.
     places : tuple
-        Positions of the cases of the stage in the store.
+        For each group, the positions of the cases of the stage in the store.
     asked, needed : list of bool array, shape of the cases
         For each group, the cases of the stage, and the cases that need the realisations of this round.
     realisations : tuple of int
-        First realisation of the round, and the last plus one.
+        Number of the first realisation of the round, and number of the last one plus 1.
     taken : tuple of int array, shape of the cases
         For each group, the number of realisations of each case after the round.
     """
@@ -93,18 +95,18 @@ def run(
     resources : Resources
         Threads, processes or cluster of the run.
     report : callable
-        Called with the progress after every block.
+        Receives the progress after every block.
     retry_failed : bool
         Whether to compute failed and not converged cases again.
     part : Part, optional
-        Compute only the blocks of this part; other parts may run at the same time.
+        Part whose blocks are computed, while other parts may run at the same time. By default, all blocks are computed.
     tell : callable
-        Called with every `Event`, from any thread.
+        Receives every `Event`. Any thread may call it.
 
     Returns
     -------
     Progress
-        The state at the end, counting only the results of the part if `part` is given.
+        The state at the end of the run. If `part` is given, only the results of this part are counted.
 
     Raises
     ------
@@ -125,11 +127,11 @@ def run(
 
         require_known(campaign)
     stage = Stage.first(campaign)
-    stored_layout(stage, url)  # raises an error before anything is locked
+    stored_layout(stage, url)  # called here so that an error is raised before anything is locked
     url = store.absolute(url)  # a model may change the working directory
     with Executor(resources, campaign.model, url, tell) as execute:
         if not store.exists(url):
-            execute.connect()  # before a new store is created
+            execute.connect()  # connect before a new store is created
         with store.exclusive(url) if part is None else store.shared(url, part) as lock:
             execute.hold(lock)
             if store.exists(url):
@@ -142,7 +144,7 @@ def run(
 
 
 def _merge(job: _Job) -> None:
-    """Merge the record files, and warn if blocks come from different kinds of machine."""
+    """Merge the record files, and warn if different kinds of machine have computed the blocks."""
     names = store.series_names(job.url)
     for name in names:
         store.merge_records(job.url, name)
@@ -154,10 +156,11 @@ def _merge(job: _Job) -> None:
 
 
 def outlook(campaign: Campaign, url: str) -> Progress:
-    """Return how many results of a campaign are in a store and how many are missing, without changing the store.
+    """Return how many results of a campaign are in its store and how many are missing. The store is not changed.
 
-    If realisations are added in rounds, only the results of the first round are counted. On adaptive axes, all values
-    that are known to be needed are counted.
+    If realisations are added in rounds, only the results of the first round are counted. If axes are adaptive, all
+    values that are known to be needed are counted. If both is the case, only the first values of these axes are
+    counted.
 
     Raises
     ------
@@ -182,7 +185,7 @@ def outlook(campaign: Campaign, url: str) -> Progress:
 
 
 def _run_stages(job: _Job) -> Progress:
-    """Run the stages of a campaign, until its adaptive axes need no more values."""
+    """Run stage after stage of a campaign, until its adaptive axes need no more values."""
     start = time.monotonic()
     progress = Progress()
 
@@ -220,9 +223,10 @@ def _run_stages(job: _Job) -> Progress:
 def _run_rounds(
     job: _Job, run_round: Callable[[_Round, list[Cells]], None], current: _Round | None = None
 ) -> _Round | None:
-    """Run round after round; each adds realisations to the cases whose errors are still too large.
+    """Run the rounds of a stage. Each round adds realisations to the cases whose errors are still too large.
 
-    Return the last round, or None if another part has not finished a round and is not running.
+    Return the last round, or None if the run cannot go on, because another part has not finished a round and is not
+    running.
     """
     replication = job.stage.campaign.replication
     while current is None or (replication.goes_on and current.realisations[1] < replication.at_most):
@@ -243,7 +247,7 @@ def _run_rounds(
 
 
 def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], None], realisations: int) -> None:
-    """Run the rounds for fitted constants, with all values of the adaptive axes; mark unused results as not needed."""
+    """Run the rounds for fitted constants, with all values of the adaptive axes; mark missing results as not needed."""
     layout, places = stored_layout(job.stage, job.url)
     if job.stage.campaign.replication.answers:
         job = replace(job, stage=replace(job.stage, new=tuple(mesh.cases for mesh in job.stage.meshes)))
@@ -262,14 +266,14 @@ def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], None], rea
 
 
 def _without_answers(job: _Job) -> _Job:
-    """Return the job without tolerances of fitted constants; it is used until all adaptive values are known."""
+    """Return the job without tolerances of fitted constants. It is used until all values of adaptive axes are known."""
     campaign = job.stage.campaign
     campaign = replace(campaign, replication=replace(campaign.replication, answers={}))
     return replace(job, stage=replace(job.stage, campaign=campaign))
 
 
 def _next(job: _Job, last: _Round | None) -> _Round:
-    """Return the next round; if any case needs it, lay out the store for it while other parts wait."""
+    """Return the next round. If any case needs it, lay out the store for it, while other parts wait."""
     replication = job.stage.campaign.replication
     with store.gate(job.url):
         layout, places = stored_layout(job.stage, job.url)
@@ -288,7 +292,7 @@ def _next(job: _Job, last: _Round | None) -> _Round:
 
 
 def _laid_out(job: _Job, layout: tuple[Template, ...], count: int) -> tuple[Template, ...]:
-    """Lay a study out for `count` realisations, unless this was done before."""
+    """Lay out a study for `count` realisations, unless this was done before."""
     sizes = [{**t.sizes, "realisation": max(t.sizes["realisation"], count)} for t in layout]
     layout = tuple(replace(template, sizes=each) for template, each in zip(layout, sizes, strict=True))
     if not store.is_laid_out(job.url, layout):
@@ -301,14 +305,14 @@ def _laid_out(job: _Job, layout: tuple[Template, ...], count: int) -> tuple[Temp
 
 
 def _growth(job: _Job, layout: tuple[Template, ...], places: Places, last: _Round) -> list[FloatArray]:
-    """Return the factor by which the number of realisations of each case must grow; at most 1 if there are enough."""
+    """Return the factor by which the number of realisations of each case must grow; at most 1 if a case has enough."""
     own = [
         np.where(mask, _growth_of(job.url, template, last.realisations[1]), 0.0) if mask.any() else np.zeros(mask.shape)
         for mask, template in zip(last.needed, layout, strict=True)
     ]
     if not job.stage.campaign.replication.answers:
         return own
-    from mdr_dask.execute.answers import cases_that_narrow  # late, because it imports the fits
+    from mdr_dask.execute.answers import cases_that_narrow  # imported late, because it imports the fits
 
     narrow = cases_that_narrow(job.url, job.stage, layout, places, last.taken)
     return [np.where(cases, np.maximum(each, GROWTH), each) for each, cases in zip(own, narrow, strict=True)]
@@ -333,7 +337,7 @@ def _find(job: _Job, current: _Round) -> list[Cells]:
 
 
 def _require_seen(job: _Job, current: _Round) -> None:
-    """Raise StoreError unless this process finds all computed results in the store."""
+    """Raise StoreError if this process does not find all computed results in the store."""
     lost = sum(cells.new for cells in _find(replace(job, retry_failed=False), current))
     if lost:
         where = "workers need a shared file system or a URL"
@@ -341,7 +345,10 @@ def _require_seen(job: _Job, current: _Round) -> None:
 
 
 def _others_are_done(job: _Job, part: Part, current: _Round) -> bool:
-    """Wait until the other parts have finished a round; return False if a part that has not finished is not running."""
+    """Wait until the other parts have finished a round.
+
+    Return False as soon as one of them has not finished the round and is not running.
+    """
     what = f"the round of {current.realisations[1]} realisations needs results of parts"
     reported = time.monotonic()
     while True:

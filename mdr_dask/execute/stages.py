@@ -1,7 +1,7 @@
-"""Stages of a campaign with adaptive axes: find the cases of a stage in the store, and choose the next values.
+"""Find the cases of a stage of a campaign with adaptive axes in the store, and choose the values of the next stage.
 
-A stage depends only on the results of the previous stage. So it can be determined again at any time, even if the store
-holds further results.
+A stage depends only on the results of the previous stage. So the same stage is found again at any time, even if the
+store contains further results.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from mdr_dask.models.base import Status
 from mdr_dask.plan import Template, templates
 from mdr_dask.refinement import Mean, Mesh, Stage, refined
 
-#: For each group, the positions in the store of the entries of a stage along each dimension.
+#: For each group and each dimension, the positions in the store of the values of a stage.
 Places = tuple[Mapping[str, IntArray], ...]
 
 
 def stored_layout(stage: Stage, url: str) -> tuple[tuple[Template, ...], Places]:
-    """Return the layout of the stored study extended by a stage, and the positions of the cases of the stage in it.
+    """Return the layout of the stored study, extended by a stage, and the positions of the cases of this stage in it.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def _all_of(template: Template) -> Mapping[str, IntArray]:
 
 
 def cases_of(stage: Stage, layout: Sequence[Template], places: Places, cases: Sequence[BoolArray]) -> list[BoolArray]:
-    """Return masks of cases over the dimensions of the store, from masks over the dimensions of each series."""
+    """Convert masks of cases from the dimensions of the series to the dimensions of the store."""
     found = []
     for mesh, template, place, wanted in zip(stage.meshes, layout, places, cases, strict=True):
         dims = template.dims[:-1]
@@ -59,9 +59,9 @@ def cases_of(stage: Stage, layout: Sequence[Template], places: Places, cases: Se
 def following(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, realisations: int
 ) -> tuple[Stage | None, Event]:
-    """Return the stage that follows a finished stage, or None if no values are needed.
+    """Return the stage that follows a finished stage, or None if no further values are needed, and an event about it.
 
-    Only the first `realisations` realisations are used.
+    Of the results, only the first `realisations` realisations are used.
     """
     meshes, short = [], []
     facts: dict[str, int] = {}
@@ -78,7 +78,7 @@ def following(
 
 
 def _short(series: str, mesh: Mesh, number: int, count: int) -> str:
-    """Return a sentence with the reason why interpolation along an adaptive axis misses its tolerance in some cases."""
+    """Return a sentence that says why interpolation along an adaptive axis misses its tolerance in some cases."""
     axis, values = mesh.series.axes[number], mesh.used[number].sum(axis=-1)
     others, most = values.size, mesh.refinement(number).at_most
     why = f"{most} values are allowed" if (values >= most).any() else "it jumps or bends within a 1000th of the axis"

@@ -1,4 +1,4 @@
-"""A window of tasks on a Dask cluster: enough blocks are submitted at the same time to keep its workers busy."""
+"""A window of tasks on a Dask cluster: just enough blocks are submitted at the same time to keep all workers busy."""
 
 from __future__ import annotations
 
@@ -19,17 +19,18 @@ from mdr_dask.execute.children import Child, children, compute_apart
 from mdr_dask.execute.events import Event, Settle, Tell, of_block
 from mdr_dask.task import Outcome, Work, finished, one_blas_thread, run_block, write_off
 
-#: Seconds between two checks of the cluster.
+#: Time in s between two checks of the cluster.
 CHECK_PAUSE = 1.0
-#: Seconds between two messages that there is no worker.
+#: Time in s between two messages that there is no worker.
 REPORT_PAUSE = 3.0
-#: Seconds to wait for a short answer of the scheduler.
+#: Time in s to wait for a short answer of the scheduler.
 ANSWER_LIMIT = 3.0
 #: Name of the Dask topic under which workers report blocks that they begin.
 TOPIC = "mdr_dask"
 KEPT = "what is in the store is kept: run the campaign again"
 
-#: Context of the child process of a worker, and the lock with which the threads of the worker take turns to use it.
+#: Context of the child process of a worker, and the lock with which the threads of the worker take turns to use this
+#: child process.
 _OPEN, _APART = ExitStack(), threading.Lock()
 
 Outcomes = list[tuple[Work, Outcome]]
@@ -47,9 +48,9 @@ class TaskWindow:
     patience : float
         Seconds without any worker after which the run ends with an error.
     most : int
-        Largest number of threads of an adaptive cluster; 0 for other clusters.
+        Largest number of threads if the cluster is adaptive, otherwise 0.
     replace_lost : callable
-        Requests new workers in place of lost workers.
+        Requests new workers that replace lost workers.
     last_message : callable
         Returns the last error message of the cluster, or an empty string.
     case_timeout : float or None
@@ -77,7 +78,7 @@ class TaskWindow:
         client.subscribe_topic("all", self._report_worker)
 
     def run(self, works: Iterable[Work], settle: Settle) -> None:
-        """Compute blocks. A block whose worker died is computed once more, in a child process of a worker.
+        """Compute blocks. If the worker of a block dies, compute the block once more, in a child process of a worker.
 
         Raises
         ------
@@ -106,7 +107,7 @@ class TaskWindow:
                     outcomes = _outcomes(future)
                 except Empty:
                     continue
-                except TimeoutError:  # the worker with the result has disappeared
+                except TimeoutError:  # the worker that had the result has disappeared
                     future.add_done_callback(self._ended.put)
                     continue
                 work = self._running.pop(future)
@@ -164,7 +165,10 @@ class TaskWindow:
 
 
 def _outcomes(future: Future) -> Outcomes | None:
-    """Return the result of a task, or None if its workers died; raise any other error with a one-sentence message."""
+    """Return the result of a task, or None if its workers died.
+
+    Raise any other error with a message of one sentence.
+    """
     from concurrent.futures import CancelledError
 
     try:
@@ -181,7 +185,7 @@ def _outcomes(future: Future) -> Outcomes | None:
 
 
 def _run(work: Work, _: float | None) -> Outcomes:
-    """Compute a block in a worker, unless another worker has already written it and died before reporting it."""
+    """Compute a block in a worker, unless another worker has already written it, but died before reporting this."""
     outcome = finished(work)
     if outcome is None:
         _report(work)
@@ -195,7 +199,7 @@ def _run_apart(work: Work, limit: float | None) -> Outcomes:
     try:
         with _APART:
             return list(compute_apart(_child(work.model), work, limit))
-    except (ImportError, ModelError):  # the model exists in this process only
+    except (ImportError, ModelError):  # the child process cannot import the model
         return _run(work, limit)
 
 
@@ -206,5 +210,5 @@ def _report(work: Work) -> None:
 
 @lru_cache(maxsize=1)
 def _child(model: str) -> Child:
-    """Return the child process of this worker, which ends together with the worker."""
+    """Return the child process of this worker. It ends together with the worker."""
     return _OPEN.enter_context(children(1, model))[0]

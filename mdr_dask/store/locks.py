@@ -81,7 +81,7 @@ class Lock:
     name : str
         Name of the lock; the exclusive lock has an empty name.
     owner : str
-        Unique identifier of the run; empty for a run that can only read.
+        Unique identifier of the run. It is empty if the run can only read.
     claim : int or None
         Number of the claim. None for a lock of the operating system.
     begun : tuple of str
