@@ -25,10 +25,8 @@ from mdr_dask.store import Place
 from mdr_dask.version import __version__
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # numbers of two settings in malloc.h of glibc
-MAPPED, TRIMMED = (
-    32 * 2**20,
-    128 * 2**20,
-)  # in bytes: size above which glibc puts arrays outside the heap; free memory that it keeps in the heap
+# in bytes: size above which glibc puts arrays outside the heap, and free memory that it keeps in the heap
+MAPPED, TRIMMED = 32 * 2**20, 128 * 2**20
 
 #: Environment variable from which child processes of this machine read the result of `kind`.
 KIND = "MDR_DASK_KIND_OF_MACHINE"

@@ -162,9 +162,8 @@ class _Expansion:
         """
         one = variations[index]
         known = _checked(base, self._substituted(self.data, variations, 0), {one.path[0]})
-        elsewhere = broken | {
-            other.path for other in variations if other is not one
-        }  # their problems are reported by their own axes
+        # the problems of the other axes are reported when their own values are checked
+        elsewhere = broken | {other.path for other in variations if other is not one}
         last = self._validate(known, [one], len(one.items) - 1, elsewhere)
         independent = fields.is_independent(self.parameters, one.path, self.data)
         values: list[Any] = []

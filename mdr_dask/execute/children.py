@@ -131,9 +131,8 @@ def compute_apart(child: Child, work: Work, limit: float | None = None) -> Itera
 
 def serve(model: str, numbers: list[int]) -> None:
     """Import the modules that blocks need, fork a keeper for each pipe, and wait until all keepers have ended."""
-    signal.signal(
-        signal.SIGINT, signal.SIG_IGN
-    )  # the terminal sends Ctrl-C to all processes, but only the driver reacts to it
+    # the terminal sends Ctrl-C to all processes, but only the driver reacts to it
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     with suppress(Exception):  # ignore an error here, because the first block will raise it again
         models.load(model)
     pipes = [Connection(number) for number in numbers]

@@ -71,9 +71,8 @@ def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
         for names, handler in ((ECHOES, logging.NullHandler()), (STARTING, message)):
             for logger in _loggers(names):
                 stack.enter_context(_redirected(logger, handler))
-        stack.enter_context(
-            one_blas_thread()
-        )  # the workers of a client that the user gives may be threads of this process
+        # the workers of a client that the user gives may be threads of this process
+        stack.enter_context(one_blas_thread())
         most: int = 0
         replace_lost: Callable[[], None] = _nothing
         if resources.client is not None:

@@ -59,7 +59,7 @@ def cases_of(stage: Stage, layout: Sequence[Template], places: Places, cases: Se
 def following(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, realisations: int
 ) -> tuple[Stage | None, Event]:
-    """Return the stage that follows a finished stage, or None if no further values are needed, and an event about it.
+    """Return the stage that follows a finished stage, or None if no values are needed, and an event with the choice.
 
     Of the results, only the first `realisations` realisations are used.
     """

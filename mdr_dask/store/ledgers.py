@@ -138,9 +138,8 @@ def _faults(url: str, series: Sequence[str], to_run: bool) -> Iterator[str]:
         if metadata["attributes"]["mdr_dask_layout"] < 2:  # version 0.1 wrote no chunk if all its values were NaN
             continue
         done = _has_done(ledger(url, name), blocks.lengths)
-        present = set(
-            listed(url, group_name(name))
-        )  # list the chunks after reading the ledger, because a run writes the ledger last
+        # list the chunks after reading the ledger, because a run writes the ledger last
+        present = set(listed(url, group_name(name)))
         for array in list(blocks.further)[1:]:
             chunks = (blocks.chunk(array, tuple(block)) for block in np.argwhere(done).tolist())
             yield from (f"{chunk} is missing" for chunk in chunks if chunk not in present)

@@ -7,7 +7,7 @@ cannot write any more.
 
 Every run first acquires another lock, the gate, and holds it only for a short time. Meanwhile it checks which other
 runs are active. So a part and an exclusive run cannot start at the same time. A part also acquires the gate to lay out
-a study, while the other parts wait.
+the study, while the other parts wait.
 """
 
 from __future__ import annotations
@@ -258,7 +258,10 @@ def acquire(url: str, name: str = "") -> Iterator[Lock]:
 
 @contextmanager
 def while_locked(url: str, lock: Lock) -> Iterator[None]:
-    """Check that a run still holds its lock. Until this context ends, no other run can take over the lock.
+    """Check that a run still holds its lock.
+
+    With a lock of the operating system, no other run can take over the lock until this context ends. A claim is only
+    checked at the beginning.
 
     Raises
     ------
@@ -302,11 +305,7 @@ def _lock_file(url: str, name: str = "") -> Path:
     path = Path(url.removeprefix("file://"))
     try:
         path = path.resolve()
-    except (
-        OSError,
-        RuntimeError,
-        ValueError,
-    ) as error:  # for example, the path is a link to itself or contains a null character
+    except (OSError, RuntimeError, ValueError) as error:  # for example, a link to itself, or a null character
         raise StoreError(f"{url}: expected a path: {error}") from None
     return path.with_name(".".join(["", path.name, *filter(None, [name]), "lock"]))
 
@@ -487,9 +486,8 @@ def _claimed(url: str, name: str) -> Iterator[Lock]:
 
     def live() -> None:
         while not ended.wait(BEAT):
-            with suppress(
-                StoreError
-            ):  # go on, because the network may come back; blocks are written only while the claim is valid
+            # go on after an error, because the network may come back; blocks are written only while the claim is valid
+            with suppress(StoreError):
                 write_bytes(url, _life(name, number), json.dumps({"time": time.time()}).encode())
 
     alive = threading.Thread(target=live, daemon=True)

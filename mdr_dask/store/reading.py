@@ -99,8 +99,7 @@ def save(dataset: xr.Dataset, path: Path) -> None:
     plain.attrs = {
         name: value if isinstance(value, str | int | float) and not isinstance(value, bool) else json.dumps(value)
         for name, value in dataset.attrs.items()
-        if value is not None
-        and name != "mdr_dask_layout"  # the copy lacks this attribute, so that no run can extend it
+        if value is not None and name != "mdr_dask_layout"  # without this attribute, no run can extend the copy
     }
     if path.suffix == ".nc":
         if find_spec("h5netcdf") is None:

@@ -61,9 +61,8 @@ def _checked(content: bytes, group: str) -> tuple[dict[str, Any] | None, str | N
         return found, " is damaged"
     attributes = found.get("attributes", {})
     layout = attributes.get("mdr_dask_layout")
-    is_newer = (
-        isinstance(layout, int) and layout > LAYOUT
-    )  # do not check a later layout, which `attributes` refuses with its own message
+    # a later layout is not checked, because `attributes` refuses it with its own message
+    is_newer = isinstance(layout, int) and layout > LAYOUT
     if "mdr_dask_layout" not in attributes or only_claimed(attributes) or is_newer:
         return None if group else found, None
     fault = next(faults(found), None)

@@ -126,9 +126,8 @@ def repair(url: str) -> tuple[Inspection, Inspection]:
         remove(url, [name for name in (RECORD, *coordinate_files(root, bad)) if name in bad])
         for group in found.groups:
             for block in sorted(group.bad_blocks):
-                remove(
-                    url, [group.blocks.chunk(name, block) for name in group.blocks.further]
-                )  # this includes the ledger, which is removed first
+                # `further` begins with the ledger, so the ledger is removed first
+                remove(url, [group.blocks.chunk(name, block) for name in group.blocks.further])
             _remove_records(url, group)
             remove(url, group.foreign)
         return found, _inspect(url)
