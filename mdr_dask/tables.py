@@ -409,7 +409,7 @@ def _head_of_words(grid: _Grid, is_name: Callable[[str], bool]) -> _Head:
 def _body(grid: _Grid, head: _Head) -> tuple[list[int], list[tuple[str, str] | None], tuple[str, ...]]:
     """Return the positions of the lines of numbers, the temperature stated above each of them, and the text below all.
 
-    Raise TableError if there is other text between lines of numbers than text that repeats the line of names.
+    The text between lines of numbers must repeat the line of names; other text raises TableError.
     """
     kept, stated, wrong = [], [], []
     between: list[int] = []

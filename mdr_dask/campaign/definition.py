@@ -21,7 +21,7 @@ SOME = 64
 
 @dataclass(frozen=True)
 class Spread:
-    """An interval from which values are drawn, uniformly in the value or in its logarithm."""
+    """An interval from which values are taken, evenly spread either in the value or in its logarithm."""
 
     low: float
     high: float
@@ -50,7 +50,8 @@ class Spread:
 def tidy(value: float, whole: bool, exact: bool = False) -> float:
     """Return a number of a range, rounded.
 
-    It is rounded to a whole number if `whole`, not rounded if `exact`, and otherwise rounded to 14 digits.
+    It is rounded to a whole number if `whole` is true. Otherwise it is rounded to 14 digits, or not at all if `exact`
+    is true.
     """
     if whole:
         return round(value)

@@ -56,7 +56,8 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
 
     Files are written in this order: the record of the layout, which holds the digests of all following files; metadata
     and coordinates of arrays; the metadata of groups; and finally ``zarr.json``, the metadata of the study. This last
-    write makes the new shape visible. Coordinates and metadata that are missing are written again.
+    write makes the new shape visible. A new store first gets a ``zarr.json`` without arrays. If coordinates or metadata
+    are missing in an existing store, they are written again.
 
     Parameters
     ----------

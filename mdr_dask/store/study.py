@@ -107,7 +107,7 @@ def exists(url: str) -> bool:
     Raises
     ------
     StoreError
-        If there is something else than a study.
+        If there is something at this place that is not a study.
     """
     refuse_file(url, "the folder of a store or nothing")
     path, found = local(url), _root_attributes(url)
