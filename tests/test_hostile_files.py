@@ -101,7 +101,7 @@ def test_a_fault_of_the_program_has_its_own_exit_code_and_a_report(filled, monke
     printed = capsys.readouterr().err
     assert len(printed.splitlines()) == 1
     assert "RuntimeError: wheels came off" in printed
-    report = Path(printed.split()[-1])
+    report = Path(printed.split()[-1].rstrip(")"))
     assert "Traceback" in report.read_text()
     assert f"mdr-dask status {filled}" in report.read_text()
     report.unlink()

@@ -36,7 +36,7 @@ _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border"
 _RENAMED = {"contact_force": "normal_force"}
 #: Requested error of the profile, divided by eta d0, when the evolution is solved. It is `_USUAL` if the campaign
 #: states no accuracy, and never below `_FINEST`.
-_USUAL, _FINEST = 1e-3, 3e-6
+_USUAL, _FINEST = 1e-3, 1e-5
 #: If the campaign states an accuracy, the first solution requests the error `_FIRST` times the accuracy. If an output
 #: then misses the accuracy, the next solution requests `_FINER` times this error.
 _FIRST, _FINER = {"depth": 0.2, "force": 0.6}, 0.25

@@ -183,6 +183,8 @@ def at(problem: Problem, history: Sequence[Any], time: float, tolerance: float) 
     before = int(np.searchsorted([moment.time for moment in history], time))
     if history[before].time == time:
         return before, history[before]
+    if time < np.finfo(np.float64).tiny:  # the inverse of such a time overflows
+        return 0, history[0]
     moment, _ = _try_step(problem, _Newton(problem, tolerance), history[:before], time)
     if moment is None:
         raise NotConvergedError(f"the wear law has no solution at {time:.6g}")
