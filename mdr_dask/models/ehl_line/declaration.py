@@ -210,7 +210,7 @@ def coordinates(parameters: EhlLineParameters) -> dict[str, Coordinate]:
 
 MODEL = Model(
     name="ehl_line",
-    version=10,
+    version=11,
     summary="film, pressure and traction of a lubricated line contact (elastohydrodynamic)",
     parameters=EhlLineParameters,
     outputs=OUTPUTS,

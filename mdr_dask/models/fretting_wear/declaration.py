@@ -303,7 +303,7 @@ def units(parameters: FrettingWear) -> dict[str, str]:
 _SOLVE = "mdr_dask.models.fretting_wear.solve"
 MODEL = Model(
     name="fretting_wear",
-    version=14,
+    version=15,
     summary="fretting wear of bodies of revolution: exact, by the fast rule, and in the limit",
     parameters=FrettingWear,
     outputs=OUTPUTS,

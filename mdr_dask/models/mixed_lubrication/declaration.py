@@ -326,7 +326,7 @@ def seconds(block: Block[MixedLubrication]) -> float:
 
 MODEL = Model(
     name="mixed_lubrication",
-    version=13,
+    version=14,
     summary="breakthrough of the boundary layer between two rough rollers on an oil film",
     parameters=MixedLubrication,
     outputs=OUTPUTS,

@@ -42,7 +42,7 @@ SOLVE = "mdr_dask.models.sliding_friction.solve"
 
 MODEL = Model(
     name="sliding_friction",
-    version=18,
+    version=19,
     summary="steady friction of a viscoelastic body on a rough line or a rough indenter",
     parameters=SlidingFriction,
     outputs=OUTPUTS,
