@@ -188,7 +188,7 @@ def _workbook(content: bytes, source: str) -> str:
         sheets = pd.read_excel(io.BytesIO(content), sheet_name=None, header=None, dtype=str, engine="openpyxl")
     except ImportError:
         raise DataError(
-            f"{source}: reading Excel workbooks needs openpyxl (or save the sheet as 'CSV UTF-8')"
+            f"{source}: reading Excel workbooks needs openpyxl: pip install openpyxl, or save the sheet as 'CSV UTF-8'"
         ) from None
     except Exception as error:  # openpyxl and zipfile raise many kinds of errors for damaged files
         raise DataError(f"{source}: expected a table or an Excel workbook, got neither ({error})") from None

@@ -62,6 +62,9 @@ def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
         raise DataError(str(error)) from None
     figure.warnings += _apart(measured, data)
     panels = [p for p in figure.panels if p.y.quantity == measured.output and p.x.quantity in measured.conditions]
+    if not measured.conditions:
+        axes = ", ".join(str(name) for name in data["status"].dims if name != "realisation")
+        raise DataError(f"{measured.source}: expected a column with a parameter of the study ({axes}), got none")
     if not panels:
         known = ", ".join(measured.conditions)
         raise DataError(f"{measured.source} holds {measured.output} against {known}, which this figure does not show")

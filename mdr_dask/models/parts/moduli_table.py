@@ -115,6 +115,12 @@ def _as_measured(chosen: ModulusTable, law: Law | None) -> Moduli:
     """Return the moduli at one temperature, in shear or in tension as in the table."""
     omega, storage, loss, temperature = _measured(chosen)
     if temperature is None:
+        if chosen.reference is not None or chosen.table_temperature is not None:
+            given = "table_temperature" if chosen.reference is None else "reference"
+            raise DataError(
+                f"{chosen.file.name}: expected a column temperature, because {given} is given: add the column, "
+                f"or leave out {given} if all rows belong to one temperature"
+            )
         return Moduli(omega, storage, loss, None, None)
     ends = float(temperature.min()), float(temperature.max())
     if ends[1] - ends[0] < SAME_TEMPERATURE:
@@ -183,6 +189,11 @@ def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
     assert temperature is not None
     assert chosen.reference is not None
     member, levels = _levels(temperature)
+    if not levels[0] <= chosen.reference <= levels[-1]:
+        raise DataError(
+            f"{chosen.file.name}: expected a reference between {shown(levels[0], 'K')} and {shown(levels[-1], 'K')}, "
+            f"got {shown(chosen.reference, 'K')}"
+        )
     _require_overlap(storage, member, levels)
     x, y = np.log10(omega), np.log10([storage, loss])
     parts = [member == number for number in range(levels.size)]
