@@ -192,7 +192,7 @@ class Template:
         return {axis.path: _as_array(axis) for axis in self.series.axes}
 
     def sample(self, chunks: Mapping[str, int], position: float) -> Block[Any]:
-        """Return a block with the given lengths, for estimates.
+        """Return a block whose dimensions have the given sizes; it is used for estimates of time and memory.
 
         `position` is the place of the block in the group, from 0 (the first block) to 1 (the last block).
         """

@@ -347,7 +347,7 @@ class _Head(NamedTuple):
 def _head(grid: _Grid) -> _Head:
     """Find the names and units.
 
-    They are in the last lines of text above the numbers that have as many cells as most lines.
+    Among the lines of text above the numbers, they are the last ones with as many cells as most lines of the table.
     """
     data, numeric = _lines_of_numbers(grid)
     full = np.flatnonzero(data & (grid.length == numeric.size))

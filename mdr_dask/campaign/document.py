@@ -86,7 +86,7 @@ def read_text(path: str | FilePath) -> str:
 
 
 def parse(text: str, source: str) -> Document:
-    """Return the document in a YAML 1.2 text. Messages call the text `source`.
+    """Return the document in a YAML 1.2 text. `source` is the name of the text in messages, such as its file name.
 
     Syntax errors, duplicate keys, keys that are not strings, and unknown tags become problems of the document.
     """

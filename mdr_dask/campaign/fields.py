@@ -144,7 +144,7 @@ def is_independent(parameters: type[BaseModel], path: Path, data: Any) -> bool:
 
 
 def choices(parameters: type[BaseModel], path: Path) -> tuple[str, ...]:
-    """Return how the structure of a nested parameter may be written.
+    """Return the forms in which a nested parameter may be written.
 
     For the path of the exponent of an indenter, for example, this is ``indenter: {shape: power, ...}``.
     """

@@ -27,7 +27,7 @@ def each(
     fit: Callable[[xr.Dataset], Variables],
     *outputs: str,
 ) -> xr.Dataset:
-    """Fit a law separately for every combination of values of the dimensions that one fit does not need.
+    """Fit a law to some dimensions of the data, separately for every combination of values of the other dimensions.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def power_law(x: FloatArray, logs: FloatArray, count: int) -> Fitted:
 
 
 def stated_power(x: FloatArray, logs: FloatArray, power: float, count: int, where: Callable[[int], str]) -> str:
-    """Return a sentence on whether a stack of logarithms follows a power law with a stated power and any factor."""
+    """Return a sentence on whether data, given as a stack of logarithms, follow a stated power with a free factor."""
     rest = logs - power * x
     free = power_law(x, logs, count).constants[:, 0]
     if np.isnan(free[0]):

@@ -127,7 +127,7 @@ def _between(scale: Scale, places: FloatArray, line: FloatArray, error: FloatArr
     filled = cubic(places[known], line[known], places, 0, Scale.of(places))
     left_out = (
         left_out_error(scale, line[known], places[known], 0) / LEFT
-    )  # no factor LEFT: the missing values leave gaps as wide as those of the estimate, which omits every second value
+    )  # without the factor LEFT, because gaps at missing values are as wide as those in the estimate of the error
     between = np.interp(places, places[known], error[known] + left_out)
     inside = (places >= places[known][0]) & (places <= places[known][-1])
     return np.where(inside, filled, np.nan), np.where(known, error, between)

@@ -158,7 +158,8 @@ def shared(url: str, part: Part) -> Iterator[Lock]:
     Raises
     ------
     StoreBusyError
-        If this part is already active, or an exclusive run, or a part of a division into another number of parts.
+        If another process runs this part, runs the whole study exclusively, or runs a part of the study that was
+        divided into a different number of parts.
     StoreError
         If locking fails. In a read-only store it does not fail, but the lock allows only reading.
     """

@@ -75,7 +75,7 @@ class VelocityJump(SlidingBody):
         return kelvin(self.shear_modulus, self.relaxation_time)
 
     def time_unit(self) -> float:
-        """Return the unit of stored times in s: tau, the longest relaxation time of the Prony terms and the dashpot."""
+        """Return tau in s, the unit of stored times: the longest relaxation time of Prony terms and dashpot."""
         solid = self.solid()
         return float(max([solid.viscosity / solid.static_modulus, *solid.times]))
 

@@ -479,7 +479,7 @@ def _pass_block(
 ) -> int:
     """Add the sums of a block for every case in which the whole block is in contact or the whole block is free.
 
-    Write the indices of the other cases to the queue, and return their number.
+    Write the indices of the cases in which the block is partly in contact to the queue, and return their number.
     """
     peak, lowest, steepest = block[PEAK], block[LOWEST], block[STEEPEST]
     steepest /= refinement

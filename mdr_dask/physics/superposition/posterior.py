@@ -230,7 +230,7 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
 
 
 def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return the first of the four splines that overlap at each place (in cells), their values, and derivatives."""
+    """Return the index of the first of the four splines at each place (in cells), and values and slopes of all four."""
     # NaN and infinity from diverged rows must not become indices
     first = np.clip(np.nan_to_num(np.floor(place)), 0, splines - 4).astype(np.intp)
     inside = np.clip(place - first, 0.0, 1.0)

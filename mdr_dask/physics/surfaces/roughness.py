@@ -85,7 +85,7 @@ def phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     return _phase_factors(seed, realisation, 1 << max(modes - 1, 0).bit_length())[:modes]
 
 
-@lru_cache(maxsize=8)  # numbers of modes are powers of two, so eight entries cover lengths up to a ratio of 128
+@lru_cache(maxsize=8)  # modes are powers of two: eight sizes up to 128 times the smallest
 def _phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     factors: ComplexArray = np.exp(1j * phases(seed, realisation, modes))
     factors.flags.writeable = False

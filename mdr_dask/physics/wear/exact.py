@@ -332,7 +332,7 @@ def _end(problem: PartialSlip, moment: SlipMoment) -> Worn:
     """
     profile, c, eta = problem.profile, problem.inner_radius, problem.eta
     border, frozen = problem.radius(moment.path[0, -1]), _frozen(problem, moment.path)
-    # the stick zone takes over the load of the virgin slip zone: b d = ... - int_c^b (d' - eta) db'
+    # the stick zone now also carries the load of the slip zone before wear: subtract int_c^b (d' - eta) db' from b d
     annulus = float(np.trapezoid((frozen.depths - 1.0) / eta - 1.0, frozen.reached))
     load = float(problem.load or 0.0)
     depth = 1.0 + eta * (load + annulus) / border

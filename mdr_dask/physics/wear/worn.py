@@ -86,8 +86,9 @@ class Worn:
         """Return the expected absolute error of an output; for functions, at the positions `places`.
 
         The error follows from the differences between this solution and the rougher solutions. Without rougher
-        solutions, it is the fraction `relative_error` of the largest value. For functions, the largest difference among
-        neighbouring positions is used. These positions are dense at the borders of stick zone and contact.
+        solutions, it is the fraction `relative_error` of the largest value. For a function of position, the error at a
+        position is the largest difference there and at the neighbouring positions, which are dense at the borders of
+        stick zone and contact.
         """
         if not self.rougher:
             value = np.asarray(self.value(output, places), dtype=float)
