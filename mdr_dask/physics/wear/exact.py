@@ -167,13 +167,22 @@ def exact(
         border_moves = constant_force and 0.5 * (1.0 - stick_radius) > accuracy**2
         coarsest = COARSEST_OF_MOVING if border_moves else coarsest
         solve = partial(_fretted, profile, stick_radius, wanted, border_moves)
-    resolution = Resolution(min(accuracy, coarsest))
-    found, *rougher = _solutions(solve, resolution, errors)
+    found, *rougher = _converged(solve, min(accuracy, coarsest), errors)
     contacts = {
         amount: one if one.relative_error > 0.0 else replace(one, rougher=tuple(other[amount] for other in rougher))
         for amount, one in found.items()
     }
     return [contacts[float(amount)] for amount in amounts]
+
+
+def _converged(solve: Solver, accuracy: float, errors: bool) -> list[dict[float, Worn]]:
+    """Return the solutions of `_solutions`. If they fail, repeat them at up to two finer accuracies."""
+    for finer in (accuracy, 0.25 * accuracy):
+        try:
+            return _solutions(solve, Resolution(finer), errors)
+        except NotConvergedError:
+            continue
+    return _solutions(solve, Resolution(0.0625 * accuracy), errors)
 
 
 def _solutions(solve: Solver, resolution: Resolution, errors: bool) -> list[dict[float, Worn]]:
