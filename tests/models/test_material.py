@@ -98,6 +98,21 @@ def test_a_reference_needs_temperatures_that_enclose_it(tmp_path):
         solid_of(material(dma_table={"file": shifted_table(tmp_path / "x.csv", (290.0, 300.0)), "reference": 20.0}))
 
 
+def test_table_temperature_is_the_temperature_of_a_table_without_temperatures(tmp_path):
+    rows = "".join(f"{f},{m / 1e6},{s / 1e6}\n" for f, m, s in ROWS)
+    (tmp_path / "dma.csv").write_text(f"f [Hz],G' [MPa],G'' [MPa]\n{rows}")
+    law = {"c1": 10.0, "c2": 100.0, "reference": 300.0}
+
+    def times(**table):
+        return solid_of(
+            material(dma_table={"file": str(tmp_path / "dma.csv"), **table}, wlf=law, temperature=320.0)
+        ).times
+
+    shift = 10 ** (-10 * 20 / 120)
+    assert times(table_temperature=320.0) * shift == pytest.approx(times(table_temperature=300.0), rel=1e-12)
+    assert times() == pytest.approx(times(table_temperature=300.0), rel=1e-12)
+
+
 def test_a_note_states_the_error_of_the_fit():
     fitted = material(dma_table={"file": TABLE, "table_temperature": 298.0, "poisson_ratio": 0.5})
     (note,) = fit_notes(fitted)

@@ -39,7 +39,11 @@ class ModulusTable(NamedByFile):
     frequency_unit: str = Field(default="", description="unit of the frequencies, if the table does not state it")
     modulus_unit: str = Field(default="", description="unit of the moduli, if the table does not state it")
     table_temperature: float | None = quantity(
-        "K", "use only the curves that were measured at this temperature", default=None, gt=0
+        "K",
+        "use only the curves that were measured at this temperature. If the table has no column of temperatures, this "
+        "is the temperature of all its rows",
+        default=None,
+        gt=0,
     )
     reference: float | None = quantity(
         "K",
@@ -115,13 +119,13 @@ def _as_measured(chosen: ModulusTable, law: Law | None) -> Moduli:
     """Return the moduli at one temperature, in shear or in tension as in the table."""
     omega, storage, loss, temperature = _measured(chosen)
     if temperature is None:
-        if chosen.reference is not None or chosen.table_temperature is not None:
-            given = "table_temperature" if chosen.reference is None else "reference"
+        if chosen.reference is not None:
             raise DataError(
-                f"{chosen.file.name}: expected a column temperature, because {given} is given: add the column, "
-                f"or leave out {given} if all rows belong to one temperature"
+                f"{chosen.file.name}: expected a column temperature, because reference is given: add the column, or "
+                "give table_temperature instead if all rows were measured at one temperature"
             )
-        return Moduli(omega, storage, loss, None, None)
+        only = chosen.table_temperature
+        return Moduli(omega, storage, loss, only, None if only is None else (only, only))
     ends = float(temperature.min()), float(temperature.max())
     if ends[1] - ends[0] < SAME_TEMPERATURE:
         return Moduli(omega, storage, loss, float(temperature.mean()), ends)
