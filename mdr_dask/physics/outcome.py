@@ -32,10 +32,10 @@ class Outcome(IntEnum):
 
 _SENTENCES = {
     Outcome.CONVERGED: "converged",
-    Outcome.DEPTH_NOT_FOUND: "the depth for the load was not found",
+    Outcome.DEPTH_NOT_FOUND: "the depth at which the contact carries the load was not found",
     Outcome.OUTSIDE_LINE: "the contact leaves the line: a longer line or a smaller load is needed",
     Outcome.INVALID: "load, velocity and line must be finite, the load and the Deborah number positive",
-    Outcome.NOT_STEADY: "friction did not come to the steady state at the new velocity",
+    Outcome.NOT_STEADY: "friction did not reach the steady state at the new velocity",
     Outcome.TOO_MANY_STEPS: "too many steps were needed",
     Outcome.SINGULAR: "the linear equations of a step have no solution",
     Outcome.FILM_COLLAPSED: "the next step would have closed the film",

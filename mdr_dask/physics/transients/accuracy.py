@@ -45,7 +45,9 @@ class Levels(NamedTuple):
 
 
 class Jumps(NamedTuple):
-    """Results of the velocity jumps on a line; drags are F_x / (4 G L h) in units of h / L, depths in units of h.
+    """Results of the velocity jumps on a line.
+
+    Drags are F_x / (4 G L h) in units of h / L, and depths are in units of h, where h is the unit of height.
 
     Parameters
     ----------
@@ -54,10 +56,11 @@ class Jumps(NamedTuple):
     trace, depth : array, shape (cases, times)
         Drag and depth at the requested times: the steady value after the jump plus the transient of the march.
     trace_error, depth_error : array, shape (cases, times)
-        Estimated absolute errors; NaN if they are not requested.
+        Estimated absolute errors of `trace` and `depth`; NaN if they are not requested.
     contact : array, shape (cases,)
-        The larger of the fractions of the line in contact in steady sliding before and after the jump.
+        Fraction of the line in contact in steady sliding, before or after the jump, whichever is larger.
     outcome : array, shape (cases,)
+        Values of `Outcome`.
     """
 
     levels: Levels
@@ -87,7 +90,7 @@ def solve_jumps(
     ----------
     line : RoughLine
     loads : array, shape (cases,)
-        F_N / (4 G L h).
+        F_N / (4 G L h), where h is the unit of height.
     deborah : array, shape (cases, 2)
         v_1 tau / L and v_2 tau / L.
     accuracy : float or None
@@ -146,7 +149,7 @@ def solve_jumps(
 
 
 def _left_out(jump: Jump, limits: SteadyLimits, request: MarchRequest) -> FloatArray:
-    """Return the errors of drag and depth of a jump without a march: the neglected changes, or 0 in full contact."""
+    """Return the errors of drag and depth if a jump was not marched: the neglected changes, or 0 in full contact."""
     changes = np.array([jump.left_out, abs(limits.depth[1] - limits.depth[0]) if jump.left_out > 0 else 0.0])
     return np.repeat(changes[:, None], request.times.size, axis=1)
 

@@ -12,8 +12,8 @@ of the depth and the rate of the depth. In each cell that is examined:
 A patch is added to the sums when its end is found. Most cells can be skipped because of three bounds. The bounds are
 rigorous, so that no contact is missed.
 
-* A cell in contact is skipped under two conditions. First, the force was positive everywhere in the cell while the
-  elements that are now further along the line passed the cell. Second, the displacement u of free elements cannot
+* A cell in contact is skipped if two conditions are met. First, the force was positive everywhere in the cell while
+  those elements passed it that are now further along the line. Second, the displacement u of free elements cannot
   exceed w = depth + h in the cell. Along the line u' = (drift - u) / D, so that u stays below w wherever w + D h'
   exceeds the largest drift (see `free_recovery`).
 * A free cell is skipped if its highest point is below a lower bound of the displacement of the free elements. The bound
@@ -75,7 +75,7 @@ PERIODS = 3  # largest number of periods of the line for which the search is rep
 VISITS = 6  # largest number of changes of contact in a cell: a cubic force changes sign at most three times
 ROUNDING = 1e-9  # margin for rounding errors, relative to a displacement
 CLOSE = 1e-9  # cells: accuracy of the place where contact is lost to free elements
-FULL = -1  # returned instead of the number of patches if the capacity is exceeded or a patch continues beyond its run
+FULL = -1  # returned instead of the number of patches if the arrays are too small or a patch extends beyond its run
 DEPTH_CHANGES = 4.0  # assumed largest derivative of a displacement with respect to the last depth
 
 # Entries of `Workspace.scan`, the state of the search
@@ -100,7 +100,7 @@ class Reachable(NamedTuple):
 
 
 class SkipBounds(NamedTuple):
-    """Bounds that show which cells can be skipped until the line has approached further.
+    """For each cell out of contact, the approach (see the module) up to which it can be skipped.
 
     Parameters
     ----------
@@ -345,7 +345,10 @@ def _search_period(search: Search, runs: IntArray) -> int:
 
 @jit_inline_uncounted
 def _oldest(recovery: FreeRecovery, otherwise: float) -> float:
-    """Return the first place at which elements that are now further along the line can have separated."""
+    """Return the first place at which elements that are now further along the line can have separated.
+
+    If `recovery` contains no place, return `otherwise`.
+    """
     return recovery.earliest[0] if recovery.count[0] > 0 else otherwise
 
 

@@ -6,9 +6,9 @@ then:
 
     u(x, t) = max over t' <= t of (d(t') + h(x')) exp(-(t - t'))
 
-Only the depth d(t) needs a history, so that elements are never followed one by one. The place where an element
-separated from the line is the place x' where the expression in the maximum is stationary; the force on the element was
-zero there. `FreeRecovery` holds the places near which elements can have separated.
+This needs only the history of the depth d(t); no element is followed in time. The place where an element
+separated from the line is the place x' where the expression in the maximum is stationary. The force on the element was
+zero there. `FreeRecovery` contains the places near which elements can have separated.
 
 The *drift* of free elements is D u' + u, where u' is the derivative along the line. It is equal to minus the rate of
 the depth at the time of separation, reduced by the decay since then. The extremes of the drift over the recent past
@@ -31,7 +31,7 @@ NEAR = 0.02  # cells: largest last Newton step towards a place of separation; th
 STRIDE = 2.0  # cells: longest step towards a place of separation
 MET = 1e-3  # cells: largest last step towards the place where contact begins; the error is about the cube of this step
 CREST = 1e-3  # cells: resolution of the place in a cell where the gap between line and free elements is smallest
-FARTHEST = 200  # cells before x in which the place of separation is searched for in a stretch
+FARTHEST = 200  # largest number of cells of a stretch in which the place of separation is searched for
 MARGIN = 64.0  # cells added to twice a distance when the window of a bound is chosen
 WINDOW, WINDOWS = 8.0, 16  # cells travelled in the shortest window; number of windows, each twice as long as the last
 
@@ -73,8 +73,8 @@ class PathBounds(NamedTuple):
     least_lift : array
         Least lift, the sum of depth and rate.
     most_drift, least_drift : array
-        Largest and least drift, or 0, of elements that separated within the window or have been free since before the
-        jump.
+        Largest and least drift of elements that separated within the window or have been free since before the jump.
+        The largest drift is at least 0, and the least drift at most 0.
     """
 
     spread: FloatArray
@@ -90,8 +90,9 @@ class FreeRecovery(NamedTuple):
     Parameters
     ----------
     earliest, place, farthest : array
-        If ``earliest == place``, contact ends there now, and has ended between `place` and `farthest` since the jump.
-        Otherwise no contact ends there now, but elements can have separated in the cells from `earliest` to `place`.
+        If ``earliest == place``, contact ends at `place` now; at earlier instants after the jump it ended between
+        `place` and `farthest`. Otherwise no contact ends there now, but elements can have separated in the cells from
+        `earliest` to `place`.
     barrier : array
         Elements can have separated in a stretch only while the lift was below this value.
     count : int array, shape (1,)
@@ -140,7 +141,10 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
 
 @jit_inline_uncounted
 def window(distance: float) -> int:
-    """Return the index of the window whose bounds are valid over a distance in cells."""
+    """Return the index of the shortest window in which the line travels more than a distance in cells.
+
+    If even the longest window is too short, return the index of the longest.
+    """
     return min(max(frexp(distance / WINDOW)[1], 0), WINDOWS - 1)
 
 
@@ -349,7 +353,7 @@ def nearest_approach(now: Instant, recovery: FreeRecovery, low: float, high: flo
 
 @jit_inline_uncounted
 def prune(now: Instant, recovery: FreeRecovery, x: float, pressed: float, deepest: float) -> None:
-    """Remove places of separation whose elements can no longer exceed the displacement `pressed` at x.
+    """Remove the places of separation whose elements can no longer have a larger displacement at x than `pressed`.
 
     `deepest` is the largest depth since the jump.
     """

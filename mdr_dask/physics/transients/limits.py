@@ -27,14 +27,19 @@ from mdr_dask.physics.transients.patches import (
     track_of,
 )
 
-KEPT_CELLS, KEPT_SPEEDS = 2**21, 4  # barriers are kept for this many cells (16 bytes each), or for at least 4 speeds
+# barriers are kept for up to this many cells in total (16 bytes each), but always for up to 4 velocities
+KEPT_CELLS, KEPT_SPEEDS = 2**21, 4
 WHOLE = 1 - 1e-12  # fraction of the line in contact that counts as full contact, within rounding
 NEWTON_STEPS = 60
 NEARLY = 1e-6  # relative error of the load before the last Newton step; the remaining error is about its square
 
 
 class PreparedLine(NamedTuple):
-    """One periodic line, prepared for the steady sweep and for the march, with the barriers computed so far."""
+    """One periodic line, prepared for the steady sweep and for the march.
+
+    `known` contains the barriers for each Deborah number used so far. A barrier is the depth above which the force on
+    elements in contact is positive everywhere in a cell.
+    """
 
     cells: Cells
     blocks: Blocks
@@ -59,7 +64,7 @@ class PreparedLine(NamedTuple):
         return self.known[deborah]
 
     def patches(self, depth: float, deborah: float) -> tuple[Patches, FloatArray]:
-        """Return the contact in steady sliding at a given depth of the highest point, and the sums of the sweep."""
+        """Return the patches in steady sliding at a given depth of the highest point, and the sums of `sweep_cells`."""
         sums = np.empty(SWEEP_SUMS)
         start, end = patches_at(self.cells, self.blocks, self.barriers(deborah), deborah, depth, sums)
         pressed = _pressed(self.track, end, depth)
@@ -160,9 +165,10 @@ def _pressed(track: Track, end: FloatArray, depth: float) -> FloatArray:
 def _release(
     track: Track, first: Patches, barriers: Barriers, deborah: float, load: float
 ) -> tuple[float, float, float, int]:
-    """Return the drag just after a jump, the rate of the depth that carries the load, the tilt, and the outcome.
+    """Return the drag just after a jump, the rate of the depth, the tilt, and the outcome.
 
-    The tilt is the derivative of the drag with respect to the rate.
+    The rate of the depth is the one at which the load is carried. The tilt is the derivative of the drag with respect
+    to this rate.
     """
     rate, sums = 0.0, np.empty(SUMS)
     for _ in range(NEWTON_STEPS):

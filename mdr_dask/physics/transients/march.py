@@ -29,12 +29,12 @@ TRIALS = 80  # largest number of Newton steps for the depth at one moment
 ORDER = 3  # order of the backward differentiation
 EXACT = 1e-11  # relative error of the load below which no Newton step is needed
 NEWTON_LOAD = 0.03  # largest relative error of the load before the last Newton step
-SETTLED = 1.5  # a march ends when depth and drag have met `Finish` from a time t until this factor times t
+SETTLED = 1.5  # a march ends when depth and drag have been near their final values from a time t to this factor times t
 LEFT_LIMITS = -1  # outcome of a march whose depth leaves the interval for which the reachable cells are known
 
 
 class Stepping(NamedTuple):
-    """Steps of a march.
+    """Sizes of the time steps of a march.
 
     Parameters
     ----------
@@ -45,9 +45,9 @@ class Stepping(NamedTuple):
     miss : float
         Largest allowed difference between the extrapolated and the solved depth.
     close : float
-        Newton's method ends with the first step of the depth that is smaller than this.
+        Newton's method ends when it changes the depth by less than this length.
     until : float
-        Last time.
+        Time at which the march ends at the latest.
     """
 
     first: float
@@ -58,9 +58,9 @@ class Stepping(NamedTuple):
 
 
 class Finish(NamedTuple):
-    """Criterion for the end of a march: final depth and drag, and allowed distances from these values.
+    """Criterion for the end of a march: final depth and drag, and the allowed distances from these values.
 
-    The allowed distance of the drag is a fraction of its largest distance during the march.
+    `drag_distance` is a fraction of the largest distance of the drag during the march; `depth_distance` is a length.
     """
 
     depth: float
@@ -110,10 +110,10 @@ class Trajectory(NamedTuple):
 
 @jit_uncounted
 def _drag_rate(sums: FloatArray, stiff: float, step: float) -> float:
-    """Return the rate of the drag at constant load. Growing patches add load; the lift falls to compensate for it.
+    """Return the rate of the drag at constant load.
 
-    `step` is the last Newton step of the depth. It also changes the rate of the depth, and therefore the growth of the
-    patches at their edges.
+    Growing patches add load; the lift (the depth plus its rate) falls to compensate for it. `step` is the last Newton
+    step of the depth. It also changes the rate of the depth, and therefore the growth of the patches at their edges.
     """
     edges = sums[STIFFNESS] - sums[LENGTH] * (1 + stiff)
     edges_drag = sums[DRAG_STIFFNESS] - sums[TILT] * (1 + stiff)
@@ -126,7 +126,7 @@ def _drag_rate(sums: FloatArray, stiff: float, step: float) -> float:
 def _balance(
     marching: Marching, history: History, weights: tuple[float, float], close: float, work: Workspace
 ) -> tuple[int, float, float]:
-    """Find the depth that carries the load at the last moment of the history, by Newton steps.
+    """Find the depth at which the load is carried, at the last moment of the history, by Newton's method.
 
     Returns
     -------
@@ -168,10 +168,10 @@ def _balance(
 
 @jit_uncounted
 def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
-    """Return the weights a and b of the rate of the depth, a d + b, at moment `now` of a march.
+    """Return the numbers a and b with which the rate of the depth d at moment `now` of a march is a d + b.
 
-    The weights are those of backward differentiation with respect to log(1 + t / onset). As a function of this variable
-    the relaxation is smooth, and the steps are equal. The first step uses the known rate just after the jump instead.
+    They follow from backward differentiation with respect to log(1 + t / onset). As a function of this variable the
+    relaxation is smooth, and the steps are equal. The first step uses the known rate just after the jump instead.
     """
     time, place, depth = found.time, found.place, found.depth
     if now == 1:
@@ -215,9 +215,9 @@ def march_depth(
     marching, pace, finish
         The constant quantities, the steps, and the criterion for the end of the march.
     found : Trajectory
-        Written from the second entry on.
+        Results of the march. The first moment is given; the others are written.
     work : Workspace
-        Contains the barriers at the Deborah number after the jump.
+        Work arrays of the contact search, with the barriers at the Deborah number after the jump.
 
     Returns
     -------

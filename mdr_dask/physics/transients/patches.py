@@ -28,7 +28,7 @@ class Track(NamedTuple):
     Parameters
     ----------
     height : array, shape (n + 2,)
-        Heights at the nodes minus the height of the highest point. In this form, light contacts have no rounding error.
+        Heights at the nodes minus the height of the highest point. This avoids rounding errors in light contacts.
     enter, leave, peak : array, shape (n + 1,)
         Slope at the start and at the end of each cell, and largest height in the cell; the last cell repeats the first
         cell.
@@ -110,10 +110,10 @@ def _part(c0: float, c1: float, c2: float, c3: float, y: float) -> tuple[float, 
 
 @jit_inline_uncounted
 def add_patch(track: Track, start: float, end: float, lift: float, deborah: float, sums: FloatArray) -> None:
-    """Add the exact forces of a patch in contact, f = lift + h + deborah h' with lift = d + d_dot.
+    """Add the exact load, drag, length and rise of a patch in contact to `sums`.
 
-    The integrals over whole cells follow from the integrals in `Track`, the integrals over parts of cells from the
-    cubics.
+    The force on an element is lift + h + deborah h'. The integrals over whole cells follow from the integrals in
+    `Track`, the integrals over parts of cells from the cubics.
     """
     last = track.enter.size - 1
     i, j = min(int(start), last), min(int(end), last)
@@ -137,7 +137,7 @@ def add_patch(track: Track, start: float, end: float, lift: float, deborah: floa
 
 @jit_uncounted
 def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
-    """Return the first place between y and 1 where p + q y + r y^2 + c y^3 falls through zero, or `NONE`.
+    """Return the first place x between y and 1 where p + q x + r x^2 + c x^3 falls through zero, or `NONE`.
 
     The cubic is not negative at y. If its Bernstein coefficients on [y, 1] decrease, the cubic decreases as well, and
     Newton's method finds the zero.
@@ -195,7 +195,9 @@ def keeps_pressed(track: Track, barriers: Barriers, deborah: float, i: int, lift
 
 @jit_uncounted
 def released(track: Track, first: Patches, barriers: Barriers, deborah: float, rate: float, sums: FloatArray) -> None:
-    """Add up the forces just after a jump. Contact continues only where the force is positive at the new rates.
+    """Add up the forces just after a jump.
+
+    Contact continues only where the force is positive at the new velocity and the new rate of the depth.
 
     Parameters
     ----------

@@ -1,8 +1,9 @@
-"""Friction after a velocity jump at constant load, marched from one steady state to the next on one line.
+"""Friction after a velocity jump at constant load, on one periodic line.
 
-The march starts from steady sliding at v_1. After the jump the depth is marched by backward differentiation of third
-order with respect to the logarithm of the time. The edges of all patches are solved at every moment. The method is that
-of section 4.2 of the thesis, except that the velocity of the elements includes the rate of the depth.
+The march (the sequence of time steps) starts from steady sliding at v_1 and ends when sliding is steady at v_2. The
+depth is found by the backward differentiation formula of third order, with the logarithm of the time as the variable.
+At every moment the edges of all contact patches are computed. The method is that of section 4.2 of the thesis, except
+that the velocity of the elements includes the rate of the depth.
 """
 
 from __future__ import annotations
@@ -23,13 +24,13 @@ from mdr_dask.physics.transients.limits import PreparedLine, SteadyLimits, stead
 from mdr_dask.physics.transients.march import LEFT_LIMITS, Finish, Marching, Stepping, Trajectory, march_depth
 from mdr_dask.physics.transients.patches import Patches, Track
 
-ONSET = 0.5  # time after which the steps grow in a constant ratio, divided by the duration of a travel of 1 / q_max
+# time after which the steps grow in a constant ratio, divided by the time in which the line travels 1 / q_max, where
+# q_max is the largest wavenumber
+ONSET = 0.5
 ROOT = 10.0  # the first step is smaller by this factor if the velocity falls, because contact then grows as sqrt(t)
 # NEWTON and SETTLED are divided by the number of steps per decade
-NEWTON = 0.2  # largest last Newton step, divided by the change of depth; the error is about the square of the step
-SETTLED = (
-    0.04  # distances from the steady depth and drag at which a march ends, divided by the changes of depth and drag
-)
+NEWTON = 0.2  # largest last Newton step of the depth, divided by the change of the steady depth
+SETTLED = 0.04  # a march ends at this distance from the steady depth and drag, divided by the total change of each
 OF_ACCURACY = 0.1  # distance from the steady drag that is always small enough, divided by the allowed error of the drag
 NEGLIGIBLE = 1e-5  # smallest change of depth that is used in these ratios, divided by the mean displacement
 # the march has failed if, after LONG relaxation times, the drag differs from the steady drag by more than
@@ -40,7 +41,7 @@ LONG, NOT_STEADY = 15.0, (0.02, 1e-3)
 MARGIN, WIDENINGS = 0.25, 3
 SHALLOW = 0.01  # least depth of a march, divided by the smaller steady depth
 MOMENTS = 3000  # largest number of moments of a march
-STEEPEST = 3.0  # largest ratio of a tangent to the flatter of the two adjacent secants; a steeper cubic may overshoot
+STEEPEST = 3.0  # largest ratio of a tangent to the flatter of the two adjacent secants; steeper cubics may overshoot
 
 
 class MarchRequest(NamedTuple):
@@ -49,15 +50,15 @@ class MarchRequest(NamedTuple):
     Parameters
     ----------
     times : array, shape (m,)
-        Requested (t - t_0) / tau, increasing.
+        Requested times after the jump, (t - t_0) / tau, increasing.
     wavenumber : float
         Largest wavenumber of the line times its length, q_max L; it determines the first step.
     per_decade : float
         Steps per factor of ten in time.
     accuracy : float
         Allowed error of the friction relative to the steady friction after the jump. A transient that is smaller than
-        this error is not marched. A march ends when drag and depth are close enough to the steady values; for the drag,
-        a tenth of this error is always close enough.
+        this error is not marched; with 0 every transient is marched. A march ends when drag and depth are close enough
+        to the steady values. For the drag, a tenth of this error is always close enough.
     """
 
     times: FloatArray
@@ -72,6 +73,7 @@ class Path(NamedTuple):
     Parameters
     ----------
     time : array, shape (moments,)
+        Times after the jump, in relaxation times, from 0 on.
     values, rates : array, shape (2, moments)
         Drag and depth, and their derivatives with respect to time. The first rate of the drag is unknown and is NaN.
     falls : bool
@@ -84,11 +86,11 @@ class Path(NamedTuple):
     falls: bool
 
     def at(self, times: FloatArray, after: FloatArray) -> FloatArray:
-        """Return drag and depth at increasing times, shape (2, times); after the last moment they are equal to `after`.
+        """Return drag and depth at increasing times, shape (2, times).
 
-        Between moments both are cubic in log(1 + t / t_1), where t_1 is the first moment after the jump. Before t_1
-        both change in proportion to the time. If the velocity falls, both change in proportion to the square root of
-        the time instead, because contact then grows behind every patch.
+        Between moments both are cubic in log(1 + t / t_1), where t_1 is the first moment after the jump. If the
+        velocity falls, t / t_1 is replaced by its square root, because contact then grows as sqrt(t) behind every
+        patch. After the last moment drag and depth are equal to the steady values in `after`.
         """
         power = 0.5 if self.falls else 1.0
         moments, wanted = (self.time / self.time[1]) ** power, (times / self.time[1]) ** power
@@ -98,7 +100,7 @@ class Path(NamedTuple):
 
 
 def _limited_cubic(x: FloatArray, rows: FloatArray, slopes: FloatArray, places: FloatArray) -> FloatArray:
-    """Return the values at `places` of piecewise cubics through rows of points with given slopes.
+    """Return the values at `places` of piecewise cubics; each row contains the points of one curve with given slopes.
 
     If the first slope of a row is NaN, the first piece of this row is a parabola. A slope that is much steeper than the
     secants at its point is due to a single asperity that enters or leaves contact. Such a slope is reduced, so that the
@@ -114,7 +116,9 @@ def _limited_cubic(x: FloatArray, rows: FloatArray, slopes: FloatArray, places: 
 
 
 class Jump(NamedTuple):
-    """Friction before, at and after a velocity jump; drags are F_x / (4 G L) in height squared over length.
+    """Friction before, at and after a velocity jump.
+
+    Drags are F_x / (4 G L), in the unit of height squared divided by the unit of length.
 
     Parameters
     ----------
@@ -125,7 +129,8 @@ class Jump(NamedTuple):
     path : Path or None
         Path of the march; None if there was no march.
     left_out : float
-        Estimated size of a transient that was not marched because it is smaller than the accuracy; otherwise 0.
+        Estimated size of the transient, if it was not marched because it is smaller than the allowed error; otherwise
+        0.
     outcome : Outcome
     """
 
@@ -145,9 +150,7 @@ class Jump(NamedTuple):
 
 
 def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], request: MarchRequest) -> Jump:
-    """Return the friction of a Kelvin foundation on a periodic line before, during and after a velocity jump.
-
-    The load is constant.
+    """Return the friction of a Kelvin foundation on a periodic line before and after a velocity jump at constant load.
 
     Parameters
     ----------
@@ -166,7 +169,10 @@ def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], re
 def jump_between(
     line: PreparedLine, load: float, deborah: FloatArray, limits: SteadyLimits, request: MarchRequest
 ) -> Jump:
-    """Return one jump between known steady states; the other parameters are those of :func:`velocity_jump`."""
+    """Return the friction of one jump, if its steady states (`limits`) are known.
+
+    The other parameters are those of :func:`velocity_jump`.
+    """
     times = request.times
     if limits.outcome != Outcome.CONVERGED:
         return _failed(times, limits.outcome)
@@ -194,7 +200,10 @@ def _failed(times: FloatArray, outcome: Outcome) -> Jump:
 
 
 class _Relaxation(NamedTuple):
-    """One jump with lengths in cells: load, Deborah numbers, and the steady states before and after."""
+    """One jump: the line, the load, the two Deborah numbers, and the steady states before and after.
+
+    Lengths are in cells.
+    """
 
     line: PreparedLine
     load: float
@@ -215,10 +224,11 @@ class _Relaxation(NamedTuple):
 
     @property
     def stepping(self) -> Stepping:
-        """Sizes of the steps.
+        """Sizes of the time steps.
 
-        The steps grow in a constant ratio after `ONSET` times the duration of a travel of 1 / q_max. The line travels
-        at v_2. If the velocity falls, contact behind a patch grows at v_1 - v_2, and the larger velocity is used.
+        The steps grow in a constant ratio after `ONSET` times the time in which the line travels 1 / q_max. The line
+        travels at v_2. If the velocity falls, contact behind a patch grows at the speed v_1 - v_2. The larger of the
+        two speeds is used.
         """
         before, after = self.deborah / self.line.track.cells
         growth = 10 ** (1 / self.request.per_decade)
@@ -232,9 +242,9 @@ class _Relaxation(NamedTuple):
     def transient(self) -> float:
         """Estimate the size of the transient, with a safety factor of two.
 
-        The difference between the drag just after the jump and the steady drag is no bound, because the drag may cross
-        its steady value. Two terms are added: the drag due to the rate of the depth just after the jump, and the drag
-        due to the change of depth.
+        The difference between the drag just after the jump and the steady drag is not an upper bound, because the drag
+        may cross its steady value. Two terms are therefore added: the drag due to the rate of the depth just after the
+        jump, and the drag due to the change of depth.
         """
         _, sums = self.line.patches(self.ends[1], self.deborah[1])
         by_depth = abs(sums[DRAG_RATE] * (self.ends[1] - self.ends[0]))
@@ -274,9 +284,9 @@ class _Relaxation(NamedTuple):
         return path, Outcome.CONVERGED
 
     def begun(self, interval: tuple[float, float]) -> tuple[Marching, Trajectory, Workspace]:
-        """Return the constants of a march whose depth stays in an interval, its trajectory and its workspace.
+        """Prepare a march whose depth stays in an interval; return its constants, its trajectory and its workspace.
 
-        The trajectory contains the first moment.
+        Only the first moment of the trajectory is filled in.
         """
         line, limits, stepping = self.line, self.limits, self.stepping
         assert limits.first is not None
@@ -296,8 +306,9 @@ class _Relaxation(NamedTuple):
 def _runs(track: Track, slower: Patches, low: float, high: float) -> tuple[IntArray, FloatArray]:
     """Return the runs of cells where contact is possible at depths from `low` to `high`, and a bound for each cell.
 
-    The bound is the largest depth at which the cell is certainly out of contact. It follows from the steady state at
-    the lower velocity: if the depth is smaller by some length, displacements are smaller by at most this length.
+    A run is given by its first and last node. The bound is the largest depth at which the cell is certainly out of
+    contact. It follows from the steady state at the lower velocity: if the depth is smaller by some length,
+    displacements are smaller by at most this length.
     """
     cells, decay = track.peak.size, np.exp(-1 / slower.deborah)
     bound = np.full(cells + 1, -np.inf)

@@ -30,10 +30,10 @@ class Foundation(NamedTuple):
     rates : array, shape (modes,)
         Decay rates of the modes, positive. There is one mode for each Prony term, and one more for a dashpot.
     outward, inward : array, shape (modes, modes)
-        Transformation from the modes to the state, and back. The state consists of the displacement u, if there is a
-        dashpot, and of the strains a_m of the dashpots of the Prony terms.
+        Transformation from the modes to the state of an element, and back. The state consists of the strains a_m of
+        the dashpots of the Prony terms. If the solid has a dashpot of its own, the displacement u precedes them.
     push : array, shape (modes,)
-        Growth rates of the modes of the mean state of all elements under a unit load.
+        Rates at which a unit load makes the modes of the mean state of all elements grow.
     """
 
     moduli: FloatArray
@@ -248,7 +248,8 @@ def advance(
     part, leaves : float
         Results of :func:`release` for an element in contact.
     after : float
-        Displacement at the end of the element if it separates as :func:`release` states, or recovers freely.
+        Displacement of the element at the end if it separates at the time returned by :func:`release`, or if it is free
+        all the time.
     """
     if w1 > after:
         rest, fades = lapse.time, lapse.fades

@@ -28,10 +28,10 @@ from mdr_dask.physics.transients.elements.foundation import (
 
 
 class Edges(NamedTuple):
-    """Edges of contact in the cell before each element, at the last moment at which the edge followed from the force.
+    """Edge of contact in the cell before each element, as it was when it last followed from a vanishing force.
 
-    `place` is the distance of the edge from the element in contact, in cells, or -1 if there is no edge. `gap` is the
-    gap, at that moment, at the other end of the cell, where the element is out of contact.
+    At one end of such a cell the element is in contact, at the other end it is not. `place` is the distance of the edge
+    from the element in contact, in cells, or -1 if there is no edge. `gap` is the gap of the other element.
     """
 
     place: FloatArray
@@ -136,7 +136,11 @@ def _whole(values: FloatArray, j: int) -> float:
 
 @jit_inline
 def _limit(inner: float, outer: float, place: float, gap: float) -> float:
-    """Return the distance of the edge from the element in contact, in cells."""
+    """Return the distance of the edge from the element in contact, in cells.
+
+    `inner` and `outer` are the gaps of the elements in contact and out of contact; `place` and `gap` are those of
+    `Edges`.
+    """
     if place < 0:
         inner = max(inner, 0.0)
         return inner / (inner - outer) if outer < 0 else 1.0
@@ -147,7 +151,7 @@ def _limit(inner: float, outer: float, place: float, gap: float) -> float:
 def _cell(
     j: int, gaps: FloatArray, force: FloatArray, touching: BoolArray, edges: Edges, keep: bool
 ) -> tuple[float, float]:
-    """Return where contact starts and ends in the cell before element j, between 0 and 1."""
+    """Return where contact starts and ends in the cell before element j, between 0 and 1; write the edge if `keep`."""
     f0, f1 = force[j - 1], force[j]
     before, after = touching[j - 1], touching[j]
     if keep and before == after:
@@ -246,8 +250,8 @@ class State(NamedTuple):
     displacement, terms : array, shape (n,) and (n, terms)
         Displacement u, and strains of the dashpots of the Prony terms.
     free, free_terms : array, shape (n,) and (n, terms)
-        Values of `displacement` and `terms` that an element would have if it had separated; `free_terms` is valid only
-        for elements in contact.
+        Values of `displacement` and `terms` that an element in contact would have if its contact had not begun. For a
+        free element, `free` is its displacement, and `free_terms` is not used.
     touching : array, shape (n,)
         Whether an element is in contact.
     edges : Edges
@@ -536,7 +540,7 @@ def follow_elements(
 
 @jit
 def note_edges(solid: Foundation, line: CubicLine, state: State, depth: float, deborah: float, load: float) -> None:
-    """Write the edges of contact in a steady state."""
+    """Write the edges of contact of a steady state to `state`."""
     workspace = _workspace_for(solid, line.height.size - 1)
     under_elements(line, 0.0, workspace.under, workspace.slope)
     forces_now(solid, state, workspace, depth, 0.0, Drive(deborah, load, -1 if line.periodic else 0))
