@@ -1,8 +1,12 @@
 """The method of the papers: steady state of a Kelvin foundation by backward Euler, many cases on a line at once.
 
-The displacement at node i is u_i = max(w_i, lambda u_(i-1)), with the penetration w = depth + height and lambda = 1 /
-(1 + dt / tau), where dt is the time in which the body travels the distance dx between two nodes. As u is periodic, F_N
-/ (4 G dx) is the sum of u_i, and F_x / (4 G) is the sum of (u_i - lambda u_(i-1)) / (1 - lambda) (w_i - w_(i-1)).
+The displacement at node i is u_i = max(w_i, lambda u_(i-1)), with the penetration w = depth + height. The decay per
+step is lambda = 1 / (1 + dt / tau), where dt is the time in which the body travels the distance dx between two nodes.
+As u is periodic, the forces are sums over the nodes:
+
+    F_N / (4 G dx) = sum of u_i
+    F_x / (4 G) = sum of (u_i - lambda u_(i-1)) / (1 - lambda) (w_i - w_(i-1))
+
 Blocks of nodes that are entirely in contact or entirely free are summed in closed form. In the other blocks the inner
 loops run over cases, as vector instructions. The results of a case do not depend on the other cases.
 """
@@ -82,7 +86,7 @@ class Lanes(NamedTuple):
     packed : array, shape (ROWS + 2, cases + LANES)
         State, decay and depth of the cases in the queue, without gaps between them.
     queue : array, shape (cases,)
-        Cases in which contact begins or ends in a block.
+        Cases in which contact begins or ends in the current block.
     sums : array, shape (SUMS, cases)
         Results of the sweep: the sum of u, the derivative of this sum with respect to the depth, and F_x / (4 G) times
         1 - lambda.
@@ -103,7 +107,11 @@ def lanes_for(cases: int) -> Lanes:
 
 @jit
 def _step(h: float, t: float, decay: float, depth: float, u: float, fade: float) -> tuple[float, float, float]:
-    """Return u at the next node, du/d(depth) there, and the contribution to the drag times 1 - lambda."""
+    """Return u at the next node, du/d(depth) there, and the contribution to the drag times 1 - lambda.
+
+    The height of the next node is h; it is higher by t than the node before, where u and du/d(depth) are `u` and
+    `fade`.
+    """
     free = decay * u
     w = h + depth
     is_pressed = w > free
@@ -284,7 +292,7 @@ def contact(
     touched: FloatArray,
     slope: FloatArray,
 ) -> None:
-    """Write the number of nodes in contact and the rms rise at these nodes.
+    """Write for every case the number of nodes in contact (`touched`) and the rms rise at these nodes (`slope`).
 
     The other parameters are as in :func:`steady_by_steps`.
     """

@@ -14,7 +14,7 @@ from mdr_dask.physics.outcome import Outcome
 Scheme = Literal["hermite", "backward_euler"]
 
 COLUMNS = ("drag", "depth", "contact_fraction", "contact_slope")
-"""Names of the results of a case, in the order of the rows in which arrays of results store them."""
+"""Names of the results of a case, in the order of the rows of an array of results."""
 
 
 class Cases(NamedTuple):

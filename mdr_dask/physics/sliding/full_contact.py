@@ -1,10 +1,12 @@
-"""Full contact of any linear solid with a rough plane: the waves of the line are independent.
+"""Full contact of any linear solid with a rough plane: the waves of the line are independent of each other.
 
-The displacement is u = d + h, with the depth d and the height h. The pressure of wave k, with the amplitude c_k and the
-wave number q_k, is G*(q_k v) c_k (thesis eq. 3.14 for the Kelvin solid). The drag is therefore a sum over the spectrum
-and does not depend on the phases. This is valid if the pressure is positive everywhere. The pressure is computed at
-m nodes, two per Nyquist point. Between the nodes, a sum of waves with up to k periods on the line is at most
-1 / cos(pi k / m) times its largest value at the nodes (Ehlich and Zeller, Z. Angew. Math. Mech. 44, T22, 1964).
+The displacement is u = d + h, with the depth d and the height h. The pressure of wave k is G*(q_k v) c_k, with the
+complex modulus G*, the wavenumber q_k and the amplitude c_k (thesis eq. 3.14 for the Kelvin solid). The drag is
+therefore a sum over the spectrum and does not depend on the phases.
+
+Contact is full if the pressure is positive everywhere. The pressure is computed at m nodes, two per Nyquist point.
+Between the nodes, a sum of waves with up to k periods on the line is at most 1 / cos(pi k / m) times its largest value
+at the nodes (Ehlich and Zeller, Z. Angew. Math. Mech. 44, T22, 1964).
 """
 
 from __future__ import annotations

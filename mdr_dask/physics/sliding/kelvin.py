@@ -21,7 +21,7 @@ from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, summit
 
 BLOCK = 16  # cells that are skipped together if all of them are in contact or all of them are free
 TINY = 1e-290  # displacements below this are set to 0
-CLOSE = 1e-8  # cells: Newton's method stops after a step shorter than this, because a further step would be rounding
+CLOSE = 1e-8  # cells: Newton's method stops after a step shorter than this; the next step would be a rounding error
 ITERATIONS = 80
 
 # Indices of the results of a sweep
@@ -30,7 +30,7 @@ SUMS = 7
 
 
 class Blocks(NamedTuple):
-    """The largest height in every `BLOCK` cells, and the sums of the integrals over these cells."""
+    """For every block of `BLOCK` cells: largest height, and integrals of the height and of the slope squared."""
 
     peak: FloatArray
     mean: FloatArray
@@ -175,7 +175,10 @@ def _falling(p: float, q: float, r: float, c: float, low: float, high: float) ->
 
 
 class FreeElement(NamedTuple):
-    """A free element in a cell: the cubic w of the cell, and the displacement u of the element at the place `start`."""
+    """A free element in a cell: its displacement u at the place `start`, and the penetration w of the line.
+
+    In the cell w is w0 + a x + b x^2 + c x^3.
+    """
 
     w0: float
     a: float

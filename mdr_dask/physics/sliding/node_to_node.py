@@ -3,16 +3,16 @@
 All lengths are in cells: neighbouring nodes have the distance 1, and De = v tau is the Deborah number in cells. Inside
 a cell the penetration w = d + h is a cubic, which follows from heights and slopes at the two nodes (d is the depth, h
 the height of the line). Contact ends where the force w + De w' falls to 0. Contact begins where the line reaches the
-displacement u of the free element. Both places inside a cell are found approximately.
+displacement u of the free element. Both places are computed approximately.
 
 The load is the integral of w in contact and of u out of contact. The drag is the integral of De w'^2 in contact and of
 u^2 / De out of contact. All terms are positive, so that no digits are lost in slow sliding. The integrals over cells
 that are entirely in contact are exact, and so are the results in full contact on any grid.
 
-One sweep moves one element of every case along the line, block by block. Sums in closed form are used for a case in
-which the block is entirely in contact or entirely free. The element of any other case moves from cell to cell. The
-results of a case do not depend on the other cases. Newton's method finds the depth that carries the load, first on a
-coarse grid, then on finer grids.
+One sweep moves one element of every case along the line, block by block. In cases in which a block is entirely in
+contact or entirely free, its sums have closed forms. In all other cases the element moves from cell to cell. The
+results of a case do not depend on the other cases. Newton's method finds the depth at which the load is carried, first
+on a coarse grid, then on finer grids.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ SUMMIT = 64  # number of fine nodes in the cell of the highest point; the highes
 NO_ENDS: FloatArray = np.empty((2, 0))
 # Indices of the bounds and sums of a block of cells
 PEAK, LOWEST, STEEPEST, HEIGHTS, SQUARES = range(5)
-# Rows of a tile: height and slope at each node (beginning with the node before the tile), then for each cell the
-# integrals of height and of slope squared, and the largest height
+# Rows of a tile (a part of a line on a finer grid): height and slope at each node, beginning with the node before the
+# tile; then for each cell the integrals of height and of slope squared, and the largest height
 HEIGHT, SLOPE, MEAN, SQUARE, TOP = range(5)
 IN_A_TILE = 5
 
@@ -57,7 +57,7 @@ class Nodes(NamedTuple):
         Heights relative to the first node, and slopes as rises per cell; the arrays begin with `BEFORE` nodes of the
         previous period and end with `AFTER` nodes of the next period.
     ends : array, shape (2, BEFORE + n + AFTER) or (2, 0)
-        The corrections of `ends_of`, with the same additional nodes.
+        The corrections of the trapezium rule from `ends_of`, with the same additional nodes.
     blocks : array, shape (n // BLOCK, 5)
         For every block: upper bound of the height, lowest node, smallest slope, integrals of height and of slope
         squared.
@@ -199,7 +199,7 @@ def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
 
 @jit_inline
 def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatArray) -> int:
-    """Write a tile, a part of a line on a finer grid, and return the number of its cells.
+    """Write a tile (a part of a line on a finer grid), and return the number of its cells.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatAr
     first, cells : int
         Index of the node of the line at which the tile begins, and number of cells of the line in the tile.
     weights : array, shape (2, refinement, 4 WING)
-        From :func:`weights`.
+        From :func:`weights`. The refinement is the number of cells of the tile in each cell of the line.
     tile : array, shape (IN_A_TILE, cells refinement + 3), output
         Heights and slopes, from the node before the tile to the node after the tile; integrals of height and of slope
         squared over each cell; largest height in each cell.
@@ -228,7 +228,7 @@ def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatAr
 
 @lru_cache
 def weights(refinement: int) -> FloatArray:
-    """Return interpolation weights for the nodes of a finer grid, shape (2, refinement, 4 WING).
+    """Return interpolation weights for a grid with `refinement` times as many nodes, shape (2, refinement, 4 WING).
 
     The first index is 0 for the interpolated height and 1 for the interpolated slope. The second index is the node of
     the finer grid in a cell. The third index runs over the heights at the `WING` nodes on each side of the cell, and
@@ -279,7 +279,7 @@ RESOLVED = 10  # a grid resolves the contact if at least this number of cells is
 
 ITERATIONS = 25
 COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most COARSENING * COARSEST nodes
-LAST_STEP = 0.03  # largest relative last step of the depth; the results of the last step are extrapolated linearly
+LAST_STEP = 0.03  # largest relative last step of the depth; the results are extrapolated linearly over this step
 SECANT_ERROR = 0.1  # assumed error of this extrapolation, as a fraction of the extrapolated change
 FIRST_STEP, FIRST_ERROR = 0.1, 0.03  # replace LAST_STEP and the allowed error on grids that only provide a guess
 ROUNDING = 1e-12  # relative step of the depth that is as small as rounding errors
@@ -347,9 +347,10 @@ def _contact_end(
 ) -> tuple[float, float, float]:
     """Return the place where the force falls to 0 in a cell, w at this place, and the remaining fraction of w.
 
-    The remaining fraction is the ratio of the free element's displacement at the end of the cell to w. Linear
-    interpolation between `begins`, where the force begins to fall, and the end of the cell gives a first estimate of
-    the place. One Newton step improves this estimate.
+    The remaining fraction is the ratio of the free element's displacement at the end of the cell to w. The Deborah
+    number is r, and `inverse` is 1 / r. The force is `force` at the place `begins`, where it begins to fall, and
+    `force_end` at the end of the cell. Linear interpolation between these two places gives a first estimate, which one
+    Newton step improves.
     """
     fall = (1 - begins) / (force - force_end)
     x = begins + force * fall
@@ -368,8 +369,9 @@ def _contact_end(
 def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: float) -> tuple[float, float]:
     """Return the place before `last` where the gap closes, and the fraction of the displacement u that remains there.
 
-    The gap is the distance between the free element and the line; it is negative at `last`. A parabola through the gap
-    at the start of the cell and at `last` gives a first estimate of the place. One Newton step improves this estimate.
+    The gap is the distance between the free element and the line; it is negative at `last`. `inverse` is one divided by
+    the Deborah number. A parabola through the gap at the start of the cell and at `last` gives a first estimate of the
+    place. One Newton step improves this estimate.
     """
     gap, closing = u - cell.w0, cell.s0 + u * inverse
     bow = (gap - closing * last - gap_last) / (last * last + SMALL)
@@ -391,8 +393,9 @@ def _contact_in_cell(
 ) -> tuple[bool, float, float, float, float]:
     """Return whether a free element comes into contact in a cell, and four values about the end of this contact.
 
-    The values are: the place where the contact ends, w at this place, the fraction of w that remains at the end of the
-    cell, and the gap between line and element that this place would have without contact.
+    The displacement of the free element is u at the start of the cell, and would be `kept` at its end. The values are:
+    the place where the contact ends, w at this place, the fraction of w that remains at the end of the cell, and the
+    gap that would be between element and line at this place without contact.
     """
     force, gap = cell.w1 + r * cell.s1, kept - cell.w1
     if force > 0:
@@ -558,7 +561,7 @@ def sweep(
 
 @jit
 def load_case(workspace: FloatArray, k: int, depth: float, deborah: float, cells: int) -> None:
-    """Write the constants of a case on a grid."""
+    """Write the constants of a case on a grid; `cells` is the number of cells in a block."""
     workspace[DEPTH + k], workspace[DEBORAH + k] = depth, deborah
     workspace[INVERSE + k] = min(1 / deborah, LARGE)
     workspace[DECAY + k], workspace[THROUGH + k] = math.exp(-1 / deborah), math.exp(-cells / deborah)
@@ -575,7 +578,9 @@ def _search(
     rates: FloatArray,
     results: FloatArray,
 ) -> None:
-    """Find the depths of cases on a grid by Newton's method; no sweep follows the last step.
+    """Find the depths of cases on a grid by Newton's method.
+
+    The results are extrapolated over the last step of the depth, without another sweep.
 
     Parameters
     ----------
@@ -593,7 +598,7 @@ def _search(
     rates : array, shape (cases, SECANTS), input and output
         Derivatives of the logarithms of the results with respect to the depth; NaN where unknown.
     results : array, shape (cases, SECANTS), output
-        Not changed for cases whose depth is not found.
+        Drag, contact fraction and contact slope. They are not changed for cases whose depth is not found.
     """
     (deborah, loads), rise = cases, line.rise
     refinement = weights.shape[1]

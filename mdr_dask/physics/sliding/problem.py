@@ -66,7 +66,8 @@ class Request:
     scheme : {"hermite", "backward_euler"}
         Scheme for a Kelvin solid: cubic cells, or the time steps of the papers.
     with_errors : bool
-        Whether to estimate the errors for a Kelvin solid on a given grid. In all other cases they are always estimated.
+        Whether to estimate the errors if the solid is a Kelvin solid and the grid is given. In all other cases the
+        errors are always estimated.
     contact : bool
         Whether contact fraction and contact slope are requested. These need finer grids than the other results.
     """
@@ -94,7 +95,7 @@ def solve(
     loads : array, shape (cases,)
         F_N / (4 G_inf L), in the unit of height.
     request : Request
-        Accuracy or grid. All results of a case have to meet the accuracy, because the drag (or another single result)
+        Accuracy or grid. All results of a case have to meet the accuracy, because a single result, such as the drag,
         may agree on two grids by chance.
 
     Returns
@@ -102,8 +103,8 @@ def solve(
     Steady
         A case that misses the accuracy on the finest grid keeps its results and errors.
     array, shape (4, cases)
-        Estimated absolute discretisation errors of `Steady.columns`. They are infinite if a grid is given and
-        `with_errors` is False.
+        Estimated absolute discretisation errors of `Steady.columns`. They are infinite for a Kelvin solid on a given
+        grid if `with_errors` is False.
     """
     cases = Cases(deborah, loads)
     if terms is not None:

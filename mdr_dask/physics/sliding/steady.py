@@ -37,7 +37,9 @@ from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 ITERATIONS = 200
 PATIENCE = 20  # after this number of sweeps the search bisects the interval that contains the depth
 LOST = 1e-13  # if the line rises less than this fraction of the depth where contact begins, rounding errors dominate
-TRAIL = 5  # entries of a trail: log depth, log load, slope d(log depth) / d(log load), its change, Deborah number
+# A trail describes the depth as a function of the load near the last sweep. Its five entries are: log depth, log load,
+# slope d(log depth) / d(log load), derivative of this slope with respect to the log load, and Deborah number.
+TRAIL = 5
 LATTICE_BITS = 20  # depths are searched on a lattice of relative spacing 2**-LATTICE_BITS: see `_solve`
 
 
@@ -63,9 +65,10 @@ def _begin(trail: FloatArray, depth: float, load: float) -> None:
 
 @jit
 def _follow(sums: FloatArray, depth: float, deborah: float, trail: FloatArray) -> None:
-    """Write log depth, log load, slope and change of the slope (see `TRAIL`) to `trail`, from the last two sweeps.
+    """Update a `trail` (see `TRAIL`) after a sweep at a depth.
 
-    At a new Deborah number the old change of the slope is kept, because it hardly depends on the Deborah number.
+    The derivative of the slope follows from the last two sweeps. At a new Deborah number the old derivative is kept,
+    because it hardly depends on the Deborah number.
     """
     carried = sums[DISPLACEMENT]
     load, slope = np.log(carried), carried / (sums[STIFFNESS] * depth)
@@ -96,7 +99,7 @@ class _Swept(NamedTuple):
 def _solve(
     line: _Swept, deborah: float, load: float, trail: FloatArray, sums: FloatArray, places: Places
 ) -> tuple[float, bool]:
-    """Return the largest lattice depth that carries at most the load, and whether it was found.
+    """Return the largest lattice depth at which not more than the load is carried, and whether it was found.
 
     The sums at this depth are written to `sums`.
 
@@ -291,7 +294,7 @@ def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> t
 
 
 def _is_lost(cases: Cases, near: FloatArray, depth: FloatArray) -> NDArray[np.bool_]:
-    """Return the cases in which the line rises so little where contact begins that rounding errors dominate.
+    """Return for each case whether the line rises so little where contact begins that rounding errors dominate.
 
     If the dashpots carry the load, this rise is F_N / (4 G dx) divided by v tau / dx. `near` contains the heights of
     the two nodes next to the highest point, relative to the highest point.

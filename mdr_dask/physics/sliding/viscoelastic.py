@@ -1,7 +1,8 @@
 """Steady sliding of any linear viscoelastic foundation along a rough line or under an indenter.
 
 `viscoelastic_sweep` moves an element once along the line. In this module, Newton's method finds the depth. For a
-periodic line it also finds the stretches of the Prony terms at the start, which must repeat after one period.
+periodic line it also finds the stretches e_m = u - a_m of the Prony terms at the start (u is the displacement of the
+element, a_m that of the dashpot of term m). They must repeat after one period.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ from mdr_dask.physics.solids import LinearSolid, recovery
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
 TOLERANCE = 1e-11  # largest last step of Newton's method, relative to the depth; it is larger than rounding errors
-LINEAR = 1e-10  # relative residual of the linear equations of a step; much smaller than the error after the step
+LINEAR = 1e-10  # allowed relative residual of the linear equations of a step; much smaller than the error of the step
 SWEEPS = 80
-DEEPEST_STEP = 0.7  # largest relative decrease of the depth in a step under an indenter, so that it stays positive
+DEEPEST_STEP = 0.7  # largest relative decrease of the depth in a step under an indenter; the depth stays positive
 SHORTEST = 1e-9  # cells: faster Prony terms (smaller tau v) are merged with the dashpot to one term: see `_travelling`
 BALANCE = 1e-3  # largest relative error of the carried load in a converged solution
 ORDER = 2.0  # order of convergence without extrapolation; extrapolation raises it unless few cells are in contact
@@ -222,8 +223,9 @@ def follow(
 ) -> None:  # pragma: no cover
     """Write how given changes of the unknowns change the integrals of the stretches e_m and of u over the line.
 
-    A contact or free recovery of fixed length changes the stretches linearly. The places where contact begins and ends
-    shift as well, but this has an effect of second order only, because u is continuous at these places.
+    The changes are propagated through contacts and free recoveries of fixed lengths, which is a linear problem. The
+    places where contact begins and ends shift as well, but this has an effect of second order only, because u is
+    continuous at these places.
 
     Parameters
     ----------
@@ -236,6 +238,7 @@ def follow(
     product : array, shape (terms + 1,), output
         Changes of the integrals of e_m, and of the integral of u.
     workspace : array, shape (3, terms)
+        Overwritten.
     """
     decayed, lengths, solid = swept
     moduli, deborah, times, stretch_of, amplitude_of = solid
@@ -382,7 +385,7 @@ def solve_sliding(
     unknown: FloatArray,
     totals: FloatArray,
 ) -> tuple[bool, int, bool]:  # pragma: no cover
-    """Find the depth that carries the load and, for a periodic line, the stretches that repeat after one period.
+    """Find the depth for a load and, for a periodic line, the stretches that repeat after one period.
 
     In the steady state the integral of the stress is equal to the integral of u, so that the load prescribes the
     integral of u. The strain is a convex, increasing function of the unknowns (in contact it is the larger of two
