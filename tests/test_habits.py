@@ -18,10 +18,8 @@ ROOT = Path(__file__).parent.parent
 BESIDE_PYTHON = Path(sys.executable).parent
 
 
-def output_of(*command: str) -> str:
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+def run(*command: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
 
 
 @pytest.mark.parametrize(
@@ -31,7 +29,8 @@ def output_of(*command: str) -> str:
 )
 def test_tools_report_nothing(command):
     name, *arguments = command.split()
-    output_of(str(BESIDE_PYTHON / name), *arguments)
+    done = run(str(BESIDE_PYTHON / name), *arguments)
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize(
@@ -51,8 +50,9 @@ def test_tools_report_nothing(command):
     ],
 )
 def test_importing_loads_only_what_is_used(statement, forbidden):
-    printed = output_of(sys.executable, "-c", f"import sys; {statement}; print(' '.join(sys.modules))")
-    assert not forbidden & set(printed.splitlines()[-1].split())
+    done = run(sys.executable, "-c", f"import sys; {statement}; print(' '.join(sys.modules))")
+    assert done.returncode == 0, done.stderr
+    assert not forbidden & set(done.stdout.splitlines()[-1].split())
 
 
 @pytest.mark.parametrize("name", sorted(cli.commands))

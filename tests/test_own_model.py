@@ -260,14 +260,10 @@ def test_a_fault_in_another_function_of_the_model_is_one_message(example, capsys
 def test_ctrl_c_during_a_case_of_the_main_thread_is_no_failed_case():
     handler = signal.signal(signal.SIGINT, signal.default_int_handler)  # workers of pytest ignore it
     try:
-        interrupted()
+        with pytest.raises(KeyboardInterrupt):
+            per_case(raises(KeyboardInterrupt()))(Block(None, {}, 1, (0,), 1, ("y",)))
     finally:
         signal.signal(signal.SIGINT, handler)
-
-
-def interrupted():
-    with pytest.raises(KeyboardInterrupt):
-        per_case(raises(KeyboardInterrupt()))(Block(None, {}, 1, (0,), 1, ("y",)))
 
 
 def test_an_output_may_declare_that_nan_is_normal(example, capsys):

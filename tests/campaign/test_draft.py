@@ -48,7 +48,7 @@ def test_every_optional_entry_passes_when_its_mark_is_taken_off(name, tmp_path):
     tried = [entry for entry, field in entries if field not in beside | set(NEED_MORE) and "[...]" not in entry]
     assert len(tried) > 5
     for entry in tried:
-        loads(text.replace("\n\noutputs", f"\n  {entry}\n\noutputs"), entry, str(tmp_path))
+        assert loads(text.replace("\n\noutputs", f"\n  {entry}\n\noutputs"), entry, str(tmp_path)).series
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -69,7 +69,8 @@ def test_every_way_to_give_a_thing_passes(name, tmp_path):
             alone = way == ("surface",)  # a line as it is brings its length with it
             (tmp_path / "table.csv").write_text(line if alone else spectrum)
             kind = "{profile: {file: table.csv}}" if alone else "{spectrum: {files: [table.csv]}}"
-            loads(changed.replace("{spectrum: {files: [table.csv]}}", kind), describe((way,)), str(tmp_path))
+            changed = changed.replace("{spectrum: {files: [table.csv]}}", kind)
+            assert loads(changed, describe((way,)), str(tmp_path)).series
 
 
 def test_a_model_of_ones_own_has_a_draft_too(tmp_path, monkeypatch, capsys):
