@@ -80,11 +80,3 @@ def test_show_distinguishes_scatter_and_grid_error(filled, capsys):
     assert row["width_mean"] == pytest.approx(float(opened.width.mean()))
     assert row["width_grid_error"] == pytest.approx(float(opened.width_error.mean()))
     assert row["width_standard_error"] == pytest.approx(float(opened.width.std(ddof=1)) / 6**0.5)
-
-
-def test_show_hides_rounding_noise_and_marks_unknown_errors():
-    from mdr_dask.cli.printing import with_error
-
-    assert with_error(0.1642, 8e-18) == "0.1642 +- 0"
-    assert with_error(0.1642, float("nan"), 2e-4) == "0.1642 +- ? +- 0.0002"
-    assert with_error(0.1642, float("nan")) == "0.1642"

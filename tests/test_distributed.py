@@ -7,7 +7,6 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import dask
 import psutil
@@ -17,7 +16,7 @@ from test_execute import digests, run, values
 from mdr_dask import execute, store, task
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.errors import ClusterError, StoreError
-from mdr_dask.execute import Resources, clusters, executors, window
+from mdr_dask.execute import Resources, clusters, executors
 from mdr_dask.models.base import Status
 
 
@@ -42,61 +41,6 @@ def test_a_lost_worker_fails_nothing(toy, url, tmp_path, workers):
     progress = run_on(workers, campaign, url)
     assert (progress.done, progress.failed) == (12, 0)
     assert (tmp_path / "died").exists()
-
-
-class Central:
-    """As much of a scheduler as a window of tasks needs."""
-
-    status = "running"
-
-    def __init__(self):
-        self.threads, self.scheduler = {"first": 1}, self
-
-    def subscribe_topic(self, *_):
-        pass
-
-    def ncores(self):
-        raise AssertionError("called by sync")
-
-
-SILENT = {
-    "no worker yet": ({}, {}),
-    "all workers are gone": ({"first": 1}, {}),
-    "no answer of the scheduler yet": ({"first": 1}, None),
-}
-
-
-@pytest.mark.parametrize("what", SILENT)
-def test_within_five_seconds_a_user_is_told_what_is_waited_for_and_within_the_limit_it_ends(monkeypatch, what):
-    clock, told, central = SimpleNamespace(now=0.0), [], Central()
-    monkeypatch.setattr(window, "time", SimpleNamespace(monotonic=lambda: clock.now))
-
-    def answer(*_, callback_timeout):
-        if central.threads is None:
-            clock.now += callback_timeout
-            raise TimeoutError
-        return central.threads
-
-    central.sync = answer
-    central.threads, after = SILENT[what]
-    workers = window.TaskWindow(central, lambda e: told.append((clock.now, e.sentence)), 30, 0, lambda: None, str, None)
-    workers._check()
-    central.threads = after
-
-    def look_on():
-        while True:
-            clock.now += window.CHECK_PAUSE
-            workers._check()
-
-    with pytest.raises(ClusterError, match=r"for \d+ s; what is in the store is kept: run the campaign again"):
-        look_on()
-    assert told[0][0] <= 5
-    assert told[0][1].startswith(f"{what}, waiting for ")
-    assert told[0][1].endswith("; giving up after 30 s")
-    assert clock.now <= 35
-    central.status = "closed"
-    with pytest.raises(ClusterError, match="the scheduler went away; what is in the store is kept"):
-        workers._check()
 
 
 @pytest.mark.slow
@@ -208,15 +152,6 @@ def listening_beyond_this_machine() -> list[str]:
         for each in psutil.Process().net_connections("inet")
         if each.status == psutil.CONN_LISTEN and each.laddr.ip not in ("127.0.0.1", "::1")
     ]
-
-
-@pytest.mark.parametrize("name", ["os.system", "distributed.Client", "pathlib.Path"])
-def test_nothing_but_a_dask_cluster_is_called(toy, url, tmp_path, name):
-    ran = tmp_path / "ran"
-    resources = Resources(cluster={"class": name, "arguments": {"command": f"touch {ran}"}})
-    with pytest.raises(ClusterError, match=rf"cannot start '{name}': expected a class of Dask clusters"):
-        run_on(resources, toy.campaign(toy.axis("position", [1.0])), url)
-    assert not ran.exists()
 
 
 @pytest.mark.parametrize("retry", [False, True], ids=["first attempt", "retry of failures"])

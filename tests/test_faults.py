@@ -150,14 +150,6 @@ def test_contents_are_flushed_before_names_are_given_and_names_before_the_ledger
     assert acts == [("flushed", False)] * 3 + first + [("flushed", True)] * 2 + last + [("flushed", True)]
 
 
-def test_the_root_of_a_store_with_series_says_where_to_look(toy, tmp_path):
-    url = str(tmp_path / "series.zarr")
-    run(two_series(small(toy)), url)
-    where = "the results of each series are in a group: open_datatree, or open_zarr with group='far' or group='near'"
-    assert xr.open_zarr(url).attrs["comment"] == where
-    assert "comment" not in xr.open_zarr(url, group="far").attrs
-
-
 @pytest.mark.parametrize("act", ["put", "give_name"])
 def test_a_write_that_fails_leaves_no_unnamed_file(act, tmp_path, monkeypatch):
     given, calls = getattr(files, act), []

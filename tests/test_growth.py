@@ -160,18 +160,6 @@ def test_leftovers_of_a_killed_write_are_not_read_and_removed_by_the_next_run(to
     assert not any(leftover.exists() for leftover in leftovers)
 
 
-def test_the_outlook_counts_what_is_there_and_touches_nothing(toy, url):
-    campaign = toy.campaign(toy.axis("position", [1.0, 2.0]))
-    assert execute.outlook(campaign, url).to_do == 12
-    assert not Path(url).exists()
-    run(campaign, url)
-    before = {path: path.stat().st_mtime_ns for path in Path(url).rglob("*")}
-    grown = toy.campaign(toy.axis("position", [1.0, 1.5, 2.0]), realisations=Replication(8, 8, {}))
-    progress = execute.outlook(grown, url)
-    assert (progress.total, progress.kept, progress.to_do) == (24, 12, 12)
-    assert {path: path.stat().st_mtime_ns for path in Path(url).rglob("*")} == before
-
-
 POSITIONS = (1.0, 2.0, 3.0, 4.0)
 NOISES = (0.01, 0.2, 0.4)
 

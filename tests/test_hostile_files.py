@@ -4,15 +4,12 @@ import json
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
-import zarr
 
 from mdr_dask import cli
 from mdr_dask.campaign import loads
 from mdr_dask.cli import main
-from mdr_dask.errors import CampaignError, StoreError
-from mdr_dask.store import datasets
+from mdr_dask.errors import CampaignError
 
 HEAD = "name: a\nmodel: toy\n"
 HOSTILE = {
@@ -48,23 +45,6 @@ def filled(toy, tmp_path, monkeypatch, capsys):
     assert main(["run", "a.yaml", "--quiet"]) == 1
     capsys.readouterr()
     return Path("results/a.zarr")
-
-
-@pytest.mark.parametrize("harm", ["flip", "delete", "swap"])
-def test_a_damaged_axis_is_named_and_not_read(filled, harm, capsys):
-    chunk = filled / "position/c/0"
-    if harm == "delete":
-        chunk.unlink()
-    elif harm == "swap":
-        zarr.open_array(filled / "position", mode="r+")[:] = np.array([1.0, 3.0, 2.0])
-    else:
-        content = bytearray(chunk.read_bytes())
-        content[len(content) // 2] ^= 1
-        chunk.write_bytes(bytes(content))
-    with pytest.raises(StoreError, match="damaged"):
-        datasets(str(filled))
-    assert main(["show", str(filled)]) == 2
-    assert "damaged" in capsys.readouterr().err
 
 
 def test_control_characters_of_messages_are_escaped(filled, capsys):

@@ -17,7 +17,7 @@ from mdr_dask import execute, store
 from mdr_dask.campaign import Replication
 from mdr_dask.errors import StoreBusyError, StoreError
 from mdr_dask.execute import Resources
-from mdr_dask.store import Lock, Part, files, locks
+from mdr_dask.store import Lock, files, locks
 from mdr_dask.task import run_block
 
 
@@ -176,15 +176,3 @@ def test_the_next_runner_waits_for_a_task_in_the_middle_of_writing(url, monkeypa
         locks.acquire(url),
     ):
         pass
-
-
-def test_a_look_at_who_is_at_work_writes_nothing_and_stops_nobody(toy, url):
-    run(small(toy), url)
-    before = sorted(Path(url).parent.iterdir())
-    folder = Path(url).parent
-    with store.shared(url, Part(1, 2)):
-        assert store.at_work(url) == (None, [Part(1, 2)])
-    with store.exclusive(url):
-        assert store.at_work(url)[0].startswith("process ")
-    assert store.at_work(url) == (None, [])
-    assert sorted(folder.iterdir()) == before

@@ -2,10 +2,8 @@
 
 import importlib
 import json
-import os
 import re
 import signal
-import subprocess
 import sys
 from dataclasses import replace
 from importlib.metadata import EntryPoint
@@ -57,32 +55,6 @@ def test_the_example_of_the_page_goes_through_every_command(example, capsys):
     assert "nothing to do" in capsys.readouterr().out
     assert main(["aggregate", "results/pin.zarr", "--json"]) == 0
     assert "wear_volume_grid_error" in json.loads(capsys.readouterr().out)["rows"][0]
-
-
-def test_workers_import_it_too(example):
-    environment = os.environ | {"PYTHONPATH": str(example), "OMP_NUM_THREADS": "1"}
-    command = [sys.executable, "-m", "mdr_dask", "run", "pin.yaml", "--workers", "1", "--quiet"]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "200 done, 0 failed" in done.stdout
-
-
-def test_another_version_of_it_is_refused(example, capsys):
-    assert main(["run", "pin.yaml", "--quiet"]) == 0
-    (example / "wear_rate.py").write_text(MODULE.replace("version=1", "version=2"))
-    del sys.modules["wear_rate"]
-    assert main(["run", "pin.yaml", "--quiet"]) == 2
-    assert "version" in capsys.readouterr().err
-
-
-def test_a_case_that_raises_is_data(example, capsys):
-    check = '    if case.normal_force > 50:\n        raise ValueError("too heavy")\n'
-    broken = MODULE.replace("    coefficient = case", check + "    coefficient = case")
-    (example / "wear_rate.py").write_text(broken)
-    assert main(["run", "pin.yaml", "--quiet"]) == 1
-    capsys.readouterr()
-    assert main(["status", "results/pin.zarr", "--failures"]) == 0
-    assert "40 x failed: ValueError: too heavy" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
-import psutil
 import pytest
 from killed_parts import run_with_kills, study
 from test_execute import digests, run
@@ -157,21 +156,3 @@ def test_log_and_status_of_parts(toy, campaign_file, capsys):
         assert capsys.readouterr().out.endswith("\nat work: 2 of 8 parts (2-3)\n")
         assert main(["status", "toy.zarr", "--json"]) == 0
         assert json.loads(capsys.readouterr().out)["at_work"] == ["2 of 8 parts (2-3)"]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("alone", [False, True])
-def test_a_part_opens_no_port_as_a_cluster_does(toy, url, alone):
-    campaign = replace(toy.campaign(toy.axis("position", [1.0, 2.0, 4.0])), blocks={"position": 1})
-    cluster = {"class": "distributed.LocalCluster", "arguments": {"n_workers": 1, "preload": [toy.PRELOAD]}}
-    resources, part = (Resources(cluster=cluster), None) if alone else (Resources(threads=2), Part(1, 2))
-    looks = [listening()]
-    execute.run(campaign, url, resources, lambda _: looks.append(listening()), part=part)
-    assert len(looks) > 1
-    assert bool(set().union(*looks[1:]) - looks[0]) == alone
-
-
-def listening():
-    """Return the ports at which this process listens."""
-    found = psutil.Process().net_connections("inet")
-    return {connection.laddr.port for connection in found if connection.status == psutil.CONN_LISTEN}

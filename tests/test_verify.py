@@ -104,21 +104,6 @@ def test_a_run_that_was_killed_leaves_nothing_to_find_fault_with(toy, url, monke
     assert run(small(toy), url).done == 12
 
 
-def test_records_of_many_blocks_lie_together(toy, url, monkeypatch):
-    monkeypatch.setattr("mdr_dask.execute.cells.RECORDS_TOGETHER", 3)
-    monkeypatch.setattr("mdr_dask.execute.executors.AHEAD", 1)
-    seen = []
-    folder = Path(url, "status/records")
-
-    def look(_):
-        seen.append(len(list(folder.glob("*.json"))))
-
-    execute.run(damage.campaign(toy, False), url, Resources(threads=1), look)
-    assert 0 < max(seen) < 5
-    assert not list(folder.glob("*.json"))
-    assert set(store.attempts(url, "")) == {(i, j) for i in range(4) for j in range(2)}
-
-
 def test_a_store_of_an_earlier_version_is_verified_as_far_as_it_can_be(toy, url, capsys):
     run(small(toy), url)
     older(url)

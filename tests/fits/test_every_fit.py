@@ -98,12 +98,6 @@ STUDIES: dict[str, tuple[str, dict[str, object], set[str]]] = {
 }
 
 
-def test_all_fits_but_the_master_curve_treat_series_separately():
-    models = ("sliding_friction", "velocity_jump", "mixed_lubrication", "ehl_line", "fretting_wear")
-    joined = {name for model in models for name, fit in fits.available(model).items() if not fit.apart}
-    assert joined == {"master_curve"}
-
-
 #: Studies of the default run: at least one of every model, and of every kind of surface, material and history.
 QUICK = {"spectrum", "moduli of a table", "smooth and rough cone", "calibration on a surface", "jumps on a spectrum"}
 QUICK |= {"jumps of three sizes on a scan", "jumps", "ramps", "film", "one film", "rollers", "wear"}

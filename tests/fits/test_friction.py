@@ -18,17 +18,6 @@ def forces():
     return store(axes, realisations=12)
 
 
-def test_zone_one_is_that_of_the_statics(forces):
-    found = FIT["zone_one"]({"": forces})
-    assert found["alpha"].dims == ("hurst",)
-    # 12 short lines: H / (1 + H) within the interval and 0.1 for the shortness of the line and the window
-    for hurst in (0.3, 0.7):
-        here = found.sel(hurst=hurst)
-        assert here["alpha_low"] < here["alpha"] < here["alpha_high"]
-        assert here["alpha"] == pytest.approx(laws.alpha(hurst), abs=0.1)
-        assert here["beta"] == pytest.approx(1.6, abs=0.3)
-
-
 def test_laws_are_found_again_in_data_made_by_them(forces):
     force = laws.force_number(forces.normal_force, forces.shear_modulus, forces.rms_roughness, forces.length)
     slope = forces.rms_slope.mean("realisation")
@@ -101,12 +90,6 @@ def test_a_lost_line_of_three_leaves_a_plateau():
     lines[1, 2] = np.nan
     found = top.highest(x, bootstrap.means(lines), 2)
     assert found.height[0] == pytest.approx(0.99, abs=0.03)
-
-
-def test_series_are_fitted_separately(forces):
-    two = {"force": forces, "spacing": forces.isel(normal_force=0, drop=False)}
-    assert list(ZONE_ONE.results(two)) == ["force"]
-    assert list(ZONE_ONE.results({"a": forces, "b": forces})) == ["a", "b"]
 
 
 @pytest.mark.parametrize("shape", [{"shape": "cone", "angle": 0.17}, {"shape": "parabola", "radius": 0.01}])

@@ -1,33 +1,11 @@
-"""Verdicts of fits: sentences, undetermined constants, and the command line."""
-
-import json
-from importlib import import_module
+"""Verdicts of fits: sentences, and constants that are not determined."""
 
 import numpy as np
 import pytest
 import xarray as xr
 
-from mdr_dask import bootstrap, fits
-from mdr_dask.cli import main
+from mdr_dask import bootstrap
 from mdr_dask.fits.base import Fit, fitted, law_holds, verdict
-
-WORDS = ("yes", "approximately", "no", "not tested")
-STUDY = """\
-name: study
-model: sliding_friction
-seed: 1
-realisations: 4
-outputs: [friction_coefficient, contact_fraction, contact_slope, rms_slope]
-parameters:
-  length: 20 mm
-  points: 100
-  hurst: 0.7
-  rms_roughness: 0.5 um
-  shear_modulus: 10 MPa
-  relaxation_time: 1 ms
-  normal_force: {geometric: [1 mN, 30 mN, 4]}
-  velocity: {geometric: [1 um/s, 10 m/s, 8]}
-"""
 
 
 @pytest.mark.parametrize(
@@ -103,31 +81,3 @@ def test_a_fit_without_a_verdict_is_not_tested():
     assert plain.results({})[""]["law_holds"].item().startswith("not tested: ")
     apart = Fit("plain", ("toy",), "none", lambda groups: xr.Dataset({"a": 1.0}), apart=True)
     assert apart.results({"x": xr.Dataset()})["x"]["law_holds"].item().startswith("not tested: ")
-
-
-def test_names_of_fits_differ_and_every_module_has_some():
-    laws = [each for subject in fits.SUBJECTS for each in import_module(f"mdr_dask.fits.{subject}").FITS]
-    assert len({each.name for each in laws}) == len(laws) > 10
-
-
-@pytest.fixture(scope="module")
-def friction(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("friction")
-    (folder / "study.yaml").write_text(STUDY)
-    assert main(["run", str(folder / "study.yaml"), "--quiet", "--store", str(folder / "study.zarr")]) == 0
-    return str(folder / "study.zarr")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", ["zone_one", "plateau", "interpolation", "contact_growth", "contact_slope", "collapse"]
-)
-def test_the_command_line_prints_the_verdict_as_table_and_json(friction, name, capsys):
-    capsys.readouterr()
-    assert main(["fit", friction, name]) == 0
-    printed = " ".join(capsys.readouterr().out.split())
-    assert "law_holds" in printed
-    assert any(f"{word}: " in printed for word in WORDS)
-    assert main(["fit", friction, name, "--json"]) == 0
-    row = json.loads(capsys.readouterr().out)["rows"][0]
-    assert row["law_holds"].split(":")[0] in WORDS

@@ -15,14 +15,6 @@ def test_interpolation_has_the_limits_it_joins():
     assert laws.interpolation(1.0, 1e6, 0.4, 1.6) == pytest.approx(1)
 
 
-def test_interpolation_adds_the_squares_of_the_reciprocals():
-    force, velocity = np.array([0.03, 0.5, 2.0, 30.0]), np.array([1e-3, 0.1, 1.0, 10.0])
-    low = laws.zone_one(force, velocity, 0.4, 1.6) / np.sqrt(2)
-    full = laws.full_contact(force, velocity) / np.sqrt(2)
-    expected = (1 + low**-2 + full**-2) ** -0.5
-    np.testing.assert_allclose(laws.interpolation(force, velocity, 0.4, 1.6), expected)
-
-
 def test_regions_end_where_the_share_is_lost():
     first, third = laws.regions(0.7, 0.4, 1.6, share=0.9)
     linear = first / laws.crossover(0.7, 0.4, 1.6)

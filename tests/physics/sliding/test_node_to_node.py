@@ -64,16 +64,6 @@ def test_grids_converge_to_the_exact_sweep(hurst):
     assert typical[2] < 5e-5
 
 
-def test_full_contact_is_exact_on_any_grid():
-    height, _, rms = line()
-    deborah, loads = np.array([1e-4, 1e-3]), np.array([50.0, 300.0])
-    drag, depth, fraction, contact_slope = settled(1, deborah, loads, height, 5e-3)
-    assert drag == pytest.approx(deborah * rms**2, rel=1e-11)
-    assert fraction == pytest.approx(1.0)
-    assert contact_slope == pytest.approx(rms, rel=1e-11)
-    assert depth == pytest.approx(loads, rel=1e-11)
-
-
 @pytest.mark.parametrize("count", [1, 5, 42])
 def test_a_case_is_the_same_among_any_others(count):
     height, _, _ = line(0.3)

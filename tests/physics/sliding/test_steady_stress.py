@@ -102,19 +102,3 @@ def test_spikes_and_steps_are_solved(scheme):
     found = steady.status == Outcome.CONVERGED
     assert np.all(found | rounding)
     assert np.all(steady.drag[found] >= 0)
-
-
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_neighbours_and_order_do_not_change_a_bit(scheme):
-    points = 200
-    amplitude, phase = roughness.amplitudes(points // 2, 0.3), roughness.phases(0, 0, points // 2)
-    h, slope = (roughness.line(amplitude, phase, 2 * points, order) for order in (0, 1))
-    deborah, load = (grid.ravel() for grid in np.meshgrid(np.geomspace(1e-7, 1e2, 12), np.geomspace(1e-4, 1e3, 15)))
-    together = on_line(h, slope, deborah, load, scheme)
-    shuffle = np.random.default_rng(0).permutation(deborah.size)
-    shuffled = on_line(h, slope, deborah[shuffle], load[shuffle], scheme)
-    for name, column in vars(together).items():
-        assert np.array_equal(column[shuffle], vars(shuffled)[name])
-        for k in (0, 77, 179):
-            alone = solve(h, slope, deborah[k], load[k], scheme)
-            assert vars(alone)[name][0] == column[k]

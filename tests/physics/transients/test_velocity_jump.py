@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from references.followed_kelvin import follow_kelvin
 from schemes import on_line
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -12,7 +11,6 @@ from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients.elements.foundation import KELVIN
 from mdr_dask.physics.transients.elements.loading_history import Piece, trace
-from mdr_dask.physics.transients.elements.steps import Schedule
 from mdr_dask.physics.transients.limits import PreparedLine, steady_limits
 from mdr_dask.physics.transients.velocity_jump import Jump, MarchRequest, jump_between, velocity_jump
 
@@ -62,48 +60,6 @@ def test_ends_in_the_direct_steady_state(change: float) -> None:
     assert relaxing[-1] < 1e-5 * relaxing.max()
 
 
-def reference(change: float, elements: int, last: float) -> tuple[np.ndarray, np.ndarray]:
-    """Follow every element with steps of half its spacing from a steady state reached by sliding at v_1."""
-    height, slope = line(oversampling=elements)
-    nodes = height.size
-    first = on_line(height, slope, np.array([DEBORAH]), np.array([LOAD]))
-    step = 0.5 / nodes / DEBORAH
-    run_in = np.arange(0, 2 / DEBORAH + 1e-9, step)  # two periods: exp(-20) of the start is left
-    u = np.maximum(first.depth[0] + height, 0.0)
-    u *= LOAD / u.mean()
-    same = np.full(run_in.size, LOAD)
-    state = follow_kelvin(
-        height, slope, Schedule(run_in, run_in * DEBORAH, np.full(run_in.size, DEBORAH), same), u, float(first.depth[0])
-    )
-    deborah = DEBORAH * (1 + change)
-    start = np.geomspace(1e-4, 1, 30) * step
-    moments = np.concatenate([[0.0], np.cumsum(start)])
-    moments = np.concatenate([moments, np.arange(moments[-1] + step, last, step)])
-    travels = run_in[-1] * DEBORAH + moments * deborah
-    after = follow_kelvin(
-        height,
-        slope,
-        Schedule(moments, travels, np.full(moments.size, deborah), np.full(moments.size, LOAD)),
-        state.state.displacement,
-        float(state.depth[-1]),
-    )
-    assert after.status == Outcome.CONVERGED
-    return moments, after.drag
-
-
-@pytest.mark.parametrize("change", [0.2, -0.2])
-def test_agrees_with_following_every_element(change: float) -> None:
-    height, slope = line()
-    times = np.geomspace(0.02, 0.9, 12)
-    fast = solved(height, slope, LOAD, (DEBORAH, DEBORAH * (1 + change)), times, 48)
-    errors = []
-    for elements in (4, 8, 16):
-        moments, drag = reference(change, elements, 1.0)
-        errors.append(np.max(np.abs(np.interp(times, moments, drag) - fast.trace)) / fast.after)
-    assert errors[2] < 0.4 * errors[0]
-    assert errors[2] < 1e-3
-
-
 @pytest.mark.parametrize(("deborah", "change", "load"), [(0.01, -0.5, 0.3), (0.1, -0.8, 0.03), (0.01, 2.0, 0.03)])
 def test_a_large_jump_is_right_from_its_beginning(deborah: float, change: float, load: float) -> None:
     """Where the velocity falls, contact grows behind every patch as the root of the time, before the first step."""
@@ -114,30 +70,6 @@ def test_a_large_jump_is_right_from_its_beginning(deborah: float, change: float,
     found = solved(*line(oversampling=4), load, ends, times, 8)
     transient = np.max(np.abs(followed.friction - followed.after))
     assert np.max(np.abs(found.trace / load - followed.friction)) < 0.05 * transient
-
-
-def test_jump_condition_against_ever_finer_steps() -> None:
-    found = jump(oversampling=64)
-    errors = []
-    for elements in (256, 1024):
-        fine_height, fine_slope = line(oversampling=elements)
-        steady = on_line(fine_height, fine_slope, np.array([DEBORAH]), np.array([LOAD]))
-        w = steady.depth[0] + fine_height
-        u = w.copy()
-        fade = np.exp(-1 / fine_height.size / DEBORAH)
-        u = np.roll(u, -int(np.argmax(fine_height)))
-        w = u.copy()
-        for i in range(1, u.size):
-            u[i] = max(w[i], u[i - 1] * fade)
-        u = np.roll(u, int(np.argmax(fine_height)))
-        deborah = 1.2 * DEBORAH
-        one = np.ones(1)
-        state = follow_kelvin(
-            fine_height, fine_slope, Schedule(0 * one, 0 * one, deborah * one, LOAD * one), u, float(steady.depth[0])
-        )
-        errors.append(abs(state.drag[0] / found.at - 1))
-    assert errors[1] < 0.5 * errors[0]
-    assert errors[1] < 1e-4
 
 
 def test_steps_converge_faster_than_at_first_order() -> None:
