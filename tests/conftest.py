@@ -13,6 +13,7 @@ import toy as toy_model
 
 import mdr_dask
 
+TESTS = Path(__file__).parent
 PHYSICS = Path(mdr_dask.__file__).parent / "physics"
 if "NUMBA_CACHE_DIR" not in os.environ:
     # numba compares a kernel's own file only: a changed function that kernels of other files call needs a new cache
@@ -29,8 +30,18 @@ hypothesis.settings.load_profile("repeatable")
 
 
 def pytest_collection_modifyitems(items):
-    """Run slow tests first, so that no worker is idle in the end."""
-    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+    """Run slow tests first, so that no worker is idle in the end, and then the tests of solvers.
+
+    pytest-xdist gives the first half of the tests to the first of two workers. It compiles most kernels, and the other
+    worker finds them in the cache.
+    """
+    rooms = {TESTS / room: rank for rank, room in enumerate(("physics", "models", "fits"))}
+
+    def order(item):
+        rank = min((rooms[parent] for parent in item.path.parents if parent in rooms), default=len(rooms))
+        return item.get_closest_marker("slow") is None, rank
+
+    items.sort(key=order)
 
 
 def pytest_collection_finish(session):
