@@ -1,9 +1,9 @@
 """Grid refinement: solve on a grid and on the next finer one, and estimate the error from the difference.
 
 Every solver that works on a grid uses `refine`. The number of cells doubles from one level to the next, so that the
-error of a solver of order p decreases by r = 2^p per level. Let c be the relative change of the results at the last
-refinement, from the last level but one to the last level, and b the relative change at the refinement before. The
-relative error on the last level is estimated as
+error of a solver of order p decreases by r = 2^p per level. Let c be the relative change of the results from the second
+last level to the last, and b the relative change from the third last level to the second last. The relative error on
+the last level is estimated as
 
     error = safety max( c / (r - 1),  b / (r (r - 1)) ) + e.
 
@@ -114,7 +114,7 @@ def refine(
     Returns
     -------
     Refined
-        If a case has no solution on the last grids, its solution on a coarser grid is returned, if there is one.
+        If a case has no solution on the finest grids, the solution on the finest grid that has one is returned.
 
     Notes
     -----
@@ -187,7 +187,7 @@ def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> Fl
 
 
 def _sizes(values: Sequence[FloatArray] | FloatArray, floors: FloatArray) -> FloatArray:
-    """Return the largest absolute value of every output and case, or the floor if it is larger; (outputs, cases)."""
+    """Return for each output and case the largest absolute value, or the floor if it is larger."""
     return np.maximum([_largest(np.fmax(np.abs(value), 0.0)) for value in values], floors[:, None])
 
 

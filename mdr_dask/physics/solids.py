@@ -239,7 +239,10 @@ def fit_series(
     """
     omega, stored, lost = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (angular_frequency, storage, loss))
     if not omega.size == stored.size == lost.size >= 2:
-        raise ValueError(f"a frequency needs both moduli, got {omega.size}, {stored.size} and {lost.size} values")
+        raise ValueError(
+            f"expected at least two frequencies with a storage and a loss modulus each, got {omega.size} frequencies, "
+            f"{stored.size} storage and {lost.size} loss moduli"
+        )
     if not all(np.all(np.isfinite(a) & (a > 0)) for a in (omega, stored, lost)):
         raise ValueError("frequencies and moduli must be positive and finite")
     times = _times_covering(omega, terms_per_decade)

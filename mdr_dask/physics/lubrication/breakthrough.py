@@ -25,7 +25,7 @@ from mdr_dask.physics.surfaces.splines import integral, piece, shares, zeros
 #: ``whole``: the whole cluster is tested and counted. ``inside``: a cut cluster is ignored.
 EDGE_RULES: tuple[str, ...] = ("part", "clip", "whole", "inside")
 _PART, _CLIP, _WHOLE, _INSIDE = range(4)
-#: Lengths in contact are counted in units of the spacing divided by this number.
+#: Number of parts of a spacing. Lengths in contact are counted in whole parts.
 PARTS = 64
 
 
@@ -46,15 +46,16 @@ def layer_strength(shear_strength: ArrayLike, E_star: ArrayLike, thickness: Arra
 
 @jit
 def _counted(length: float) -> int:
-    """Return a length, given in spacings, in units of 1/`PARTS` of a spacing: a whole number, at least 1."""
+    """Convert a length in spacings to a whole number of parts (a spacing has `PARTS` parts), at least 1."""
     return max(1, int(length * PARTS + 0.5))
 
 
 @jit
 def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> None:
-    """Add `number` to `count` positions of the closed trace, starting at `begin`.
+    """Add `number` to `count` positions of the trace, starting at `begin`.
 
-    `jumps` holds the differences between neighbouring positions of the trace.
+    The trace contains the length in contact for the window that begins at each node of the closed line. `jumps` holds
+    the differences between neighbouring positions of the trace.
     """
     points = jumps.size - 1
     while begin < 0:
@@ -71,7 +72,7 @@ def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> Non
 
 @jit
 def _add(jumps: NDArray[np.int32], at: int, number: int) -> None:
-    """Add `number` to the position `at` of the closed trace, like `_block`.
+    """Add `number` to the position `at` of the trace, like `_block`.
 
     `at` may lie outside the trace by at most the length of the trace.
     """
@@ -175,8 +176,8 @@ def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> ND
     Returns
     -------
     int array, shape (points,)
-        In units of 1/`PARTS` of a spacing, so that sums are exact. An entry is above zero if its window is in intimate
-        contact. The fraction of these entries is the breakthrough probability.
+        Lengths in whole parts of a spacing (a spacing has `PARTS` parts), so that sums are exact. An entry is above
+        zero if its window is in intimate contact. The fraction of these entries is the breakthrough probability.
     """
     trace = np.zeros(clusters.points + 1, dtype=np.int32)
     if clusters.start.size:
@@ -287,7 +288,7 @@ def _windows(
 def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray], rule: str = "part") -> IntArray:
     """Return the length in intimate contact of each given window.
 
-    Rolling with creep is computed with this function; for pure rolling it is a slower reference.
+    This function is needed for rolling with creep. For pure rolling, :func:`contact_lengths` is faster.
 
     Parameters
     ----------
@@ -303,7 +304,7 @@ def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray
     Returns
     -------
     int array, shape (n,)
-        Length in intimate contact of each window, in units of 1/`PARTS` of a spacing.
+        Length in intimate contact of each window, in whole parts of a spacing (a spacing has `PARTS` parts).
     """
     contact = np.zeros(positions[0].size, dtype=np.int64)
     if pair.line_1.max() + pair.line_2.max() > pair.level:
@@ -318,10 +319,10 @@ def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> 
     Parameters
     ----------
     travel : array_like, shape (n,)
-        Travel at the mean velocity of the surfaces, in points. For mean values, steps of an eighth of the window are
-        small enough.
+        Distance that the contact has travelled, at the mean velocity of the surfaces, in spacings. For mean values,
+        steps of an eighth of the window are small enough.
     points : int
-        Points of each line.
+        Number of points of each line.
     slide_roll_ratio : float
         ``S = (v1 - v2)/u`` with the mean velocity u. The lines move by ``1 + S/2`` and ``1 - S/2`` times the travel.
 

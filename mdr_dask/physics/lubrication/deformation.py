@@ -15,7 +15,7 @@ from mdr_dask.physics.jit import jit
 
 @jit
 def _second_integral(x: float) -> float:
-    """Return the function whose second derivative is ``ln|x|``."""
+    """Return the value at x of a function whose second derivative is ``ln|x|``."""
     square = x * x
     return 0.0 if square == 0.0 else 0.25 * square * (log(square) - 3.0)
 

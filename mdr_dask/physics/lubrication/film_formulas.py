@@ -96,7 +96,7 @@ def fluid_friction(
     return float(np.sum(weights * stress * cosine) / (contact.pressure * np.sum(weights * cosine**2)))
 
 
-#: Film thickness divided by the radius above which a roller differs from a parabola by more than a few per cent.
+#: Ratio of film thickness and radius above which a roller differs from a parabola by more than a few per cent.
 THICKEST_FILM = 0.1
 
 
@@ -105,7 +105,7 @@ def thick_film(film: float) -> str:
     if not film > THICKEST_FILM:
         return ""
     return (
-        f"the film is thicker than {THICKEST_FILM} of the radius: rollers are no parabolas there, and "
+        f"the film is thicker than {THICKEST_FILM} of the radius: the rollers cannot be approximated by parabolas, and "
         "Reynolds' equation does not hold"
     )
 
@@ -282,7 +282,8 @@ def regime(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> NDArray[np.intp]:
 
     Elastic flattening makes an isoviscous film thicker and a piezoviscous film thinner. So the isoviscous film is the
     thicker of its two limits, and the piezoviscous film is the thinner of its two limits. The limit that gives the
-    thicker of these two films determines the regime. For a sharp transition, Moes' formula gives the same regimes.
+    thicker of these two films determines the regime. Moes' formula gives the same regimes if its smooth transitions are
+    replaced by sharp ones.
     """
     rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(W, U, G)
     isoviscous = np.where(elastic_iso > rigid_iso, 2, 0)

@@ -27,9 +27,9 @@ _TOO_EARLY = 0.035
 class GridSolution:
     """Pressure in units of p0, and film in units of ``a^2/R``, at the nodes of one grid.
 
-    `central` is the film at ``X = 0``. `spacing` is the distance between nodes divided by the distance that the density
-    of nodes gives. The numerical method uses a pressure that is linear between two nodes, so that its film sags between
-    the nodes. Therefore :meth:`film_between` uses a polynomial through the nodes.
+    `central` is the film at ``X = 0``. `spacing` is the distance between two nodes times the density of nodes; it is
+    about halved on each finer grid. The numerical method uses a pressure that is linear between two nodes, so that its
+    film sags between the nodes. Therefore :meth:`film_between` uses a polynomial through the nodes.
     """
 
     nodes: FloatArray
@@ -51,10 +51,11 @@ class GridSolution:
         return np.where(inside, np.maximum(_between(self.nodes, self.pressure, positions, _CUBIC), 0.0), 0.0)
 
     def pressure_carried(self, nodes: FloatArray, front: float) -> FloatArray:
-        """Return the pressure at the nodes of another grid, with the front behind the spike moved to `front`.
+        """Return the pressure at the nodes of another grid, with its front moved to the position `front`.
 
-        The nodes on either side of the new front get the pressures that this grid has at half a cell from its own
-        front. On a finer grid, the pressures at half a cell from the front are nearly the same.
+        The front is the steep fall of the pressure behind the spike (see :attr:`front`). The nodes on either side of
+        the new front get the pressures that this grid has at half a cell from its own front. On a finer grid, the
+        pressures at half a cell from the front are nearly the same.
         """
         if np.isnan(front + self.front):
             return self.pressure_between(nodes)
@@ -150,7 +151,7 @@ def _cell_around(nodes: FloatArray, position: float) -> FloatArray:
 def expected(
     before: Sequence[GridSolution], reading: Callable[[GridSolution], float | FloatArray], spacing: float
 ) -> FloatArray:
-    """Return the expected value of a quantity on a grid of another spacing.
+    """Return the expected value of a quantity on a grid of another spacing; `reading` evaluates it on a known grid.
 
     If there are two earlier grids or more, the value is extrapolated from the last two, assuming an error of second
     order in the spacing. If there is only one earlier grid, the value on this grid is returned.

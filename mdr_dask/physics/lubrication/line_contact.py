@@ -55,7 +55,7 @@ REACH = 2.0
 
 
 class Estimate(NamedTuple):
-    """A value or a profile and its estimated absolute error, of the same shape."""
+    """A value (or a profile), and its estimated absolute error, which has the same shape."""
 
     value: FloatArray
     error: FloatArray
@@ -65,6 +65,7 @@ class Estimate(NamedTuple):
         return Estimate(self.value * factor, self.error * factor)
 
 
+#: Function that evaluates a quantity, or a profile at fixed positions, on one grid.
 Reading = Callable[[GridSolution], float | FloatArray]
 
 
@@ -155,7 +156,7 @@ def line_contact(
         pole = ROELANDS_PRESSURE / p0
         exponent = G / (2 * E_star) * ROELANDS_PRESSURE / float(np.log(viscosity) + ROELANDS_LOGARITHM)
     elif viscosity_law not in VISCOSITY_LAWS:
-        raise ValueError(f"expected a viscosity law of {', '.join(VISCOSITY_LAWS)}, got {viscosity_law!r}")
+        raise ValueError(f"expected the viscosity law {' or '.join(VISCOSITY_LAWS)}, got {viscosity_law!r}")
     rise, saturation = (DENSITY_RISE * p0, DENSITY_SATURATION * p0) if compressible else (0.0, 0.0)
     return LineContact(float(moes.M), float(moes.L), pole, exponent, rise, saturation, inlet)
 
@@ -412,5 +413,5 @@ def _no_solution(case: LineContact, outcome: Outcome, failed: GridSolution) -> L
     """Return a solution without a film, with the reason."""
     none = Estimate(np.asarray(np.nan), np.asarray(np.nan))
     why = "too few grids have a solution" if outcome == Outcome.CONVERGED else outcome.sentence
-    reason = f"no film found for M = {case.M:.4g}, L = {case.L:.4g}: {why} on {failed.nodes.size} nodes"
+    reason = f"no film found for M = {case.M:.4g}, L = {case.L:.4g} on {failed.nodes.size} nodes: {why}"
     return LineSolution(case, outcome, reason, (), none, none)

@@ -119,7 +119,7 @@ def pressure_viscosity(correlation: str, kinematic: ArrayLike, dynamic: ArrayLik
     if correlation == "wooster":
         return np.asarray((0.6 + 0.965 * np.log10(np.asarray(dynamic, dtype=np.float64) * 1e3)) * 1e-8)
     if correlation not in GOLD:
-        raise ValueError(f"expected a pressure-viscosity correlation of {', '.join(CORRELATIONS)}, got {correlation!r}")
+        raise ValueError(f"expected one of the correlations {', '.join(CORRELATIONS)}, got {correlation!r}")
     factor, exponent = GOLD[correlation]
     return np.asarray(factor * (np.asarray(kinematic, dtype=np.float64) / _MM2) ** exponent * 1e-9)
 
@@ -227,7 +227,7 @@ def log_viscosity(law: str, pressure: ArrayLike, viscosity: ArrayLike, alpha: Ar
     if law == "barus":
         return np.asarray(logarithm + np.asarray(alpha) * p)
     if law != "roelands":
-        raise ValueError(f"expected a viscosity law of barus, roelands, got {law!r}")
+        raise ValueError(f"expected the viscosity law barus or roelands, got {law!r}")
     scale = logarithm + ROELANDS_LOGARITHM
     return np.asarray(
         logarithm + scale * ((1 + p / ROELANDS_PRESSURE) ** (np.asarray(alpha) * ROELANDS_PRESSURE / scale) - 1)

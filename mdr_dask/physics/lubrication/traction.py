@@ -1,8 +1,8 @@
 """Friction of a lubricated line contact from the shear of its film.
 
 The film is computed for pure rolling and a Newtonian liquid of constant temperature; the shear stress follows from this
-film. This is a good approximation for small sliding velocities. The film is computed without heating and shear
-thinning, which would make film and traction smaller.
+film. This is a good approximation for small sliding velocities. Heating and shear thinning are neglected; they would
+make film and traction smaller.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Half-integrals of piecewise polynomials on graded panels: matrices of both transforms, exact for such polynomials.
+"""Matrices of both transforms on graded panels, exact for functions that are a polynomial in every panel.
 
-As functions of z, the square of the radius, both transforms of the MDR are Abel's half-integrals. The substitution z' =
-z - t^2 turns the integrands into polynomials in t, which Gauss's rule integrates exactly. All contacts are scaled to
-the interval [0, 1], so that one set of matrices is enough.
+As functions of z, the square of the radius, both transforms of the MDR are Abel's half-integrals. The substitution
+``z' = z - t^2`` turns the integrands into polynomials in t, which Gauss's rule integrates exactly. All contacts are
+scaled to the interval [0, 1], so that one set of matrices is enough.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from mdr_dask.physics.mdr.transforms import gauss
 
 
 class Mesh(NamedTuple):
-    """Panels for a piecewise polynomial; the first panel begins at 0.
+    """Panels (intervals) and nodes of a function that is a polynomial in every panel.
 
-    There is no node at 0, because functions may jump there.
+    The first panel begins at 0. There is no node at 0, because functions may jump there.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ class UniformGrid:
     forward : array, shape (n, n)
         g = forward @ f.
     stress : array, shape (n, n)
-        p = stress @ q, where q is the line load: d - g inside the contact, and zero outside.
+        p / E* = stress @ q, where q is the line load: d - g inside the contact, and zero outside.
     """
 
     nodes: FloatArray
@@ -56,7 +56,7 @@ class UniformGrid:
         return float(self.nodes[k] - self.spacing * (image[k] - depth) / (image[k] - image[k - 1]))
 
     def pressure(self, image: FloatArray, depth: float) -> FloatArray:
-        """Return p(r) at the nodes; the cell that contains the contact edge is cut at the edge."""
+        """Return p / E* at the nodes; the cell that contains the contact edge is cut at the edge."""
         load = np.maximum(depth - image, 0.0)
         k = int(np.argmax(image >= depth))
         result = self.stress @ load
@@ -71,7 +71,7 @@ class UniformGrid:
         return result
 
     def force(self, image: FloatArray, depth: float) -> float:
-        """Return F_N = 2 int (d - g)_+ dx over x >= 0; the cell that contains the contact edge is cut at the edge."""
+        """Return F_N / E*, twice the integral of d - g from 0 to the contact edge."""
         load = np.maximum(depth - image, 0.0)
         k = int(np.argmax(image >= depth))
         if k == 0:
@@ -80,7 +80,10 @@ class UniformGrid:
         return float(2.0 * np.trapezoid(load[:k], self.nodes[:k]) + last)
 
     def depth(self, image: FloatArray, force: float, guess: float | None = None) -> float:
-        """Return the depth at which the image carries a force, by Newton's method; the force is convex in the depth."""
+        """Return the depth at which F_N / E* is equal to `force`, by Newton's method.
+
+        The method converges, because the force is a convex function of the depth.
+        """
         depth = float(np.max(image[: max(int(self.nodes.size * 0.4), 2)])) if guess is None else guess
         for _ in range(60):
             slope = 2.0 * max(self.edge(image, depth), self.spacing)

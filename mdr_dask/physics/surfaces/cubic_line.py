@@ -16,9 +16,7 @@ from mdr_dask.physics.surfaces import shapes
 
 NONE = 2.0  # result of `summit` if the cell has no maximum
 STEEPEST_RISE = 4 / 27  # largest rise of a cubic above its ends, divided by the sum of the slopes at the ends
-UNRESOLVED = (
-    0.5  # a line is not resolved if the mean squared slopes at nodes and in cells differ by this fraction or more
-)
+UNRESOLVED = 0.5  # a line is not resolved if the mean squared slopes at nodes and in cells differ by this fraction
 
 
 class CubicLine(NamedTuple):
@@ -51,6 +49,7 @@ def periodic_line(height: FloatArray, slope: FloatArray | None) -> CubicLine:
     Parameters
     ----------
     height : array, shape (n,)
+        Heights at equidistant nodes of one period.
     slope : array, shape (n,), or None
         Derivative of the height with respect to the position divided by the length of the line.
     """
@@ -98,12 +97,12 @@ class Cells(NamedTuple):
     Parameters
     ----------
     height : array, shape (n + 2,)
-        Heights at the nodes minus the height of the highest point; they are never positive. Contact under a light load
-        depends on small distances from the highest point, which have no rounding error in this form.
+        Heights at the nodes minus the height of the highest point; they are never positive. In this form, the small
+        distances from the highest point, which matter under light loads, have no rounding error.
     enter, leave : array, shape (n + 1,)
         Slopes at the start and the end of each cell.
     peak : array, shape (n + 1,)
-        Highest point of each cell.
+        Largest height in each cell.
     mean, stretch : array, shape (n + 1,)
         Integrals of the height and of the squared slope over each cell.
     start : float
@@ -189,7 +188,7 @@ def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float]:
 def cut(line: CubicLine) -> Cells:
     """Split a line into its cells; a periodic line starts at its highest point."""
     best, place, top = _highest(line.height, line.enter, line.leave)
-    if line.smooth and place == 1:  # a highest node belongs to the cell that begins there, however nodes are numbered
+    if line.smooth and place == 1:  # if the highest point is a node, use the cell that begins there
         best, place = (best + 1) % line.enter.size, 0.0
     columns = _turned(line, top, best if line.periodic else 0)
     if line.smooth and _is_resolved(columns[1][:-1], columns[5][:-1]):

@@ -37,7 +37,7 @@ def test_every_correlation_rises_with_viscosity(name):
 
 
 def test_unknown_correlation_names_the_known_ones():
-    with pytest.raises(ValueError, match=r"expected a pressure-viscosity correlation of gold_mineral.*got 'barus'"):
+    with pytest.raises(ValueError, match=r"expected one of the correlations gold_mineral.*got 'barus'"):
         oil.pressure_viscosity("barus", 1e-4, 0.1)
 
 
@@ -68,5 +68,5 @@ def test_roelands_has_the_slope_of_barus_and_stays_below_it():
 
 
 def test_unknown_viscosity_law_names_the_known_ones():
-    with pytest.raises(ValueError, match="expected a viscosity law of barus, roelands, got 'free volume'"):
+    with pytest.raises(ValueError, match="expected the viscosity law barus or roelands, got 'free volume'"):
         oil.log_viscosity("free volume", 1e8, 0.1, 2e-8)
