@@ -1,9 +1,9 @@
 """Grid refinement: solve on a grid and on the next finer one, and estimate the error from the difference.
 
-Every solver that works on a grid uses `refine`. The number of cells doubles from one level to the next, so that the
-error of a solver of order p decreases by r = 2^p per level. Let c be the relative change of the results from the second
-last level to the last, and b the relative change from the third last level to the second last. The relative error on
-the last level is estimated as
+Sliding, velocity jumps and lubrication use `refine`. The number of cells doubles from one level to the next, so that
+the error of a solver of order p decreases by r = 2^p per level. Let c be the relative change of the results from the
+second last level to the last, and b the relative change from the third last level to the second last. The relative
+error on the last level is estimated as
 
     error = safety max( c / (r - 1),  b / (r (r - 1)) ) + e.
 

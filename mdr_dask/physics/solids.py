@@ -309,7 +309,7 @@ def wlf_factor(temperature: ArrayLike, reference: float, c1: float, c2: float) -
     difference = np.asarray(temperature, dtype=np.float64) - reference
     if np.any(c2 + difference <= 0):
         lowest, end = distinguishable(float(np.min(temperature)), reference - c2, digits=6)
-        raise ValueError(f"the law of Williams, Landel and Ferry ends at {end} K, got {lowest} K")
+        raise ValueError(f"the law of Williams, Landel and Ferry is valid above {end} K only, got {lowest} K")
     return np.asarray(10 ** (-c1 * difference / (c2 + difference)), dtype=np.float64)
 
 

@@ -17,15 +17,16 @@ class Clusters(NamedTuple):
     Parameters
     ----------
     start, end : array, shape (n,)
-        Beginning and end of each cluster in spacings. If a cluster contains the seam of the closed line, its end lies
-        beyond the last node.
+        Beginning and end of each cluster in spacings. If a cluster continues from the last node of the closed line to
+        the first, its end lies beyond the last node.
     total : array, shape (n,)
         Integral of ``z - h0`` over each cluster, in m times spacings.
     overlap : array, shape (points + 3,)
         Spline of ``z - h0`` in m, extended periodically: the last coefficient, all coefficients, and the first two
         coefficients.
     limit : float
-        The number ``s dx^2`` in m. A cluster breaks the layer if ``total > limit (end - start)^3`` (thesis eq. 5.6).
+        The number ``s dx^2`` in m, with the layer strength s and the distance dx between nodes. A cluster breaks the
+        layer if ``total > limit (end - start)^3`` (thesis eq. 5.6).
     closed : bool
         Whether one cluster covers the whole closed line, so that it has no end.
     """
@@ -88,7 +89,7 @@ def _totals(overlap: FloatArray, start: FloatArray, end: FloatArray, found: Floa
 
 
 def find_clusters(line: FloatArray, level: float, spacing: float, strength: float) -> Clusters:
-    """Return the clusters at a film thickness.
+    """Return the clusters for a given film thickness.
 
     Parameters
     ----------

@@ -24,7 +24,8 @@ def _second_integral(x: float) -> float:
 def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
     """Replace the second integrals of ``ln|x|`` at the nodes by the integrals of ``ln|x|`` times the hat functions.
 
-    The entries of both end nodes become zero.
+    The hat function of a node is 1 at this node, 0 at all others, and linear in between. The entries of both end nodes
+    become zero.
     """
     left, left_slope = row[0], 0.0
     for j in range(nodes.size - 1):

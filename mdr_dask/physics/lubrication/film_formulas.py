@@ -257,7 +257,8 @@ def limiting_films(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:
     Returns
     -------
     array, shape (4, *shape)
-        In the order of `REGIMES`; the last row is the Dowson-Higginson formula, as in Johnson's map.
+        The films in the order of `REGIMES`. The last row is the Dowson-Higginson formula, as in Johnson's map of the
+        regimes.
     """
     W, U, G = np.broadcast_arrays(np.asarray(W, float), np.asarray(U, float), np.asarray(G, float))
     M = moes_parameters(W, U, G).M

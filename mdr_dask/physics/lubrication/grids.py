@@ -112,7 +112,7 @@ def _halved_by(share: float, cells: int) -> int:
 def _cells_before(position: float, positions: FloatArray, density: FloatArray, number: FloatArray) -> float:
     """Return the number of cells before a position.
 
-    `number` has the numbers of cells before the positions of the density.
+    `number` contains the number of cells before each position at which the density is given.
     """
     before = int(np.clip(np.searchsorted(positions, position) - 1, 0, positions.size - 2))
     rest = position - positions[before]

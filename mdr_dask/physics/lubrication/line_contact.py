@@ -138,8 +138,8 @@ def line_contact(
     Raises
     ------
     ValueError
-        If a number is not positive (G may be zero), the law is unknown, Roelands' law has no viscosity above
-        ``exp(-9.67)`` Pa s, or the inlet is not upstream.
+        If a number is not positive (G may be zero), the law is unknown, the inlet is not upstream, or the viscosity for
+        Roelands' law is missing or is not above ``exp(-9.67)`` Pa s.
     """
     W, U, G = groups
     for name, value in (("W", W), ("U", U), ("G", G), ("E_star", E_star)):
@@ -261,7 +261,7 @@ class LineSolution:
 
 
 def _pairs(solved: Sequence[GridSolution]) -> Sequence[tuple[GridSolution, GridSolution]]:
-    """Return pairs of a grid and the next finer grid, for the finest grids; at most three pairs."""
+    """Return the last three pairs (or fewer) of a grid and the next finer grid."""
     return list(itertools.pairwise(solved))[-3:]
 
 
@@ -272,7 +272,10 @@ def _extrapolated(reading: Reading, coarse: GridSolution, fine: GridSolution) ->
 
 
 def _error(values: Sequence[FloatArray]) -> FloatArray:
-    """Return the error of the last of several extrapolated values on finer and finer grids, by the rule of `refine`."""
+    """Return the estimated error of the last of several extrapolated values, by the rule of `refine`.
+
+    The values are extrapolated from pairs of finer and finer grids.
+    """
     if len(values) < 2:
         return np.full_like(values[-1], np.inf)
     changes = np.abs(np.diff(values[-3:], axis=0))

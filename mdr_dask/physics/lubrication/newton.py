@@ -129,9 +129,9 @@ def log_viscosities(pressure: FloatArray, liquid: Liquid) -> FloatArray:
 
 @jit
 def _mobility(left: float, right: float) -> tuple[float, float, float]:
-    """Return the mean of 1/eta between two nodes with the log-viscosities `left` and `right`, and its two derivatives.
+    """Return the mean of 1/eta between two nodes, and its derivatives with respect to ln(eta) at both nodes.
 
-    The mean is exact if ln(eta) is linear between the nodes.
+    `left` and `right` are ln(eta) at the nodes. The mean is exact if ln(eta) is linear between the nodes.
     """
     rise = right - left
     if abs(rise) < 1e-3:
@@ -369,7 +369,7 @@ def film_on(grid: Grid, P: FloatArray, central: float) -> FloatArray:
 
 
 def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: float, pace: Pace) -> Iterate:
-    """Solve for the pressure on one grid.
+    """Solve for pressure and film on one grid.
 
     Parameters
     ----------

@@ -130,7 +130,7 @@ def _kernel(low: ArrayLike, high: ArrayLike, radius: ArrayLike) -> FloatArray:
     """Return the integral of 1 / sqrt(x^2 - r^2) from `low` to `high`, for low >= r.
 
     In the cell next to the axis, with r = low = 0, the integral diverges. In this cell the slope of the line load is
-    therefore assumed to be proportional to x, with the same mean as before; the result is then 2.
+    therefore not taken as constant but as proportional to x, with the same mean. The result is then 2.
     """
     low, high, r = np.broadcast_arrays(*(np.asarray(each, dtype=np.float64) for each in (low, high, radius)))
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -46,7 +46,7 @@ ROUNDING = 1e-12  # relative error of closed forms
 
 @dataclass(frozen=True)
 class PronyTerms:
-    """Prony terms of a solid in units of the line: G_m / G_inf and tau_m v / L."""
+    """Prony terms of a solid in dimensionless form: G_m / G_inf and tau_m v / L."""
 
     moduli: tuple[float, ...] = ()
     deborah: tuple[float, ...] = ()
@@ -166,7 +166,10 @@ def _on_grid(line: RoughLine, cases: Cases, request: Request, oversampling: int,
 
 
 def _write(results: tuple[FloatArray, FloatArray, NDArray[np.int8]], cases: IntArray, found: Refined) -> None:
-    """Store the results of cases that have no results yet, or whose new results meet the accuracy or are better."""
+    """Store new results of cases that have none yet.
+
+    Other results are replaced if the new ones meet the accuracy, or if the new error of the drag is smaller.
+    """
     columns, errors, status = results
     better = (status[cases] != Outcome.CONVERGED) | found.met | (found.errors[0] < errors[0, cases])
     some = cases[better]

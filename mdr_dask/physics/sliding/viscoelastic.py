@@ -354,7 +354,10 @@ def _dot(one: FloatArray, other: FloatArray) -> float:  # pragma: no cover
 
 @jit
 def static_depth(profile: FloatArray, strain_area: float) -> float:  # pragma: no cover
-    """Return the depth at which sum max(0, depth + profile) is `strain_area` (> 0), by Newton's method from above."""
+    """Return the depth at which the penetrations of all nodes in contact, depth + profile > 0, add up to `strain_area`.
+
+    Newton's method approaches the depth from above.
+    """
     depth = 0.0
     for value in profile:
         depth -= value

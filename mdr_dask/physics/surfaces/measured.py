@@ -60,8 +60,8 @@ def measured_line(
     detrend : {"none", "mean", "line", "parabola"}
         Least-squares polynomial that is subtracted.
     taper : float
-        Fraction of the line (0 to 1), both ends together, in which a cosine window reduces the heights to their mean.
-        The periodic line then has no step at its ends.
+        Fraction of the line (0 to 1), both ends together, over which a cosine window reduces the heights towards their
+        mean. The periodic line then has no step at its ends.
     shortest, longest : float
         Shortest and longest wavelength that are kept, m; 0 for no limit.
 
@@ -92,7 +92,7 @@ def _ordered(position: ArrayLike, height: ArrayLike) -> tuple[FloatArray, FloatA
     if x[0] > x[-1]:
         x, z = x[::-1], z[::-1]
     if np.any(np.diff(x) <= 0):
-        raise DataError("the positions of a measured line must ascend or descend: sort and merge equal ones")
+        raise DataError("the positions of a measured line must ascend or descend: sort them, and merge equal positions")
     return x, z
 
 
@@ -138,5 +138,5 @@ def rms_height(height: FloatArray) -> float:
 
 
 def rms_slope(height: FloatArray, length: float) -> float:
-    """Return the rms slope of all waves of the periodic line through samples, down to the wave of two points."""
+    """Return the rms slope of a periodic line, from all its waves; the shortest wave is two points long."""
     return waves_of(height).rms_slope() / length

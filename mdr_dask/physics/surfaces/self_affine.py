@@ -14,7 +14,8 @@ LEAST_ERROR = 0.05  # smallest assumed relative error of a bin, because real spe
 LEAST_BINS = 5  # smallest number of bins for the power law
 LOWEST, HIGHEST = -0.1, 1.2  # range of Hurst exponents
 CHI_SQUARED = 3.84  # 95 % quantile of chi squared for one parameter
-STEEPEST, FLATTEST = -6.0, -1.0  # limits of d log C2D / d log q for roughness; it is -4 for H = 1 and -2 for H = 0
+# limits of the slope d log C2D / d log q of roughness; the slope is -4 for H = 1 and -2 for H = 0
+STEEPEST, FLATTEST = -6.0, -1.0
 ABOVE_NOISE = 2.0  # smallest ratio of the spectrum to the noise at which roughness is accepted
 
 

@@ -29,7 +29,10 @@ class Shape(Protocol):
     """The line of an indenter, as used by the solvers."""
 
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the height towards the elastomer, 0 at the tip, and the slopes left and right of every x."""
+        """Return the height at every x, and the slopes on its left and right side.
+
+        Heights are positive towards the elastomer, and 0 at the tip.
+        """
 
     def body(self, r: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return height and slope of the body of revolution that corresponds to the line."""
@@ -55,7 +58,7 @@ class PowerLaw:
         return cls(mapped(exponent) * coefficient, exponent)
 
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the height -c |x|^n towards the elastomer, and its slopes on the left and right side of every x."""
+        """Return the height -c |x|^n at every x, and the slopes on its left and right side."""
         distance = np.abs(x)
         steepness = self.coefficient * self.exponent * distance ** (self.exponent - 1)
         left = np.where(x > 0, -steepness, steepness)
@@ -97,7 +100,7 @@ class RoundedCone:
     blend: float
 
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the height towards the elastomer, and its slope, which is equal on both sides."""
+        """Return the height at every x, and the slopes on its left and right side, which are equal."""
         place, b = np.abs(x), self.blend
         outer = np.maximum(place, b)
         root = np.sqrt((outer - b) * (outer + b))
@@ -131,7 +134,7 @@ def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatAr
     load : array
         F_N / (4 G), so that ``load = 2 n c a^(n+1) / (n + 1)`` (thesis 3.3.2).
     coefficient, exponent : float
-        Coefficient c > 0 and exponent n of the line, after the MDR rule.
+        Coefficient c > 0 and exponent n of the line (not of the body).
     """
     width: FloatArray = ((exponent + 1) * load / (2 * exponent * coefficient)) ** (1 / (exponent + 1))
     return width
@@ -171,7 +174,7 @@ def smooth(loads: FloatArray, deborah: FloatArray, coefficient: float, exponent:
     loads, deborah : array, shape (cases,)
         F_N / (4 G) and v tau, positive and finite.
     coefficient, exponent : float
-        Coefficient c > 0 and exponent n >= 1 of the line, after the MDR rule.
+        Coefficient c > 0 and exponent n >= 1 of the line (not of the body).
     """
     c, n = coefficient, exponent
     depth, active = c * half_width(loads, c, n) ** n, np.ones(loads.size, np.bool_)

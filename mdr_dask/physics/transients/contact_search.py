@@ -495,7 +495,7 @@ def _overtaking(search: Search, held: float, x: float, w: float) -> float:
 
 @jit_inline_uncounted
 def _close_patch(search: Search, end: float, is_lost: bool, found: int) -> None:
-    """Store the current patch, and start the bounds of the free elements behind it."""
+    """Store the current patch, and write a lower bound of the displacement of the free elements behind it."""
     now, motion, work, scan = search.now, search.motion, search.work, search.work.scan
     if is_lost:
         _, slope, _, by_depth, opening = gap_at(now, work.recovery, end)

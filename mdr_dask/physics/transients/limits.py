@@ -53,7 +53,7 @@ class PreparedLine(NamedTuple):
         return cls(cells, blocks_of(cells), track_of(cells), {})
 
     def barriers(self, deborah: float) -> Barriers:
-        """Return the barriers at a Deborah number in cells.
+        """Return the barriers for a Deborah number v tau in cells.
 
         They are stored, because successive cases often have the same Deborah number.
         """
@@ -64,7 +64,10 @@ class PreparedLine(NamedTuple):
         return self.known[deborah]
 
     def patches(self, depth: float, deborah: float) -> tuple[Patches, FloatArray]:
-        """Return the patches in steady sliding at a given depth of the highest point, and the sums of `sweep_cells`."""
+        """Return the patches in steady sliding, and load, drag and other sums in the order of `sweep_cells`.
+
+        `depth` is the depth of the highest point.
+        """
         sums = np.empty(SWEEP_SUMS)
         start, end = patches_at(self.cells, self.blocks, self.barriers(deborah), deborah, depth, sums)
         pressed = _pressed(self.track, end, depth)

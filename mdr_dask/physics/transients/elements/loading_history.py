@@ -337,7 +337,7 @@ def trace(
         Velocity and load until t = 0. The body slides steadily until then, or is at rest if the velocity is 0. Velocity
         and load may jump at t = 0.
     pieces : sequence of Piece
-        Velocity and load from t = 0 on; the last piece has no end.
+        Velocity and load from t = 0 on, in the order of time; the end of the last piece is infinite.
     times : array, shape (m,)
         Requested times, increasing.
     per_decade : float

@@ -28,10 +28,10 @@ from mdr_dask.physics.transients.elements.foundation import (
 
 
 class Edges(NamedTuple):
-    """Edge of contact in the cell before each element, as it was when it last followed from a vanishing force.
+    """Edge of contact in the cell before each element, as it was when it was last located where the force vanishes.
 
     At one end of such a cell the element is in contact, at the other end it is not. `place` is the distance of the edge
-    from the element in contact, in cells, or -1 if there is no edge. `gap` is the gap of the other element.
+    from the element in contact, in cells, or -1 if there is no edge. `gap` is the gap of the other element then.
     """
 
     place: FloatArray
