@@ -7,10 +7,9 @@ import random
 import re
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import xarray as xr
 from test_execute import digests
 
@@ -115,118 +114,70 @@ def build(toy, url: str, series: bool):
     return study
 
 
-def load(opener: Callable[[], dict[str, xr.Dataset]]) -> dict[str, xr.Dataset] | None:
-    """Read all of a study; None if that is refused."""
+def load(url: str) -> dict[str, xr.Dataset] | None:
+    """Read all of a store without this program; None if Zarr refuses it."""
+    groups = [str(path.parent.parent.relative_to(url)) for path in sorted(Path(url).glob("**/status/zarr.json"))]
     try:
-        return {name: found.load() for name, found in opener().items()}
+        return {name: xr.open_zarr(url, group=name.replace(".", "") or None).load() for name in groups}
     except Exception:  # whatever Zarr and its codecs raise
         return None
 
 
-def plainly(url: str) -> dict[str, xr.Dataset]:
-    """Open a study as somebody who does not know this program."""
-    groups = [path.parent.parent for path in sorted(Path(url).glob("**/status/zarr.json"))]
-    return {
-        str(group.relative_to(url)): xr.open_zarr(url, group=str(group.relative_to(url)).replace(".", "") or None)
-        for group in groups
-    }
+def same(one: dict[str, xr.Dataset] | None, other: dict[str, xr.Dataset] | None) -> bool:
+    if one is None or other is None or one.keys() != other.keys():
+        return False
+    return all(one[name].equals(other[name]) for name in one)
 
 
-def named(act: Callable[[], object]) -> bool:
-    """Say whether an act names damage."""
+def names_damage(act: Callable[[], object]) -> bool:
+    """Say whether an act ends with an error that names damage."""
     try:
         with store.readable("here"):
             act()
     except StoreError as error:
-        return "damaged" in str(error) or "verify" in str(error) or "checksum" in str(error) or "failed" in str(error)
+        return any(word in str(error) for word in ("damaged", "verify", "checksum", "failed"))
     return False
 
 
-@dataclass(frozen=True)
-class Trial:
-    """What came of one harm."""
+def faults(toy, sound: Path, study, work: Path, kind: str, harm: str, draw: random.Random) -> list[str]:
+    """Harm one file of a copy of a sound store, read it in every way, repair it and run the study again.
 
-    kind: str
-    harm: str
-    file: str
-    changed: bool
-    reads_wrongly: bool
-    verify: bool
-    run: bool
-    status: bool
-    show: bool
-    healed: bool
-    sound: bool
-
-    @property
-    def faults(self) -> list[str]:
-        """What went wrong, or was not told."""
-        swapped = self.harm == "swap with a sibling" and self.kind in ("values", "values with a dimension", "ledger")
-        looks = {"verify": self.changed}
-        if not swapped:  # chunks in each other's place have good checksums: only `verify` compares digests
-            looks |= dict.fromkeys(("run", "status", "show"), self.reads_wrongly)
-        silent = [f"{look} is silent" for look, due in looks.items() if due and not getattr(self, look)]
-        return silent + ["other bytes after repair"] * (not self.healed) + ["not sound after repair"] * (not self.sound)
-
-
-def try_harm(toy, sound: Path, study, work: Path, kind: str, harm: str, draw: random.Random) -> Trial | None:
-    """Harm one file of a copy of a sound store; look with everything there is; repair, run, compare."""
-    shutil.rmtree(work, ignore_errors=True)
+    Return what went wrong: damage that was not named, and differences from the sound store in the end.
+    """
     shutil.copytree(sound, work)
-    url = str(work)
-    files = sorted(work.glob(KINDS[kind]), key=in_order)
-    if not files:
-        return None
-    before = {path: path.read_bytes() for path in work.rglob("*") if path.is_file()}
-    truth = load(lambda: plainly(url))
-    file = draw.choice(files)
-    HARMS[harm](file, draw)
-    changed = {path: path.read_bytes() for path in work.rglob("*") if path.is_file()} != before
-    seen = load(lambda: plainly(url))
-    wrongly = seen is not None and not _same(seen, truth)
-    try:
-        found = store.verify(url)
-        unfinished = (kind, harm) == ("ledger", "delete") and found.notes  # as if a task had been killed
-        verified = bool(found.findings or unfinished)
-    except StoreError:
-        verified = True
+    url, truth = str(work), load(str(sound))
+    HARMS[harm](draw.choice(sorted(work.glob(KINDS[kind]), key=in_order)), draw)
+    seen = load(url)
+    is_wrong = seen is not None and not same(seen, truth)
+    lost_ledger = (kind, harm) == ("ledger", "delete")
 
-    def status():
+    def verify() -> None:
+        found = store.verify(url)
+        if found.findings or (lost_ledger and found.notes):  # as if a task had been killed
+            raise StoreError("damaged")
+
+    def status() -> None:
         groups = store.datasets(url)
         for dataset in groups.values():
             dataset["status"].load()
         store.require_sound(url, list(groups))
 
-    result = {
-        "verify": verified,
-        "status": named(status),
-        "show": named(lambda: [found.load() for found in store.datasets(url).values()]),
-        "run": named(lambda: execute.run(study, url, Resources(threads=1), lambda _: None)),
-    }
-    result["run"] = result["run"] or not store.verify(url).findings  # a run writes what is missing again
-    if harm == "delete" and kind == "ledger":
-        result["status"] = result["show"] = True  # it was shown as missing
+    def run() -> None:
+        execute.run(study, url, Resources(threads=1), lambda _: None)
+
+    found = [] if names_damage(verify) else ["verify is silent"]
+    named = {"status": names_damage(status)}
+    named["show"] = names_damage(lambda: [found.load() for found in store.datasets(url).values()])
+    if lost_ledger:  # status and show count its results as missing
+        named = dict.fromkeys(named, True)
+    named["run"] = names_damage(run) or not store.verify(url).findings  # a run writes what is missing again
+    if is_wrong and not (harm == "swap with a sibling" and kind in ("values", "values with a dimension", "ledger")):
+        # a chunk in the place of another one has a good checksum: only `verify` compares digests
+        found += [f"{name} is silent" for name, is_named in named.items() if not is_named]
     store.repair(url)
-    execute.run(study, url, Resources(threads=1), lambda _: None)
-    return Trial(
-        kind,
-        harm,
-        str(file.relative_to(work)),
-        changed,
-        wrongly,
-        healed=digests(url) == digests(str(sound)) and _same(load(lambda: plainly(url)), truth),
-        sound=not store.verify(url).findings,
-        **result,
-    )
-
-
-def _same(one: dict[str, xr.Dataset] | None, other: dict[str, xr.Dataset] | None) -> bool:
-    if one is None or other is None or one.keys() != other.keys():
-        return False
-    return all(_equal(one[name], other[name]) for name in one)
-
-
-def _equal(one: xr.Dataset, other: xr.Dataset) -> bool:
-    if set(one.variables) != set(other.variables):
-        return False
-    return all(np.array_equal(one[v], other[v], equal_nan=one[v].dtype.kind == "f") for v in one.variables)
+    run()
+    if digests(url) != digests(str(sound)) or not same(load(url), truth):
+        found.append("other bytes after repair")
+    if store.verify(url).findings:
+        found.append("not sound after repair")
+    return found

@@ -49,11 +49,10 @@ def test_what_is_planted_is_told(case, verdicts):
 
 
 @pytest.mark.slow
-def test_false_alarms_are_rare():
-    """Two tests with a chance of 5 % each; Arrhenius does not hold, and WLF is enough."""
-    told = [master_curve(modulus(seed, 0.02))["law_holds"].item() for seed in range(10)]
-    print(*(sentence for sentence in told if not sentence.startswith("yes")), sep="\n")
-    assert np.mean([sentence.startswith(("yes: ", "approximately: ")) for sentence in told]) >= 0.8
+def test_a_law_that_holds_is_rarely_contradicted():
+    """Each of two tests rejects what holds with a chance of 5 %. Scatter of 2 % is too large to confirm the law."""
+    sentences = [master_curve(modulus(seed, 0.02))["law_holds"].item() for seed in range(8)]
+    assert sum(sentence.startswith("no: ") for sentence in sentences) <= 1, sentences
 
 
 def test_too_few_curves_leave_a_law_untested():

@@ -90,18 +90,6 @@ def test_cases_share_what_is_the_same() -> None:
     assert 0 < result.values["traction_coefficient"][2, 0] < result.values["traction_coefficient"][1, 0]
 
 
-def test_a_value_does_not_depend_on_its_block() -> None:
-    columns = {"load_parameter": [2e-6, 5e-5, 5e-4], "viscosity_law": np.array(["barus", "roelands", "barus"], object)}
-    outputs = ("central_film", "minimum_film", "film", "pressure", "traction_coefficient")
-    whole = block(outputs, columns, 2, **(CHECKED | {"viscosity": 0.05, "slide_roll_ratio": 0.01}))
-    together = compute(whole)
-    for index in range(3):
-        alone = compute(whole.part(index, 1))
-        for name in outputs:
-            assert together.values[name][index, 1].tobytes() == alone.values[name][0, 0].tobytes()
-    assert together.solves == 3
-
-
 def test_errors_are_absolute_and_in_the_unit_of_their_output() -> None:
     """Film errors scale from h/R to metres; those of a profile cover a finer solution, position by position."""
     names = ("central_film", "minimum_film", "central_film_thickness", "film", "pressure", "rolling_coefficient")

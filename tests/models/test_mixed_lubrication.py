@@ -1,7 +1,6 @@
 """The model mixed_lubrication: values, invariances, shared solutions, bad input and warnings."""
 
 import dataclasses
-import itertools
 import re
 
 import numpy as np
@@ -57,33 +56,6 @@ def test_every_output_has_the_declared_shape_and_no_gaps():
         assert result.values[output.name].shape == (1, 2, *(sizes[dim] for dim in output.dims))
         assert np.all(np.isfinite(result.values[output.name])), output.name
     assert np.all(result.status == Status.DONE)
-
-
-@pytest.mark.parametrize("slip", [0.0, 0.2])
-def test_values_do_not_depend_on_block_or_neighbours(slip):
-    """Bitwise: the whole block, and each of its cases and realisations alone."""
-    columns = dict(
-        zip(
-            ("film_thickness", "rms_roughness", "layer_thickness"),
-            np.array(list(itertools.product([3e-7, 5e-7], [1.5e-7, 2e-7], [5e-9, 8e-9]))).T,
-            strict=True,
-        )
-    )
-    whole = block(columns=columns, realisations=(0, 3), slide_roll_ratio=slip)
-    together = MODEL.compute(whole)
-    for index, position in itertools.product(range(whole.cases), range(2)):
-        alone = MODEL.compute(whole.part(index, whole.realisations[position]))
-        for name, values in together.values.items():
-            np.testing.assert_array_equal(values[index, position], alone.values[name][0, 0], err_msg=name)
-
-
-def test_seed_and_realisation_make_the_lines():
-    def probability(**keys):
-        return MODEL.compute(block(["contact_length"], **keys)).values["contact_length"][0, 0]
-
-    assert probability(realisations=(5,)) == probability(realisations=(5,))
-    assert probability(realisations=(5,)) != probability(realisations=(6,))
-    assert probability(realisations=(5,), seed=1) != probability(realisations=(5,))
 
 
 def test_trace_agrees_with_its_mean():

@@ -39,16 +39,6 @@ def block(
     return Block(parameters(**changes), columns, cases, realisations, 5, EVERY)
 
 
-def test_value_depends_on_the_case_alone() -> None:
-    whole = block({"velocity": np.array([0.001, 0.05, 2.0]), "hurst": np.array([0.3, 0.7, 0.7])})
-    together = compute(whole)
-    for j in range(whole.cases):
-        for r, realisation in enumerate(whole.realisations):
-            alone = compute(whole.part(j, realisation))
-            for name in EVERY:
-                assert np.array_equal(alone.values[name][0, 0], together.values[name][j, r], equal_nan=True)
-
-
 def test_a_transient_that_misses_the_accuracy_has_a_warning() -> None:
     coarse = block({"velocity": np.array([0.05])}, (0, 1), hurst=0.3, oversampling=2, steps_per_decade=4)
     assert not compute(coarse).messages
