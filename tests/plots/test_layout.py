@@ -37,7 +37,7 @@ def study(curves, second=1, words=False, name="a_parameter_with_a_rather_long_na
     return data.squeeze([dim for dim in (name, "load") if data.sizes[dim] == 1])
 
 
-@pytest.mark.parametrize("size", ["", "85mm", "170mm", "85x60mm"])
+@pytest.mark.parametrize("size", ["85mm", *(pytest.param(s, marks=pytest.mark.slow) for s in ("", "170mm", "85x60mm"))])
 @pytest.mark.parametrize("case", [(1, 1, False), (5, 1, False), (25, 1, False), (6, 3, False), (25, 3, True)])
 def test_nothing_overlaps_and_nothing_is_cut(size, case):
     curves, second, words = case
@@ -51,10 +51,9 @@ def test_nothing_overlaps_and_nothing_is_cut(size, case):
             assert figure.get_figwidth() == pytest.approx(asked.width)
 
 
-@pytest.mark.parametrize("size", ["85mm"])
 @pytest.mark.parametrize("view", [View("mu", ("velocity", "load")), View("mu"), View("mu", "velocity", panels="load")])
-def test_maps_effects_and_panels_do_not_overlap(size, view):
-    with page.drawing_for(page.Page(*page.size(size))):
+def test_maps_effects_and_panels_do_not_overlap(view):
+    with page.drawing_for(page.Page(*page.size("85mm"))):
         figure = render(draw({"": study(5, 4)}, view))
         assert not list(problems(figure))
 

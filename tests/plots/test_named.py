@@ -83,8 +83,14 @@ def test_what_is_drawn_is_what_the_store_holds(name, stores):
         assert len(drawn) >= data[panel.x.quantity].size if panel.x.quantity in data.coords else len(drawn)
 
 
+#: Figures of the default run, each with panels, curves or labels of another kind.
+QUICK = {"velocity", "stribeck", "wear_profiles", "history"}
+
+
 @pytest.mark.parametrize("size", ["85mm", pytest.param("170mm", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("name", [*FIGURES, "history"])
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] * (n not in QUICK)) for n in (*FIGURES, "history")]
+)
 def test_nothing_overlaps_and_no_panel_is_empty(name, size, stores):
     text, _ = FIGURES.get(name, (JUMP, []))
     groups = stores(text)
