@@ -117,7 +117,7 @@ def test_fitted_series_recovers_moduli_it_was_made_from():
 
 
 def test_tables_that_cannot_be_fitted_are_refused():
-    with pytest.raises(ValueError, match="got 2, 1 and 2 values"):
+    with pytest.raises(ValueError, match="got 2 frequencies, 1 storage and 2 loss moduli"):
         fit_series([1, 2], [1], [1, 2])
     with pytest.raises(ValueError, match="must be positive and finite"):
         fit_series([1, 2], [1, -1], [1, 2])
@@ -127,7 +127,7 @@ def test_temperature_laws_agree_with_their_definitions():
     assert wlf_factor(300.0, 300.0, 17.4, 51.6) == 1
     assert np.log10(wlf_factor(310.0, 300.0, 17.4, 51.6)) == pytest.approx(-17.4 * 10 / 61.6, rel=ROUNDING)
     assert np.log(arrhenius_factor(350.0, 300.0, 8.31446261815324e4)) == pytest.approx(1e4 * (1 / 350 - 1 / 300))
-    with pytest.raises(ValueError, match=r"ends at 248.4 K"):
+    with pytest.raises(ValueError, match=r"valid above 248\.4 K only"):
         wlf_factor(248.0, 300.0, 17.4, 51.6)
     with pytest.raises(ValueError, match="absolute temperatures must be positive"):
         arrhenius_factor(0.0, 300.0, 1e4)
