@@ -29,7 +29,7 @@ class GridSolution:
 
     `central` is the film at ``X = 0``. `spacing` is the distance between two nodes times the density of nodes; it is
     about halved on each finer grid. The numerical method uses a pressure that is linear between two nodes, so that its
-    film sags between the nodes. Therefore :meth:`film_between` uses a polynomial through the nodes.
+    film is slightly too thin between the nodes. Therefore :meth:`film_between` uses a polynomial through the nodes.
     """
 
     nodes: FloatArray

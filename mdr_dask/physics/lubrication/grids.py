@@ -1,4 +1,6 @@
-"""Graded grids for a lubricated line contact: a first grid from the expected film, then grids from a solution.
+"""Graded grids for a lubricated line contact.
+
+The first grid follows from the expected film, all others from a solution on an earlier grid.
 
 A grid is sampled from a density of nodes along the contact. Grids of different size are therefore similar, and their
 errors can be compared (Richardson extrapolation). Positions are in half widths, films in ``a^2/R``.

@@ -56,7 +56,7 @@ class Nodal(NamedTuple):
     height, rise : array, shape (n,)
         Height of each node, and its increase from the previous node.
     blocks : array, shape (n // BLOCK, 8)
-        From `_blocks`.
+        Bounds and sums of every block, from `_blocks`.
     periodic : bool
         Whether the line is periodic; it then ends at its highest node.
     """

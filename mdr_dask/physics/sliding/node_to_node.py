@@ -36,7 +36,9 @@ from mdr_dask.physics.surfaces.rough_line import RoughLine
 BLOCK = 32  # cells
 WING = 4  # the nodes of a finer grid in a cell are interpolated from this number of nodes on each side of the cell
 BEFORE, AFTER = WING + 1, WING + 2  # numbers of nodes added from the previous and the next period, for `refine`
-ABOVE = 4 / 27  # a cubic cell rises above its ends by at most this factor times the sum of its inward slopes
+# a cubic cell rises above its ends by at most this factor times the sum of the upward slope at its start and the
+# downward slope at its end
+ABOVE = 4 / 27
 SUMMIT = 64  # number of fine nodes in the cell of the highest point; the highest of these nodes is used as the summit
 
 NO_ENDS: FloatArray = np.empty((2, 0))
@@ -207,7 +209,8 @@ def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatAr
     first, cells : int
         Index of the node of the line at which the tile begins, and number of cells of the line in the tile.
     weights : array, shape (2, refinement, 4 WING)
-        From :func:`weights`. The refinement is the number of cells of the tile in each cell of the line.
+        Interpolation weights from :func:`weights`. The refinement is the number of cells of the tile in each cell of
+        the line.
     tile : array, shape (IN_A_TILE, cells refinement + 3), output
         Heights and slopes, from the node before the tile to the node after the tile; integrals of height and of slope
         squared over each cell; largest height in each cell.
@@ -587,7 +590,7 @@ def _search(
     line : Nodes
         The line on a grid.
     weights : array, shape (2, refinement, 4 WING)
-        From `weights`.
+        Interpolation weights from :func:`weights`.
     cases : Cases
         v tau / L, and F_N / (4 G L) in the unit of height.
     last_step, error : float

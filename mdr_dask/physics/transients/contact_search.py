@@ -16,8 +16,8 @@ rigorous, so that no contact is missed.
   those elements passed it that are now further along the line. Second, the displacement u of free elements cannot
   exceed w = depth + h in the cell. Along the line u' = (drift - u) / D, so that u stays below w wherever w + D h'
   exceeds the largest drift (see `free_recovery`).
-* A free cell is skipped if its highest point is below a lower bound of the displacement of the free elements. The bound
-  is computed along the line from the last known displacement and the least drift.
+* A free cell is skipped if depth + h is smaller everywhere in the cell than a lower bound of the displacement of the
+  free elements. The bound is computed along the line from the last known displacement and the least drift.
 * A free cell is also skipped if its gap is wider than any gap that can have opened since the elements separated,
   because the cell was then out of contact all the time. The cell is skipped until the line has approached by the width
   of the gap. The gap closes at most at the rate of the depth plus the largest drift. The integral of this rate over
@@ -288,7 +288,7 @@ def _motion_until(now: Instant, second: float) -> Motion:
 
 @jit_inline_uncounted
 def _add_approach(now: Instant, bounds: PathBounds, state: FloatArray) -> None:
-    """Add the approach since the last search.
+    """Add the approach (see the module) since the last search.
 
     If the last search was neither at this instant nor at the previous instant of the history, no cell remains skipped.
     """
@@ -480,8 +480,8 @@ def _contact_end(search: Search, cell: Cell, x: float) -> tuple[float, float, bo
 def _overtaking(search: Search, held: float, x: float, w: float) -> float:
     """Return the displacement at x of free elements that may arrive inside a patch, or 0 if no such element exists.
 
-    The displacement at the line is w. Up to `held` the patch is certainly in contact. Beyond `held` no element of the
-    patch has separated.
+    An element in contact at x has the displacement w. Up to `held` the patch is certainly in contact. Beyond `held` no
+    element of the patch has separated.
     """
     now, recovery = search.now, search.work.recovery
     if x > held:
@@ -516,7 +516,7 @@ def _lowest_behind(search: Search, u: float) -> float:
 
 @jit_inline_uncounted
 def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[bool, float]:
-    """Return whether contact begins in a cell from x on, and where; if not, the place where the search continues.
+    """Return whether contact begins in a cell from x on, and where it begins (or else where the search continues).
 
     Contact can begin only between the place `low`, where the force becomes positive, and the place `high`, where the
     force falls to zero again. Elements may have separated at `high` at an earlier time. `ended` states that contact or

@@ -118,8 +118,8 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
     most, least = max(-rate, -history.rate[0] * left, 0.0), min(-rate, -history.rate[0] * left, 0.0)
     if first.deborah > deborah:  # the drift of elements that have been free since before the jump is u (1 - D / D_1)
         most = max(most, min(depth, first.depth * left) * (1 - deborah / first.deborah))
-    # if the velocity rises, elements that were free at the jump arrive with larger displacements than those before
-    # them; this is taken into account until half a window after the jump
+    # if the velocity rises, elements that were free at the jump arrive with larger displacements than the elements that
+    # passed earlier; this is taken into account until half a window after the jump
     rise, gains = 0.0, first.depth * (deborah / first.deborah - 1)
     for k in range(WINDOWS):
         duration = WINDOW / deborah * 2.0**k
