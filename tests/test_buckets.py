@@ -1,15 +1,11 @@
 """Studies in a bucket, of a real S3 server on the loopback: kills, two runners, a network that drops and stalls."""
 
 import os
-import signal
 import socket
 import socketserver
-import subprocess
-import sys
 import threading
 import time
-from contextlib import contextmanager, suppress
-from pathlib import Path
+from contextlib import suppress
 
 import pytest
 from killed_parts import run_with_kills, study
@@ -176,52 +172,6 @@ def test_a_server_that_does_not_answer_ends_a_run_in_one_sentence(toy, link, buc
     with pytest.raises(StoreError, match="the server has not answered for 1 s"):
         run(small(toy, 9), bucket)
     assert time.monotonic() - start < 15
-
-
-SCRIPT = """
-import sys
-sys.path.insert(0, {tests!r})
-import toy, time
-toy.install()
-from test_locks import small
-from mdr_dask import execute
-from mdr_dask.execute import Resources
-compute = toy.MODEL.compute
-object.__setattr__(toy.MODEL, "compute", lambda block: time.sleep(0.5) or compute(block))
-print("begun", flush=True)
-execute.run(small(toy, {count}), {url!r}, Resources(threads=2), lambda progress: print(progress.blocks, flush=True))
-"""
-
-
-@contextmanager
-def process(url: str, count: int):
-    code = SCRIPT.format(tests=str(Path(__file__).parent), count=count, url=url)
-    started = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
-    try:
-        yield started
-    finally:
-        started.kill()
-        started.communicate()
-
-
-def test_a_runner_that_is_killed_is_taken_over_when_it_is_silent(toy, bucket, url, monkeypatch, caplog):
-    run(small(toy, 40), url)
-    with process(bucket, 40) as first:
-        while first.stdout.readline().strip() not in ("2", "3"):
-            pass
-        with pytest.raises(StoreBusyError, match=rf"process {first.pid} on .* is running on this store"):
-            run(small(toy, 40), bucket)
-        first.send_signal(signal.SIGKILL)
-        first.wait()
-    monkeypatch.setattr(locks, "SILENCE", 0.5)
-    monkeypatch.setattr(locks, "BEAT", 0.2)
-    time.sleep(0.6)
-    progress = run(small(toy, 40), bucket)
-    assert progress.kept > 0
-    assert progress.kept + progress.done == 80
-    assert f"sign of life of process {first.pid}" in caplog.text
-    assert chunks(bucket) == chunks(url)
-    assert store.verify(bucket).findings == []
 
 
 def test_parts_in_a_bucket_are_kept_apart_and_may_be_killed(toy, bucket, url):

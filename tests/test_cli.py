@@ -184,18 +184,6 @@ def test_killed_at_any_moment_a_run_ends_with_the_same_bytes(campaign, tmp_path)
 
 
 @pytest.mark.slow
-def test_threads_and_worker_processes_give_the_same_bytes(campaign, tmp_path):
-    campaign.write_text(CAMPAIGN + "store: {path: x, blocks: {realisation: 2}}\n")
-    for name, options in {"threads": ["--threads", "2"], "processes": ["--workers", "2"]}.items():
-        subprocess.run(
-            command("run", str(campaign), "--quiet", "--store", f"{name}.zarr", *options),
-            check=True,
-            capture_output=True,
-        )
-    assert digests("threads.zarr") == digests("processes.zarr")
-
-
-@pytest.mark.slow
 def test_a_running_scheduler_and_a_cluster_file_are_used(campaign, tmp_path):
     from distributed import LocalCluster
 

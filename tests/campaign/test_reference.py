@@ -69,16 +69,6 @@ def test_reference_names_every_key_parameter_and_output(rubbing, monkeypatch):
     assert "| `moduli` | Pa | [1000000] | list, each: number | moduli of the Prony series |" in page
 
 
-def test_rows_say_what_a_command_prints(rubbing):
-    rows = {row["parameter"]: row for row in reference.parameter_rows(rubbing)}
-    assert rows["oversampling"]["allowed"] == "whole number ≥ 1 or auto"
-    assert rows["indenter"]["default"] == "{shape: plane}"
-    assert rows["profile"] | {"meaning": ""} == {
-        "parameter": "profile", "unit": "", "default": "", "allowed": "string", "meaning": ""
-    }  # fmt: skip
-    assert [row["output"] for row in reference.output_rows(rubbing)] == [output.name for output in rubbing.outputs]
-
-
 def test_tables_have_as_many_cells_in_every_row(rubbing, monkeypatch):
     monkeypatch.setattr(models, "NAMES", (rubbing.name,))
     tables = re.findall(r"(?:^\|.*\n)+", reference.reference_page(), flags=re.MULTILINE)

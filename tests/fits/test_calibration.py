@@ -14,7 +14,6 @@ from mdr_dask.cli import main
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits import available
 from mdr_dask.fits.calibration import LEAST, calibrate, calibration, summary
-from mdr_dask.fits.identifiability import written
 
 AXES = {
     "normal_force": (np.geomspace(0.1, 10, 5), "N"),
@@ -263,9 +262,3 @@ def test_an_unknown_error_of_measurement_is_estimated(given):
     assert len(estimated) == (not given)
     if not given:  # equal shares were planted; forty residuals determine their size to an eighth
         assert found["relative_measurement_error"].item() == pytest.approx(0.03, rel=0.35)
-
-
-def test_a_product_is_written_in_halves_and_thirds():
-    """And in a decimal number where it is neither."""
-    powers = np.array([1.0, 2.0, 0.5, -1 / 3, 0.25, 0.0])
-    assert written("abcdef", powers) == "a x b^2 x c^(1/2) x d^(-1/3) x e^0.25"

@@ -138,7 +138,7 @@ ODD = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("odd", ODD)
-@pytest.mark.parametrize("study", ["jumps", "jumps of three sizes on a scan", "lengths and points"])
+@pytest.mark.parametrize("study", ["jumps", "jumps of three sizes on a scan", "spectrum"])
 def test_fits_accept_unusual_numbers_without_a_warning(study, odd, tmp_path):
     """They give constants with wide intervals, constants without intervals, or one sentence."""
     text, special, _ = STUDIES[study]

@@ -180,11 +180,6 @@ def test_failed_realisations_are_left_out() -> None:
     assert np.allclose(found["rate"], whole["rate"])
 
 
-def test_a_missing_output_is_named() -> None:
-    with pytest.raises(FitError, match="rms_slope"):
-        FIT["jump_law"].compute({"": store(ABOVE, 0.7, 0.3).drop_vars("rms_slope")})
-
-
 def test_a_limit_is_not_tested_with_one_realisation() -> None:
     data = store(np.array([1e-6, 2e-6]), 0.7, 0.3, realisations=5)
     levels = [name for name in data.data_vars if name.startswith("friction_coefficient")]

@@ -94,21 +94,8 @@ def test_oscillation_slower_and_faster_than_relaxation(
     check(protocol=swing, normal_force=force)
 
 
-@pytest.mark.parametrize("velocity", [1e-6, 0.05, 10.0])
-@pytest.mark.parametrize("duration", [1e-9, 1.0])
-def test_ramps_like_jumps_and_like_nothing(velocity: float, duration: float) -> None:
-    check(protocol={"shape": "ramp", "start": "rest", "duration": duration, "velocity": velocity, "force": 1e-6})
-
-
 @pytest.mark.parametrize("hurst", [0.0, 1.0])
 @pytest.mark.parametrize("roughness", [1e-12, 1e-3])
 def test_nearly_flat_and_very_rough_lines(hurst: float, roughness: float) -> None:
     steps = {"shape": "steps", "times": [0.0], "velocities": [0.06]}
     check(protocol=steps, hurst=hurst, rms_roughness=roughness)
-
-
-def test_fifty_terms_end_in_their_steady_state() -> None:
-    steps = {"shape": "steps", "times": [0.0], "velocities": [0.06]}
-    values, status, _ = solved(protocol=steps, relaxation_times=(1.0, 40.0), oversampling=8, **of("prony"))
-    assert status == Status.DONE
-    assert values["friction_coefficient"][-1] == pytest.approx(values["friction_coefficient_after"], rel=1e-2)
