@@ -252,8 +252,8 @@ def test_a_second_process_is_refused_until_the_first_has_ended(campaign, capsys)
     assert main(["run", str(campaign), "--quiet"]) == 2
     assert f"process {second.pid} on " in capsys.readouterr().err
     second.terminate()
-    second.communicate(timeout=PATIENCE)
-    assert second.returncode == 130
+    _, errors = second.communicate(timeout=PATIENCE)
+    assert second.returncode == 130, errors
 
 
 def test_dry_run_on_a_store_counts_what_remains(campaign, filled, capsys):
