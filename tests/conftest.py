@@ -33,9 +33,10 @@ def pytest_collection_modifyitems(items):
     """Run slow tests first, so that no worker is idle in the end, and then the tests of solvers.
 
     pytest-xdist gives the first half of the tests to the first of two workers. It compiles most kernels, and the other
-    worker finds them in the cache.
+    worker finds them in the cache. Kernels that take longest to compile, and that the other half needs, come first.
     """
-    rooms = {TESTS / room: rank for rank, room in enumerate(("physics", "models", "fits"))}
+    first = ("physics/superposition", "physics/transients", "physics", "models", "fits")
+    rooms = {TESTS / room: rank for rank, room in enumerate(first)}
 
     def order(item):
         rank = min((rooms[parent] for parent in item.path.parents if parent in rooms), default=len(rooms))
