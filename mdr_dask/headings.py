@@ -6,44 +6,44 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
+from mdr_dask.errors import did_you_mean
 from mdr_dask.units import conversion, is_unit
 
-#: Further names of quantities. A `Column` whose name is a key here also has the names listed under this key.
-SYNONYMS = {
-    name: tuple(text.split(", "))
-    for name, text in {
-        "temperature": "T, temp, sample temperature, temperature sample, ts, tr, temperatur",
-        "frequency": "f, freq, omega, w, ω, angular frequency, frequency angular, frequenz, kreisfrequenz",
-        "time": "t, step time, test time, zeit",
-        "velocity": "v, speed, sliding velocity, sliding speed, load point velocity, geschwindigkeit, "
-        "gleitgeschwindigkeit",
-        "storage modulus": "e', g', storage, e storage, g storage, e stor, g stor, e1, g1, speichermodul",
-        "loss modulus": "e'', g'', loss, e loss, g loss, e2, g2, verlustmodul",
-        "modulus": "relaxation modulus, e relax, g relax, e(t), g(t), e, g",
-        "compliance": "creep compliance, j, j(t)",
-        "tan delta": "tan(delta), tan d, tan δ, tandelta, tan(δ), loss factor, damping factor, verlustfaktor",
-        "friction coefficient": "coefficient of friction, coefficient, friction, mu, μ, cof, reibwert, "
-        "reibungskoeffizient, reibungszahl",
-        "normal force": "force, load, normal load, f n, fn, F, kraft, normalkraft",
-        "kinematic viscosity": "nu, ν, viscosity, kinematische viskosität, viskosität",
-        "dynamic viscosity": "eta, η, mu, viscosity, dynamische viskosität, viskosität",
-        "wavenumber": "q, k, wave number, wavevector, wave vector",
-        "wavelength": "lambda, λ",
-        "C2D": "C, c iso, areal spectrum, psd 2d, psd, c(q)",
-        "C1D": "C, line spectrum, psd 1d, psd, c(q)",
-        "x": "X, position, distance, length, weg",
-        "height": "z, Z, h, höhe",
-        "wear volume": "worn volume, verschleißvolumen",
-    }.items()
-}
+#: Each line contains names of one quantity. The case of letters matters only in names of one letter.
+SYNONYMS = tuple(
+    tuple(line.split(", "))
+    for line in """\
+temperature, T, temp, temperatur, ts, tr
+frequency, f, freq, omega, w, ω, angular frequency, frequency angular, frequenz, kreisfrequenz
+time, t, zeit
+velocity, v, speed, sliding velocity, sliding speed, load point velocity, geschwindigkeit, gleitgeschwindigkeit
+rotation speed, rotational speed, angular velocity, speed, drehzahl
+storage modulus, e', g', storage, e storage, g storage, e stor, g stor, e1, g1, speichermodul
+loss modulus, e'', g'', loss, e loss, g loss, e2, g2, verlustmodul
+modulus, relaxation modulus, e relax, g relax, e(t), g(t), E, G
+compliance, creep compliance, J, j(t)
+tan delta, tan d, tan δ, loss factor, damping factor, verlustfaktor
+friction coefficient, coefficient of friction, friction, coefficient, mu, μ, cof, reibwert, reibungszahl
+normal force, force, load, normal load, f n, F, kraft, normalkraft
+kinematic viscosity, nu, ν, viscosity, kinematische viskosität, viskosität
+dynamic viscosity, eta, η, mu, viscosity, dynamische viskosität, viskosität
+wavenumber, q, k, wave number, wavevector, wave vector
+wavelength, lambda, λ
+C2D, C, c iso, areal spectrum, psd 2d, psd, c(q)
+C1D, C, line spectrum, psd 1d, psd, c(q)
+x, X, position, distance, length, weg
+height, z, Z, h, höhe
+wear volume, worn volume, verschleißvolumen
+""".splitlines()
+)  # fmt: skip
+#: Words in front of or behind the name of a quantity that do not change its meaning.
+IGNORED = {"mean", "average", "avg", "mittel", "sample", "test", "step", "measured"}
 #: Units that may be joined to a name, as in ``freq_hz``, by their spelling in lower case.
-JOINED = {unit.casefold(): unit for unit in ("Pa", "kPa", "MPa", "GPa", "Hz", "K", "N")} | {"c": "degC", "f": "degF"}
-_ALIKE = str.maketrans({"’": "'", "′": "'", "″": "''", '"': "''", "µ": "μ", "δ": "δ"})
-#: A name followed by its symbol, as in ``Storage modulus G'`` or ``force (F)``.
-_WITH_SYMBOL = re.compile(r"(.+?)\s*(?:\(([^()]+)\)|\s(\S['\"’′″]*))")
-#: The end of an abbreviated word, as in ``Ang. frequency``.
-_ABBREVIATED = re.compile(r"(?<=\w{3})\.")
+JOINED = {unit.casefold(): unit for unit in ("Pa", "kPa", "MPa", "GPa", "mPa", "Hz", "K", "N")} | {"f": "degF"}
+JOINED |= {"c": "degC"}
+_ALIKE = str.maketrans({"’": "'", "′": "'", "″": "''", '"': "''", "µ": "μ"})
 #: Two forms of a heading: a name with its unit in brackets, and a name with its unit after a slash, a comma or "in".
 _BRACKETED = re.compile(r"(.+?)[\s,/]*([\[({<])([^\])}>]*)[\])}>]")
 _BEHIND = re.compile(r"(.+?)\s*(?:/|,|\bin\b)\s*(\S.*)")
@@ -60,7 +60,7 @@ class Column:
     unit : str
         SI unit of the result, ``"1"`` for a pure number. For angular frequencies (``rad/s``) a table may use Hz or rpm.
     other_names : tuple of str
-        Further names. Case, blanks and punctuation are ignored, except in names of one letter.
+        Further names.
     needed : bool
         Whether a table must have this column.
     above, least : float, optional
@@ -83,25 +83,52 @@ class Column:
         return is_called(heading, self.name, *self.other_names)
 
 
+def plain(name: str) -> str:
+    """Return a name in lower case, with single blanks instead of punctuation, and one kind of prime.
+
+    The case of a single letter is kept: t is a time, T a temperature.
+    """
+    name = re.sub(r"[\s_.\-:()|]+", " ", name.translate(_ALIKE)).strip()
+    return name if len(name) == 1 else name.casefold()
+
+
+def _key(name: str) -> str:
+    """Return a name without blanks and without the words that do not change its meaning."""
+    words = plain(name).split()
+    return "".join([word for word in words if word not in IGNORED] or words)
+
+
+@lru_cache(maxsize=1024)
+def _names_of(*names: str) -> list[str]:
+    """Return names and all their synonyms."""
+    keys = {_key(name) for name in names}
+    return [*names, *(each for line in SYNONYMS if keys & set(map(_key, line)) for each in line)]
+
+
 def is_called(heading: str, *names: str) -> bool:
     """Return whether a heading is one of the names or a synonym, perhaps abbreviated or followed by a symbol.
 
     For example, ``Storage modulus G'`` and ``Stor. mod.`` are names of the storage modulus.
     """
-    known = [each for name in names for each in (name, *SYNONYMS.get(plain(name), ()), *SYNONYMS.get(name, ()))]
-    if len(heading.strip()) == 1:
-        return heading.strip().translate(_ALIKE) in known
-    if plain(heading) in {plain(name) for name in known}:
+    known = _names_of(*names)
+    if _key(heading) in map(_key, known):
         return True
-    if found := _WITH_SYMBOL.fullmatch(heading.strip()):
-        return is_called(found[1], *names) and is_called(found[2] or found[3], *names)
-    parts = [re.escape(plain(part)) for part in _ABBREVIATED.split(heading)]
+    name, _, symbol = re.sub(r"[()]", " ", heading).strip().rpartition(" ")
+    if name and is_called(name, *names) and is_called(symbol, *names):
+        return True
+    parts = [re.escape(plain(part)) for part in re.split(r"(?<=\w{3})\.", heading)]
     return len(parts) > 1 and any(re.fullmatch(r"\w* ?".join(parts), plain(name)) for name in known)
 
 
-def plain(name: str) -> str:
-    """Return a name in a standard form: lower case, single blanks, no punctuation, one kind of prime."""
-    return re.sub(r"[\s_.\-:]+", " ", name.strip().casefold().translate(_ALIKE)).strip()
+def nearest(heading: str, names: Sequence[str]) -> str:
+    """Return a hint with the name that is nearest to a heading: a similar name, or one with a word in common.
+
+    The hint is empty if there is no such name.
+    """
+    words = {word for word in plain(heading).split() if len(word) > 2}
+    similar = did_you_mean(heading, names)
+    common = [name for name in names if any(words & set(plain(each).split()) for each in _names_of(name))]
+    return similar if "mean" in similar else f" (did you mean {common[0]!r}?)" if common else ""
 
 
 def split_unit(heading: str) -> tuple[str, str]:
@@ -113,28 +140,29 @@ def split_unit(heading: str) -> tuple[str, str]:
     found = _BRACKETED.fullmatch(heading.strip())
     if found:
         name, text = found[1].strip(" ,"), found[3].strip()
-        is_symbol = any(is_called(name, quantity) and is_called(text, quantity) for quantity in SYNONYMS)
-        looks = text == "-" or re.match(r"deg|°|1/|%", text) or is_unit(text)
-        return (name, text) if found[2] == "[" or (looks and not is_symbol) else (heading, "")
+        looks = text in ("-", "1") or re.match(r"deg|°|1/|%", text) or is_unit(text)
+        return (name, text) if found[2] == "[" or (looks and not is_called(text, name)) else (heading, "")
     found = _BEHIND.fullmatch(heading.strip())
-    return (found[1], found[2]) if found and is_unit(found[2]) else (heading, "")
+    return (found[1], found[2]) if found and (found[2] in ("-", "1") or is_unit(found[2])) else (heading, "")
 
 
 def match(name: str, unit: str, columns: Sequence[Column]) -> tuple[Column | None, str]:
-    """Return the column that a name means, and its unit, which may be part of the name (``freq_hz``).
+    """Return the column that a name means, and its unit, which may be part of the name (``freq_hz``, ``v_mm_s``).
 
     The column is None if the name fits none of the columns.
     """
-    front, _, behind = name.replace(" ", "_").rpartition("_")
-    readings = [(name, unit)]
-    if front and not unit:
-        readings.append((front, JOINED.get(behind.casefold(), behind)))
-    for reading, written in readings:
-        fitting = [each for each in columns if each.holds(reading) and (reading == name or _fits(written, each))]
-        best = [each for each in fitting if _fits(written, each)] or fitting
-        if best:
-            return best[0], written
-    return None, unit
+    fitting = [column for column in columns if column.holds(name)]
+    if fitting:
+        return next((column for column in fitting if _fits(unit, column)), fitting[0]), unit
+    words = re.split(r"[\s_]", name)
+    for count in range(len(words) - 1, 0, -1) if not unit else ():
+        behind = [JOINED.get(word.casefold(), word) for word in words[count:]]
+        for joined in (" ".join(behind), "/".join(behind)):
+            for column in columns:
+                if column.holds(" ".join(words[:count])) and _fits(joined, column):
+                    return column, joined
+    written = _BRACKETED.fullmatch(name)  # an unknown unit in round brackets
+    return match(written[1], written[3], columns) if written and not unit else (None, unit)
 
 
 def _fits(unit: str, column: Column) -> bool:
@@ -148,7 +176,7 @@ def _fits(unit: str, column: Column) -> bool:
 def factors(unit: str, wanted: str) -> tuple[float, float, float]:
     """Return numbers p, q and z: a number x in a unit is p (q x + z) in the SI unit `wanted`.
 
-    If an angular frequency is wanted, p is 2 pi for Hz, and 1/s counts as rad/s.
+    If an angular frequency is wanted, p is 2 pi for Hz and 1/min (revolutions per minute); 1/s counts as rad/s.
     """
     if not unit:
         return 1.0, 1.0, 0.0
@@ -157,5 +185,5 @@ def factors(unit: str, wanted: str) -> tuple[float, float, float]:
     except ValueError:
         if not wanted.startswith("rad/"):
             raise
-        turns = 2 * math.pi if "hz" in unit.lower() else 1.0
+        turns = 2 * math.pi if re.search("hz|min", unit.lower()) else 1.0
         return turns, *conversion(unit, wanted.replace("rad", "1"))

@@ -15,6 +15,7 @@ import csv
 import io
 import math
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,9 +24,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdr_dask.arrays import BoolArray, FloatArray, IntArray
-from mdr_dask.errors import DataError, did_you_mean
-from mdr_dask.headings import Column, factors, is_called, match, plain, split_unit
+from mdr_dask.arrays import BoolArray, FloatArray
+from mdr_dask.errors import DataError
+from mdr_dask.headings import Column, factors, is_called, match, nearest, plain, split_unit
 from mdr_dask.units import example_unit, in_degrees, is_unit, scaled
 
 COMMENT = "#%"
@@ -33,8 +34,6 @@ BLANKS = r"\s+"
 SEPARATORS = ("\t", ";", ",", BLANKS)
 #: Start of the line that precedes each sheet of a workbook; the name of the sheet follows.
 SHEET = "# sheet of a workbook: "
-#: Largest number of problems of one table that are shown.
-MOST_SHOWN = 10
 #: Two columns of one quantity agree if their relative difference is at most this. Instruments print three digits.
 AGREE = 0.01
 NO_ROWS = "expected a line of names and at least one line of values"
@@ -43,7 +42,8 @@ NO_ROWS = "expected a line of names and at least one line of values"
 _LOGARITHM = re.compile(r"(?:log10|log|lg)(?:[\s_]+|\s*(?=\())(.+)", re.IGNORECASE)
 _NUMBER = re.compile(r"(?=.{1,60}\Z)[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}([.,' ]\d{3})+([.,]\d+)?")
-_STATED = re.compile(r"(?<![a-z])t(?:emp[a-z]*)?\.?\s*[=:]?\s*([+-]?\d+(?:[.,]\d+)?)\s*(°\s?[CF]|deg[CF]|K)\b", re.I)
+_TEMPERATURE = r"([+-]?\d+(?:[.,]\d+)?)\s*(°\s?[CF]|deg[CF]|K)\b"
+_STATED = re.compile(rf"(?<![a-z])t(?:emp[a-z]*)?\.?\s*[=:]?\s*{_TEMPERATURE}", re.IGNORECASE)
 _MISSING = re.compile(
     r"(?=.{0,20}\Z)[\s.,/*#_<>–—-]*(n[\s.,/]*a[.,]?n?|no[\s_]*data|null|none)?[\s.,/*#_<>–—-]*", re.IGNORECASE
 )
@@ -95,12 +95,8 @@ class TableError(DataError):
         return found
 
     def __str__(self) -> str:
-        source, problems = self.args
-        lines = [
-            f"{source}:{line}:{column}: {what}" if line else f"{source}: {what}" for line, column, what in problems
-        ]
-        more = [f"{source}: {len(lines) - MOST_SHOWN} more problems"] if len(lines) > MOST_SHOWN else []
-        return "\n".join([*lines[:MOST_SHOWN], *more])
+        source = self.args[0]
+        return "\n".join(f"{source}:{f'{at}:{column}:' if at else ''} {what}" for at, column, what in self.problems)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,6 +165,8 @@ def decoded(content: bytes, source: str) -> str:
         return _workbook(content, source)
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return content.decode("utf-16", errors="replace")
+    if content[1:2] == b"\0" or content[:1] == b"\0":  # without a byte-order mark
+        return content.decode("utf-16-le" if content[:1] != b"\0" else "utf-16-be", errors="replace")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -202,6 +200,8 @@ def _workbook(content: bytes, source: str) -> str:
 def _lines(text: str) -> list[Line]:
     """Return the lines of a text that are not empty."""
     lines, sheet, before = [], "", 0
+    # a name between quotation marks may contain the end of a line
+    text = re.sub(r'(?:^|(?<=[\n;,\t]))"[^"]*"(?=[;,\t\r\n])', lambda found: re.sub(r"\s+", " ", found[0]), text)
     for number, line in enumerate(text.lstrip("\ufeff").splitlines(), 1):
         if line.startswith(SHEET):
             sheet, before = line.removeprefix(SHEET), number
@@ -220,28 +220,26 @@ def _split(line: str, separator: str) -> list[str]:
 
 
 def _separator(lines: Sequence[str]) -> str:
-    """Return the separator with which most lines contain several numbers.
+    """Return the separator with which most lines contain several numbers, or else the one that most lines contain.
 
-    If there are no such lines, return the separator that most lines contain.
+    Commas and blanks count half, because commas also occur in numbers, and blanks between a number and its unit.
     """
 
     def has_numbers(line: str, mark: str) -> bool:
-        if mark != BLANKS and mark not in line:
-            return False
-        filled = [cell for cell in _split(line, mark) if cell]
+        filled = [cell for cell in _split(line, mark) if cell] if mark == BLANKS or mark in line else []
         count = sum(bool(_NUMBER.fullmatch(cell)) for cell in filled)
         return count > 1 and 2 * count >= len(filled)
 
-    several = {mark: [has_numbers(line, mark) for line in lines] for mark in SEPARATORS}
-    best = max(SEPARATORS, key=lambda mark: sum(several[mark]))
-    if not any(several[best]):
+    several = {
+        mark: sum(has_numbers(line, mark) for line in lines) * (2 if mark in "\t;" else 1) for mark in SEPARATORS
+    }
+    best = max(SEPARATORS, key=lambda mark: several[mark])
+    if not several[best]:
         best = max(SEPARATORS[:3], key=lambda mark: sum(mark in line for line in lines))
         return best if any(best in line for line in lines) else ","
-    first = several[best].index(True)
-    is_one_column = (
-        first and "," not in lines[first - 1] and all(_NUMBER.fullmatch(each.strip()) for each in lines[first:])
-    )
-    return ";" if best == "," and is_one_column else best  # one column of numbers with decimal commas
+    if best == "," and all(_NUMBER.fullmatch(line.strip()) for line in lines[1:]) and "," not in lines[0]:
+        return ";"  # one column of numbers with decimal commas
+    return best
 
 
 def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = None) -> Sheet:
@@ -273,7 +271,8 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
     cells = _with_points(grid, rows)[:, : len(units)]
     first = grid.lines[rows[0] if head.names is None else head.names]
     sheet = Sheet(source, names, units, cells, tuple(grid.lines[row] for row in rows), first, notes)
-    if _are_pairs(names):
+    known = [plain(name) for name in names]
+    if len(names) >= 4 and known == known[:2] * (len(names) // 2):
         return _from_pairs(grid, sheet, head.labels)
     if not names or not all(stated) or any(is_called(name, "temperature") for name in names):
         return sheet
@@ -299,14 +298,20 @@ class _Grid:
     cells: Cells
     lines: tuple[Line, ...]
     comments: tuple[Line, ...]
-    length: IntArray
+    length: NDArray[np.int64]
     filled: BoolArray
     number: BoolArray
     word: BoolArray
 
-    def error(self, row: int, column: int, what: str) -> TableError:
-        """Return an error at a cell."""
-        return TableError(self.source, [self.lines[row].problem(column, what)])
+    def require(self, wrong: Sequence[int], column: int, what: str) -> None:
+        """Raise TableError with the first of the wrong lines, and the number of the others."""
+        if len(wrong):
+            raise TableError(self.source, [self.lines[wrong[0]].problem(column, what + _further(len(wrong)))])
+
+
+def _further(count: int) -> str:
+    """Return a text with the number of lines in which a problem occurs, except the first one."""
+    return f" (and in {count - 1} more line{'s' if count > 2 else ''})" if count > 1 else ""
 
 
 def _grid(source: str, every: Sequence[Line]) -> _Grid:
@@ -316,15 +321,14 @@ def _grid(source: str, every: Sequence[Line]) -> _Grid:
     if not texts:
         raise TableError(source, [Problem(1, 1, NO_ROWS)])
     separator = _separator([line.text for line in texts])
-    lines = tuple(line._replace(separator=separator) for line in texts)
-    rows = [_split(line.text, separator) for line in lines]
-    filled = [place for row in rows for place, cell in enumerate(row) if cell]
-    width = 1 + max(filled, default=0)  # without the separators at the ends of all lines
+    rows = [_split(line.text, separator) for line in texts]
+    width = 1 + max((place for row in rows for place, cell in enumerate(row) if cell), default=0)
     cells = np.array([[*row[:width], *[""] * (width - len(row))] for row in rows], dtype=object)
-    length = np.array([min(len(row), width) for row in rows])
     number = np.array([[bool(_NUMBER.fullmatch(cell)) for cell in row] for row in cells])
     word = ~number
     word[word] = [not _MISSING.fullmatch(cell) for cell in cells[word]]
+    length = np.array([min(len(row), width) for row in rows])
+    lines = tuple(line._replace(separator=separator) for line in texts)
     return _Grid(source, cells, lines, comments, length, cells != "", number, word)
 
 
@@ -347,12 +351,14 @@ class _Head(NamedTuple):
 def _head(grid: _Grid) -> _Head:
     """Find the names and units.
 
-    Among the lines of text above the numbers, they are the last ones with as many cells as most lines of the table.
+    They are lines of text above the numbers with as many cells as most lines of the table. The line above the last line
+    of units contains the names. Without such a line, the last line contains the names, and perhaps the one above it the
+    units.
     """
     data, numeric = _lines_of_numbers(grid)
     full = np.flatnonzero(data & (grid.length == numeric.size))
     if not full.size:
-        raise grid.error(-1, 0, NO_ROWS)
+        grid.require([len(grid.cells) - 1], 0, NO_ROWS)
     begin = int(full[0])
     above = [row for row in range(begin) if not data[row]]
     if not above and begin + 2 < data.size and not data[begin + 1]:  # numbers above the names of pairs of columns
@@ -360,10 +366,12 @@ def _head(grid: _Grid) -> _Head:
     if not above:
         return _Head(None, None, None, begin, numeric, data)
     wide = [row for row in above if grid.length[row] == numeric.size] or above[-1:]
-    names, units = wide.pop(), None
-    if wide and _are_units(grid.cells[names]):
-        names, units = wide.pop(), names
-    return _Head(names, units, wide[-1] if wide else None, above[-1] + 1, numeric, data)
+    units = next((row for row in wide[:0:-1] if _are_units(grid.cells[row])), None)
+    if units is not None:
+        wide = wide[: wide.index(units)]
+    elif len(wide) > 1 and _are_units(grid.cells[wide[-2]]):
+        units = wide.pop(-2)
+    return _Head(wide[-1], units, wide[-2] if len(wide) > 1 else None, above[-1] + 1, numeric, data)
 
 
 def _lines_of_numbers(grid: _Grid) -> tuple[BoolArray, BoolArray]:
@@ -377,31 +385,29 @@ def _lines_of_numbers(grid: _Grid) -> tuple[BoolArray, BoolArray]:
     """
     mostly = grid.number.any(axis=1) & (grid.number.sum(axis=1) >= grid.word.sum(axis=1))
     mostly = mostly if mostly.any() else grid.number.any(axis=1)  # tables with more columns of words than of numbers
-    lengths = [int(length) for length in grid.length[mostly]] or [0]
-    width = max(lengths, key=lambda each: (lengths.count(each), each))
-    numeric = np.zeros(grid.cells.shape[1], dtype=bool)
+    lengths = Counter(grid.length[mostly].tolist() or [0])
+    width = max(lengths, key=lambda each: (lengths[each], each))
+    numeric = np.zeros(width, dtype=bool)
     if mostly.any():
-        numeric[:width] = grid.number[mostly & (grid.length == width), :width].mean(axis=0) >= 0.5
+        numeric = grid.number[mostly & (grid.length == width), :width].mean(axis=0) >= 0.5
+    wide = np.append(numeric, np.zeros(grid.cells.shape[1] - width, dtype=bool))
     first = grid.filled.argmax(axis=1)
     begins = np.array([bool(_WORD.match(row[column])) for row, column in zip(grid.cells, first, strict=True)])
     share = 2 * grid.filled.sum(axis=1)
-    is_text = begins & (numeric[first] | (share < width) | ((share == width) & (grid.length < width)))
-    filled = grid.filled[:, numeric].sum(axis=1)
-    words = grid.word[:, numeric].sum(axis=1)
-    has_numbers = (2 * words <= filled) & grid.number[:, numeric].any(axis=1)
-    return np.asarray((filled > 0) & (has_numbers | (words == 0)) & ~is_text), numeric[:width]
+    is_text = begins & (wide[first] | (share < width) | ((share == width) & (grid.length < width)))
+    filled, words = (marks[:, wide].sum(axis=1) for marks in (grid.filled, grid.word))
+    has_numbers = (2 * words <= filled) & grid.number[:, wide].any(axis=1)
+    return np.asarray((filled > 0) & (has_numbers | (words == 0)) & ~is_text), numeric
 
 
 def _head_of_words(grid: _Grid, is_name: Callable[[str], bool]) -> _Head:
     """Find the names of a table whose entries may be words: the first line with a known name."""
     count = len(grid.cells)
     names = next((row for row in range(count) if any(is_name(split_unit(cell)[0]) for cell in grid.cells[row])), 0)
-    if grid.number[names].any():
-        raise grid.error(names, 0, "expected a line of names")
+    grid.require([names] if grid.number[names].any() else [], 0, "expected a line of names")
     units = names + 1 if names + 1 < count and _are_units(grid.cells[names + 1]) else None
     begin = names + 1 if units is None else units + 1
-    if begin == count:
-        raise grid.error(names, 0, NO_ROWS)
+    grid.require([names] if begin == count else [], 0, NO_ROWS)
     numeric = np.asarray(grid.number[begin:].mean(axis=0) >= 0.5)
     return _Head(names, units, None, begin, numeric, np.ones(count, dtype=bool))
 
@@ -427,15 +433,10 @@ def _body(grid: _Grid, head: _Head) -> tuple[list[int], list[tuple[str, str] | N
         between = []
     first = grid.filled.argmax(axis=1)
     wrong += [row for row in between if grid.number[row, first[row]]]
-    problems = []
-    for row in wrong:
-        words = np.flatnonzero(grid.word[row])
-        in_numbers = [place for place in words if place < head.numeric.size and head.numeric[place]]
-        column = next(iter([*in_numbers, *words]), 0)
-        what = f"expected a line of numbers, got {grid.cells[row, column][:60]!r}"
-        problems.append(grid.lines[row].problem(int(column), what))
-    if problems:
-        raise TableError(grid.source, problems)
+    if wrong:
+        words = np.flatnonzero(grid.word[wrong[0]])
+        column = int(next(iter([*(place for place in words if head.numeric[place : place + 1].any()), *words]), 0))
+        grid.require(wrong, column, f"expected a line of numbers, got {grid.cells[wrong[0], column][:60]!r}")
     return kept, stated, tuple(grid.cells[row, first[row]] for row in between)
 
 
@@ -473,19 +474,21 @@ def _names_in_comment(grid: _Grid, head: _Head) -> list[str]:
 
 
 def _require_even(grid: _Grid, rows: Sequence[int], width: int, head: _Head) -> None:
-    """Raise TableError for lines that lack a number, or have more cells than there are names."""
-    problems = []
+    """Raise TableError if a line lacks a number, or has more cells than there are names."""
     first = grid.lines[rows[0] if head.names is None else head.names]
-    for row in rows:
-        length = int(grid.length[row])
-        has_blanks = length < width > head.numeric.size and first.separator == BLANKS
-        if grid.filled[row, width:].any() or head.numeric[length:width].any() or has_blanks:
-            hint = " (put semicolons between the values if they have decimal commas)" if length > width else ""
-            hint = " (write names without blanks, or put tabs between the columns)" if has_blanks else hint
-            what = f"expected {width} values as in {first}, got {length}{hint}"
-            problems.append(grid.lines[row].problem(0, what))
-    if problems:
-        raise TableError(grid.source, problems)
+    blanks = width > head.numeric.size and first.separator == BLANKS  # names with blanks between blanks
+    wrong = [
+        row
+        for row in rows
+        if grid.filled[row, width:].any()
+        or head.numeric[grid.length[row] : width].any()
+        or (blanks and grid.length[row] < width)
+    ]
+    if wrong:
+        length = int(grid.length[wrong[0]])
+        hint = " (put semicolons between the values if they have decimal commas)" if length > width else ""
+        hint = " (write names without blanks, or put tabs between the columns)" if blanks else hint
+        grid.require(wrong, 0, f"expected {width} values as in {first}, got {length}{hint}")
 
 
 def _with_points(grid: _Grid, rows: Sequence[int]) -> Cells:
@@ -495,41 +498,34 @@ def _with_points(grid: _Grid, rows: Sequence[int]) -> Cells:
     commas, points = ([place for place in places if mark in cells[place]] for mark in ",.")
     if commas and points:
         (row, column), comma = points[0], commas[0]
-        raise grid.error(
-            rows[row],
-            column,
+        what = (
             f"expected decimal commas or decimal points, got both ({cells[points[0]]!r}, and {cells[comma]!r} in "
-            f"{grid.lines[rows[comma[0]]]}): remove the separators of thousands, and write one kind of decimals",
+            f"{grid.lines[rows[comma[0]]]}): remove the separators of thousands, and write one kind of decimals"
         )
+        grid.require([rows[row]], column, what)
     for place in commas:
         cells[place] = cells[place].replace(",", ".")
     return cells
-
-
-def _are_pairs(names: Sequence[str]) -> bool:
-    """Return whether the names are the same two names, repeated."""
-    known = [plain(name) for name in names]
-    return len(known) >= 4 and len(known) % 2 == 0 and known == known[:2] * (len(known) // 2)
 
 
 def _from_pairs(grid: _Grid, sheet: Sheet, labels: int | None) -> Sheet:
     """Return pairs of columns as three columns; the third contains the temperature above each pair."""
     count = len(sheet.names) // 2
     above = [] if labels is None else [cell for cell in grid.cells[labels] if cell]
-    found = [re.match(r"\D*?([+-]?\d+(?:[.,]\d+)?)[\s\])(\[]*([^\])]*)", cell) for cell in above]
-    known = [each for each in found if each]
-    if not len(known) == len(found) == count:
+    known = [found for cell in above if (found := re.match(r"\D*?([+-]?\d+(?:[.,]\d+)?)[\s\])(\[]*([^\])]*)", cell))]
+    if not len(known) == len(above) == count:
         what = f"expected a temperature above each of the {count} pairs of columns, such as '20 degC'"
         raise TableError(sheet.source, [sheet.head.problem(0, what)])
-    cells, rows = [], []
-    for pair, of_pair in enumerate(known):
-        for line, two in zip(sheet.lines, sheet.cells[:, 2 * pair : 2 * pair + 2], strict=True):
-            if any(two):
-                cells.append([*two, of_pair[1].replace(",", ".")])
-                rows.append(line)
+    filled = [
+        (line, [*two, found[1].replace(",", ".")])
+        for place, found in enumerate(known)
+        for line, two in zip(sheet.lines, sheet.cells[:, 2 * place : 2 * place + 2], strict=True)
+        if any(two)
+    ]
+    lines, cells = zip(*filled, strict=True)
     units = (*sheet.units[:2], in_degrees(known[0][2]))
     names = (*sheet.names[:2], "temperature")
-    return replace(sheet, names=names, units=units, cells=np.array(cells, dtype=object), lines=tuple(rows))
+    return replace(sheet, names=names, units=units, cells=np.array(cells, dtype=object), lines=lines)
 
 
 def _are_units(row: Sequence[str]) -> bool:
@@ -538,7 +534,10 @@ def _are_units(row: Sequence[str]) -> bool:
     It is if at least half of its words are units, or if all are in square brackets.
     """
     filled = [text for text in row if text not in ("", "-", "--", "1", "[1]", "[-]")]
-    known = sum(is_unit(text.strip("[](){}<> ")) and not text[0].isdigit() for text in filled)
+    known = sum(
+        is_unit(text.strip("[](){}<> ")) and not _NUMBER.fullmatch(text) and not re.match(_TEMPERATURE, text)
+        for text in filled
+    )
     return bool(filled) and (2 * known >= len(filled) or all(re.fullmatch(r"\[.*\]", text) for text in filled))
 
 
@@ -589,8 +588,8 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
     Raises
     ------
     TableError
-        With all problems by line and column: missing or misspelt columns, two columns of one quantity that disagree,
-        missing or unknown units, entries that are not numbers, impossible values.
+        With all problems, at most one for each column: missing or misspelt columns, two columns of one quantity that
+        disagree, missing or unknown units, entries that are not numbers, impossible values.
     """
     sheet, read, problems = read_sheet(text, source), Read(), []
     meanings = matched(sheet, columns)
@@ -598,8 +597,7 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
     absent = [column for column in columns if column.name not in present]
     unknown = [(place, sheet.names[place]) for place, (column, _, _) in enumerate(meanings) if column is None]
     for place, name in unknown:
-        hint = did_you_mean(name, [column.name for column in absent])
-        if "mean" in hint:
+        if hint := nearest(name, [column.name for column in absent]):
             problems.append(sheet.head.problem(place, f"unknown column {name!r}{hint}"))
     taken: dict[str, int] = {}
     for place, (column, written, is_logarithm) in enumerate(meanings):
@@ -621,6 +619,8 @@ def read_table(text: str, source: str, columns: Sequence[Column], allow_missing:
     lacking = [column.name for column in absent if column.needed]
     if lacking and not problems:
         got = f", got {', '.join(name for _, name in unknown)[:200]}" if unknown else ""
+        if any(re.match(_TEMPERATURE, name) for _, name in unknown):
+            got += " (write the temperatures into a column of their own)"
         problems.append(sheet.head.problem(0, f"expected a column {' and a column '.join(lacking)}{got}"))
     if problems:
         raise TableError(source, sorted(problems, key=lambda problem: problem[:2]))
@@ -651,32 +651,35 @@ def _unit(written: str, column: Column) -> str:
 def _values(
     sheet: Sheet, place: int, column: Column, unit: str, is_logarithm: bool, allow_missing: bool
 ) -> tuple[FloatArray, list[Problem]]:
-    """Return the values of a column in SI, and the problems of its entries."""
-    values, problems = np.full(len(sheet.cells), np.nan), []
+    """Return the values of a column in SI, and a list with the first problem of its entries, if there is one."""
+    values, wrong = np.full(len(sheet.cells), np.nan), []
     before, factor, zero = factors(unit, column.unit)
-    for row, (line, text) in enumerate(zip(sheet.lines, sheet.cells[:, place], strict=True)):
-        if _NUMBER.fullmatch(text):
-            exact = repr(10.0 ** float(text)) if is_logarithm and abs(float(text)) < 300 else text
-            values[row] = before * (scaled(exact, factor) + zero)
-            wanted = _wanted(values[row], column)
-        elif allow_missing and _MISSING.fullmatch(text):
+
+    def limit(text: str, si: float) -> str:
+        return f"{text} {(si / before - zero) / factor:.6g}{f' {unit}' if si or zero else ''}"
+
+    for row, text in enumerate(sheet.cells[:, place]):
+        if allow_missing and not _NUMBER.fullmatch(text) and _MISSING.fullmatch(text):
             continue
-        else:
-            wanted = "a number"
-        if wanted:
-            shown = f"{text[:60]} {unit if wanted != 'a number' else ''}".strip()
+        if not _NUMBER.fullmatch(text):
             hint = " (remove the separators of thousands)" if _THOUSANDS.fullmatch(text) else ""
-            problems.append(line.problem(place, f"column {column.name}: expected {wanted}, got {shown!r}{hint}"))
+            hint = " (write errors in a column of their own)" if re.search("±|[+][/-]", text) else hint
+            wrong.append((row, f"expected a number, got {text[:60]!r}{hint}"))
+            continue
+        exact = repr(10.0 ** float(text)) if is_logarithm and abs(float(text)) < 300 else text
+        value = values[row] = before * (scaled(exact, factor) + zero)
+        got = repr(f"{text[:60]} {unit}".strip())
+        if not math.isfinite(value):
+            wrong.append((row, f"expected a finite number, got {got}"))
+        elif column.above is not None and not value > column.above:
+            wrong.append((row, f"expected {limit('a value above', column.above)}, got {got}"))
+        elif column.least is not None and not value >= column.least:
+            wrong.append((row, f"expected {limit('at least', column.least)}, got {got}"))
+    problems = [
+        sheet.lines[row].problem(place, f"column {column.name}: {what}{_further(len(wrong))}")
+        for row, what in wrong[:1]
+    ]
     return values, problems
-
-
-def _wanted(value: float, column: Column) -> str:
-    """Return the text that a message gives as expected instead of a value; empty if the value is possible."""
-    if not math.isfinite(value):
-        return "a finite number"
-    if column.above is not None and not value > column.above:
-        return f"a value above {column.above:g}"
-    return f"at least {column.least:g}" if column.least is not None and not value >= column.least else ""
 
 
 def numbers(sheet: Sheet) -> FloatArray:
@@ -689,19 +692,18 @@ def numbers(sheet: Sheet) -> FloatArray:
     TableError
         If an entry is not a number in a column that contains numbers.
     """
-    columns, problems = [], []
-    for place, cells in enumerate(sheet.cells.T):
-        known = [float(text) if _NUMBER.fullmatch(text) else math.nan for text in cells]
-        columns.append(known)
-        if not all(map(math.isnan, known)):
-            problems += [
-                line.problem(place, f"expected a number, got {text[:60]!r}")
-                for line, text, number in zip(sheet.lines, cells, known, strict=True)
-                if math.isnan(number) and not _MISSING.fullmatch(text)
-            ]
-    if problems:
-        raise TableError(sheet.source, sorted(problems))
-    return np.array(columns).T
+    values = np.array([[float(text) if _NUMBER.fullmatch(text) else math.nan for text in row] for row in sheet.cells])
+    is_numeric = ~np.all(np.isnan(values), axis=0)
+    wrong = [
+        (row, place)
+        for row, place in np.argwhere(np.isnan(values) & is_numeric)
+        if not _MISSING.fullmatch(sheet.cells[row, place])
+    ]
+    if wrong:
+        row, place = wrong[0]
+        what = f"expected a number, got {sheet.cells[row, place][:60]!r}{_further(len(wrong))}"
+        raise TableError(sheet.source, [sheet.lines[row].problem(int(place), what)])
+    return values
 
 
 #: A table without names and with more columns than this is described as a map. Otherwise each column is described.

@@ -48,10 +48,11 @@ degree_Fahrenheit = 0.5555555555555556 * kelvin; offset: 255.3722222222222 = °F
 percent = 0.01
 permille = 0.001 = ‰
 ppm = 1e-6
+cycle = 1 = cycles
 degree = 0.017453292519943295 * radian = deg = °
 arcminute = degree / 60 = arcmin
 arcsecond = degree / 3600 = arcsec
-turn = 6.283185307179586 * radian = _ = revolution = rev
+turn = 6.283185307179586 * radian = _ = revolution = rev = U
 revolutions_per_minute = turn / minute = rpm
 minute = 60 * second = min
 hour = 3600 * second = h = hr
@@ -73,6 +74,7 @@ bar = 1e5 * pascal
 atmosphere = 101325 * pascal = atm
 psi = pound_force / inch ** 2
 vickers = kilogram_force / millimeter ** 2 = HV
+brinell = kilogram_force / millimeter ** 2 = HB = HBW
 joule = newton * meter = J
 electron_volt = 1.602176634e-19 * joule = eV
 watt = joule / second = W
@@ -119,7 +121,7 @@ _BAD_POWER = re.compile(r"(\*\*|\^)\s*(?!\(?[-+]?\d{1,2}\)?(?![\d.]|\s*(\*\*|\^)
 _FACTOR = re.compile(
     r"[x×*]?\s*(10\s*\^\s*[+-]?\d+|\d+(?:\.\d+)?(?:e[+-]?\d+)?|e[+-]?\d+)[\s×x*]*(?=[^\W\d]|°)", re.IGNORECASE
 )
-_DEGREES = re.compile(r"(?:(?i:deg(?:rees?)?|°)\s*([CFcf])|([CF]))")
+_DEGREES = re.compile(r"(?:(?i:deg(?:rees?)?\.?|°)\s*([CFcf])|([CF]))")
 _NOT_A_UNIT = re.compile(r"[,._]|\d(?!\s*/)|.*%.*%")
 #: Patterns of a number with a decimal comma, of a number whose comma may separate thousands, and of a text that looks
 #: like several numbers.
@@ -262,8 +264,7 @@ def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
     """Return whether a number without a unit may have been meant in another unit than the SI unit.
 
     The number is doubtful if, taken in SI, it differs from the first usual value by more than 3 decades. It is also
-    doubtful if a usual value has a unit that is no decimal multiple of the SI unit (rpm, degC), and the number, taken
-    in this unit, is nearer to the first usual value than when taken in SI.
+    doubtful if it is nearer to the first usual value when it is taken in the unit of one of the usual values.
 
     Parameters
     ----------
@@ -277,9 +278,8 @@ def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
     if value == 0:
         return False
     in_si = _decades(value, unit, usual[0])
-    units = [each for each in map(unit_behind, usual) if not _is_decimal(each, unit)]
     return in_si > _FAR + 1e-9 or any(
-        _decades(to_si(f"{value!r} {each}", unit), unit, usual[0]) < in_si for each in units
+        _decades(to_si(f"{value!r} {each}", unit), unit, usual[0]) < in_si for each in map(unit_behind, usual)
     )
 
 
@@ -301,11 +301,6 @@ def likely(value: float, unit: str, usual: Sequence[str]) -> str:
 def _decades(value: float, unit: str, usual: str) -> float:
     """Return the difference in decades between a number in SI and a usual value."""
     return abs(math.log10(abs(value)) - math.log10(abs(to_si(usual, unit)))) if value else math.inf
-
-
-def _is_decimal(given: str, unit: str) -> bool:
-    factor, zero = conversion(given, unit) if given else (1.0, 0.0)
-    return zero == 0 and math.isclose(factor, 10.0 ** round(math.log10(factor)))
 
 
 def example_unit(unit: str) -> str:
@@ -367,8 +362,12 @@ def conversion(given: str, unit: str) -> tuple[float, float]:
         word = error.args[0] if isinstance(error.args[0], str) else next(iter(error.args[0]))
         raise ValueError(f"unknown unit {word!r}{_nearest(word, unit if word == given.strip() else '')}") from None
     except DimensionalityError:
-        weight = " (1 kg weighs 9.81 N)" if source == units.kilogram and target == units.newton else ""
-        raise ValueError(f"expected {expected(unit)}{weight}") from None
+        hint = " (1 kg weighs 9.81 N)" if source == units.kilogram and target == units.newton else ""
+        for angle in (units.turn, 1 / units.turn) if "[time]" in source.dimensionality else ():
+            one = units.Quantity(1.0, source) * angle
+            if one.is_compatible_with(target):
+                hint = f" (1 {spelling} is {one.to(target).magnitude:.4g} {unit})"
+        raise ValueError(f"expected {expected(unit)}{hint}") from None
     except Exception:  # pint's parser raises many types: TypeError, AssertionError, ...
         raise ValueError(f"expected {expected(unit)}") from None
     factor = one - zero
@@ -408,6 +407,7 @@ def _factor_and_unit(text: str) -> tuple[float, str]:
     found = _FACTOR.match(text)
     number = re.sub(r"^10\s*\^\s*", "1e", found[1]) if found else "1"
     unit = text[found.end() :] if found else text
+    unit = re.sub(r"^(HV|HBW?)\s?\d+([.,/]\d+)*$", r"\1", unit)  # hardness with the load of the test, such as HV10
     unit = unit.replace("−", "-").replace("·", " ").replace("microns", "micron")
     unit = re.sub(r"(?<=[A-Za-zμ])\^?\{?(-?\d{1,2})\}?(?!\d)", r"^\1", unit)
     unit = in_degrees(unit)
@@ -421,5 +421,7 @@ def _nearest(word: str, unit: str = "") -> str:
     If `unit` is given, only units with the dimension of `unit` are considered.
     """
     common = COMMON.split()
+    if re.match("HR[A-K]", word):
+        return " (Rockwell hardness is not a pressure: convert it to HV by a table)"
     hint = did_you_mean(word, [each for each in common if dimension_of(each) == dimension_of(unit)] if unit else common)
     return hint if "mean" in hint else f", expected {expected(unit)}" if unit else ""

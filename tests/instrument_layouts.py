@@ -212,6 +212,38 @@ READ = {
         {"velocity": 1e-3},
     ),
     "rule below the names": ("v [mm/s],mu\n-----,-----\n1,0.5\n2,0.6\n", FRICTION, {"velocity": 1e-3}),
+    "names on two lines": (
+        '"Frequency\n(Hz)","Storage\nModulus (MPa)","Temp.\n(°C)"\n0.1,5.1,20\n1,6.2,20\n',
+        DMA,
+        {"storage modulus": 5.1e6, "temperature": 293.15},
+    ),
+    "names, units and comments": (
+        "Frequency\tStorage modulus\tTemperature\nHz\tMPa\t°C\nrun 1\trun 1\trun 1\n0.1\t5.1\t20\n1\t6.2\t20\n",
+        DMA,
+        {"storage modulus": 5.1e6, "temperature": 293.15},
+    ),
+    "units above names": ("s;mm/s;-\nTime;Speed;COF\n0;1;0.5\n1;2;0.6\n", FRICTION, {"velocity": 1e-3}),
+    "factor in a row of units": (
+        "cycles;wear volume\ncycles;10^3 um^3\n1000;0,5\n2000;0,7\n",
+        (Column("cycles", "1"), Column("wear volume", "m^3")),
+        {"cycles": 1000.0, "wear volume": 5e-16},
+    ),
+    "units of pure numbers behind a slash": ("f/Hz;E'/MPa;tanD/-\n1;3;0,26\n2;4;0,3\n", DMA, {"tan delta": 0.26}),
+    "compound units joined to a name": (
+        "speed_mm_s,cof_mean,load_N\n1,0.4,5\n10,0.5,5\n",
+        FRICTION,
+        {"velocity": 1e-3, "friction coefficient": 0.4, "normal force": 5.0},
+    ),
+    "rotation speeds in 1/min": (
+        "Drehzahl [1/min];Reibwert\n100;0,1\n1000;0,05\n",
+        (Column("rotation speed", "rad/s"), Column("friction coefficient", "1")),
+        {"rotation speed": 10.472},
+    ),
+    "temperatures above pairs of tabs": (
+        "20 °C\t\t40 °C\t\nf (Hz)\tG' (kPa)\tf (Hz)\tG' (kPa)\n0.1\t5\t0.1\t2\n1\t6\t1\t3\n",
+        DMA,
+        {"temperature": 293.15},
+    ),
 }
 #: Layouts that are refused, each with a part of the sentence that says what to change.
 REFUSED = {
@@ -239,6 +271,21 @@ REFUSED = {
         "f [Hz],G' [MPa],f [Hz],G' [MPa]\n1,50,1,5\n2,60,2,6\n",
         DMA,
         "expected a temperature above each of the 2 pairs of columns, such as '20 degC'",
+    ),
+    "number and error in one cell": (
+        "v [mm/s];COF\n1;0,45 ± 0,02\n",
+        FRICTION,
+        "write errors in a column of their own",
+    ),
+    "one column for each temperature": (
+        "f [Hz];20 °C;40 °C\n1;5;4\n2;6;5\n",
+        DMA,
+        "expected a column storage modulus, got 20 °C, 40 °C (write the temperatures into a column of their own)",
+    ),
+    "unknown unit in round brackets": (
+        "v [mm/s],mu,Force (Newtons)\n1,0.5,10\n",
+        FRICTION,
+        "column normal force: unknown unit 'Newtons' (did you mean 'newton'?)",
     ),
     "numbers below": (
         "v [mm/s];mu\n1;0,5\n2;0,6\n3;worn out\n",

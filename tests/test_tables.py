@@ -105,7 +105,7 @@ WRONG = {
     ),
     "below absolute zero": (
         "f [Hz],E' [Pa],T [C]\n1,2,-300\n",
-        "2:5: column temperature: expected a value above 0, got '-300 degC'",
+        "2:5: column temperature: expected a value above -273.15 degC, got '-300 degC'",
     ),
     "overflow": ("f [Hz],E' [MPa]\n1,1e305\n", "2:3: $expected a finite number"),
     "decimal comma in commas": (
@@ -130,14 +130,12 @@ def test_what_is_wrong_is_one_sentence_with_its_place(kind):
     assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
 
 
-def test_all_problems_are_told_at_once_up_to_ten():
-    text = "f [Hz],E' [Pa]\n" + "-1,x\n" * 20
+def test_each_column_has_one_message():
     with pytest.raises(TableError) as caught:
-        read_table(text, "a.csv", COLUMNS)
-    lines = str(caught.value).splitlines()
-    assert len(lines) == 11
-    assert lines[-1] == "a.csv: 30 more problems"
-    assert [line.split(":")[1] for line in lines[:4]] == ["2", "2", "3", "3"]
+        read_table("f [Hz],E' [Pa]\n" + "-1,x\n" * 20, "a.csv", COLUMNS)
+    frequency, modulus = str(caught.value).splitlines()
+    assert frequency.startswith("a.csv:2:1: column frequency: expected a value above 0, got '-1 Hz'")
+    assert modulus.endswith("expected a number, got 'x' (and in 19 more lines)")
 
 
 def test_empty_entries_may_be_allowed():

@@ -12,8 +12,8 @@ from pydantic import BaseModel
 from mdr_dask import models
 from mdr_dask.arrays import FloatArray
 from mdr_dask.campaign.definition import Campaign, Series
-from mdr_dask.errors import DataError, did_you_mean, distinguishable
-from mdr_dask.headings import Column, match, plain
+from mdr_dask.errors import DataError, distinguishable
+from mdr_dask.headings import Column, match, nearest, plain
 from mdr_dask.models.numbers import numbers_of
 from mdr_dask.tables import Line, Sheet, read_sheet, read_table
 from mdr_dask.units import shown
@@ -46,6 +46,8 @@ class Measured:
         The measured values, in SI.
     errors : array, shape (points,), or None
         Standard errors of the values; None if the table does not contain them.
+    error_name : str
+        Name of the column of the errors; empty if there is none.
     conditions : dict of str to array, shape (points,)
         The values of the parameters at each measured point, in SI, by the names of their coordinates in the store.
     lines : tuple of Line
@@ -60,6 +62,7 @@ class Measured:
     errors: FloatArray | None
     conditions: Mapping[str, FloatArray]
     lines: tuple[Line, ...]
+    error_name: str = ""
     remark: str = ""
 
 
@@ -87,8 +90,7 @@ def read_measured(
     of_outputs = {name: Column(name, unit) for name, unit in outputs.items()}
     found = [name for name, column in of_outputs.items() if any(column.holds(name) for name in sheet.names)]
     if len(found) != 1:
-        near = () if found else (did_you_mean(name, [*outputs]) for name in sheet.names)
-        hint = next((each for each in near if "mean" in each), "")
+        hint = "" if found else next(filter(None, (nearest(name, [*outputs]) for name in sheet.names)), "")
         got = ", ".join(found or sheet.names) or "no names"
         wanted = f"a column with one output of the study ({', '.join(outputs)})"
         raise DataError(f"{source}: expected {wanted}, got {got}{hint}")
@@ -96,9 +98,12 @@ def read_measured(
     short = _short_names([*conditions, *outputs], structures)
     columns = [Column(name, unit, tuple(short.get(name, ())), needed=False) for name, unit in conditions.items()]
     columns.append(of_outputs[output])
-    headings, unit = _error_of(sheet, columns)
-    error = Column(ERROR, outputs[output], headings, needed=False, above=0.0, given_unit=unit)
+    headings, unit, is_relative = _error_of(sheet, columns)
+    unit_of_errors = "1" if is_relative else outputs[output]
+    error = Column(ERROR, unit_of_errors, headings, needed=False, above=0.0, given_unit=unit)
     read = read_table(text, source, [*columns, error], allow_missing=True)
+    if is_relative and ERROR in read:
+        read[ERROR] = read[ERROR] * np.abs(read[output])
     known = np.isfinite(np.array([*read.values()])).all(axis=0)
     missing = f"rows without a number are left out: {np.count_nonzero(~known)}" if not known.all() else ""
     remark = "; ".join(filter(None, (read.remark, missing)))
@@ -107,14 +112,15 @@ def read_measured(
     if values.size < 2:
         raise DataError(f"{source}: expected at least two measured points, got {values.size}")
     lines = tuple(line for line, is_known in zip(read.lines, known, strict=True) if is_known)
-    return Measured(source, output, values, errors, rows, lines, remark)
+    name = read.headings.get(ERROR, "") + (", relative to the values" if is_relative else "")
+    return Measured(source, output, values, errors, rows, lines, name, remark)
 
 
-def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...], str]:
-    """Return the headings of the errors of the output, and the unit that these errors have if they state none.
+def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...], str, bool]:
+    """Return the headings of the errors of the output, the unit of errors without one, and whether errors are relative.
 
-    The output is the last of `columns`. The returned unit is that of the output. It is empty if a heading of the errors
-    states a unit.
+    The output is the last of `columns`. Errors without a unit have the unit of the output. Errors in percent are
+    relative to the values, unless the values are in percent as well.
 
     A heading without the name of a quantity, such as ``std``, means the error of the nearest known column before it.
     """
@@ -130,7 +136,12 @@ def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...],
         of = plain(name).replace(found[0], "", 1).strip(" ()").removeprefix("of ")
         if output.holds(of) or (not of and before in (output, None)):
             headings.append((name, unit))
-    return tuple(name for name, _ in headings), "" if any(unit for _, unit in headings) else given
+    percent = {unit in ("%", "percent") for _, unit in headings}
+    return (
+        tuple(name for name, _ in headings),
+        "" if any(unit for _, unit in headings) else given,
+        percent == {True} and given not in ("%", "percent"),
+    )
 
 
 def _short_names(names: Sequence[str], structures: Iterable[str]) -> dict[str, list[str]]:
@@ -176,7 +187,9 @@ def notes(campaign: Campaign) -> tuple[str, ...]:
 
 
 def _sentences(found: Measured, model: str, series: Series, units: Mapping[str, str], unit: str) -> Iterator[str]:
-    errors = "standard_error" if found.errors is not None else "errors estimated by the fit"
+    errors = "errors estimated by the fit"
+    if found.errors is not None:
+        errors = f"column {found.error_name!r} taken as one standard error"
     reach = (shown(float(end), unit) for end in (found.values.min(), found.values.max()))
     yield f"{found.values.size} rows of {found.output}, {' to '.join(dict.fromkeys(reach))}, {errors}"
     ranges = {

@@ -13,17 +13,12 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.headings import JOINED, SYNONYMS, is_called
+from mdr_dask.headings import JOINED, is_called, nearest
 from mdr_dask.tables import AGREE, decoded, numbers, read_sheet
 from mdr_dask.units import conversion, is_unit
 
 if TYPE_CHECKING:
     from mdr_dask.physics.superposition.master_curve import Vertical
-
-ALIASES = {"normal_force": "normal force", "friction_coefficient": "friction coefficient"} | {
-    f"{kind}_modulus": f"{kind} modulus" for kind in ("storage", "loss")
-}
-"""Names of columns in a study, and other names of these columns in tables (from `mdr_dask.tables.SYNONYMS`)."""
 
 LEAST_JUMP = 3.0  # the gap between two groups of scattered values is at least this many times a gap within a group
 
@@ -47,7 +42,8 @@ def read_table(path: str | Path) -> pd.DataFrame:
     values = numbers(sheet)
     names = list(sheet.names)
     if len(set(names)) < len(names):
-        raise DataError(f"{path}: expected each name of a column once, got {', '.join(names)!r:.200}")
+        twice = next(name for name in names if names.count(name) > 1)
+        raise DataError(f"{path}: column {twice!r} is given twice: delete or rename one of the two")
     kept = [k for k, column in enumerate(values.T) if not np.all(np.isnan(column))]  # columns of words are left out
     table = pd.DataFrame(values[:, kept], columns=[names[k] for k in kept])
     units = {names[k]: sheet.units[k] for k in kept}
@@ -86,8 +82,7 @@ def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
     columns = [str(name) for name in frame.columns]
     if wanted in columns:
         return wanted
-    names = [wanted, ALIASES.get(wanted, wanted), *(name for name in SYNONYMS if is_called(wanted, name))]
-    loose = [each for each in columns if is_called(each, *names) or _joined(each, wanted)]
+    loose = [each for each in columns if is_called(each, wanted) or _joined(each, wanted)]
     return loose[0] if loose and all(_agree(frame[loose[0]], frame[each]) for each in loose[1:]) else None
 
 
@@ -102,7 +97,7 @@ def _joined(column: str, wanted: str) -> bool:
     """Return whether the name of a column is the wanted name followed by a unit, such as ``freq_hz``."""
     front, _, behind = column.rpartition("_")
     unit = JOINED.get(behind.casefold(), behind)
-    return bool(front) and is_unit(unit) and is_called(front, wanted, ALIASES.get(wanted, wanted))
+    return bool(front) and is_unit(unit) and is_called(front, wanted)
 
 
 FAMILIES = (
@@ -135,12 +130,15 @@ def columns_to_use(
             f"expected curves at two or more values of {constant!r}, got one value: there is nothing to shift"
         )
     if not found:
-        wanted = ", ".join(repr(name) for name in (abscissa, *(wished or ()), group) if name is not None) or (
-            "a coefficient against force by velocity or temperature, or a modulus against frequency or time by "
-            "temperature"
-        )
         got = [str(name) for name in frame.columns]
-        raise DataError(f"expected columns for {wanted}, got {got!r}: name them by --over, --of and --by")
+        lacking = [name for name in (abscissa, *(wished or ()), group) if name and column_of(frame, name) is None]
+        if lacking:
+            hints = (f"{name!r}{nearest(name, got)}" for name in lacking)
+            raise DataError(f"expected a column {' and a column '.join(hints)}, got {', '.join(got)}")
+        raise DataError(
+            "expected a coefficient of friction against force by velocity or temperature, or a modulus against "
+            f"frequency or time by temperature, got {', '.join(got)}: name three columns by --over, --of and --by"
+        )
     over, by, *ordinates = varied[0]
     return over, tuple(ordinates), by
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mdr_dask.campaign.measured import read_measured
+from mdr_dask.errors import DataError
 from mdr_dask.tables import decoded
 
 CONDITIONS = {"velocity": "m/s", "normal_force": "N"}
@@ -52,3 +53,17 @@ def test_reports_of_a_rig_are_read_as_they_stand(encoding):
     found = read(decoded(text.encode(encoding), "rig.csv"))
     np.testing.assert_allclose(found.conditions["velocity"], [1e-3, 1e-2])
     assert found.errors is not None
+
+
+@pytest.mark.parametrize(("unit", "error", "values"), [("-", "5", [0.02, 0.025]), ("%", "5", [0.05, 0.05])])
+def test_errors_in_percent_are_relative_unless_the_output_is_in_percent(unit, error, values):
+    factor = 100 if unit == "%" else 1
+    found = read(f"velocity [m/s];mu [{unit}];error [%]\n1;{0.4 * factor:g};{error}\n2;{0.5 * factor:g};{error}\n")
+    assert found.errors is not None
+    np.testing.assert_allclose(found.errors, values)
+
+
+@pytest.mark.parametrize(("heading", "output"), [("V_wear [mm^3]", "wear_volume"), ("CoF max", "friction_coefficient")])
+def test_unknown_outputs_get_the_nearest_name(heading, output):
+    with pytest.raises(DataError, match=rf"did you mean '{output}'"):
+        read(f"velocity [m/s];{heading}\n1;0.1\n2;0.2\n")

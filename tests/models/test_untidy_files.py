@@ -75,6 +75,6 @@ def test_moduli_in_tension_are_never_those_of_shear(heading, tmp_path):
     unit = "" if "[" in heading else " [MPa]"
     (tmp_path / "dma.csv").write_text(f"f [Hz],{heading}{unit},tan delta\n1,9,0.1\n10,12,0.1\n100,15,0.1\n")
     context = {"to_si": to_si, "directory": str(tmp_path)}
-    with pytest.raises(ValueError, match=r"give poisson_ratio \(0.5 for rubber\), or name the column G'"):
+    with pytest.raises(ValueError, match=r"give poisson_ratio \(0.5 for rubber\), or name the columns G'"):
         ModulusTable.model_validate({"file": "dma.csv"}, context=context)
     ModulusTable.model_validate({"file": "dma.csv", "poisson_ratio": 0.5}, context=context)

@@ -21,8 +21,9 @@ from mdr_dask.models.parts.temperature import Law
 from mdr_dask.tables import Read, TableError, read_sheet, read_table
 from mdr_dask.units import shown
 
-#: Pattern for the names of columns that hold moduli in tension. It is applied to names simplified by `plain`.
-_IN_TENSION = re.compile(r"(?<!\w)e(?:'|1|[ _]?stor|$)|young|tensile|tension")
+#: Patterns for the names of columns with moduli in tension and in shear, in the form returned by `plain`.
+_IN_TENSION = re.compile(r"(?<!\w)e(?:'|\*|1|2| ?stor| ?loss|$)|young|tensile|tension", re.IGNORECASE)
+_IN_SHEAR = re.compile(r"(?<!\w)g(?:'|\*|1|2| ?stor| ?loss|$)|shear", re.IGNORECASE)
 SAME_TEMPERATURE = 1.0  # largest difference, in K, between temperatures that count as equal
 #: Largest gap in decades between the moduli of neighbouring curves that the scatter of an instrument can explain.
 APART = 0.02
@@ -70,9 +71,14 @@ class ModulusTable(NamedByFile):
         return self
 
     def notes(self) -> tuple[str, ...]:
-        """Return a note that lists the unused columns of the table, if there are any."""
-        remark = _table(self).remark
-        return (f"table {self.file.name}: {remark}",) if remark else ()
+        """Return notes on unused columns, and on a modulus whose name does not say whether it is one of shear."""
+        table = _table(self)
+        heading = table.headings["storage modulus"]
+        notes = [table.remark] if table.remark else []
+        if self.poisson_ratio is None and not _IN_SHEAR.search(plain(heading)):
+            name = f"column {heading!r}" if heading else "the second column"
+            notes.append(f"{name} is taken as a shear modulus (give poisson_ratio if it was measured in tension)")
+        return tuple(f"table {self.file.name}: {note}" for note in notes)
 
 
 @dataclass(frozen=True)
@@ -278,7 +284,7 @@ def _table(chosen: ModulusTable) -> Read:
 def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
     """Return angular frequency, storage modulus, loss modulus and temperature (or None) of a file, in SI units.
 
-    Raise DataError for moduli in tension without a Poisson ratio.
+    Raise DataError for moduli in tension without a Poisson ratio, and for moduli of shear with one.
     """
     name, table = chosen.file.name, _table(chosen)
     omega, storage, loss = table["frequency"], table["storage modulus"], table.get("loss modulus")
@@ -291,10 +297,14 @@ def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray,
         _, levels = _levels(temperature)
         known = ", ".join(shown(level, "K") for level in levels[:12])
         raise DataError(f"{name}: got no rows at {shown(wanted, 'K')}; the table was measured at {known}")
-    heading = table.headings["storage modulus"]
-    if chosen.poisson_ratio is None and _IN_TENSION.search(plain(heading)):
+    heading, others = table.headings["storage modulus"], read_sheet(chosen.file.read_text(), name).names
+    is_shear = bool(_IN_SHEAR.search(plain(heading)))
+    if is_shear and chosen.poisson_ratio is not None:
+        raise DataError(f"{name}: column {heading!r} is a shear modulus: leave out poisson_ratio")
+    tension = [each for each in (heading, *others) if _IN_TENSION.search(plain(each))]
+    if tension and not is_shear and chosen.poisson_ratio is None:
         raise DataError(
-            f"{name}: column {heading!r} is a modulus in tension: give poisson_ratio (0.5 for rubber), or name the "
-            "column G' if it is a modulus of shear"
+            f"{name}: column {tension[0]!r} is a modulus in tension: give poisson_ratio (0.5 for rubber), or name the "
+            "columns G' and G'' if they are moduli of shear"
         )
     return omega, storage, loss, temperature
