@@ -534,10 +534,9 @@ def _are_units(row: Sequence[str]) -> bool:
     It is if at least half of its words are units, or if all are in square brackets.
     """
     filled = [text for text in row if text not in ("", "-", "--", "1", "[1]", "[-]")]
-    known = sum(
-        is_unit(text.strip("[](){}<> ")) and not _NUMBER.fullmatch(text) and not re.match(_TEMPERATURE, text)
-        for text in filled
-    )
+    # a text such as "10 mm" is a value of a table with words, but "10^3 um^3" is a unit
+    texts = [text for text in filled if re.match(r"(?!\d)|10\s*[\^⁰¹²³⁴-⁹]|1e", text)]
+    known = sum(is_unit(text.strip("[](){}<> ")) for text in texts)
     return bool(filled) and (2 * known >= len(filled) or all(re.fullmatch(r"\[.*\]", text) for text in filled))
 
 

@@ -154,7 +154,8 @@ def test_check_compares_measured_points_with_each_series(tmp_path, monkeypatch, 
     assert main(["check", "rig.yaml"]) == 0
     printed = capsys.readouterr().out
     for line in (
-        "measured rig.csv: 4 rows of friction_coefficient, 0.2 to 0.3, standard_error",
+        "measured rig.csv: 4 rows of friction_coefficient, 0.2 to 0.3, "
+        "column 'standard_error' taken as one standard error",
         "measured rig.csv: conditions velocity 1 mm/s to 10.01 mm/s, relaxation_times 0.01 to 100",
         "measured rig.csv: unknowns material_kelvin_relaxation_time",
         "measured rig.csv: outside the ranges of the study, so that the fit will refuse the table: line 4, velocity "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -150,7 +151,7 @@ def dimensions(file: DataFile) -> int:
     if (channel := _channel(file)) is not None:
         return int(channel.dim)
     lines = file.read_text().splitlines()
-    if _is_grid(lines):
+    if _grid_file(file, lines) is not None:
         return 2
     try:
         cells, first = _block(file, lines)
@@ -160,15 +161,23 @@ def dimensions(file: DataFile) -> int:
 
 
 def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[float, float]]:
-    """Return the unit of the heights in m and the spacings along x and y in m, as stated by the file or the user."""
+    """Return the unit of the heights in m and the spacings along x and y in m, as stated by the file or the user.
+
+    If positions have no unit, the spacing stated by the user is used, provided that it equals the step of the positions
+    in any decimal unit.
+    """
     height = _one_unit(file, "unit", grid.stated.height, units.height)
     position = _one_unit(file, "x_unit", grid.stated.position, units.position)
-    metre = _metre(file, position, "x_unit") if position else _implied_unit(file, grid.steps, units)
+    metre = _metre(file, position, "x_unit") if position else None
     spacings: list[float | None] = []
     for option, step, stated, given in zip(
-        ("spacing", "spacing_y"), grid.steps, grid.stated[2:], units[2:], strict=True
+        ("spacing", "spacing_y"), grid.steps, grid.stated[2:], (units.spacing, units.spacing_y), strict=True
     ):
-        sources = {"its positions": step and metre and step * metre, "its heading": stated, f"`{option}`": given}
+        length = step * metre if step and metre else None
+        user = given or (spacings[0] if spacings and units.spacing and step else None)
+        if step and user and not metre:
+            length = step * 10.0 ** round(math.log10(user / step))
+        sources = {"its positions": length, "its heading": stated, f"`{option}`": given}
         known = [(source, length) for source, length in sources.items() if length]
         for source, length in known[1:]:
             if abs(length - known[0][1]) > SAME * known[0][1]:
@@ -178,7 +187,7 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
                 )
         spacings.append(known[0][1] if known else None)
     missing = []
-    if any(grid.steps) and metre is None:
+    if any(grid.steps) and not metre and not units.spacing:
         missing.append("the unit of its positions: give `x_unit`, such as um")
     elif spacings[0] is None:
         missing.append("its spacing: give `spacing`, such as 1 um")
@@ -188,25 +197,6 @@ def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[fl
         raise DataError("\n".join(f"{file.name}: does not state {what}" for what in missing))
     assert spacings[0] is not None
     return _metre(file, height, "unit"), (spacings[0], spacings[1] or spacings[0])
-
-
-def _implied_unit(file: DataFile, steps: tuple[float | None, float | None], units: Units) -> float | None:
-    """Return the unit of the positions in m: the power of ten that follows from the spacing stated by the user.
-
-    Return None if no power of ten agrees with this spacing.
-    """
-    import math
-
-    for step, spacing in zip(steps, (units.spacing, units.spacing_y or units.spacing), strict=True):
-        if step and spacing:
-            power = round(math.log10(spacing / step))
-            if abs(spacing / step / 10.0**power - 1) > SAME:
-                raise DataError(
-                    f"{file.name}: the step of its positions is {step:.4g}, which is not {shown(spacing, 'm')} in any "
-                    "unit: give `x_unit`, the unit of the positions"
-                )
-            return 10.0**power
-    return None
 
 
 def _one_unit(file: DataFile, option: str, stated: str, given: str) -> str:
@@ -292,10 +282,32 @@ def _array(file: DataFile) -> FloatArray:
     return np.asarray(array, dtype=np.float64)
 
 
-def _is_grid(lines: list[str]) -> bool:
-    """Return whether a text is a grid file of Surfer or ESRI."""
-    head = lines[0].split() if lines else []
-    return head[:1] == ["DSAA"] or (bool(head) and head[0].lower() == "ncols")
+def _grid_file(file: DataFile, lines: list[str]) -> _Grid | None:
+    """Return the heights of a grid file of Surfer or ESRI; None for other texts.
+
+    A Surfer text begins with DSAA, the numbers of points, and the ranges of x, y and z; its rows have ascending y. An
+    ESRI text begins with names and numbers; its rows have descending y.
+    """
+    import numpy as np
+
+    kind = {"dsaa": "Surfer", "ncols": "ESRI"}.get("".join(lines[:1]).casefold().partition(" ")[0].strip())
+    if kind is None:
+        return None
+    try:
+        if kind == "Surfer":
+            numbers = np.array(" ".join(lines[1:]).split(), dtype=np.float64)
+            nx, ny = (int(n) for n in numbers[:2])
+            steps = (numbers[3] - numbers[2]) / (nx - 1), (numbers[5] - numbers[4]) / (ny - 1)
+            return _Grid(numbers[8:].reshape(ny, nx), (float(steps[0]), float(steps[1])))
+        head = {line.split()[0].lower(): line.split()[-1] for line in lines[:6] if line.strip()[:1].isalpha()}
+        rows = np.array(" ".join(lines[len(head) :]).split(), dtype=np.float64)
+        rows[rows == float(head.get("nodata_value", "nan"))] = np.nan
+        step = float(head["cellsize"])
+        return _Grid(rows.reshape(int(head["nrows"]), int(head["ncols"]))[::-1], (step, step))
+    except (KeyError, ValueError, ZeroDivisionError):
+        raise DataError(
+            f"{file.name}: expected a grid of {kind} with a complete heading, and as many heights as stated in it"
+        ) from None
 
 
 def _grid_of_text(file: DataFile) -> _Grid:
@@ -303,8 +315,8 @@ def _grid_of_text(file: DataFile) -> _Grid:
     import numpy as np
 
     lines = file.read_text().splitlines()
-    if _is_grid(lines):
-        return _surfer(file, lines) if lines[0].startswith("DSAA") else _esri(file, lines)
+    if (grid := _grid_file(file, lines)) is not None:
+        return grid
     cells, first = _block(file, lines)
     stated = _stated(file, lines[:first], lines[first])
     if cells.shape[1] <= MOST_COLUMNS < len(cells):
@@ -384,72 +396,30 @@ def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
         found = [cell for cell in map(str.strip, line.split(separator)) if cell]
         return bool(found) and 2 * sum(number.fullmatch(cell) is not None for cell in found) > len(found)
 
-    first = next((k for k, line in enumerate(kept) if is_row(line)), len(kept))
-    last = next((k for k in range(len(kept) - 1, first - 1, -1) if is_row(kept[k])), first - 1)
-    stripped = [len(line.rstrip(separator).split(separator)) for line in kept[first : last + 1]]
-    common = max(set(stripped), key=stripped.count, default=0)
-
-    def cells_of(line: str) -> list[str]:
-        """Return the entries of a row; an empty last entry is a missing point, unless the row is too long."""
-        cells = line.split(separator)
-        while len(cells) > common and not cells[-1].strip():
-            cells.pop()
-        return cells
-
-    width = [len(cells_of(line)) for line in kept[first : last + 1]]
-    while width and width[0] != common:  # skip numbers in the preamble
-        first, width = first + 1, width[1:]
+    numeric = [k for k, line in enumerate(kept) if is_row(line)] or [0]
+    rows = kept[numeric[0] : numeric[-1] + 1]
+    if separator and all(line.rstrip(" ").endswith(separator) for line in rows):
+        rows = [line.rstrip(" ").removesuffix(separator) for line in rows]
+    width = [len(line.split(separator)) for line in rows]
+    common = max(set(width), key=width.count, default=0)
+    start = next((k for k, count in enumerate(width) if count == common), 0)  # skip numbers in the preamble
+    odd = next((k for k in range(start, len(width)) if width[k] != common), None)
+    first = lines.index(kept[numeric[0] + start]) if kept else 0
     try:
         table = pd.read_csv(
-            io.StringIO("\n".join((separator or " ").join(cells_of(line)) for line in kept[first : last + 1])),
+            io.StringIO("\n".join((separator or " ").join(line.split(separator)) for line in rows[start:odd])),
             sep=separator or r"\s+",
             decimal=decimal,
             header=None,
-            names=range(common) if common else None,
             skipinitialspace=True,
-            on_bad_lines="error",
             index_col=False,
         )
     except (ValueError, pd.errors.ParserError) as problem:
         raise DataError(f"{file.name}: expected the same number of heights in every row: {problem}") from None
-    odd = [first + k for k, n in enumerate(width) if n != common]
-    if table.empty or odd:
-        line = f": line {lines.index(kept[odd[0]]) + 1} has {width[odd[0] - first]}, others {common}" if odd else ""
-        raise DataError(f"{file.name}: expected the same number of heights in every row{line}")
-    return table.apply(pd.to_numeric, errors="coerce"), lines.index(kept[first])
-
-
-def _surfer(file: DataFile, lines: list[str]) -> _Grid:
-    """Return the grid of a Surfer text: DSAA, numbers of points, ranges of x, y and z, and rows in ascending y."""
-    import numpy as np
-
-    try:
-        numbers = np.array(" ".join(lines[1:]).split(), dtype=np.float64)
-        nx, ny = (int(n) for n in numbers[:2])
-        rows = numbers[8:].reshape(ny, nx)
-    except ValueError:
-        raise DataError(f"{file.name}: expected a Surfer grid with as many heights as stated in its heading") from None
-    steps = (numbers[3] - numbers[2]) / (nx - 1), (numbers[5] - numbers[4]) / (ny - 1)
-    return _Grid(rows, (float(steps[0]), float(steps[1])))
-
-
-def _esri(file: DataFile, lines: list[str]) -> _Grid:
-    """Return the grid of an ESRI text, which has names with numbers, followed by rows in descending y."""
-    import numpy as np
-
-    head = {
-        line.split()[0].lower(): line.split()[-1] for line in lines[:6] if line.strip() and line.strip()[0].isalpha()
-    }
-    try:
-        shape = int(head["nrows"]), int(head["ncols"])
-        rows = np.array(" ".join(lines[len(head) :]).split(), dtype=np.float64).reshape(shape)
-        step = float(head["cellsize"])
-    except (KeyError, ValueError):
-        raise DataError(
-            f"{file.name}: expected an ESRI grid with ncols, nrows, cellsize and ncols x nrows heights"
-        ) from None
-    rows[rows == float(head.get("nodata_value", "nan"))] = np.nan
-    return _Grid(rows[::-1], (step, step))
+    if odd is not None:
+        where = f"line {lines.index(rows[odd]) + 1} has {width[odd]}, others {common}"
+        raise DataError(f"{file.name}: expected the same number of heights in every row: {where}")
+    return table.apply(pd.to_numeric, errors="coerce"), first
 
 
 #: Columns of a table that holds the points of a map.
@@ -509,13 +479,6 @@ def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]
     """
     import numpy as np
 
-    def spaced(height: FloatArray) -> tuple[FloatArray, FloatArray]:
-        if units.spacing is None:
-            raise DataError(
-                f"{file.name}: expected a column x: name the column, or give `spacing`, the distance between heights"
-            )
-        return np.asarray(units.spacing * np.arange(height.size), dtype=np.float64), height
-
     text = file.read_text()
     sheet = read_sheet(text, file.name)
     if sheet.names:
@@ -526,21 +489,28 @@ def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]
         table = read_table(text, file.name, columns, allow_missing=True)
         if "x" in table and units.spacing is not None:
             raise DataError(f"{file.name}: the file has positions: leave out `spacing`")
-        return (table["x"], table["z"]) if "x" in table else spaced(table["z"])
-    rows = numbers(sheet)
-    count = rows.shape[1]
-    rises = [k for k, one in enumerate(positions.rising(rows.T)) if one]
-    numbered = [k for k in rises if positions.is_numbered(rows[:, k])]
-    along = [] if count == 1 else [k for k in rises if k not in numbered] or rises
-    across = [k for k in range(count) if count == 1 or (k not in rises and k not in along)]
-    if len(across) != 1 or len(along) > 1:
+        x, z = table.get("x"), table["z"]
+    else:
+        rows = numbers(sheet)
+        count = rows.shape[1]
+        rises = [k for k, one in enumerate(positions.rising(rows.T)) if one]
+        along = [] if count == 1 else [k for k in rises if not positions.is_numbered(rows[:, k])] or rises
+        across = [0] if count == 1 else [k for k in range(count) if k not in rises]
+        if len(across) != 1 or len(along) > 1:
+            raise DataError(
+                f"{file.name}: expected one column of positions and one of heights, got {count} columns: name the "
+                "columns in a header line above the numbers, such as x [mm], z [um]"
+            )
+        wanted = [("heights", "unit", units.height), ("positions", "x_unit", units.position)][: 1 + len(along)]
+        missing = [f"unit of its {what}: give `{option}`, such as um" for what, option, unit in wanted if not unit]
+        if missing:
+            raise DataError("\n".join(f"{file.name}: does not state the {what}" for what in missing))
+        x = rows[:, along[0]] * _metre(file, units.position, "x_unit") if along else None
+        z = rows[:, across[0]] * _metre(file, units.height, "unit")
+    if x is not None:
+        return x, z
+    if units.spacing is None:
         raise DataError(
-            f"{file.name}: expected one column of positions and one of heights, got {count} columns: name the "
-            "columns in a header line above the numbers, such as x [mm], z [um]"
+            f"{file.name}: expected a column x: name the column, or give `spacing`, the distance between heights"
         )
-    wanted = [("heights", "unit", units.height), ("positions", "x_unit", units.position)][: 1 + len(along)]
-    missing = [f"does not state the unit of its {what}: give `{option}`" for what, option, unit in wanted if not unit]
-    if missing:
-        raise DataError("\n".join(f"{file.name}: {sentence}, such as um" for sentence in missing))
-    height = rows[:, across[0]] * _metre(file, units.height, "unit")
-    return (rows[:, along[0]] * _metre(file, units.position, "x_unit"), height) if along else spaced(height)
+    return np.asarray(units.spacing * np.arange(z.size), dtype=np.float64), z
