@@ -135,9 +135,12 @@ def columns_to_use(
         if lacking:
             hints = (f"{name!r}{nearest(name, got)}" for name in lacking)
             raise DataError(f"expected a column {' and a column '.join(hints)}, got {', '.join(got)}")
+        names = list(dict.fromkeys(name for over, values, by in FAMILIES for name in (over, *values, by)))
+        known = {column_of(frame, name) for name in names}
+        hints = (each if each in known else each + nearest(each, names) for each in got)
         raise DataError(
             "expected a coefficient of friction against force by velocity or temperature, or a modulus against "
-            f"frequency or time by temperature, got {', '.join(got)}: name three columns by --over, --of and --by"
+            f"frequency or time by temperature, got {', '.join(hints)}: name columns by --over, --of and --by"
         )
     over, by, *ordinates = varied[0]
     return over, tuple(ordinates), by

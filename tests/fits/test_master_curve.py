@@ -222,7 +222,7 @@ def test_tables_that_are_ambiguous_or_incomplete_are_refused():
         master_curve(frame.assign(temperature=[1.0, 2, 3, 4]))
     with pytest.raises(DataError, match="varies in 'force' too"):
         master_curve(frame.rename(columns={"velocity": "frequency"}).assign(T=[1.0, 1, 2, 2]), "frequency", "mu", "T")
-    with pytest.raises(DataError, match="expected columns for 'hardness'"):
+    with pytest.raises(DataError, match="expected a column 'hardness'"):
         master_curve(frame, ordinate="hardness")
     with pytest.raises(DataError, match="must be positive"):
         master_curve(frame.assign(mu=[1.0, -1, 1, 1]))
