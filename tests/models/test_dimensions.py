@@ -177,12 +177,11 @@ ROWS = {
     ),
 }
 
-#: Outputs without a value: no last state is steady, a body worn along a path has no estimate of its image, and a spike
-#: of the pressure that falls within one cell has no height (docs/ehl.md).
+#: Outputs without a value: no last state is steady, and a spike of the pressure within one cell has no height
+#: (docs/ehl.md).
 NO_VALUE = {
     "steps": {"friction_coefficient_after", "friction_coefficient_after_error"},
     "oscillation": {"friction_coefficient_after", "friction_coefficient_after_error"},
-    "wear, path": {"worn_image_error"},
     "film": {"spike_pressure_error"},
     "film, compressible": {"spike_pressure_error"},
     "film, starved, Eyring": {"spike_pressure_error"},
