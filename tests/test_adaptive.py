@@ -59,10 +59,7 @@ def test_each_curve_has_what_its_interpolation_needs_and_the_rest_is_not_needed(
     assert not store.verify(url).findings
 
 
-@pytest.mark.parametrize(
-    ("shape", "most"),
-    [("kink", 25), ("jump", 45), ("gap", 40), ("flat", 9)],
-)
+@pytest.mark.parametrize(("shape", "most"), [("kink", 25), ("jump", 45), ("gap", 40), ("flat", 9)])
 def test_discontinuous_curves_end_and_leave_other_curves_resolved(study, url, shape, most):
     events = []
     run(study(f"shape: [{shape}, smooth], shift: [-0.7, 0.9]", AXIS.replace("60", "45")), url, tell=events.append)
@@ -293,11 +290,7 @@ def test_laws_and_tables_omit_values_that_were_not_needed(study, url):
             "film, minimum_film",
             "speed_parameter.until.film: expected an output with a single number for each case, got one",
         ),
-        (
-            "1 %",
-            "film",
-            "until: expected at least one output with a single number for each case",
-        ),
+        ("1 %", "film", "until: expected at least one output with a single number for each case"),
     ],
 )
 def test_an_axis_is_refined_by_outputs_of_one_number(until, outputs, message):

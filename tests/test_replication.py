@@ -81,22 +81,8 @@ def coverage(at_least, tolerance, values):
     return np.mean(np.abs(mean - 1.0) <= t.ppf(0.975, used - 1) * error)
 
 
-@pytest.mark.parametrize(
-    "tolerance",
-    [
-        0.04,
-        0.1,
-    ],
-)
-@pytest.mark.parametrize(
-    "at_least",
-    [
-        2,
-        5,
-        10,
-        20,
-    ],
-)
+@pytest.mark.parametrize("tolerance", [0.04, 0.1])
+@pytest.mark.parametrize("at_least", [2, 5, 10, 20])
 def test_the_interval_of_an_adaptive_ensemble_covers_the_truth(at_least, tolerance):
     """4000 campaigns of scatter 0.2: 95 % intervals cover 94 % or more, within 3 sigma, whatever the first round.
 

@@ -192,10 +192,7 @@ def test_exceptions_have_the_messages_of_the_command_line(call, error, message):
 UNFIT = [
     (lambda study: mdr_dask.fit(study, "zone_on"), "no law for sliding_friction is called 'zone_on'"),
     (lambda study: mdr_dask.plot(study, "stribeck"), "no figure of sliding_friction is called 'stribeck'"),
-    (
-        lambda study: mdr_dask.aggregate(study, "medan"),
-        "no statistic is called 'medan' (did you mean 'mean'?)",
-    ),
+    (lambda study: mdr_dask.aggregate(study, "medan"), "no statistic is called 'medan' (did you mean 'mean'?)"),
     (lambda study: mdr_dask.aggregate(xr.Dataset()), "expected a study as returned by run or open_study"),
     (lambda study: mdr_dask.plot(study.isel(realisation=0), "velocity"), "isel(realisation=[0]) keeps one"),
     (lambda study: mdr_dask.fit(study.mean("realisation"), "plateau"), "with its status and realisations"),

@@ -55,8 +55,7 @@ def table(rng, points=12, noise=0.03, given=True, function=friction, velocities=
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("lines", "scatter", "given", "tables"),
-    [(1, 0.0, True, 60), (5, 0.1, True, 60), (1, 0.0, False, 12)],
+    ("lines", "scatter", "given", "tables"), [(1, 0.0, True, 60), (5, 0.1, True, 60), (1, 0.0, False, 12)]
 )
 def test_intervals_contain_the_truth_at_their_rate(lines, scatter, given, tables):
     """Each table comes with lines of its own; a binomial leaves the bounds once in a thousand times or less."""

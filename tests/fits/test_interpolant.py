@@ -118,10 +118,7 @@ def test_cases_that_adaptive_axes_left_out_have_the_error_of_what_lies_between(s
     data["status"] = ("force", "velocity", "realisation"), np.full(data.mu.shape, Status.DONE)
     left_out = np.zeros(data.mu.shape, dtype=bool)
     left_out[1, 3::4] = True
-    data = data.assign(
-        mu=data.mu.where(~left_out),
-        status=data.status.where(~left_out, Status.NOT_NEEDED),
-    )
+    data = data.assign(mu=data.mu.where(~left_out), status=data.status.where(~left_out, Status.NOT_NEEDED))
     table = law(data, "mu")
     rows = table.sel(force=data.force[1], velocity=data.velocity[left_out[1, :, 0]])
     error = np.abs(rows.mu - study(shape).mu[1, left_out[1, :, 0], 0].to_numpy())

@@ -67,14 +67,7 @@ def scaled(parameters, factors):
 KELVIN = {"shear_modulus": 1e7, "relaxation_time": 1e-3}
 LINE = {"length": 0.02, "points": 64, "rms_roughness": 5e-7, "normal_force": 1.5, "velocity": 0.1}
 TERMS = {"material": {"prony": {"static_modulus": 1e7, "moduli": (1e7, 3e8), "times": (1e-2, 1e-4), "viscosity": 50.0}}}
-LAW = {
-    "static_modulus": 3e6,
-    "loss_modulus": 1e6,
-    "frequency": 1e3,
-    "exponent": 0.2,
-    "lowest": 1.0,
-    "highest": 1e5,
-}
+LAW = {"static_modulus": 3e6, "loss_modulus": 1e6, "frequency": 1e3, "exponent": 0.2, "lowest": 1.0, "highest": 1e5}
 JUMP = LINE | {"oversampling": 2, "relaxation_times": (0.0, 0.1, 1.0)}
 FRETTING = {
     "contact_modulus": 115e9,
@@ -142,11 +135,7 @@ ROWS = {
     "wear": ("fretting_wear", FRETTING | BALL, FREE),
     "wear, force": ("fretting_wear", FRETTING | BALL | {"hold": "force"}, FREE),
     "wear, fast": ("fretting_wear", FRETTING | BALL | {"wear_rule": "fast"}, FREE),
-    "wear, cone": (
-        "fretting_wear",
-        FRETTING | {"indenter": {"shape": "cone", "angle": 0.05}, "depth": 1e-6},
-        FREE,
-    ),
+    "wear, cone": ("fretting_wear", FRETTING | {"indenter": {"shape": "cone", "angle": 0.05}, "depth": 1e-6}, FREE),
     "wear, history": (
         "fretting_wear",
         {name: value for name, value in (FRETTING | BALL).items() if name != "cycles"}

@@ -32,10 +32,7 @@ def test_temperature_and_velocity_are_interchangeable():
 
 def test_material_can_vary():
     materials = np.empty(2, dtype=object)
-    materials[:] = [
-        Material.model_validate({"kelvin": KELVIN}),
-        Material.model_validate({"standard_solid": SOLID}),
-    ]
+    materials[:] = [Material.model_validate({"kelvin": KELVIN}), Material.model_validate({"standard_solid": SOLID})]
     result = MODEL.compute(block(LINE | LOAD | {"material": materials[0]}, {"material": materials}))
     assert np.all(result.status == Status.DONE)
     assert np.all(result.values["friction_coefficient"][0] != result.values["friction_coefficient"][1])

@@ -204,13 +204,7 @@ def test_friction_is_that_of_asperities_and_film():
     np.testing.assert_allclose(some - none, 0.1 * share, rtol=1e-9)
 
 
-@pytest.mark.parametrize(
-    "formula",
-    [
-        "pan_hamrock",
-        "ehl",
-    ],
-)
+@pytest.mark.parametrize("formula", ["pan_hamrock", "ehl"])
 def test_the_film_is_never_thinner_for_its_asperities(formula):
     """Smooth rollers have the film of the whole load."""
     speeds = [1.0, 10.0, 100.0, 1000.0]

@@ -97,11 +97,7 @@ def test_table_is_the_ramp(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "indenter",
-    [
-        {"shape": "parabola", "radius": 0.01},
-        {"shape": "power", "exponent": 4.0, "coefficient": 1e6},
-    ],
+    "indenter", [{"shape": "parabola", "radius": 0.01}, {"shape": "power", "exponent": 4.0, "coefficient": 1e6}]
 )
 def test_indenters(indenter: dict[str, object]) -> None:
     found = compute(block(indenter=indenter))

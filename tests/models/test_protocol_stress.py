@@ -85,12 +85,7 @@ def of(body: str) -> dict[str, object]:
 def test_oscillation_slower_and_faster_than_relaxation(
     frequency: float, part: float, load: float, force: float
 ) -> None:
-    swing = {
-        "shape": "oscillation",
-        "amplitude": 0.05 * part,
-        "frequency": frequency,
-        "force_amplitude": force * load,
-    }
+    swing = {"shape": "oscillation", "amplitude": 0.05 * part, "frequency": frequency, "force_amplitude": force * load}
     check(protocol=swing, normal_force=force)
 
 

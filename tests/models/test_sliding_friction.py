@@ -8,13 +8,7 @@ from mdr_dask.models.base import Block, Status
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
 
 BASE = SlidingFriction(
-    length=0.02,
-    points=200,
-    rms_roughness=5e-7,
-    shear_modulus=1e7,
-    relaxation_time=1e-3,
-    normal_force=1.5,
-    velocity=0.1,
+    length=0.02, points=200, rms_roughness=5e-7, shear_modulus=1e7, relaxation_time=1e-3, normal_force=1.5, velocity=0.1
 )
 ALL = MODEL.with_companions([output.name for output in MODEL.outputs])
 
@@ -30,10 +24,7 @@ def grid():
     return {"normal_force": force.ravel(), "velocity": velocity.ravel()}
 
 
-@pytest.mark.parametrize(
-    ("scheme", "oversampling"),
-    [("hermite", 1), ("hermite", "auto"), ("backward_euler", 4)],
-)
+@pytest.mark.parametrize(("scheme", "oversampling"), [("hermite", 1), ("hermite", "auto"), ("backward_euler", 4)])
 def test_a_value_does_not_depend_on_its_neighbours(scheme, oversampling):
     block = make(grid(), scheme=scheme, oversampling=oversampling, accuracy=0.1)
     whole = MODEL.compute(block)
@@ -63,11 +54,7 @@ def test_equal_dimensionless_numbers_are_solved_once():
 
 
 CONE = {"shape": "cone", "angle": 0.17}
-SHAPES = [
-    CONE,
-    {"shape": "parabola", "radius": 0.01},
-    {"shape": "power", "exponent": 3.0, "coefficient": 100.0},
-]
+SHAPES = [CONE, {"shape": "parabola", "radius": 0.01}, {"shape": "power", "exponent": 3.0, "coefficient": 100.0}]
 
 
 def indented(shape, columns, **changes):

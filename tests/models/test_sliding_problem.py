@@ -75,13 +75,7 @@ def test_every_line_meets_every_solid(tmp_path, body):
 
 
 @pytest.mark.parametrize("solid", ["kelvin", "standard"])
-@pytest.mark.parametrize(
-    "grid",
-    [
-        2,
-        8,
-    ],
-)
+@pytest.mark.parametrize("grid", [2, 8])
 def test_errors_are_absolute_and_hold(solid, grid):
     columns = {"velocity": np.geomspace(1e-3, 10, 12), "normal_force": np.geomspace(0.01, 10, 12)}
     coarse = solved(GENERATED | SOLIDS[solid] | {"oversampling": 2 * grid}, columns=columns)

@@ -12,11 +12,7 @@ TOUCHING = 1e-12  # of its height: tolerance of contact, for rounding
 
 
 def follow_kelvin(
-    height: FloatArray,
-    slope: FloatArray,
-    schedule: Schedule,
-    displacement: FloatArray,
-    depth: float,
+    height: FloatArray, slope: FloatArray, schedule: Schedule, displacement: FloatArray, depth: float
 ) -> Response:
     """Follow every element of a Kelvin foundation on a periodic line; time in tau.
 

@@ -11,12 +11,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from mdr_dask.physics.lubrication import film_formulas as film
-from mdr_dask.physics.lubrication.line_contact import (
-    LineContact,
-    LineSolution,
-    line_contact,
-    solve_film,
-)
+from mdr_dask.physics.lubrication.line_contact import LineContact, LineSolution, line_contact, solve_film
 from mdr_dask.physics.outcome import Outcome
 
 E_STAR = 115.385e9
@@ -204,13 +199,7 @@ def test_starved_corners_of_the_box_converge(W: float, U: float, G: float, inlet
     assert 0 < found.minimum_film.value <= found.finest.film.min() * 1.02
 
 
-@pytest.mark.parametrize(
-    "numbers",
-    [
-        CHECKED,
-        (5e-5, 1e-10, 2000.0),
-    ],
-)
+@pytest.mark.parametrize("numbers", [CHECKED, (5e-5, 1e-10, 2000.0)])
 def test_positions_lie_within_their_errors(numbers: tuple[float, float, float]) -> None:
     case = line_contact(numbers, E_STAR)
     here, fine = solve_film(case, accuracy=1e-3), solve_film(case, accuracy=3e-5)

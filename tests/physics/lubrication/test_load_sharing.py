@@ -58,8 +58,7 @@ def test_shares_add_to_one_and_the_film_is_never_thinner(name: str, ratio: float
     W, U, G = 2e-5, 1e-11, 4000.0
     scale = ratio * RMS / float(formula(W, U, G))
     shared = share_load(
-        lambda share: scale * float(formula(W, U / share, G * share)),
-        lambda film: asperities.pressure(film) / pressure,
+        lambda share: scale * float(formula(W, U / share, G * share)), lambda film: asperities.pressure(film) / pressure
     )
     assert shared.film_share + shared.asperity_share == pytest.approx(1.0, abs=1e-7)
     assert shared.film >= ratio * RMS

@@ -34,8 +34,7 @@ def everywhere(line: PreparedLine) -> tuple[Reachable, np.ndarray]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("hurst", "oversampling", "deborah"),
-    [(0.0, 4, 1e-3), (0.4, 1, 0.3), (0.4, 4, 1e3), (0.8, 1, 10.0), (0.8, 4, 0.3)],
+    ("hurst", "oversampling", "deborah"), [(0.0, 4, 1e-3), (0.4, 1, 0.3), (0.4, 4, 1e3), (0.8, 1, 10.0), (0.8, 4, 0.3)]
 )
 def test_contact_long_after_a_jump_is_that_of_the_steady_sweep(hurst: float, oversampling: int, deborah: float) -> None:
     """On coarse grids contact begins and ends inside single cells, which both must find."""

@@ -10,11 +10,7 @@ from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import CubicLine, indented_line, periodic_line
 from mdr_dask.physics.surfaces.shapes import PowerLaw
 from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation, foundation
-from mdr_dask.physics.transients.elements.loading_history import (
-    Response,
-    follow_line,
-    steady_start,
-)
+from mdr_dask.physics.transients.elements.loading_history import Response, follow_line, steady_start
 from mdr_dask.physics.transients.elements.steps import Schedule
 from mdr_dask.physics.transients.velocity_jump import MarchRequest, velocity_jump
 

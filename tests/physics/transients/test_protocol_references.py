@@ -11,11 +11,7 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.cubic_line import CubicLine, indented_line, periodic_line, without_kinks
 from mdr_dask.physics.surfaces.shapes import PowerLaw
 from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation, foundation
-from mdr_dask.physics.transients.elements.loading_history import (
-    Response,
-    follow_line,
-    steady_start,
-)
+from mdr_dask.physics.transients.elements.loading_history import Response, follow_line, steady_start
 from mdr_dask.physics.transients.elements.steps import Schedule
 
 Array = np.ndarray
@@ -114,13 +110,7 @@ def test_terms_under_a_wave_in_partial_contact() -> None:
     assert off < 3e-5
 
 
-@pytest.mark.parametrize(
-    ("coefficient", "exponent"),
-    [
-        (2.0, 1.0),
-        (80.0, 4.0),
-    ],
-)
+@pytest.mark.parametrize(("coefficient", "exponent"), [(2.0, 1.0), (80.0, 4.0)])
 def test_terms_under_indenters(coefficient: float, exponent: float) -> None:
     def height(x: Array) -> Array:
         return -coefficient * np.abs(x) ** exponent
@@ -137,13 +127,7 @@ def test_terms_under_indenters(coefficient: float, exponent: float) -> None:
     assert off < 3e-5
 
 
-@pytest.mark.parametrize(
-    ("coefficient", "exponent"),
-    [
-        (2.0, 1.0),
-        (80.0, 4.0),
-    ],
-)
+@pytest.mark.parametrize(("coefficient", "exponent"), [(2.0, 1.0), (80.0, 4.0)])
 def test_dashpot_under_indenters(coefficient: float, exponent: float) -> None:
     """Elements enter undeformed and leave where the force vanishes: the depth follows an ordinary equation."""
     node, weight = np.polynomial.legendre.leggauss(40)
