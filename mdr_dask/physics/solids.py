@@ -250,7 +250,7 @@ def fit_series(
     weights, _ = nnls(design, np.ones(2 * omega.size), maxiter=100 * design.shape[1])
     static, moduli = weights[0], weights[1 : 1 + times.size]
     if static <= 0:
-        raise ValueError("the moduli leave no static modulus: the table must reach the rubbery plateau")
+        raise ValueError("the fitted static modulus is zero: the table must reach the rubbery plateau")
     solid = prony(static, moduli, times, weights[-1] if dashpot else 0.0)
     modulus = complex_modulus(solid, omega)
     errors = modulus.real / stored - 1, modulus.imag / lost - 1

@@ -234,8 +234,8 @@ def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfi
     if image[-1] < depth:
         got, end = distinguishable(depth, image[-1], digits=4)
         raise ValueError(
-            f"the contact reaches beyond the table: its image ends at the height {end}, got depth {got}; "
-            "extend the table or press less deep"
+            f"the contact reaches beyond the table: the largest possible depth is {end}, got {got}; "
+            "extend the table or reduce the depth"
         )
     a0 = bisect(lambda x: float(image_curve(x)) - depth, 0.0, float(r[-1]))
     return TableProfile(_scaled(interpolant, a0, depth), _scaled(image_curve, a0, depth), a0, depth)

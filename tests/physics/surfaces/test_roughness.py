@@ -40,7 +40,7 @@ def test_a_grid_below_the_cutoff_is_refused():
 
 
 def test_a_spectrum_without_harmonics_is_refused():
-    with pytest.raises(ValueError, match="got no harmonic of 8"):
+    with pytest.raises(ValueError, match="none of 8 waves is left"):
         roughness.amplitudes(8, 0.5, longest=9)
 
 

@@ -62,7 +62,7 @@ def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundat
     """
     g, tau = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (moduli, times))
     if g.size == 0 and not viscosity > 0:
-        raise ValueError("expected a solid with a Prony term or a dashpot, got an elastic one")
+        raise ValueError("expected a viscoelastic solid (with a Prony term or a dashpot), got an elastic one")
     order = np.argsort(tau)
     g, tau = g[order], tau[order]
     pole, weight = (np.append(0.0, tau), np.append(viscosity, g * tau)) if viscosity > 0 else (tau, g * tau)
