@@ -368,7 +368,7 @@ def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
     Notes
     -----
     The complex modulus as a function of i omega is zero at -1 / lambda_k, see :func:`recovery_times`. The modes are
-    orthogonal with the weights G_m / tau_m, so that the inverse of `stretch` has a closed form.
+    orthogonal with respect to the weights G_m / tau_m, so that the inverse of `stretch` has a closed form.
     """
     zeros, distance = recovery_times(moduli * times, times)
     stretch = times[:, None] / distance

@@ -125,7 +125,7 @@ def line_contact(
     groups : tuple of float
         Load, speed and material parameters W, U and G with ``E' = 2 E*`` and the mean velocity.
     E_star : float
-        Contact modulus in Pa; it gives the pressures for the density law and Roelands' law.
+        Contact modulus in Pa. The pressures in the density law and in Roelands' law follow from it.
     viscosity_law : str
         ``"barus"`` or ``"roelands"``.
     viscosity : float, optional

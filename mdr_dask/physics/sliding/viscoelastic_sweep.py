@@ -21,7 +21,7 @@ CLOSED, OPEN_END = 0, 1
 
 
 class Travelling(NamedTuple):
-    """A solid that slides along a line, in units of static moduli and cells, and its recovery modes.
+    """A solid that slides along a line, and its recovery modes; units are the static modulus and the length of a cell.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ STRIDE = 2.0  # cells: longest step towards a place of separation
 MET = 1e-3  # cells: largest last step towards the place where contact begins; the error is about the cube of this step
 CREST = 1e-3  # cells: resolution of the place in a cell where the gap between line and free elements is smallest
 FARTHEST = 200  # largest number of cells of a stretch in which the place of separation is searched for
-MARGIN = 64.0  # cells added to twice a distance when the window of a bound is chosen
+MARGIN = 64.0  # the window of a bound is chosen for twice a distance plus this number of cells
 WINDOW, WINDOWS = 8.0, 16  # cells travelled in the shortest window; number of windows, each twice as long as the last
 
 

@@ -3,7 +3,7 @@
 In all functions, `terms` contains the strains of the dashpots of the Prony terms of all elements, shape (n, terms), and
 i is the index of one element. An index is passed, because this is faster than slicing.
 
-Units: the static modulus is 1, heights are in any unit, lengths in the length of the line, all times in the same unit.
+The static modulus is 1. Heights are in any unit, lengths in units of the length of the line, and times in any unit.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundat
     moduli, times : array_like, shape (terms,)
         G_m / G_inf, positive, and tau_m, distinct, in any unit of time.
     viscosity : float
-        eta / G_inf in the same unit of time. For a Kelvin solid (no terms) this is 1 if the unit is tau.
+        eta / G_inf in the same unit of time. For a Kelvin solid (no terms) this is 1 if the unit of time is tau.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundat
     g, tau = g[order], tau[order]
     pole, weight = (np.append(0.0, tau), np.append(viscosity, g * tau)) if viscosity > 0 else (tau, g * tau)
     zeros, distance = recovery_times(weight, pole)
-    # modes of unit displacement, u = 1 and a_m = -lambda / (tau_m - lambda), which are orthogonal with the weights
+    # modes with u = 1 and a_m = -lambda / (tau_m - lambda); they are orthogonal with respect to the weights
     modes = -zeros / distance
     modes /= np.sqrt(weight @ modes**2)
     load = np.append(1.0, 0 * g) if viscosity > 0 else g / (1 + g.sum())

@@ -198,8 +198,8 @@ def follow_line(
     Parameters
     ----------
     line : CubicLine
-        If the line is not periodic, elements enter undeformed. Forces are interpolated linearly between elements, which
-        is most accurate for a line :func:`~mdr_dask.physics.surfaces.cubic_line.without_kinks`.
+        If the line is not periodic, elements enter undeformed. Forces are interpolated linearly between elements. This
+        is most accurate for a line without kinks (:func:`~mdr_dask.physics.surfaces.cubic_line.without_kinks`).
     solid : Foundation
     schedule : Schedule
         Travel, velocity and load at every moment.

@@ -1,6 +1,6 @@
 """Motion of all elements of a viscoelastic foundation through the moments of a loading history.
 
-Units: the static modulus is 1, heights are in any unit, lengths in the length of the line, all times in the same unit.
+The static modulus is 1. Heights are in any unit, lengths in units of the length of the line, and times in any unit.
 """
 
 from __future__ import annotations
