@@ -13,7 +13,7 @@ from mdr_dask.report import page, read_study
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(program() is None, reason="no Chromium; .ci/run installs it where it may"),
+    pytest.mark.skipif(program() is None, reason="no Chromium (apt-get install chromium)"),
 ]
 VELOCITY = "report.figures.find((figure) => figure.spec.name === 'velocity')"
 
