@@ -75,14 +75,6 @@ def test_temperature_moves_relaxation_times(law, factor):
     assert solid_of(material(kelvin=kelvin, temperature=310.0, **law)).viscosity == pytest.approx(1e3 * factor)
 
 
-def test_table_of_many_temperatures_is_superposed(tmp_path):
-    solid = solid_of(
-        material(dma_table={"file": shifted_table(tmp_path / "dma.csv", (290.0, 300.0)), "reference": 300.0})
-    )
-    omega = np.logspace(-1, 1, 5)
-    np.testing.assert_allclose(complex_modulus(solid, omega), 1e6 * (1 + (1j * omega) ** 0.3), rtol=0.1)
-
-
 def test_table_needs_a_temperature_or_a_reference():
     with pytest.raises(DataError, match="has several temperatures: choose one by table_temperature, or superpose"):
         solid_of(material(dma_table={"file": TABLE, "poisson_ratio": 0.5}))
