@@ -40,7 +40,7 @@ class Solution(NamedTuple):
         Values of `Outcome`.
     unseen : float or array, shape (outputs, cases)
         Relative errors that two grids may have in common, so that the difference of their results does not show them.
-        They are added to the estimate.
+        These errors are added to the estimate.
     """
 
     values: Sequence[FloatArray] | FloatArray

@@ -5,8 +5,9 @@ Hertz units as in :mod:`mdr_dask.physics.lubrication.deformation`. The film obey
     d/dX( rho H^3/eta dP/dX ) = K d(rho H)/dX,   K = (3 pi^2/4) U/W^2,
 
 in finite volumes around the nodes. Cavitation is described by the complementarity conditions ``P >= 0``, ``R <= 0`` and
-``P R = 0``, with the pressure P and the flow balance R of each volume. The load ``int P dX = pi/2`` is the last
-equation. The unknowns are the nodal pressures and the film at ``X = 0``, called the central film.
+``P R = 0``, with the pressure P and the flow balance R of each volume. The last equation, ``int P dX = pi/2``, states
+that the pressure carries the load. The unknowns are the nodal pressures and the film at ``X = 0``, called the central
+film.
 """
 
 from __future__ import annotations

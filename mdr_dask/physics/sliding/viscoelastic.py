@@ -162,8 +162,8 @@ class ViscoelasticCase:
     ) -> tuple[Outcome, FloatArray, FloatArray]:
         """Solve the case on one grid; return the outcome, the state and the four results.
 
-        The search starts from `start`, the state on the previous grid. If `start` is None, it starts from the static
-        contact. The computed depth is the penetration of the highest node.
+        The search starts from `start`, the state on the previous grid, or from the static contact if `start` is None.
+        The computed depth is the penetration of the highest node.
         """
         terms, cells = solid.moduli.size, below.size - 1
         if start is None or start.size != terms + 1:
@@ -325,7 +325,7 @@ def newton_step(
     step[:] = 0.0
     wanted = LINEAR * LINEAR * _dot(residual, residual)
     for j in range(n):
-        if not _dot(residual, residual) > wanted:  # also if it is not finite
+        if not _dot(residual, residual) > wanted:  # the residual is small enough, or not finite
             break
         direction, product = directions[j], products[j]
         direction[:] = residual

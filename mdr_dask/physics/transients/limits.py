@@ -55,7 +55,7 @@ class PreparedLine(NamedTuple):
     def barriers(self, deborah: float) -> Barriers:
         """Return the barriers for a Deborah number v tau in cells.
 
-        They are stored, because successive cases often have the same Deborah number.
+        The barriers are stored, because successive cases often have the same Deborah number.
         """
         if deborah not in self.known:
             if len(self.known) >= max(KEPT_CELLS // self.cells.mean.size, KEPT_SPEEDS):

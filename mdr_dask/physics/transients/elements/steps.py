@@ -438,9 +438,9 @@ def _step(
     guess: float,
     deborah: tuple[float, float],
 ) -> tuple[float, bool]:
-    """Move all elements through a step to a mean displacement; return the depth, and whether it was found.
+    """Move all elements through a step, at the end of which they have a given mean displacement.
 
-    `deborah` has v tau / L at the start and at the end of the step.
+    `deborah` contains v tau / L at the start and at the end of the step. Return the depth, and whether it was found.
     """
     for j in range(workspace.under.size):
         workspace.parts[j] = 1.0 if state.touching[j] else 0.0
