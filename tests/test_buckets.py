@@ -6,6 +6,7 @@ import socketserver
 import threading
 import time
 from contextlib import suppress
+from importlib.util import find_spec
 
 import pytest
 from killed_parts import run_with_kills, study
@@ -18,11 +19,11 @@ from mdr_dask.errors import StoreBusyError, StoreError
 from mdr_dask.execute import Part, Resources
 from mdr_dask.store import files, locks
 
-moto = pytest.importorskip("moto.server")
-pytest.importorskip("s3fs")
+MISSING = [name for name in ("moto", "s3fs") if find_spec(name) is None]
 
 pytestmark = [
     pytest.mark.slow,
+    pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}"),
     pytest.mark.filterwarnings("ignore:.*:DeprecationWarning"),
     pytest.mark.filterwarnings("ignore:.*:ResourceWarning"),
     pytest.mark.filterwarnings("ignore:.*:pytest.PytestUnraisableExceptionWarning"),
@@ -74,8 +75,10 @@ class Pipe(socketserver.BaseRequestHandler):
 def server():
     import logging
 
+    from moto.server import ThreadedMotoServer  # takes more than a second to import
+
     logging.getLogger("werkzeug").setLevel(logging.CRITICAL)
-    threaded = moto.ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
+    threaded = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
     threaded.start()
     yield threaded.get_host_and_port()[1]
     threaded.stop()

@@ -157,6 +157,7 @@ def test_a_fault_of_the_machine_is_no_failed_case(toy, url, monkeypatch):
     assert execute.run(campaign, url, Resources(threads=1), lambda _: None).done == 12
 
 
+@pytest.mark.slow
 def test_a_model_that_changes_the_working_directory_is_no_matter(example):
     assert example("run", "pin.yaml", "--quiet", line="    import os; os.chdir('/')").returncode == 0
     assert example("verify", "results/pin.zarr").returncode == 0
