@@ -100,7 +100,8 @@ def test_no_worker_and_a_worker_that_dies_and_a_scheduler_that_dies(folder, star
     command = ("mdr-dask", "run", "long.yaml", "--scheduler", address, "--log", "log.jsonl")
     alone = mdr_dask(*command[1:], "--patience", "6")
     assert alone.returncode == 2
-    assert re.search(r"^no worker yet, waiting for \d s; giving up after 6 s$", alone.stderr, flags=re.M)
+    waiting = r"^no (worker|answer of the scheduler) yet, waiting for \d s; giving up after 6 s$"
+    assert re.search(waiting, alone.stderr, flags=re.M)
     last = rf"no worker for \d+ s; {KEPT}, with more --patience if need be$"
     assert re.search(last, " ".join(alone.stderr.split()))
 

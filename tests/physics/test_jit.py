@@ -25,18 +25,20 @@ print(doubled(21.0))
 """
 
 
-def run(folder, **environment):
+def run(folder):
     (folder / "kernel.py").write_text(MODULE)
-    kept = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(folder / "cache")}
     command = [sys.executable, "-c", "import kernel"]
-    return subprocess.run(command, cwd=folder, env=kept | environment, capture_output=True, text=True, check=False)
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("ending", "content"), [("nbi", b""), ("nbc", b"\x80\x04torn")])
 def test_a_torn_cache_file_is_compiled_again_with_a_warning(tmp_path, ending, content):
     assert run(tmp_path).stdout == "42.0\n"
-    for path in Path(tmp_path, "__pycache__").glob(f"*.{ending}"):
+    files = list(Path(tmp_path, "cache").rglob(f"*.{ending}"))
+    assert files
+    for path in files:
         path.write_bytes(content)
     again = run(tmp_path)
     assert (again.returncode, again.stdout) == (0, "42.0\n"), again.stderr
