@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from mdr_dask.arrays import FloatArray
 
 CONFIDENCE = 0.95
+#: Number of resamples: the ends of an interval are then known to about 5 % of its width.
 RESAMPLES = 400
 #: Neighbouring values are put into groups; this is the number of groups. In each shifted row, the values of one group
 #: are shifted by their errors, all with the same sign.
@@ -24,7 +25,7 @@ GROUPS = 32
 TAILS = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
 #: Smallest number of resamples from which the ends of an interval are computed.
 FEWEST = round(1 / TAILS[0])
-#: Number that replaces the logarithm of a value that is not positive; its exponential is 0.
+#: Number that replaces the logarithm of a value that is not positive; its exponential is 0 in double precision.
 NOTHING = -1000.0
 
 
@@ -168,18 +169,10 @@ def widening(count: ArrayLike) -> FloatArray:
 def chance(residuals: FloatArray, count: int, draws: int = RESAMPLES) -> float:
     """Return the probability that scatter and errors alone cause an rms residual at least as large as that of the data.
 
-    The residuals of the data are in the first row. The probability is NaN if there are too few resamples, for example
-    with one realisation.
-
-    Parameters
-    ----------
-    residuals : array, shape (1 + RESAMPLES + 2 groups, ...)
-        Stack of the differences between data and law. If the law holds, the first row differs from zero by about as
-        much as the resamples differ from the first row.
-    count : int
-        Number of realisations that were resampled.
-    draws : int
-        Number of rows with resamples.
+    `residuals`, shape (1 + RESAMPLES + 2 groups, ...), is a stack of the differences between data and law; those of the
+    data are in its first row. If the law holds, the first row differs from zero by about as much as the `draws`
+    resamples differ from the first row. `count` is the number of realisations that were resampled. The probability is
+    NaN if there are too few resamples, for example with one realisation.
     """
     caused = _caused(residuals, count, draws)
     return float(np.mean(caused >= np.sqrt(np.mean(residuals[0] ** 2)))) if caused.size else np.nan
@@ -188,10 +181,7 @@ def chance(residuals: FloatArray, count: int, draws: int = RESAMPLES) -> float:
 def scatter(residuals: FloatArray, count: int) -> float:
     """Return the rms residual that scatter and errors alone exceed with a probability of 5 %; NaN if unknown.
 
-    Parameters
-    ----------
-    residuals, count
-        As for `chance`.
+    `residuals` and `count` are as for `chance`.
     """
     caused = _caused(residuals, count, RESAMPLES)
     return float(np.quantile(caused, CONFIDENCE, method="higher")) if caused.size else np.nan

@@ -45,7 +45,7 @@ class FitError(MdrDaskError):
     """A law that cannot be fitted to the data."""
 
 
-#: Number of digits with which any two floating-point numbers can be distinguished.
+#: Number of digits with which any two double-precision numbers can be distinguished.
 _ALL_DIGITS = 17
 
 

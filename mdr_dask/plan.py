@@ -20,23 +20,21 @@ from mdr_dask.errors import CampaignError, ModelError, distinguishable
 from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, with_value
 from mdr_dask.models.numbers import numbers_of
 
-#: Time in s that a block should take, as estimated by the model. This is long compared with the times for scheduling a
-#: task (about 3 ms) and for writing a chunk (about 1 ms).
-BLOCK_SECONDS = 1.0
-#: Approximate number of blocks of a small study, so that several workers can share it.
-FEW_BLOCKS = 16
-#: Shortest time in s that a block of a small study should take, as estimated by the model.
-LEAST_SECONDS = 0.1
-#: Time in s. Blocks whose cases share work are always halved if they take longer than this.
-SHARED_SECONDS = 30.0
-#: Blocks whose cases share work and that take less than `SHARED_SECONDS` are halved only if the total work then grows
-#: by less than this factor.
+#: Number of operations in a second, for the times that are printed. Only their order of magnitude is meant.
+SPEED = 1e9
+#: Number of operations of a block: about a second of work, because scheduling and writing a block take milliseconds.
+OPERATIONS = 1e9
+#: A small study has about this number of blocks, for several workers, but none of fewer than `LEAST` operations.
+FEW_BLOCKS, LEAST = 16, OPERATIONS / 10
+#: Blocks whose cases share work are always halved if they need more operations than this.
+MOST_SHARED = 30 * OPERATIONS
+#: Smaller blocks are halved only if the total number of operations then grows by less than this factor.
 REPEATED_WORK = 1.15
-#: Largest number of blocks of a series for which the model estimates the time.
+#: Largest number of blocks of a series whose operations are counted one by one, so that `check` is fast.
 SAMPLED = 1000
-#: Largest number of records that are merged into one file.
+#: Largest number of records that are merged into one file, of about a megabyte.
 RECORDS_TOGETHER = 1000
-#: Largest chunk of one array, in bytes.
+#: Largest chunk of one array, in bytes: a task holds one such chunk for each output.
 CHUNK_BYTES = 64 * 2**20
 #: Largest number of results of a series; a larger number is taken to be a mistake in the file.
 MOST_CASES = 10**9
@@ -46,29 +44,17 @@ BlockIndex = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Template:
-    """Shape, chunks and coordinates of one group of the store, before anything is computed.
-
-    Parameters
-    ----------
-    campaign : Campaign
-        The campaign.
-    series : Series
-        Parameters and axes of the group.
-    sizes : mapping of str to int
-        Length of each case dimension, then of ``realisation``.
-    chunks : mapping of str to int
-        Length of a block along each dimension.
-    outputs : tuple of Output
-        The arrays, without ``status``.
-    extra : mapping of str to Coordinate
-        Dimensions that outputs have in addition to those of cases and realisations, with their coordinates.
-    """
+    """Shape, chunks and coordinates of one group of the store, before anything is computed."""
 
     campaign: Campaign
     series: Series
+    # Length of each case dimension, then of ``realisation``.
     sizes: Mapping[str, int]
+    # Length of a block along each dimension.
     chunks: Mapping[str, int]
+    # The arrays, without ``status``.
     outputs: tuple[Output, ...]
+    # Dimensions that outputs have in addition to those of cases and realisations, with their coordinates.
     extra: Mapping[str, Coordinate]
 
     @property
@@ -141,31 +127,33 @@ class Template:
         """Return a block to compute, with its cases in C order of their dimensions."""
         return self._block(dict(zip(self.dims, self.region(index), strict=True)))
 
-    def seconds(self, index: BlockIndex) -> float:
-        """Return the estimated time of a block in s.
+    def operations(self, index: BlockIndex) -> float:
+        """Return the approximate number of operations of a block.
 
-        The model estimates the block with the same cases and the first realisations. If the given block has fewer
-        realisations, its time is shorter in proportion.
+        They are counted for the block with the same cases and the first realisations. If the given block has fewer
+        realisations, the number is smaller in proportion.
         """
         *cases, last = index
-        rest = self.sizes["realisation"] - last * self.chunks["realisation"]
-        part = min(rest / self._first_realisations, 1.0)
-        return part * self._first_seconds((*cases, 0))
+        chunk, size = self.chunks["realisation"], self.sizes["realisation"]
+        first, known = (*cases, 0), self._known
+        if first not in known:
+            known[first] = self._operations(self.block(first))
+        return known[first] * min((size - last * chunk) / min(chunk, size), 1.0)
 
-    def _first_seconds(self, index: BlockIndex) -> float:
-        """Return the time in s that the model estimates for a block of the first realisations; the result is cached."""
-        known = self._estimates
-        if index not in known:
-            known[index] = models.load(self.campaign.model).seconds(self.block(index))
-        return known[index]
+    def _operations(self, block: Block[Any]) -> float:
+        """Return the number of operations of a block.
+
+        If the model does not count them, return a number with which a study has as many blocks as a block has results.
+        """
+        count = models.load(self.campaign.model).operations
+        if count is not None:
+            return count(block)
+        results = self.cases * self.campaign.replication.at_least
+        return OPERATIONS * block.cases * len(block.realisations) / math.sqrt(results)
 
     @cached_property
-    def _estimates(self) -> dict[BlockIndex, float]:
+    def _known(self) -> dict[Any, float]:
         return {}
-
-    @property
-    def _first_realisations(self) -> int:
-        return min(self.chunks["realisation"], self.sizes["realisation"])
 
     def _block(self, region: Mapping[str, slice]) -> Block[Any]:
         case_dims = self.dims[:-1]
@@ -192,7 +180,7 @@ class Template:
         return {axis.path: _as_array(axis) for axis in self.series.axes}
 
     def sample(self, chunks: Mapping[str, int], position: float) -> Block[Any]:
-        """Return a block whose dimensions have the given sizes; it is used for estimates of time and memory.
+        """Return a block whose dimensions have the given sizes; it is used for estimates of operations and memory.
 
         `position` is the place of the block in the group, from 0 (the first block) to 1 (the last block).
         """
@@ -202,19 +190,15 @@ class Template:
     def _starts(self, chunks: Mapping[str, int], position: float) -> dict[str, int]:
         return {dim: round(position * (size - chunks[dim])) for dim, size in self.sizes.items()}
 
-    def mean_seconds(self, chunks: Mapping[str, int]) -> float:
-        """Return the mean estimated time, in s, of the first, middle and last block of the given lengths."""
-        known, model, found = self._means, models.load(self.campaign.model), []
+    def mean_operations(self, chunks: Mapping[str, int]) -> float:
+        """Return the mean number of operations of the first, middle and last block of the given lengths."""
+        known, found = self._known, []
         for position in (0.0, 0.5, 1.0):
             key = tuple(self._starts(chunks, position).values()), tuple(chunks.values())
             if key not in known:
-                known[key] = model.seconds(self.sample(chunks, position))
+                known[key] = self._operations(self.sample(chunks, position))
             found.append(known[key])
         return float(np.mean(found))
-
-    @cached_property
-    def _means(self) -> dict[tuple[BlockIndex, BlockIndex], float]:
-        return {}
 
 
 def _as_array(axis: Axis) -> NDArray[Any]:
@@ -229,7 +213,8 @@ def _as_array(axis: Axis) -> NDArray[Any]:
 class Estimate:
     """The costs of the first round of a campaign, as ``run --dry-run`` prints them.
 
-    `growth` is the largest factor by which adaptive axes can increase the number of cases.
+    `operations` is None if the model does not count them. `growth` is the largest factor by which adaptive axes can
+    increase the number of cases.
     """
 
     cases: int
@@ -239,11 +224,15 @@ class Estimate:
     solves: int
     blocks: int
     bytes: int
-    seconds: float
+    operations: float | None
     files: int
     notes: tuple[str, ...]
-    compiling: float = 0.0
     growth: float = 1.0
+
+    @property
+    def seconds(self) -> float | None:
+        """Order of magnitude of the time on one core in s: the operations divided by `SPEED`."""
+        return None if self.operations is None else self.operations / SPEED
 
     @property
     def rounds(self) -> float:
@@ -254,23 +243,11 @@ class Estimate:
 def templates(
     campaign: Campaign, realisations: int, stored_chunks: Mapping[str, Mapping[str, int]] | None = None
 ) -> tuple[Template, ...]:
-    """Lay out every series of a campaign.
+    """Lay out every series of a checked campaign for a number of realisations.
 
-    Parameters
-    ----------
-    campaign : Campaign
-        A checked campaign.
-    realisations : int
-        Number of realisations to lay out.
-    stored_chunks : mapping of series name to chunk lengths, optional
-        Chunk lengths of the groups that already exist.
-
-    Raises
-    ------
-    CampaignError
-        If a series has too many results, or one of its cases needs too much memory; all problems are reported together.
-    ModelError
-        If an output has a dimension for which the model gives no coordinates.
+    `stored_chunks` are the chunk lengths of the groups that already exist, by the names of their series. Raise
+    CampaignError with all problems if a series has too many results or one of its cases needs too much memory, and
+    ModelError if an output has a dimension for which the model gives no coordinates.
     """
     model = models.load(campaign.model)
     known = stored_chunks or {}
@@ -340,19 +317,19 @@ def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
     """Return the lengths of a block along each dimension.
 
     A block first gets all values of the axes along which cases share work; these axes are cut only if the block would
-    become too large. As far as its estimated time allows, it then gets more realisations, more values of the other
-    axes, and finally the realisations of later rounds.
+    become too large. As far as the number of its operations allows, it then gets more realisations, more values of the
+    other axes, and finally the realisations of later rounds.
     """
     whole = _whole_dims(template, model)
     chunks = {dim: size if dim in whole else 1 for dim, size in template.sizes.items()}
     limit = max(1, CHUNK_BYTES // _bytes_per_result(template))
-    goal = _block_seconds(template, chunks)
+    goal = _goal(template, chunks)
     for dim in reversed(whole):
         while chunks[dim] > 1 and (math.prod(chunks.values()) > limit or _is_cut(template, chunks, dim, 4 * goal)):
             chunks[dim] = math.ceil(chunks[dim] / 2)
 
     def capacity() -> int:
-        return int(min(goal / max(template.mean_seconds(chunks), 1e-9), limit / math.prod(chunks.values())))
+        return int(min(goal / max(template.mean_operations(chunks), 1.0), limit / math.prod(chunks.values())))
 
     for dim in ("realisation", *reversed([dim for dim in template.dims[:-1] if dim not in whole])):
         chunks[dim] = _part(template, dim, max(1, min(template.sizes[dim], capacity())))
@@ -374,21 +351,21 @@ def _whole_dims(template: Template, model: Model[Any]) -> list[str]:
 def _is_cut(template: Template, chunks: Mapping[str, int], dim: str, most: float) -> bool:
     """Return whether blocks should be halved along a dimension.
 
-    Blocks are halved if they take more than `most` seconds. But if they take at most `SHARED_SECONDS`, they are halved
+    Blocks are halved if they need more than `most` operations. But if they need at most `MOST_SHARED`, they are halved
     only if the halves repeat little of the shared work (`REPEATED_WORK`).
     """
-    now = template.mean_seconds(chunks)
-    if now <= most or now > SHARED_SECONDS:
+    now = template.mean_operations(chunks)
+    if now <= most or now > MOST_SHARED:
         return now > most
     half = math.ceil(chunks[dim] / 2)
-    growth = template.mean_seconds({**chunks, dim: half}) / now * chunks[dim] / half
+    growth = template.mean_operations({**chunks, dim: half}) / now * chunks[dim] / half
     return growth < REPEATED_WORK
 
 
-def _block_seconds(template: Template, chunks: Mapping[str, int]) -> float:
+def _goal(template: Template, chunks: Mapping[str, int]) -> float:
+    """Return the number of operations that a block should need."""
     parts = math.prod(template.sizes.values()) / math.prod(chunks.values())
-    total = parts * template.mean_seconds(chunks)
-    return min(BLOCK_SECONDS, max(LEAST_SECONDS, total / FEW_BLOCKS))
+    return min(OPERATIONS, max(LEAST, parts * template.mean_operations(chunks) / FEW_BLOCKS))
 
 
 def _is_whole(axis: Axis, path: str) -> bool:
@@ -413,13 +390,7 @@ def _bytes_per_result(template: Template) -> int:
 
 
 def estimate(campaign: Campaign) -> Estimate:
-    """Return the costs of a campaign without running it.
-
-    Raises
-    ------
-    CampaignError
-        If the campaign is too large to be run.
-    """
+    """Return the costs of a campaign without running it; raise CampaignError if it is too large to be run."""
     model = models.load(campaign.model)
     realisations = campaign.replication.at_least
     parts = [_estimate_series(template, model) for template in templates(campaign, realisations)]
@@ -431,10 +402,9 @@ def estimate(campaign: Campaign) -> Estimate:
         solves=sum(part.solves for part in parts),
         blocks=sum(part.blocks for part in parts),
         bytes=sum(part.bytes for part in parts),
-        seconds=sum(part.seconds for part in parts),
+        operations=None if model.operations is None else sum(part.operations or 0.0 for part in parts),
         files=1 + sum(part.files for part in parts) + any(series.name for series in campaign.series),
         notes=tuple(dict.fromkeys((*(note for part in parts for note in part.notes), *measured.notes(campaign)))),
-        compiling=model.compiling,
         growth=sum(part.cases * part.growth for part in parts) / sum(part.cases for part in parts),
     )
 
@@ -453,10 +423,10 @@ def _estimate_series(template: Template, model: Model[Any]) -> Estimate:
     """
     blocks, lengths = math.prod(template.grid[:-1]), template.grid[:-1]
     sample = np.linspace(0, blocks - 1, min(blocks, SAMPLED)).round().astype(int)
-    seconds, solves = 0.0, 0.0
+    operations, solves = 0.0, 0.0
     for index in zip(*np.unravel_index(sample, lengths), strict=True) if lengths else [()]:
         place = (*map(int, index), 0)
-        seconds += template.seconds(place) * blocks / sample.size
+        operations += template.operations(place) * blocks / sample.size
         if model.distinct is not None:
             block = template.block(place)
             alone = replace(block, realisations=block.realisations[:1])
@@ -472,7 +442,7 @@ def _estimate_series(template: Template, model: Model[Any]) -> Estimate:
         blocks=math.prod(template.grid),
         bytes=template.bytes,
         files=template.files,
-        seconds=seconds * realisations / min(template.chunks["realisation"], realisations),
+        operations=operations * realisations / min(template.chunks["realisation"], realisations),
         notes=template.notes,
         growth=_growth(template.series),
     )

@@ -13,33 +13,26 @@ from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.models.base import Model, Status
 
 #: A round multiplies the number of realisations by the factor with which half of the unfinished cases will probably
-#: have enough realisations. This factor is limited to the range from `LEAST_GROWTH` to `MOST_GROWTH`.
+#: have enough realisations. This factor is at least `LEAST_GROWTH`, so that there are few rounds, and at most
+#: `MOST_GROWTH`, because few results estimate their scatter poorly.
 LEAST_GROWTH, MOST_GROWTH = 1.25, 4.0
 #: Factor by which a round for a fitted constant multiplies the number of realisations. It is fixed, because the number
 #: of realisations that such a constant needs cannot be estimated.
 GROWTH = 1.5
 #: A case with `FEWEST` or more results stops if its estimated standard error meets the tolerance. With fewer results
-#: the standard error is estimated poorly. If cases stopped on this estimate alone, only 89 % of the 95 % intervals
-#: might contain the true mean. So a case with fewer than `FEWEST` results stops only if it has at least `FEW` results
-#: and would meet the tolerance even if the variance were `DOUBT` times as large. `growth_needed` lists two further
-#: conditions. The coverage was measured with ``python -m benchmarks campaigns``.
-FEWEST, FEW, DOUBT = 12, 7, 2.0
+#: the standard error is estimated poorly: if cases stopped on this estimate alone, only 89 % of the 95 % intervals
+#: might contain the true mean. `growth_needed` lists two further conditions. The coverage was measured with
+#: ``python -m benchmarks campaigns``.
+FEWEST = 12
 #: A case with two or more results also stops if its standard error is below this fraction of the tolerance, because its
 #: results are then practically equal.
 NEGLIGIBLE = 1e-3
 
 
 def next_round(replication: Replication, count: int, growth: NDArray[np.float64]) -> int:
-    """Return the number of realisations after the next round.
+    """Return the number of realisations after the next round, given their number `count` so far.
 
-    Parameters
-    ----------
-    replication : Replication
-        The rule of the campaign.
-    count : int
-        Number of realisations so far.
-    growth : float array, shape (cases,)
-        Factor by which the number of realisations of each case must grow. It is at most 1 if the case has enough.
+    `growth` is the factor by which the number of realisations of each case must grow, at most 1 if the case has enough.
     """
     more = np.minimum(growth[growth > 1], MOST_GROWTH)
     if not more.size:
@@ -56,29 +49,16 @@ def growth_needed(
 ) -> NDArray[np.float64]:
     """Return the factor by which the number of results of each case must grow.
 
-    Parameters
-    ----------
-    values : mapping of str to array, shape (..., realisations)
-        The outputs that have a tolerance.
-    status : int8 array, shape (..., realisations)
-        The ledger. Only results that are done are used.
-    until : mapping of str to Tolerance
-        Largest allowed standard error of the mean, by output.
-    scatter : mapping of str to array, shape (..., realisations), optional
-        Standard error of the output in each single realisation, for outputs of which one realisation gives such an
-        estimate.
+    `values` are the outputs that have a tolerance, shape (..., realisations), and `status` the ledger; only results
+    that are done are used. `until` is the largest allowed standard error of the mean of each output. `scatter` is the
+    standard error of an output in each single realisation, for outputs of which one realisation gives such an estimate.
 
-    Returns
-    -------
-    float array, shape (...)
-        The factor of each case. It is at most 1 if the case has enough results for every tolerance, and 0 if the case
-        has no successful result. A case has enough results for a tolerance if at least one of these conditions holds:
+    The factor is at most 1 if the case has enough results for every tolerance, and 0 if the case has no successful
+    result. A case has enough results for a tolerance if at least one of these conditions holds:
 
-        * There are at least `FEWEST` results, and the standard error is within the tolerance.
-        * There are at least `FEW` results, and the standard error would be within the tolerance even if the variance
-          were `DOUBT` times as large.
-        * The standard error is below the fraction `NEGLIGIBLE` of the tolerance.
-        * Both the standard error and the standard error from the estimates in `scatter` are within the tolerance.
+    * There are at least `FEWEST` results, and the standard error is within the tolerance.
+    * The standard error is below the fraction `NEGLIGIBLE` of the tolerance.
+    * Both the standard error and the standard error from the estimates in `scatter` are within the tolerance.
     """
     done = status == Status.DONE
     count = np.maximum(done.sum(axis=-1), 1)
@@ -87,11 +67,7 @@ def growth_needed(
         mean, error = mean_and_error(values[name], done)
         allowed = np.maximum(tolerance.absolute, tolerance.relative * np.abs(mean))
         enough = count * _times(error, allowed)
-        sufficient = [
-            np.maximum(FEWEST, enough),
-            np.maximum(FEW, DOUBT * enough),
-            count * _times(error, NEGLIGIBLE * allowed),
-        ]
+        sufficient = [np.maximum(FEWEST, enough), count * _times(error, NEGLIGIBLE * allowed)]
         if scatter and name in scatter:
             within = _error_from_within(scatter[name], done)
             sufficient.append(np.maximum(enough, count * _times(within, allowed)))

@@ -14,8 +14,6 @@ from mdr_dask.units import seconds, shown
 
 #: Longest list of values that is printed in full.
 LISTED = 6
-#: Time in s that a run needs in addition to its blocks, to start and to end.
-START = 2.0
 
 
 @dataclass(frozen=True, repr=False)
@@ -127,10 +125,10 @@ def cost_lines(costs: Estimate) -> Iterator[str]:
         yield "no case can be computed: all will fail (mdr-dask status --failures shows the reasons)"
     yield f"about {_counted('file', costs.files, more)} in the store"
     sizes = " to ".join(dict.fromkeys(human_bytes(count * costs.bytes) for count in (1, more)))
-    times = " to ".join(dict.fromkeys(seconds(START + count * costs.seconds) for count in (1, more)))
-    compiling = f"; compiling, the first time, about {seconds(costs.compiling)} more" if costs.compiling else ""
-    yield f"{sizes} uncompressed, about {times} on one core{compiling}"
-    yield "the time is an estimate, not a measurement on this machine"
+    yield f"{sizes} uncompressed"
+    if costs.seconds is not None:
+        times = " to ".join(dict.fromkeys(seconds(max(count * costs.seconds, 1.0)) for count in (1, more)))
+        yield f"about {times} on one core: an estimate from a count of operations, not a measurement on this machine"
     if more > 1:
         yield "ranges: from the first round to the last one, if no case meets its tolerance earlier"
 
@@ -157,9 +155,8 @@ def costs_row(costs: Estimate) -> dict[str, Any]:
         "at_most": costs.at_most,
         **first,
         **{f"{name}_at_most": round(count * costs.rounds) for name, count in first.items()},
-        "seconds": float(costs.seconds),
-        "seconds_at_most": float(costs.seconds * costs.rounds),
-        "compiling": costs.compiling,
+        "seconds": costs.seconds,
+        "seconds_at_most": None if costs.seconds is None else costs.seconds * costs.rounds,
         "notes": list(costs.notes),
     }
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import pickle
 import platform
@@ -20,13 +19,9 @@ from mdr_dask import models, store
 from mdr_dask.compile_clock import compile_clock
 from mdr_dask.errors import ClusterError, MachineError, MdrDaskError
 from mdr_dask.models.base import Block, Model, Result, Status
-from mdr_dask.models.per_case import is_interrupt, real_numbers, reason
+from mdr_dask.models.per_case import is_interrupt, real_numbers, reason, where
 from mdr_dask.store import Place
 from mdr_dask.version import __version__
-
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # numbers of two settings in malloc.h of glibc
-# in bytes: size above which glibc puts arrays outside the heap, and free memory that it keeps in the heap
-MAPPED, TRIMMED = 32 * 2**20, 128 * 2**20
 
 #: Environment variable from which child processes of this machine read the result of `kind`.
 KIND = "MDR_DASK_KIND_OF_MACHINE"
@@ -34,36 +29,21 @@ KIND = "MDR_DASK_KIND_OF_MACHINE"
 
 @dataclass(frozen=True)
 class Work:
-    """One task: everything that a worker needs to compute a block and to write it.
-
-    Parameters
-    ----------
-    place : Place
-        Place of the block in the store.
-    model : str
-        Name of the model.
-    versions : tuple
-        Versions of the program and of the model in the process that started the run (the driver), as `versions` returns
-        them.
-    block : Block
-        Cases and realisations of the block.
-    wanted, spared : bool array, shape of the block
-        Results to compute, and results to mark as not needed.
-    attempt : int
-        Number of the attempt, from 1: the number of times that the computation of the block was started, including this
-        one.
-    estimate : float
-        Time that the model estimates, in seconds.
-    """
+    """One task: everything that a worker needs to compute a block and to write it."""
 
     place: Place
     model: str
+    # Versions of the program and of the model in the process that started the run (the driver), as `versions` returns
+    # them.
     versions: tuple[str, int]
     block: Block[Any]
+    # Results to compute, and results to mark as not needed, in the shape of the block.
     wanted: NDArray[np.bool_]
     spared: NDArray[np.bool_]
+    # Number of the attempt, from 1: the number of times that the computation of the block was started, including this
+    # one.
     attempt: int
-    estimate: float
+    operations: float
 
     @property
     def key(self) -> str:
@@ -80,9 +60,9 @@ class Work:
             return ()
         first = np.zeros_like(self.wanted)
         first.flat[cells[: cells.size // 2]] = True
-        half, nothing = self.estimate / 2, np.zeros_like(self.spared)
-        return replace(self, wanted=first, estimate=half), replace(
-            self, wanted=self.wanted & ~first, spared=nothing, estimate=half
+        half, nothing = self.operations / 2, np.zeros_like(self.spared)
+        return replace(self, wanted=first, operations=half), replace(
+            self, wanted=self.wanted & ~first, spared=nothing, operations=half
         )
 
 
@@ -96,7 +76,7 @@ class Outcome:
 
     counts: tuple[int, ...]
     solves: int
-    estimate: float
+    operations: float
     compute_seconds: float
     write_seconds: float
     compile_seconds: float = 0.0
@@ -111,21 +91,16 @@ def versions(model: str) -> tuple[str, int]:
 def run_block(work: Work) -> Outcome:
     """Compute a block and write it. Running the same task again gives the same results.
 
-    Raises
-    ------
-    ClusterError
-        If this worker has another version of the program than the driver.
-    StoreError
-        If the store cannot be read or written.
+    Raise ClusterError if this worker has another version of the program than the driver, and StoreError if the store
+    cannot be read or written.
     """
     if versions(work.model) != work.versions:
         raise ClusterError(_other_version(work))
     model = models.load(work.model)
-    keep_freed_memory()
-    clock = compile_clock() if model.compiling else None
+    is_own = models.is_own(work.model)
+    clock = None if is_own else compile_clock()
     compiled = clock.seconds if clock else 0.0
     started = time.perf_counter()
-    is_own = models.is_own(work.model)
     if work.wanted.all():
         result = _compute(model, work.block, is_own)
         shape = work.wanted.shape
@@ -140,7 +115,7 @@ def run_block(work: Work) -> Outcome:
     compiled = clock.seconds - compiled if clock else 0.0
     record = _record(work, result, status, middle - started)
     store.write_block(work.place, work.attempt, values if work.wanted.any() else {}, status, record)
-    times = work.estimate, middle - started, time.perf_counter() - middle, compiled
+    times = work.operations, middle - started, time.perf_counter() - middle, compiled
     return Outcome(_counts(work, status), result.solves, *times, _warned(record))
 
 
@@ -155,7 +130,7 @@ def finished(work: Work) -> Outcome | None:
         return None
     _, status = store.read_block(work.place, ())
     seconds, warned = record["compute_seconds"], _warned(record)
-    return Outcome(_counts(work, status), record["solves"], work.estimate, seconds, 0.0, warned=warned)
+    return Outcome(_counts(work, status), record["solves"], work.operations, seconds, 0.0, warned=warned)
 
 
 def _other_version(work: Work) -> str:
@@ -176,7 +151,7 @@ def _warned(record: Mapping[str, Any]) -> int:
 #: Errors that come from a fault of the machine and not from a case: for example, the cache of the compiler is broken, a
 #: disk is full, or a library is missing.
 MACHINE_FAULTS = (OSError, EOFError, ImportError, pickle.UnpicklingError)
-#: Longer messages are cut to this number of characters before they are stored.
+#: Longer messages are cut to this number of characters before they are stored, because each failed result has one.
 LONGEST_MESSAGE = 1000
 
 
@@ -199,7 +174,7 @@ def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
                 f"{platform.node()} cannot compute {model.name}: {type(error).__name__}: {error}"
             ) from None
         if is_single:
-            return _failed(model, block, reason(error))
+            return _failed(model, block, reason(error) + (where(error) if is_own else ""))
     parts = [
         _compute(model, block.part(case, number), is_own)
         for case in range(block.cases)
@@ -211,10 +186,7 @@ def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
 def _checked(model: Model[Any], block: Block[Any], result: Result) -> Result:
     """Return the checked result of a model that the user wrote; results with invalid values are marked as failed.
 
-    Raises
-    ------
-    TypeError, ValueError
-        If the result lacks a declared output, or has another shape or status than declared.
+    Raise TypeError or ValueError if the result lacks a declared output, or has another shape or status than declared.
     """
     if not isinstance(result, Result):
         raise TypeError(f"expected a Result, got {type(result).__name__}")
@@ -394,18 +366,6 @@ def one_blas_thread() -> AbstractContextManager[object]:
     return limits
 
 
-@lru_cache(maxsize=1)
-def keep_freed_memory() -> None:
-    """Let glibc keep the memory of freed arrays of some megabytes in the process.
-
-    Otherwise each new array would get its memory from the operating system again, which takes time.
-    """
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None) if os.name == "posix" else None
-    if mallopt is not None:
-        mallopt(M_MMAP_THRESHOLD, MAPPED)
-        mallopt(M_TRIM_THRESHOLD, TRIMMED)
-
-
 def write_off(work: Work, message: str) -> Outcome:
     """Mark the results of a task as failed without computing them, because they crash the process."""
     _, status = store.read_block(work.place, ())
@@ -414,4 +374,4 @@ def write_off(work: Work, message: str) -> Outcome:
     lost = zip(*np.nonzero(work.wanted.reshape(work.block.cases, -1)), strict=True)
     result = Result({}, status, {(int(case), int(number)): message for case, number in lost})
     store.write_block(work.place, work.attempt, {}, status, _record(work, result, status, 0.0))
-    return Outcome(_counts(work, status), 0, work.estimate, 0.0, 0.0)
+    return Outcome(_counts(work, status), 0, work.operations, 0.0, 0.0)

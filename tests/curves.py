@@ -55,7 +55,7 @@ MODEL = Model(
     parameters=Curve,
     outputs=(Output("y", "1", "height of the curve"), Output("half", "1", "half of it", default=False)),
     compute=compute,
-    seconds=lambda block: 1e-6 * block.cases * len(block.realisations),
+    operations=lambda block: 1e3 * block.cases * len(block.realisations),
 )
 
 

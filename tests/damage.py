@@ -32,7 +32,7 @@ KINDS = {
     "ledger": "**/status/c/*/*",
     "record": "**/status/records/*.jsonl",
     "loose record": "**/status/records/*.json",
-    "record of the layout": "layout.json",
+    "record of the layout": ".layout/zarr.json",
 }
 
 
@@ -160,7 +160,7 @@ def faults(toy, sound: Path, study, work: Path, kind: str, harm: str, draw: rand
         groups = store.datasets(url)
         for dataset in groups.values():
             dataset["status"].load()
-        store.require_sound(url, list(groups))
+        store.require_undamaged(url, list(groups))
 
     def run() -> None:
         execute.run(study, url, Resources(threads=1), lambda _: None)

@@ -57,6 +57,15 @@ def test_the_example_of_the_page_goes_through_every_command(example, capsys):
     assert "wear_volume_grid_error" in json.loads(capsys.readouterr().out)["rows"][0]
 
 
+def test_a_changed_function_with_the_same_version_is_noticed(example, caplog):
+    assert main(["run", "pin.yaml", "--quiet"]) == 0
+    for change, is_noticed in (("    # a comment\n\n    volume =", False), ("    volume = 2 *", True)):
+        (example / "wear_rate.py").write_text(MODULE.replace("    volume =", change))
+        del sys.modules["wear_rate"]
+        assert main(["run", "pin.yaml", "--quiet"]) == 0
+        assert ("the file of the model wear_rate:MODEL has changed" in caplog.text) == is_noticed
+
+
 @pytest.mark.parametrize(
     ("name", "module", "sentence"),
     [
@@ -103,7 +112,7 @@ def test_where_every_case_fails_outputs_with_dimensions_of_their_own_are_written
     traced = MODULE.replace(
         "has_error=True),)", 'has_error=True), Output("trace", "m", "depth along the track", ("place",)))'
     ).replace(
-        "    seconds=", '    coordinates=lambda _: {"place": Coordinate(np.arange(3.0), "1", "place")},\n    seconds='
+        "    compute=", '    coordinates=lambda _: {"place": Coordinate(np.arange(3.0), "1", "place")},\n    compute='
     )
     broken = traced.replace("    coefficient = case", '    raise ValueError("no pin")\n    coefficient = case')
     imports = "import numpy as np\nfrom mdr_dask.models.base import Coordinate\n"
@@ -146,7 +155,7 @@ MISBEHAVIOUR = {
         r"expected a dictionary with a value for each output, got None \(is the return statement missing\?\)",
     ),
     "other names": (lambda _: {"wear": 1.0}, "the output wear_volume is missing, got wear"),
-    "exception": (raises(ValueError("two\n  lines\n")), "ValueError: two lines"),
+    "exception": (raises(ValueError("two\n  lines\n")), r"ValueError: two lines \(test_own_model.py:\d+\)"),
     "exception that has no text": (raises(UnprintableError()), "UnprintableError"),
     "exit": (raises(SystemExit(0)), "SystemExit: 0"),
     "interrupt of its own": (raises(KeyboardInterrupt()), "KeyboardInterrupt"),
@@ -218,13 +227,13 @@ def test_a_result_that_is_not_as_declared_is_a_failed_case(example, monkeypatch,
 @pytest.mark.parametrize(
     ("broken", "sentence"),
     [
-        ("seconds=lambda block: 1 / 0", "'seconds' of model 'wear_rate:MODEL' failed: ZeroDivisionError"),
-        ("seconds=lambda block: 1.0, memory=lambda block: None", "'memory' of model .* failed: TypeError"),
-        ("seconds=lambda block: 1.0, notes=lambda cases: cases[9]", "'notes' of model .* failed: "),
+        ("operations=lambda block: 1 / 0", "'operations' of model 'wear_rate:MODEL' failed: ZeroDivisionError"),
+        ("memory=lambda block: None", "'memory' of model .* failed: TypeError"),
+        ("notes=lambda cases: cases[9]", "'notes' of model .* failed: "),
     ],
 )
 def test_a_fault_in_another_function_of_the_model_is_one_message(example, capsys, broken, sentence):
-    Path("wear_rate.py").write_text(re.sub("seconds=.*,", f"{broken},", MODULE))
+    Path("wear_rate.py").write_text(MODULE.replace("    compute=", f"    {broken},\n    compute="))
     assert main(["check", "pin.yaml"]) == 2
     assert re.search(sentence, capsys.readouterr().err)
 

@@ -22,7 +22,7 @@ def costs(toy, monkeypatch):
     def set_costs(seconds: float, /, **changes: object) -> None:
         import sys
 
-        each = {"seconds": lambda block: seconds * block.cases * len(block.realisations)}
+        each = {"operations": lambda block: 1e9 * seconds * block.cases * len(block.realisations)}
         model = replace(toy.MODEL, **(each | changes))
         monkeypatch.setattr(sys.modules["mdr_dask.models.toy"], "MODEL", model)
 
@@ -68,7 +68,21 @@ def test_blocks_hold_no_more_than_the_work_aimed_at_unless_one_result_does(toy, 
     costs(10.0**cost)
     (template,) = plan.templates(study(toy, sizes, realisations), realisations)
     block = 10.0**cost * math.prod(template.chunks.values())
-    assert block <= max(plan.BLOCK_SECONDS, 10.0**cost) * (1 + 1e-9)
+    assert block <= max(1.0, 10.0**cost) * (1 + 1e-9)
+
+
+@settings(deadline=None, suppress_health_check=list(HealthCheck), max_examples=20)
+@given(positions=st.integers(1, 300), realisations=st.integers(1, 300))
+def test_without_a_count_of_operations_there_are_as_many_blocks_as_results_in_a_block(
+    toy, costs, positions, realisations
+):
+    costs(1.0, operations=None)
+    campaign = study(toy, (positions, 1), realisations)
+    (template,) = plan.templates(campaign, realisations)
+    most = math.sqrt(positions * realisations)
+    assert math.prod(template.chunks.values()) <= max(most, 1)
+    assert math.prod(template.grid) <= 16 + 4 * most
+    assert plan.estimate(campaign).seconds is None
 
 
 def test_whole_axes_stay_whole_until_a_block_is_far_too_long(toy, costs):

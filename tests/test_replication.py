@@ -47,15 +47,6 @@ def test_a_case_that_never_succeeds_is_given_up_and_a_single_success_is_not_enou
     assert needs_more(values, status, {"y": Tolerance(relative=0.5)}).tolist() == [False, True]
 
 
-@pytest.mark.parametrize(("count", "asked", "needed"), [(6, 0.2, 7), (8, 0.15, 8), (8, 0.14, 9.18), (8, 0.1, 12)])
-def test_fewer_than_twelve_are_enough_where_half_as_many_would_be(count, asked, needed):
-    """With a scatter of 0.3 a mean to 0.15 needs four results, which eight know well enough."""
-    values = {"y": 1.0 + 0.3 * np.resize([1.0, -1.0], count)[None] * np.sqrt((count - 1) / count)}
-    status = np.full((1, count), Status.DONE, dtype=np.int8)
-    growth = growth_needed(values, status, {"y": Tolerance(absolute=asked)})
-    assert growth * count == pytest.approx(needed, rel=2e-3)
-
-
 CAMPAIGNS = 4000
 
 

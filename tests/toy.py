@@ -66,7 +66,7 @@ MODEL = Model(
         Output("width", "m", "width of the line", default=False, has_error=True),
     ),
     compute=compute,
-    seconds=lambda block: 1e-6 * block.cases * len(block.realisations),
+    operations=lambda block: 1e3 * block.cases * len(block.realisations),
     coordinates=lambda _: {"multiple": Coordinate(np.arange(3.0), "1", "factor")},
 )
 

@@ -190,7 +190,7 @@ MODEL = Model(
     parameters=Case,
     outputs=(Output("friction", "1", "coefficient of friction"),),
     compute=per_case(lambda case, _: {"friction": friction(case.speed, case.line)}),
-    seconds=lambda block: 5e-4 * block.cases,
+    operations=lambda block: 5e5 * block.cases,
 )
 CAMPAIGN = """
 name: peers

@@ -12,10 +12,12 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.models.base import Parameters
 from mdr_dask.models.data_file import DataFile
 
+#: Digits of the values of a range: two fewer than a double has, so that rounding errors do not show.
 _DIGITS = 14
-#: Number of significant digits to which the values of an axis are compared. Values that agree are computed only once.
+#: Digits to which the values of an axis are compared: two fewer again, for values from different formulas. Values that
+#: agree are computed only once.
 SAME_DIGITS = 12
-#: Largest number of values that `Axis.some` returns, for checks that would take too long with all values.
+#: Largest number of values that `Axis.some` returns, so that a check of an axis with a million values is fast.
 SOME = 64
 
 
@@ -60,35 +62,22 @@ def tidy(value: float, whole: bool, exact: bool = False) -> float:
 
 @dataclass(frozen=True)
 class Axis:
-    """One varied parameter.
+    """One varied parameter."""
 
-    Parameters
-    ----------
-    path : str
-        Dotted path in the model's parameters (``velocity``, ``indenter.angle``).
-    name : str
-        Name of its coordinate in the store: the path with ``_`` for ``.``.
-    dim : str
-        Its dimension in the store: `name` in a grid, or ``case`` in a study whose parameters vary together.
-    values : tuple
-        Checked values in SI, in the order of the file: numbers, names, or whole parameter sets.
-    labels : tuple of str or None
-        Names of the values in the store if the values are not numbers. None for numbers.
-    unit : str or None
-        SI unit, ``"1"`` for pure numbers. None if the values are names.
-    long_name : str
-        The parameter's meaning.
-    refinement : Refinement or None
-        Rule by which an adaptive axis gets further values; None for any other axis.
-    """
-
+    # Dotted path in the model's parameters (``velocity``, ``indenter.angle``).
     path: str
+    # Name of its coordinate in the store: the path with ``_`` for ``.``.
     name: str
+    # Its dimension in the store: `name` in a grid, or ``case`` in a study whose parameters vary together.
     dim: str
+    # Checked values in SI, in the order of the file: numbers, names, or whole parameter sets.
     values: tuple[Any, ...]
+    # Names of the values in the store if the values are not numbers. None for numbers.
     labels: tuple[str, ...] | None
+    # SI unit, ``"1"`` for pure numbers. None if the values are names.
     unit: str | None
     long_name: str
+    # Rule by which an adaptive axis gets further values; None for any other axis.
     refinement: Refinement | None = None
 
     @property
@@ -100,19 +89,11 @@ class Axis:
 
 @dataclass(frozen=True)
 class Series:
-    """One series of a campaign, which is one group of the store: its parameters, and its axes.
+    """One series of a campaign, which is one group of the store: its parameters, and its axes."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the Zarr group. It is empty in a campaign without series, whose arrays are at the root of the store.
-    parameters : Parameters
-        All parameters. A varied parameter has the first value of its axis.
-    axes : tuple of Axis
-        The axes, in the order of the file.
-    """
-
+    # Name of the Zarr group. It is empty in a campaign without series, whose arrays are at the root of the store.
     name: str
+    # All parameters. A varied parameter has the first value of its axis.
     parameters: Parameters
     axes: tuple[Axis, ...]
 
@@ -136,42 +117,26 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Refinement:
-    """The rule by which a study chooses the values of an adaptive axis.
+    """The rule by which a study chooses the values of an adaptive axis."""
 
-    Parameters
-    ----------
-    spread : Spread
-        The interval of the axis, with the scale on which outputs are interpolated.
-    until : mapping of str to Tolerance
-        Largest accepted interpolation error of each output. A relative error refers to the largest value of the output
-        along the axis.
-    at_most : int
-        Largest number of values.
-    """
-
+    # The interval of the axis, with the scale on which outputs are interpolated.
     spread: Spread
+    # Largest accepted interpolation error of each output. A relative error refers to the largest value of the output
+    # along the axis.
     until: Mapping[str, Tolerance]
     at_most: int
 
 
 @dataclass(frozen=True)
 class Replication:
-    """The number of realisations of each case: first `at_least`, then more in rounds until every tolerance is met.
+    """The number of realisations of each case: first `at_least`, then more in rounds until every tolerance is met."""
 
-    Parameters
-    ----------
-    at_least, at_most : int
-        Number of realisations in the first round, and largest number of realisations in all rounds together.
-    until : mapping of str to Tolerance
-        Largest accepted standard error of the mean of each output.
-    answers : mapping of str to Tolerance
-        Largest accepted half width of the 95 % interval of each fitted constant. The keys have the form
-        ``fit.constant``.
-    """
-
+    # Number of realisations in the first round, and largest number of realisations in all rounds together.
     at_least: int
     at_most: int
+    # Largest accepted standard error of the mean of each output.
     until: Mapping[str, Tolerance]
+    # Largest accepted half width of the 95 % interval of each fitted constant. The keys have the form ``fit.constant``.
     answers: Mapping[str, Tolerance] = field(default_factory=dict)
 
     @property
@@ -182,44 +147,24 @@ class Replication:
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign file after all checks.
-
-    Parameters
-    ----------
-    name, model : str
-        Names of the campaign and of its model.
-    seed : int
-        Seed of every random number.
-    replication : Replication
-        Number of realisations of each case.
-    series : tuple of Series
-        At least one series.
-    outputs : tuple of str
-        The arrays to compute and store, in the order of the model.
-    accuracy : float or None
-        Relative error allowed for the outputs.
-    store : str
-        Path (relative to the working directory) or URL of the store.
-    blocks : mapping of str to int
-        Lengths of chunks that the file sets, by dimension. All other lengths are chosen automatically.
-    text, source : str
-        Text of the campaign file, and its path.
-    remarks : tuple of str
-        Questions about numbers without a unit that are far from the usual values, each with its position in the file.
-    measured : DataFile or None
-        Table of measured values of an output, for the fit ``calibration``. None if the campaign has no table.
-    """
+    """A campaign file after all checks."""
 
     name: str
     model: str
     seed: int
     replication: Replication
     series: tuple[Series, ...]
+    # The arrays to compute and store, in the order of the model.
     outputs: tuple[str, ...]
+    # Relative error allowed for the outputs.
     accuracy: float | None
+    # Path (relative to the working directory) or URL of the store.
     store: str
+    # Lengths of chunks that the file sets, by dimension. All other lengths are chosen automatically.
     blocks: Mapping[str, int]
     text: str
     source: str
+    # Questions about numbers without a unit that are far from the usual values, each with its position in the file.
     remarks: tuple[str, ...] = ()
+    # Table of measured values of an output, for the fit ``calibration``. None if the campaign has no table.
     measured: DataFile | None = None

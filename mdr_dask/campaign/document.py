@@ -18,31 +18,24 @@ from mdr_dask.campaign.problems import Path, Place, Problems, dotted
 from mdr_dask.errors import CampaignError
 
 _TAG = "tag:yaml.org,2002:"
-_DEEPEST = 50
-_LARGEST = 200_000
+_DEEPEST = 50  # levels; no campaign has more than ten, and Python ends at about 1000
+_LARGEST = 200_000  # values of a file; aliases can make billions of a short text
 _LONGEST = 300_000  # characters of a file; reading them takes about a second
 _TOO_DEEP = "too deeply nested, or an alias that contains itself"
-_MOST_DIGITS = 300
+_MOST_DIGITS = 300  # digits of a number; a double has at most 309 before the point
 _KEPT_AS_TEXT = ("str", "timestamp", "merge", "value")
 
 
 @dataclass
 class Document:
-    """The data of a YAML file, and the nodes of the file from which they were read.
+    """The data of a YAML file, and the nodes of the file from which they were read."""
 
-    Parameters
-    ----------
-    source, text : str
-        Path of the file, and its text.
-    data : object
-        Mappings, lists, texts, numbers, truth values and None.
-    problems : Problems
-        All problems of the file that have been found.
-    """
-
+    # Path of the file, and its text.
     source: str
     text: str
+    # Mappings, lists, texts, numbers, truth values and None.
     data: Any = None
+    # All problems of the file that have been found.
     problems: Problems = field(default_factory=Problems)
     _nodes: dict[Path, Node] = field(default_factory=dict)
     _keys: dict[Path, Node] = field(default_factory=dict)
@@ -70,13 +63,7 @@ class Document:
 
 
 def read_text(path: str | FilePath) -> str:
-    """Return the text of a YAML file.
-
-    Raises
-    ------
-    CampaignError
-        If the file cannot be read, or is not UTF-8.
-    """
+    """Return the text of a YAML file; raise CampaignError if the file cannot be read or is not UTF-8."""
     try:
         return FilePath(path).read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:

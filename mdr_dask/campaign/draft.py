@@ -61,7 +61,7 @@ def _entries(parameters: type[Parameters]) -> Iterator[str]:
     written: dict[str, None] = {}
     for group in parameters.alternatives:
         yield from textwrap.wrap(f"{describe(group)}:", 110, initial_indent="  # ", subsequent_indent="  # ")
-        names = {name.partition(".")[0]: None for way in group for name in way}
+        names = {name.partition(".")[0]: None for member in group for name in member}
         for name in [name for name in names if name not in written]:
             yield from _entry(parameters, name, needed)
         written |= names
@@ -73,8 +73,8 @@ def _entries(parameters: type[Parameters]) -> Iterator[str]:
 
 def _needed(parameters: type[BaseModel]) -> set[str]:
     """Return the dotted names of the required parameters, and of the first parameter of each group of alternatives."""
-    ways = getattr(parameters, "alternatives", ())
-    return {*fields.required(parameters), *(name for each in ways for name in each[0])}
+    groups = getattr(parameters, "alternatives", ())
+    return {*fields.required(parameters), *(name for group in groups for name in group[0])}
 
 
 def _entry(parameters: type[BaseModel], name: str, needed: set[str]) -> Iterator[str]:
@@ -108,8 +108,8 @@ def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str
 
 def _structures(kind: type[BaseModel], inner: set[str]) -> list[str]:
     """Return the texts of a structure on one line, one text for each of its alternatives."""
-    ways = next(iter(getattr(kind, "alternatives", ())), ())
-    wanted = [{*fields.required(kind), *way} for way in ways] or [_needed(kind)]
+    group = next(iter(getattr(kind, "alternatives", ())), ())
+    wanted = [{*fields.required(kind), *member} for member in group] or [_needed(kind)]
     open_keys = [key for key in kind.model_fields if key not in fields.fixed(kind)]
     texts = {key: _values(kind, key, set())[0] for key in open_keys if key in inner.union(*wanted)}
     return [fields.written(kind, {key: texts[key] for key in texts if key in keys | inner}) for keys in wanted]

@@ -22,7 +22,7 @@ from mdr_dask.campaign.written import questions
 from mdr_dask.models.base import Model, Parameters, with_value
 from mdr_dask.units import to_si
 
-#: Largest number of adaptive axes.
+#: Largest number of adaptive axes. With three, the number of cases would be that of a grid.
 MOST_ADAPTIVE = 2
 
 
@@ -167,14 +167,14 @@ class _Expansion:
         last = self._validate(known, [one], len(one.items) - 1, elsewhere)
         independent = fields.is_independent(self.parameters, one.path, self.data)
         values: list[Any] = []
-        seen, sound = set(), None not in (base, last)
+        seen, are_valid = set(), None not in (base, last)
         for position, item in enumerate(one.items):
-            if item.inner and (not sound or independent):  # such a value is valid if both ends of the range are
+            if item.inner and (not are_valid or independent):  # such a value is valid if both ends of the range are
                 values.append(item.value)
                 continue
             checked = base if position == 0 else self._validate(known, [one], position, elsewhere)
             if checked is None:
-                sound = False
+                are_valid = False
                 continue
             value = _get(checked, one.path)
             values.append(value)
@@ -188,7 +188,7 @@ class _Expansion:
             if key in seen:
                 self._complain(item.origin, f"this value is given twice: {item.label}")
             seen.add(key)
-        return values if sound else None
+        return values if are_valid else None
 
     def _case_values(
         self, base: Parameters | None, variations: Sequence[Variation], broken: set[Path]

@@ -16,23 +16,15 @@ from mdr_dask.models.data_file import DataFile
 
 
 class Entry(NamedTuple):
-    """A key that a campaign file may have.
+    """A key that a campaign file may have."""
 
-    Attributes
-    ----------
-    path : str
-        Dotted name, such as ``indenter.angle``.
-    parameters : type
-        The parameter set with this key.
-    info : FieldInfo
-        The field of pydantic.
-    structures : tuple of type
-        Nested parameter sets that may be written as the value.
-    """
-
+    # Dotted name, such as ``indenter.angle``.
     path: str
+    # The parameter set with this key.
     parameters: type[BaseModel]
+    # The field of pydantic.
     info: FieldInfo
+    # Nested parameter sets that may be written as the value.
     structures: tuple[type[BaseModel], ...]
 
 

@@ -22,38 +22,19 @@ from mdr_dask.units import to_si
 
 
 def load(path: str | FilePath) -> Campaign:
-    """Read a campaign file.
+    """Read a campaign file. Names of files in it are relative to its folder.
 
-    Parameters
-    ----------
-    path : str or Path
-        The YAML file. Names of files in it are relative to its folder.
-
-    Raises
-    ------
-    CampaignError
-        If the file has problems. The message lists all of them by line: ``force.yaml:12:12: parameters.hurst: expected
-        a number of at most 1, got 1.2``.
+    If the file has problems, raise CampaignError with all of them by line: ``force.yaml:12:12: parameters.hurst:
+    expected a number of at most 1, got 1.2``.
     """
     return loads(read_text(path), str(path), str(FilePath(path).parent))
 
 
 def loads(text: str, source: str, directory: str) -> Campaign:
-    """Read a campaign from its text.
+    """Read a campaign from its text (YAML 1.2).
 
-    Parameters
-    ----------
-    text : str
-        YAML 1.2.
-    source : str
-        Name of the campaign file in messages.
-    directory : str
-        Folder to which the names of files in the campaign are relative.
-
-    Raises
-    ------
-    CampaignError
-        If the text has problems. The message lists all of them by line.
+    `source` is the name of the campaign file in messages, and `directory` the folder to which the names of files in the
+    campaign are relative. If the text has problems, raise CampaignError with all of them by line.
     """
     document = parse(text, source)
     if not isinstance(document.data, dict):

@@ -94,9 +94,9 @@ def alternatives_of(model: Model[Any]) -> list[str]:
     """Return the alternatives of a model, one line for each group: ``length with rms_roughness, or profile``."""
     nested = [(f"{entry.path}.", kind) for entry in fields.walk(model.parameters) for kind in entry.structures]
     return [
-        describe(tuple(tuple(f"{before}{name}" for name in way) for way in ways))
+        describe(tuple(tuple(f"{before}{name}" for name in member) for member in group))
         for before, kind in [("", model.parameters), *nested]
-        for ways in getattr(kind, "alternatives", ())
+        for group in getattr(kind, "alternatives", ())
     ]
 
 

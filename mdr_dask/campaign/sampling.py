@@ -109,7 +109,7 @@ def tabled(
         named = [sheet.names[index] for index in unused if sheet.names[index]]
         remarks.append(f"table {name}: not used: {', '.join(named)}")
     columns = [_column(name, sheet, index) for index in used]
-    return tuple(columns) if _are_sound(columns, parameters, data, problems) else None
+    return tuple(columns) if _are_valid(columns, parameters, data, problems) else None
 
 
 def _is_unused(heading: str, entries: Iterable[str], parameters: type[Parameters]) -> bool:
@@ -148,11 +148,11 @@ def _value(text: str, unit: str) -> Any:
     return text or None
 
 
-def _are_sound(
+def _are_valid(
     columns: Sequence[Variation], parameters: type[Parameters], data: Mapping[str, Any], problems: Problems
 ) -> bool:
     seen: set[tuple[str, ...]] = set()
-    sound = True
+    are_valid = True
     for column in columns:
         found = fields.owner(parameters, column.path, data)
         given: Any = data
@@ -165,9 +165,9 @@ def _are_sound(
             problems.add(
                 column.origin.place, column.origin.name, "this parameter is given twice (keep one of the two places)"
             )
-        sound = sound and found is not None and not twice
+        are_valid = are_valid and found is not None and not twice
         seen.add(column.path)
-    return sound
+    return are_valid
 
 
 def _unknown(column: Variation, parameters: type[Parameters]) -> str:

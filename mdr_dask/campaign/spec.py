@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 from mdr_dask.models.base import Parameters, quantity, unquoted
 from mdr_dask.models.data_file import NamedFile
 
-_LONGEST_NAME = 100
+_LONGEST_NAME = 100  # file systems allow 255 bytes, and endings are added to the name
 
 
 def _usable_as_file_name(name: str) -> str:

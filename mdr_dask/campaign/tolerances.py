@@ -68,13 +68,7 @@ def answers(document: Document, path: Path, given: Mapping[str, Written]) -> dic
 
 
 def tolerance(given: Written, unit: str) -> Tolerance:
-    """Return a tolerance in SI.
-
-    Raises
-    ------
-    ValueError
-        If the text is not a tolerance, or its unit does not fit the output.
-    """
+    """Return a tolerance in SI; raise ValueError if it is not a tolerance or its unit does not fit the output."""
     if isinstance(given, ToleranceSpec):
         absolute = to_si(given.absolute, unit) if isinstance(given.absolute, str) else given.absolute
         found = Tolerance(given.relative, absolute)

@@ -19,7 +19,7 @@ from mdr_dask.units import expected, to_si
 #: Largest number of values on one axis; a larger number is taken to be a mistake in the file.
 MOST_VALUES = 10**6
 RANGES = ("linear", "geometric", "values", "adaptive")
-#: Number of values with which an adaptive axis begins.
+#: Number of values with which an adaptive axis begins: its ends, its middle and its quarters.
 FIRST = 5
 #: An adaptive axis is interpolated on a logarithmic scale if the ratio of its ends exceeds this number.
 DECADE = 10.0

@@ -19,15 +19,8 @@ from mdr_dask.units import is_doubtful, likely, unit_behind
 def written_units(text: str) -> dict[str, str]:
     """Return the unit of every parameter whose values are all written in the same unit.
 
-    Parameters
-    ----------
-    text : str
-        The text of a campaign file. If it cannot be read, the result is empty.
-
-    Returns
-    -------
-    dict of str to str
-        Units by the names of the coordinates of the parameters: ``{"rotation_speed": "rpm", "indenter_radius": "mm"}``.
+    The keys are the names of the coordinates of the parameters: ``{"rotation_speed": "rpm", "indenter_radius": "mm"}``.
+    If the text of the campaign cannot be read, the result is empty.
     """
     whole = parse(text, "").data
     data = whole if isinstance(whole, dict) else {}

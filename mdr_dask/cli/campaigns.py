@@ -166,7 +166,7 @@ def check(campaigns: tuple[Path, ...], form: str | None) -> None:
             say("\n".join([f"{path}: {campaign.model}", *study_lines(campaign, costs)]))
             ask(campaign)
     if rows and form == "json":
-        units = {"bytes": "B", "bytes_at_most": "B", "seconds": "s", "seconds_at_most": "s", "compiling": "s"}
+        units = {"bytes": "B", "bytes_at_most": "B", "seconds": "s", "seconds_at_most": "s"}
         print_json({"units": units, "rows": rows})
     if problems:
         raise CampaignError(*problems)

@@ -55,7 +55,7 @@ def status(store: str, failures: bool, messages: bool, form: str | None) -> None
         of_store = stores.attributes(store)
         study = {"study": of_store["title"], "model": of_store["model"], "model_version": of_store["model_version"]}
         _print_counts(study, progress.counts(store), stores.active_runs(store), form)
-        stores.require_sound(store, stores.series_names(store))
+        stores.require_undamaged(store, stores.series_names(store))
         return
     studies = stores.datasets(store)
     found = [message for name, data in studies.items() for message in progress.messages(store, name, data)]

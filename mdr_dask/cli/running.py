@@ -101,9 +101,9 @@ def _print_plan(study: Campaign, url: str, form: str | None) -> None:
         return
     click.echo("\n".join([f"{study.name} -> {url}", *study_lines(study, costs)]))
     if kept:
-        left = seconds(costs.seconds * to_do / costs.results)
+        left = "" if costs.seconds is None else f": about {seconds(costs.seconds * to_do / costs.results)} on one core"
         what = f"results of the {counted}" if counted else "results"
-        click.echo(f"{kept} {what} are in the store already, {to_do} remain: about {left} on one core")
+        click.echo(f"{kept} {what} are in the store already, {to_do} remain{left}")
 
 
 def _counted(study: Campaign, to_do: int) -> str:

@@ -17,25 +17,18 @@ from mdr_dask.models.base import Status
 from mdr_dask.plan import Template
 from mdr_dask.refinement import Mesh, Stage
 
-#: Smallest number of realisations from which the interval of a fitted constant is computed.
+#: Smallest number of realisations from which the interval of a fitted constant is computed: a bootstrap of fewer
+#: underestimates the scatter.
 FEWEST = 10
 
 
 def cases_that_narrow(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, taken: Sequence[IntArray]
 ) -> list[BoolArray]:
-    """Return the cases that need more realisations.
+    """Return the cases that need more realisations: those on which a fitted constant with a too wide interval depends.
 
-    These are the cases on which a fitted constant depends whose interval is too wide.
-
-    Parameters
-    ----------
-    url, stage, layout, places
-        The URL of the store, the stage of the campaign, the groups of the store, and the positions of the cases of the
-        stage in the store.
-    taken : sequence of int array
-        For each group, the number of realisations that are used of every case. Further realisations in the store are
-        ignored.
+    `places` are the positions of the cases of the stage in the store. `taken` is, for each group, the number of
+    realisations that are used of every case; further realisations in the store are ignored.
     """
     answers = stage.campaign.replication.answers
     if max(int(each.max()) for each in taken) < FEWEST:

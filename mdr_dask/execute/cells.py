@@ -19,21 +19,14 @@ from mdr_dask.task import Work, versions
 
 @dataclass(frozen=True)
 class Cells:
-    """The results of a group that a round has to compute, and the results that it has to mark as not needed.
+    """The results of a group that a round has to compute, and the results that it has to mark as not needed."""
 
-    Parameters
-    ----------
-    template : Template
-        The group.
-    wanted, spared : bool array, shape of the group
-        Results to compute, and results to mark as not needed.
-    kept, failed : int
-        Number of results of the round that are already in the store, and number of these that have failed.
-    """
-
+    # The group.
     template: Template
+    # Shape of the group. Results to compute, and results to mark as not needed.
     wanted: NDArray[np.bool_]
     spared: NDArray[np.bool_]
+    # Number of results of the round that are already in the store, and number of these that have failed.
     kept: int
     failed: int
 
@@ -42,10 +35,10 @@ class Cells:
         """Number of results to compute or to mark as not needed."""
         return int(np.count_nonzero(self.wanted) + np.count_nonzero(self.spared))
 
-    def seconds(self, index: BlockIndex) -> float:
-        """Return the estimated time of a block in s, in proportion to the number of results to compute in it."""
+    def operations(self, index: BlockIndex) -> float:
+        """Return the operations of a block, in proportion to the number of results to compute in it."""
         part = float(np.mean(self.wanted[self.template.region(index)]))
-        return part * self.template.seconds(index) if part else 0.0
+        return part * self.template.operations(index) if part else 0.0
 
 
 def find_cells(
@@ -114,5 +107,5 @@ def tasks(url: str, groups: Iterable[Cells], lock: Lock) -> Iterator[Work]:
                     wanted=wanted,
                     spared=spared,
                     attempt=attempts.get(index, 0) + 1,
-                    estimate=cells.seconds(index),
+                    operations=cells.operations(index),
                 )

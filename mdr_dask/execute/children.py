@@ -35,12 +35,13 @@ BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "
 #: Time in s between the time limit of a case and the moment when its process is killed. A case in plain Python raises
 #: TimeoutError at the limit, so its process need not be killed.
 GRACE = 1.0
-#: If this number of results of a case have crashed their process, the other results of the case are marked as failed.
-CONVICTED = 2
+#: If this number of results of a case have crashed their process, the other results of the case are marked as failed:
+#: each crash costs a process, and a case may have thousands of realisations.
+MOST_CRASHES = 2
 
 
 @dataclass(frozen=True)
-class Death:
+class Crash:
     """The reason why a child process ended while it was computing a block."""
 
     why: str
@@ -52,23 +53,20 @@ class Child:
 
     pipe: Connection
 
-    def run(self, work: Work, limit: float | None = None) -> Outcome | Death:
+    def run(self, work: Work, limit: float | None = None) -> Outcome | Crash:
         """Compute a block in the child process. Each result may take at most `limit` seconds.
 
-        Raises
-        ------
-        MdrDaskError
-            If the store cannot be written or the machine has a fault. The error is the one that the child raised.
+        If the store cannot be written or the machine has a fault, raise the error that the child has raised.
         """
         try:
             self.pipe.send((work, limit))
             begun = self.pipe.recv()
-            if isinstance(begun, Death):
+            if isinstance(begun, Crash):
                 return begun
             if limit is not None and not self.pipe.poll(limit * np.count_nonzero(work.wanted) + GRACE):
                 os.kill(begun, signal.SIGKILL)
                 self.pipe.recv()
-                return Death(f"took longer than {limit:g} s")
+                return Crash(f"took longer than {limit:g} s")
             reply = self.pipe.recv()
         except (EOFError, OSError):
             raise MachineError(
@@ -76,7 +74,7 @@ class Child:
             ) from None
         if isinstance(reply, Exception):
             raise reply
-        assert isinstance(reply, Outcome | Death)
+        assert isinstance(reply, Outcome | Crash)
         return reply
 
 
@@ -103,7 +101,7 @@ def compute_apart(child: Child, work: Work, limit: float | None = None) -> Itera
 
     If it crashes, its halves are computed separately, and so on down to single results.
 
-    A single result that crashes its process is marked as failed. If `CONVICTED` results of a case have crashed, the
+    A single result that crashes its process is marked as failed. If `MOST_CRASHES` results of a case have crashed, the
     other results of this case are marked as failed without computing them.
     """
     pieces, attempts = [work], itertools.count(work.attempt)
@@ -111,12 +109,12 @@ def compute_apart(child: Child, work: Work, limit: float | None = None) -> Itera
     while pieces:
         piece = replace(pieces.pop(), attempt=next(attempts))
         flat = piece.wanted.reshape(work.block.cases, -1)
-        lost = np.array([crashed[case] >= CONVICTED for case in range(work.block.cases)])
-        if (flat & lost[:, None]).any():
-            guilty = (flat & lost[:, None]).reshape(piece.wanted.shape)
-            others = piece.wanted & ~guilty
+        given_up = np.array([crashed[case] >= MOST_CRASHES for case in range(work.block.cases)])
+        failed = (flat & given_up[:, None]).reshape(piece.wanted.shape)
+        if failed.any():
+            others = piece.wanted & ~failed
             pieces += [replace(piece, wanted=others)] * bool(others.any())
-            part = replace(piece, wanted=guilty, spared=np.zeros_like(guilty))
+            part = replace(piece, wanted=failed, spared=np.zeros_like(failed))
             yield part, write_off(part, "other realisations of this case crashed")
             continue
         reply = child.run(piece, limit)
@@ -162,7 +160,7 @@ def _keep(pipe: Connection) -> None:
         status = os.waitpid(child, 0)[1]
         if status == 0:
             return
-        _reply(pipe, Death(_describe(status)))
+        _reply(pipe, Crash(_describe(status)))
 
 
 def _describe(status: int) -> str:

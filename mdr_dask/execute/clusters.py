@@ -24,7 +24,7 @@ from mdr_dask.execute.resources import Resources
 from mdr_dask.execute.window import TaskWindow
 from mdr_dask.task import one_blas_thread
 
-#: Time in s to wait for the answer of a scheduler.
+#: Time in s to wait for the first answer of a scheduler, which also has to import its modules.
 SCHEDULER_PATIENCE = 10
 #: Address of the web page of a scheduler. Only programs on this machine can open this page.
 DASHBOARD = "127.0.0.1:0"
@@ -61,10 +61,7 @@ class _LastMessage(logging.Handler):
 def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
     """Start a cluster or connect to a running one, and yield a task window on its workers.
 
-    Raises
-    ------
-    ClusterError
-        If the cluster cannot be started, or does not answer.
+    Raise ClusterError if the cluster cannot be started or does not answer.
     """
     message = _LastMessage(logging.ERROR)
     with ExitStack() as stack:
@@ -74,7 +71,7 @@ def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
         # the workers of a client that the user gives may be threads of this process
         stack.enter_context(one_blas_thread())
         most: int = 0
-        replace_lost: Callable[[], None] = _nothing
+        replace_lost: Callable[[], None] | None = None
         if resources.client is not None:
             client = resources.client
         elif resources.scheduler is not None:
@@ -110,10 +107,6 @@ def _require_guard() -> None:
         if text is not None and "__main__" not in text:
             remedy = "put what it does below 'if __name__ == \"__main__\":', or compute in threads"
             raise ClusterError(f"{source}: worker processes import this script: {remedy}")
-
-
-def _nothing() -> None:
-    """Do nothing, because a run does not replace the workers of this cluster."""
 
 
 def _loggers(names: tuple[str, ...]) -> list[logging.Logger]:
@@ -163,13 +156,7 @@ def _started(plan: Mapping[str, Any]) -> Iterator[Cluster]:
 
 
 def cluster_class(name: str) -> type[Cluster]:
-    """Return the class with a dotted name, which must be a class of Dask clusters.
-
-    Raises
-    ------
-    ClusterError
-        If it cannot be loaded, or is not a class of Dask clusters.
-    """
+    """Return the class with a dotted name; raise ClusterError if it is not a class of Dask clusters."""
     package, _, attribute = name.rpartition(".")
     try:
         found = getattr(import_module(package), attribute)

@@ -12,20 +12,13 @@ from mdr_dask.task import Outcome, Work
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened in a run.
+    """Something that happened in a run."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the event, such as ``laid out`` or ``block done``.
-    facts : mapping
-        Details, as values that JSON can represent.
-    sentence : str
-        A message for the user; empty for an event that is only written to the log.
-    """
-
+    # Name of the event, such as ``laid out`` or ``block done``.
     name: str
+    # Details, as values that JSON can represent.
     facts: Mapping[str, Any] = field(default_factory=dict)
+    # A message for the user; empty for an event that is only written to the log.
     sentence: str = ""
 
 

@@ -10,37 +10,27 @@ from mdr_dask.task import Outcome
 
 @dataclass(frozen=True)
 class Progress:
-    """The state of a run, counted in results. A result is one case in one realisation.
+    """The state of a run, counted in results. A result is one case in one realisation."""
 
-    Parameters
-    ----------
-    total, kept, done, failed, not_needed : int
-        Numbers of results. `total` are those of all rounds so far, and `kept` those that were in the store before the
-        run. `done`, `failed` (including not converged) and `not_needed` are those that this run has written.
-    kept_failed : int
-        Number of failed results among `kept`.
-    warned : int
-        Number of results of this run that are done but have a warning, for example because they miss the accuracy.
-    blocks, solves : int
-        Number of blocks and number of solutions that this run has computed. Several results may share one solution.
-    estimated, finished : float
-        Time in s that the model estimates for all rounds so far, and for the finished blocks.
-    compute_seconds, compile_seconds, write_seconds, wall_seconds : float
-        Times in s: for computing models; the part of it for compiling kernels; for writing; and since the start of the
-        run. The first three are sums over all threads.
-    """
-
+    # Numbers of results. `total` are those of all rounds so far, and `kept` those that were in the store before the
+    # run. `done`, `failed` (including not converged) and `not_needed` are those that this run has written.
     total: int = 0
     kept: int = 0
     done: int = 0
     failed: int = 0
     not_needed: int = 0
+    # Number of failed results among `kept`.
     kept_failed: int = 0
+    # Number of results of this run that are done but have a warning, for example because they miss the accuracy.
     warned: int = 0
+    # Number of blocks and number of solutions that this run has computed. Several results may share one solution.
     blocks: int = 0
     solves: int = 0
+    # Number of operations of all rounds so far, and of the finished blocks.
     estimated: float = 0.0
     finished: float = 0.0
+    # Times in s: for computing models; the part of it for compiling kernels; for writing; and since the start of the
+    # run. The first three are sums over all threads.
     compute_seconds: float = 0.0
     compile_seconds: float = 0.0
     write_seconds: float = 0.0
@@ -75,7 +65,7 @@ class Progress:
             warned=self.warned + outcome.warned,
             blocks=self.blocks + 1,
             solves=self.solves + outcome.solves,
-            finished=self.finished + outcome.estimate,
+            finished=self.finished + outcome.operations,
             compute_seconds=self.compute_seconds + outcome.compute_seconds,
             compile_seconds=self.compile_seconds + min(outcome.compile_seconds, outcome.compute_seconds),
             write_seconds=self.write_seconds + outcome.write_seconds,

@@ -20,7 +20,7 @@ from mdr_dask.campaign import Campaign
 from mdr_dask.errors import StoreError
 from mdr_dask.execute.cells import Cells, find_cells, owners, tasks
 from mdr_dask.execute.events import Event, Tell, ended
-from mdr_dask.execute.executors import Executor, check
+from mdr_dask.execute.executors import Executor
 from mdr_dask.execute.progress import Progress
 from mdr_dask.execute.resources import Resources
 from mdr_dask.execute.stages import Places, cases_of, following, stored_layout
@@ -51,27 +51,19 @@ class _Job:
 
 @dataclass(frozen=True)
 class _Round:
-    """One round of a stage.
+    """One round of a stage."""
 
-    Parameters
-    ----------
-    layout : tuple of Template
-        The shape of the store.
-    places : tuple
-        For each group, the positions of the cases of the stage in the store.
-    asked, needed : list of bool array, shape of the cases
-        For each group, the cases of the stage, and the cases that need the realisations of this round.
-    realisations : tuple of int
-        Number of the first realisation of the round, and number of the last one plus 1.
-    taken : tuple of int array, shape of the cases
-        For each group, the number of realisations of each case after the round.
-    """
-
+    # The shape of the store.
     layout: tuple[Template, ...]
+    # For each group, the positions of the cases of the stage in the store.
     places: Places
+    # Shape of the cases. For each group, the cases of the stage, and the cases that need the realisations of this
+    # round.
     asked: list[BoolArray]
     needed: list[BoolArray]
+    # Number of the first realisation of the round, and number of the last one plus 1.
     realisations: tuple[int, int]
+    # Shape of the cases. For each group, the number of realisations of each case after the round.
     taken: tuple[IntArray, ...]
 
 
@@ -121,7 +113,6 @@ def run(
     MachineError
         If this machine cannot compute the model, for example because a disk is full.
     """
-    check(resources)
     if campaign.replication.answers:
         from mdr_dask.fits.answers import require_known
 
@@ -129,13 +120,12 @@ def run(
     stage = Stage.first(campaign)
     stored_layout(stage, url)  # called here so that an error is raised before anything is locked
     url = store.absolute(url)  # a model may change the working directory
-    with Executor(resources, campaign.model, url, tell) as execute:
+    with Executor(resources, campaign.model, tell) as execute:
         if not store.exists(url):
             execute.connect()  # connect before a new store is created
         with store.exclusive(url) if part is None else store.shared(url, part) as lock:
-            execute.hold(lock)
             if store.exists(url):
-                store.require_sound(url, store.series_names(url), to_run=True)
+                store.require_undamaged(url, store.series_names(url), to_run=True)
             job = _Job(stage, url, lock, execute, part, retry_failed, report, tell)
             progress = _run_stages(job)
             if progress.blocks:
@@ -160,14 +150,8 @@ def outlook(campaign: Campaign, url: str) -> Progress:
 
     If realisations are added in rounds, only the results of the first round are counted. If axes are adaptive, all
     values that are known to be needed are counted. If both is the case, only the first values of these axes are
-    counted.
-
-    Raises
-    ------
-    StoreError
-        If the store was made from another campaign.
-    CampaignError
-        If the campaign is too large to be run.
+    counted. Raise StoreError if the store was made from another campaign, and CampaignError if the campaign is too
+    large to be run.
     """
     stage: Stage | None = Stage.first(campaign)
     count = campaign.replication.at_least
@@ -199,8 +183,10 @@ def _run_stages(job: _Job) -> Progress:
         nonlocal progress
         progress = _begin_round(progress, groups)
         job.report(progress)
-        job.execute(tasks(job.url, groups, job.lock), settle)
         if any(cells.new for cells in groups):
+            with store.while_locked(job.url, job.lock):
+                pass  # entering the context raises StoreError in a read-only store
+            job.execute(tasks(job.url, groups, job.lock), settle)
             _require_seen(job, current)
         facts = {"realisations": current.realisations[1], "done": progress.done, "failed": progress.failed}
         job.tell(Event("round ended", facts))
@@ -379,7 +365,7 @@ def _named(numbers: set[int], part: Part) -> str:
 
 def _begin_round(progress: Progress, groups: list[Cells]) -> Progress:
     kept = sum(cells.kept for cells in groups)
-    work = sum(cells.seconds(index) for cells in groups if cells.new for index in cells.template.block_indices())
+    work = sum(cells.operations(index) for cells in groups if cells.new for index in cells.template.block_indices())
     return replace(
         progress,
         total=progress.total + kept + sum(cells.new for cells in groups),

@@ -24,12 +24,8 @@ Places = tuple[Mapping[str, IntArray], ...]
 def stored_layout(stage: Stage, url: str) -> tuple[tuple[Template, ...], Places]:
     """Return the layout of the stored study, extended by a stage, and the positions of the cases of this stage in it.
 
-    Raises
-    ------
-    StoreError
-        If the store was made from another campaign.
-    CampaignError
-        If the campaign is too large to be run.
+    Raise StoreError if the store was made from another campaign, and CampaignError if the campaign is too large to be
+    run.
     """
     campaign = stage.campaign
     if not store.exists(url):

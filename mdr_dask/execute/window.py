@@ -19,7 +19,8 @@ from mdr_dask.execute.children import Child, children, compute_apart
 from mdr_dask.execute.events import Event, Settle, Tell, of_block
 from mdr_dask.task import Outcome, Work, finished, one_blas_thread, run_block, write_off
 
-#: Time in s between two checks of the cluster.
+#: Time in s between two checks of the cluster. With this time and the next one, a user reads within five seconds that
+#: there is no worker.
 CHECK_PAUSE = 1.0
 #: Time in s between two messages that there is no worker.
 REPORT_PAUSE = 3.0
@@ -39,22 +40,10 @@ Outcomes = list[tuple[Work, Outcome]]
 class TaskWindow:
     """The blocks that are submitted to a cluster at the same time: a few more than the cluster can compute at once.
 
-    Parameters
-    ----------
-    client : Client
-        Connection to the cluster.
-    tell : callable
-        Receives events.
-    patience : float
-        Seconds without any worker after which the run ends with an error.
-    most : int
-        Largest number of threads if the cluster is adaptive, otherwise 0.
-    replace_lost : callable
-        Requests new workers that replace lost workers.
-    last_message : callable
-        Returns the last error message of the cluster, or an empty string.
-    case_timeout : float or None
-        Seconds after which a case fails.
+    After `patience` seconds without any worker, the run ends with an error. `most` is the largest number of threads of
+    an adaptive cluster, otherwise 0. `replace_lost` requests new workers that replace lost ones, if Dask does not do
+    this itself. `last_message` returns the last error message of the cluster, or an empty text. A case fails after
+    `case_timeout` seconds.
     """
 
     def __init__(
@@ -63,7 +52,7 @@ class TaskWindow:
         tell: Tell,
         patience: float,
         most: int,
-        replace_lost: Callable[[], None],
+        replace_lost: Callable[[], None] | None,
         last_message: Callable[[], str],
         case_timeout: float | None,
     ) -> None:
@@ -80,12 +69,8 @@ class TaskWindow:
     def run(self, works: Iterable[Work], settle: Settle) -> None:
         """Compute blocks. If the worker of a block dies, compute the block once more, in a child process of a worker.
 
-        Raises
-        ------
-        ClusterError
-            If the scheduler disappears, there is no worker for too long, or a worker cannot run its task.
-        StoreError
-            If the store cannot be read or written.
+        Raise ClusterError if the scheduler disappears, there is no worker for too long, or a worker cannot run its
+        task.
         """
         remaining = iter(works)
         suspects: set[str] = set()
@@ -133,7 +118,8 @@ class TaskWindow:
         """Raise ClusterError if the scheduler has disappeared or there was no worker for too long."""
         if self._client.status != "running":
             raise ClusterError(f"the scheduler went away; {KEPT}")
-        self._replace_lost()
+        if self._replace_lost is not None:
+            self._replace_lost()
         try:
             found = self._client.sync(self._client.scheduler.ncores, callback_timeout=ANSWER_LIMIT)
             self._threads, what = sum(found.values()), "no worker"

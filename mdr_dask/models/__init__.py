@@ -6,12 +6,15 @@ entry point group `GROUP`, and objects ``package.module:NAME`` of the user.
 
 from __future__ import annotations
 
+import hashlib
+import inspect
 import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from typing import Any
 
 from mdr_dask.errors import ModelError
@@ -64,6 +67,22 @@ def is_own(name: str) -> bool:
     return name not in NAMES
 
 
+def source_digest(name: str) -> str | None:
+    """Return a digest of the lines of the file with the function of a user's model, without comments.
+
+    Return None for the models of this package, and if there is no such file.
+    """
+    if not is_own(name):
+        return None
+    try:
+        file = inspect.getsourcefile(inspect.unwrap(load(name).compute))
+        lines = map(str.strip, Path(file or "").read_text().splitlines())
+    except (OSError, TypeError, ValueError):
+        return None
+    code = "\n".join(line for line in lines if line and not line.startswith("#"))
+    return hashlib.blake2b(code.encode(), digest_size=8).hexdigest()
+
+
 @lru_cache(maxsize=1)
 def _installed() -> dict[str, EntryPoint]:
     return {entry.name: entry for entry in entry_points(group=GROUP)}
@@ -82,7 +101,7 @@ def _own(name: str, entry: EntryPoint, module: str) -> Model[Any]:
         raise ModelError(f"cannot load model {name!r}: {type(error).__name__}: {error}") from None
     if not isinstance(found, Model):
         raise ModelError(f"expected {name!r} to be an mdr_dask.models.base.Model, got {type(found).__name__}")
-    others = ("seconds", "memory", "distinct", "coordinates", "units", "notes")
+    others = ("operations", "memory", "distinct", "coordinates", "units", "notes")
     guarded: dict[str, Any] = {
         each: _guarded(name, each, getattr(found, each)) for each in others if getattr(found, each) is not None
     }
@@ -98,7 +117,7 @@ def _guarded(model: str, what: str, function: Callable[[Any], Any]) -> Callable[
     def call(argument: Any) -> Any:
         try:
             found = function(argument)
-            if what in ("seconds", "memory") and not 0 <= float(found) < math.inf:
+            if what in ("operations", "memory") and not 0 <= float(found) < math.inf:
                 raise ValueError(f"expected a number that is not negative, got {found!r}")
         except Exception as error:
             raise ModelError(f"the function {what!r} of model {model!r} failed: {reason(error)}") from None

@@ -71,10 +71,10 @@ class Parameters(BaseModel):
 
     def require_one_alternative(self) -> None:
         """Raise ValueError unless exactly one member of each group of alternatives is given."""
-        for ways in self.alternatives:
-            given = {name for way in ways for name in way if getattr(self, name) is not None}
-            if not any(given == set(way) for way in ways):
-                raise ValueError(f"expected {describe(ways)}, got {' and '.join(sorted(given)) or 'none'}")
+        for group in self.alternatives:
+            given = {name for member in group for name in member if getattr(self, name) is not None}
+            if not any(given == set(member) for member in group):
+                raise ValueError(f"expected {describe(group)}, got {' and '.join(sorted(given)) or 'none'}")
 
     @property
     def inactive(self) -> dict[str, str]:
@@ -92,16 +92,17 @@ def _may_be_whole(annotation: Any) -> bool:
     return annotation is int or any(map(_may_be_whole, get_args(annotation)))
 
 
-def describe(ways: Alternatives) -> str:
+def describe(group: Alternatives) -> str:
     """Return a group of alternatives as text: ``length with rms_roughness, or profile``."""
-    return ", or ".join(f"{way[0]} with {', '.join(way[1:])}" if len(way) > 1 else way[0] for way in ways)
+    return ", or ".join(f"{first} with {', '.join(others)}" if others else first for first, *others in group)
 
 
 def _looks_numeric(value: Any) -> bool:
     return isinstance(value, str) and value.strip()[:1] in "+-.0123456789" and value.strip() != ""
 
 
-#: Smallest and largest size of a quantity other than 0, in SI units.
+#: Smallest and largest size of a quantity other than 0, in SI units: products of ten such numbers neither overflow nor
+#: underflow.
 LEAST, MOST = 1e-30, 1e30
 
 
@@ -390,9 +391,10 @@ class Model(Generic[P]):
     compute : callable, Block -> Result
         A pure function. The value of a case depends on its parameters, the seed and its realisation, but not on the
         other cases of the block. The function does not raise an exception for a case that fails.
-    seconds : callable, Block -> float
-        Estimated computing time of `compute` in seconds. The function must be fast; it should use array operations over
-        the cases.
+    operations : callable, Block -> float, optional
+        Approximate number of floating-point operations of `compute` for a block, from which the sizes of blocks follow.
+        The function must be fast; it should use array operations over the cases. Without this function, a study has
+        about as many blocks as a block has results.
     whole : tuple of str
         Parameters whose axes are not divided among blocks, because cases along these axes share work. If a block
         becomes too large, the axis of the last parameter in this list is divided first.
@@ -408,8 +410,6 @@ class Model(Generic[P]):
     notes : callable, sequence of Parameters -> tuple of str
         Notes for ``check`` about a study. The argument contains parameter sets of the study that vary one axis at a
         time. Notes about a nested parameter set come from the method `notes` of that set.
-    compiling : float
-        Time in seconds to compile the kernels of the model when it first runs on a machine.
     numbers : tuple of Number
         Dimensionless numbers of the cases.
     """
@@ -420,14 +420,13 @@ class Model(Generic[P]):
     parameters: type[P]
     outputs: tuple[Output, ...]
     compute: Callable[[Block[P]], Result]
-    seconds: Callable[[Block[P]], float]
+    operations: Callable[[Block[P]], float] | None = None
     whole: tuple[str, ...] = ()
     coordinates: Callable[[P], dict[str, Coordinate]] = lambda _: {}
     distinct: Callable[[Block[P]], int] | None = None
     memory: Callable[[Block[P]], float] = lambda _: 0.0
     units: Callable[[P], dict[str, str]] = lambda _: {}
     notes: Callable[[Sequence[P]], tuple[str, ...]] = lambda _: ()
-    compiling: float = 0.0
     numbers: tuple[Number, ...] = ()
 
     @property

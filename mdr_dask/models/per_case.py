@@ -5,11 +5,14 @@ This is the easiest way to define a model of your own.
 
 from __future__ import annotations
 
+import os
 import reprlib
 import signal
 import threading
+import traceback
 from collections.abc import Callable, Mapping
 from numbers import Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +23,9 @@ from mdr_dask.models.base import Block, Result, Status
 #: Time in s after which a case raises TimeoutError; None for no limit. The limit applies only in a process that handles
 #: the alarm signal.
 time_limit: float | None = None
+
+#: Folder of this package.
+PACKAGE = f"{Path(__file__).parents[1]}{os.sep}"
 
 Solve = Callable[[Any, np.random.Generator], Mapping[str, ArrayLike]]
 
@@ -60,11 +66,12 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
                     if is_interrupt(error):
                         raise
                     status[case, number] = Status.FAILED
-                    messages[case, number] = reason(error)
+                    messages[case, number] = reason(error) + where(error)
         values = {name: _gathered(name, found, shape) for name in block.outputs}
         return Result(values, status, messages, solves=status.size)
 
     compute.is_plain_python = True  # type: ignore[attr-defined]
+    compute.__wrapped__ = solve  # type: ignore[attr-defined]
     return compute
 
 
@@ -99,6 +106,18 @@ def reason(error: BaseException) -> str:
     except Exception:  # the method that returns the text of the exception may itself fail
         text = ""
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def where(error: BaseException) -> str:
+    """Return the file and line of the user's function in which an exception was raised, in parentheses after a space.
+
+    If the exception was raised in another file, this is the line of the user's file that led to it. If it was raised in
+    this package, for example because of an invalid output, the text is empty.
+    """
+    frames = [(frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)]
+    others = [(file, line) for file, line in frames if not file.startswith(PACKAGE)]
+    own = [line for file, line in others if file == others[0][0]]
+    return f" ({Path(others[0][0]).name}:{own[-1]})" if own else ""
 
 
 def _output(name: str, outputs: Any) -> NDArray[np.float64]:

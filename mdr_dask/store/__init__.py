@@ -12,8 +12,8 @@ from mdr_dask.store.blocks import Place, is_written, layout_mark, read_block, va
 from mdr_dask.store.files import absolute
 from mdr_dask.store.identity import Stored, reconcile
 from mdr_dask.store.layout import Finding, is_laid_out, lay_out
-from mdr_dask.store.ledgers import ledger, require_sound
-from mdr_dask.store.locks import Lock, Part, active_runs, at_work, exclusive, gate, note_begun, shared, while_locked
+from mdr_dask.store.ledgers import ledger, require_undamaged
+from mdr_dask.store.locks import Lock, Part, active_runs, at_work, exclusive, gate, shared, while_locked
 from mdr_dask.store.packing import contents, verify_packed
 from mdr_dask.store.reading import datasets, is_damage, readable, save
 from mdr_dask.store.records import attempts, kinds, merge_records, record, records
@@ -48,14 +48,13 @@ __all__ = [
     "layout_mark",
     "ledger",
     "merge_records",
-    "note_begun",
     "read_block",
     "readable",
     "reconcile",
     "record",
     "records",
     "repair",
-    "require_sound",
+    "require_undamaged",
     "save",
     "series_names",
     "shared",

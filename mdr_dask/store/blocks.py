@@ -19,7 +19,16 @@ from zarr.core.sync import sync
 
 from mdr_dask.errors import StoreError
 from mdr_dask.plan import BlockIndex
-from mdr_dask.store.files import bytes_of, chunk_name, digest, group_name, guarded, read_bytes, sealed, write_stages
+from mdr_dask.store.files import (
+    bytes_of,
+    chunk_name,
+    digest,
+    group_name,
+    guarded,
+    read_bytes,
+    with_digest,
+    write_stages,
+)
 from mdr_dask.store.locks import Lock, while_locked
 from mdr_dask.store.records import name_of
 from mdr_dask.store.study import array_of, document
@@ -27,26 +36,14 @@ from mdr_dask.store.study import array_of, document
 
 @dataclass(frozen=True)
 class Place:
-    """The place of a block in a store.
-
-    Parameters
-    ----------
-    url, series : str
-        The store, and the name of the group.
-    index : tuple of int
-        Index of the block in the grid of blocks.
-    region : tuple of slice
-        Slices of the block along (axes..., realisation).
-    layout : str
-        The `layout_mark` that the driver found in the store. A worker that finds a different mark writes nothing.
-    lock : Lock
-        Lock of the run to which the block belongs.
-    """
+    """The place of a block in a store."""
 
     url: str
     series: str
     index: BlockIndex
+    # Slices of the block along (axes..., realisation).
     region: tuple[slice, ...]
+    # The `layout_mark` that the driver found in the store. A worker that finds a different mark writes nothing.
     layout: str
     lock: Lock
 
@@ -63,20 +60,9 @@ def write_block(
     Only the ledger states which results of a block are done. The record is written first, because it contains the
     digest of every chunk. So if a task is killed while it writes, its chunks can be identified.
 
-    Parameters
-    ----------
-    place : Place
-        Where to write the block.
-    attempt : int
-        Number of the attempt, from 1: the number of times that the computation of the block was started, including this
-        one.
-    values : mapping of str to float array
-        The outputs. Each has the shape of the region, followed by its further dimensions. Empty if only the ledger
-        changes.
-    status : int8 array, shape of the region
-        The ledger of the block.
-    record : mapping
-        The record of the block, without digests.
+    `attempt` is the number of times that the computation of the block was started, including this one. Each of the
+    `values` has the shape of the region, followed by the further dimensions of the output; there are none if only the
+    ledger changes. `status` is the ledger of the block, and `record` its record without digests.
     """
     arrays, encoded = _in_memory(place.url, place.series, place.layout)
     given = {**values, "status": status}
@@ -88,7 +74,7 @@ def write_block(
         sync(encode())
     keys = {name: _chunk(place, arrays[name], name) for name in given}
     chunks = {name: (key, encoded.pop(key).to_bytes()) for name, key in keys.items()}
-    line = sealed({**record, "chunks": {name: digest(content) for name, (_, content) in chunks.items()}})
+    line = with_digest({**record, "chunks": {name: digest(content) for name, (_, content) in chunks.items()}})
     ledger = dict([chunks.pop("status")])
     with while_locked(place.url, place.lock):
         write_stages(place.url, [{name_of(place.series, place.index, attempt): line}, dict(chunks.values()), ledger])

@@ -28,13 +28,15 @@ T = TypeVar("T")
 ROOT = "-"
 #: Folder with claims, which replace locks in a store on a server or on a file system without locks.
 CLAIMS = ".claims/"
+#: Folder with the record of the layout.
+RECORD_FOLDER = ".layout"
 #: Names of the files that a study may contain if its first run was stopped before the study was laid out.
-KEPT = ("zarr.json", "layout.json", CLAIMS.rstrip("/"))
-#: Number of simultaneous requests to a server.
+KEPT = ("zarr.json", RECORD_FOLDER, CLAIMS.rstrip("/"))
+#: Number of simultaneous requests to a server: enough to hide the time until the server answers.
 AT_ONCE = 64
-#: Time in s after which a request to a server fails if there is no answer.
+#: Time in s after which a request to a server fails if there is no answer; no chunk takes that long.
 LONGEST_REQUEST = 120.0
-#: Number of threads that flush files to the disk and wait until this is done.
+#: Number of threads that flush files to the disk and wait until this is done; a block has about ten files.
 FLUSHERS = 8
 #: Version of the layout; stores of a later version are refused. Since version 2, records hold digests of all chunks.
 LAYOUT = 2
@@ -105,7 +107,7 @@ def read_bytes(url: str, name: str) -> bytes | None:
         if path is None:
             found = sync(bytes_of(url).get(name, default_buffer_prototype()))
             return None if found is None else bytes(found.to_bytes())
-        return (path / name).read_bytes() if (path / name).is_file() else None
+        return _content(path / name)
 
 
 def read_json(url: str, name: str) -> dict[str, Any] | None:
@@ -132,7 +134,7 @@ def read_many(url: str, files: Iterable[str]) -> Iterator[tuple[str, bytes | Non
     if path is not None:
         with guarded(url, "reading its files"):
             for name in files:
-                yield name, _content(f"{path}/{name}")
+                yield name, _content(path / name)
         return
 
     async def gather(names: tuple[str, ...]) -> list[Any]:
@@ -147,20 +149,12 @@ def read_many(url: str, files: Iterable[str]) -> Iterator[tuple[str, bytes | Non
         )
 
 
-def _content(file: str) -> bytes | None:
-    """Return the content of a file, or None if it is missing. This is faster than `Path.read_bytes`."""
+def _content(file: Path) -> bytes | None:
+    """Return the content of a file, or None if it is missing."""
     try:
-        descriptor = os.open(file, os.O_RDONLY)
-    except (FileNotFoundError, NotADirectoryError):
+        return file.read_bytes()
+    except (FileNotFoundError, NotADirectoryError, IsADirectoryError):
         return None
-    try:
-        size = os.fstat(descriptor).st_size
-        content = os.read(descriptor, size + 1)
-    except IsADirectoryError:
-        return None
-    finally:
-        os.close(descriptor)
-    return content if len(content) == size else Path(file).read_bytes()
 
 
 def write_bytes(url: str, name: str, content: bytes) -> None:
@@ -236,17 +230,9 @@ def _make(folder: Path) -> list[Path]:
 
 
 def _flush(paths: Sequence[Path]) -> None:
-    """Wait until files, and the entries of folders, are on the disk.
-
-    This is done in threads, because a disk can flush several files at the same time.
-    """
-    shares = (paths[first::FLUSHERS] for first in range(min(FLUSHERS, len(paths))))
-    list(_flushers().map(_flush_in_turn, shares))
-
-
-def _flush_in_turn(paths: Sequence[Path]) -> None:
-    for path in paths:
-        flush(path)
+    """Wait until files, and the entries of folders, are on the disk, which can flush several files at the same time."""
+    with ThreadPoolExecutor(FLUSHERS) as pool:
+        list(pool.map(flush, paths))
 
 
 def flush(path: Path) -> None:
@@ -260,15 +246,6 @@ def flush(path: Path) -> None:
             raise
     finally:
         os.close(descriptor)
-
-
-@lru_cache(maxsize=1)
-def _flushers() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(FLUSHERS, thread_name_prefix="flush")
-
-
-if hasattr(os, "register_at_fork"):  # a forked process has a copy of the pool without its threads
-    os.register_at_fork(after_in_child=_flushers.cache_clear)
 
 
 def create(url: str, name: str, content: bytes) -> bool:
@@ -376,13 +353,13 @@ def digest(content: bytes) -> str:
     return hashlib.blake2b(content, digest_size=8).hexdigest()
 
 
-def sealed(document: Mapping[str, Any]) -> bytes:
+def with_digest(document: Mapping[str, Any]) -> bytes:
     """Return a document as one line of JSON that includes the digest of the document."""
     text = json.dumps(document, sort_keys=True)
     return json.dumps({**document, "digest": digest(text.encode())}, sort_keys=True).encode()
 
 
-def unsealed(line: bytes) -> dict[str, Any] | None:
+def without_digest(line: bytes) -> dict[str, Any] | None:
     """Return a document without its digest, or None if the document is damaged.
 
     A document that has no digest is not checked.

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections import Counter
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import lru_cache, reduce
 from typing import Annotated, Any
 
 import numpy as np
@@ -18,52 +19,33 @@ from mdr_dask.campaign import Axis, Campaign, Series
 from mdr_dask.campaign.definition import SAME_DIGITS
 from mdr_dask.errors import StoreError
 from mdr_dask.models.data_file import DataFile
-from mdr_dask.store.files import ROOT
+from mdr_dask.store.files import ROOT, absolute
 from mdr_dask.store.layout import plain_values
 from mdr_dask.store.study import attributes, document, series_names
+
+log = logging.getLogger("mdr_dask.store")
 
 
 @dataclass(frozen=True)
 class Stored:
-    """A campaign together with the results that a store already contains.
+    """A campaign together with the results that a store already contains."""
 
-    Parameters
-    ----------
-    campaign : Campaign
-        The campaign to lay out. Each axis has first the stored values in their order, then the new values of the
-        campaign.
-    chunks : mapping of series name to chunk lengths
-        Chunk lengths of the stored groups.
-    realisations : int
-        Number of stored realisations.
-    places : mapping of series name to (mapping of dimension to int array)
-        For each stored group and each dimension, the positions of the values of the given campaign on the extended
-        axis.
-    """
-
+    # The campaign to lay out. Each axis has first the stored values in their order, then the new values of the
+    # campaign.
     campaign: Campaign
+    # Chunk lengths of the stored groups, by the names of their series.
     chunks: Mapping[str, Mapping[str, int]]
     realisations: int
+    # For each stored group and each dimension, the positions of the values of the given campaign on the extended axis.
     places: Mapping[str, Mapping[str, IntArray]]
 
 
 def reconcile(url: str, campaign: Campaign) -> Stored:
-    """Compare a campaign with the store that it resumes or extends.
+    """Compare a campaign with the existing store that it resumes or extends.
 
     A campaign with series may extend a store whose results have no series. These results stay at the root of the store.
-    If a series of the campaign has the same parameters and axes as these results, it is continued at the root.
-
-    Parameters
-    ----------
-    url : str
-        Path or URL of an existing store.
-    campaign : Campaign
-        The campaign to run.
-
-    Raises
-    ------
-    StoreError
-        If the store was made from another campaign; the message names every difference. The store is unchanged.
+    If a series of the campaign has the same parameters and axes as these results, it is continued at the root. If the
+    store was made from another campaign, raise StoreError with every difference; the store is unchanged.
     """
     attributes(url)  # raises StoreError if this is not a study
     campaign = _with_root(url, campaign)
@@ -101,6 +83,21 @@ def _require_version(url: str, campaign: Campaign) -> None:
             f"this is version {version}. The store can be read, plotted and verified, but not extended. To extend it: "
             f"pip install mdr_dask=={program}; to compute the study again: --store with another name"
         )
+    source = models.source_digest(campaign.model)
+    if source is not None and held.get("model_source") not in (None, source):
+        _warn_of_changed_model(absolute(url), campaign.model, version)
+
+
+@lru_cache(maxsize=16)
+def _warn_of_changed_model(url: str, model: str, version: int) -> None:
+    """Log a warning of a changed model, only once for each store."""
+    log.warning(
+        "%s: the file of the model %s has changed since the store was made, and its version is still %d: increase the "
+        "version if the results are different, so that old and new results are not mixed",
+        url,
+        model,
+        version,
+    )
 
 
 def _group_attributes(url: str, name: str) -> dict[str, Any] | None:

@@ -27,23 +27,25 @@ from mdr_dask.plan import Template
 from mdr_dask.store.files import (
     CLAIMS,
     LAYOUT,
+    RECORD_FOLDER,
     digest,
     group_name,
     listed,
+    parsed,
     read_bytes,
     read_many,
     remove,
-    sealed,
-    unsealed,
+    with_digest,
     write_bytes,
     write_stages,
 )
 from mdr_dask.store.study import document, members_of, only_claimed
 from mdr_dask.version import __version__
 
-#: File with the record of the layout, which contains the digests of all other files of the layout.
-RECORD = "layout.json"
-#: Number of values in a chunk of a coordinate.
+#: File with the record of the layout, which contains the digests of all other files of the layout. For Zarr it is an
+#: empty group with attributes; Zarr would warn about any other file. No series can have this name.
+RECORD = f"{RECORD_FOLDER}/zarr.json"
+#: Number of values in a chunk of a coordinate: a single chunk for nearly every axis.
 _COORDINATE_CHUNK = 4096
 #: Names of the attributes that `_series_attributes` returns. If series are added to a store without series, these
 #: attributes stay at the root.
@@ -57,19 +59,8 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
     Files are written in this order: the record of the layout, which holds the digests of all following files; metadata
     and coordinates of arrays; the metadata of groups; and finally ``zarr.json``, the metadata of the study. This last
     write makes the new shape visible. A new store first gets a ``zarr.json`` without arrays. If coordinates or metadata
-    are missing in an existing store, they are written again.
-
-    Parameters
-    ----------
-    url : str
-        Path or URL of the store.
-    layout : sequence of Template
-        The templates of all groups. Existing groups are extended at the ends of their dimensions.
-
-    Raises
-    ------
-    StoreError
-        If the store cannot be written.
+    are missing in an existing store, they are written again. Existing groups are extended at the ends of their
+    dimensions.
     """
     if is_laid_out(url, layout):
         return
@@ -110,7 +101,7 @@ def _write(url: str, root: bytes, coordinates: Mapping[str, bytes]) -> None:
     before = dict(read_many(url, recorded))
     known = record.files if record else {name: [digest(old)] for name, old in before.items() if old is not None}
     versions = {name: [*dict.fromkeys([*known.get(name, ()), digest(new)])] for name, new in files.items()}
-    first = {RECORD: sealed({"files": {**known, **versions}, "root": root.decode()})}
+    first = {RECORD: LayoutRecord({**known, **versions}, root.decode()).content}
     changed = {name: new for name, new in {**coordinates, **metadata}.items() if new != before[name]}
     write_stages(url, [first, changed, groups, {"zarr.json": root}])
 
@@ -158,18 +149,9 @@ def coordinate_files(root: Mapping[str, Any], names: Iterable[str]) -> list[str]
 
 @dataclass(frozen=True)
 class Finding:
-    """A file that differs from what was written, or that should not exist.
+    """A file that differs from what was written, or that should not exist."""
 
-    Parameters
-    ----------
-    kind : str
-        ``damaged``, ``missing`` or ``foreign``.
-    name : str
-        The file.
-    what : str
-        The fault, for messages.
-    """
-
+    # ``damaged``, ``missing`` or ``foreign``.
     kind: str
     name: str
     what: str
@@ -177,30 +159,31 @@ class Finding:
 
 @dataclass(frozen=True)
 class LayoutRecord:
-    """The record of the layout of a study.
+    """The record of the layout of a study."""
 
-    Parameters
-    ----------
-    files : mapping of str to list of str
-        For each file of the layout, the digests of all its versions, the newest last. The record is written before
-        these files, and a run may be killed in between. So a stored file may have any of the versions.
-    root : str
-        The content of the newest ``zarr.json``, with which `mdr_dask.store.repair` restores this file.
-    """
-
+    # For each file of the layout, the digests of all its versions, the newest last. The record is written before these
+    # files, and a run may be killed in between. So a stored file may have any of the versions.
     files: Mapping[str, list[str]]
+    # The content of the newest ``zarr.json``, with which `mdr_dask.store.repair` restores this file.
     root: str
+
+    @property
+    def content(self) -> bytes:
+        """The content of the file `RECORD`."""
+        record = json.loads(with_digest({"files": self.files, "root": self.root}))
+        return json.dumps({"zarr_format": 3, "node_type": "group", "attributes": record}).encode()
 
 
 def read_record(url: str) -> LayoutRecord | None:
     """Return the record of the layout, or None if it is missing or damaged."""
     content = read_bytes(url, RECORD)
-    held = None if content is None else unsealed(content)
     try:
-        record = None if held is None else LayoutRecord(dict(held["files"]), str(held["root"]))
+        held = parsed(content or b"{}")["attributes"]
+        record = LayoutRecord(dict(held["files"]), str(held["root"]))
+        is_valid = record.content == content and _is_valid(record.files)
     except (TypeError, KeyError, ValueError):
         return None
-    return record if record is not None and _is_valid(record.files) else None
+    return record if is_valid else None
 
 
 def _is_valid(files: Mapping[Any, Any]) -> bool:
@@ -336,6 +319,7 @@ def _study_attributes(campaign: Campaign, earlier: Mapping[str, Any]) -> dict[st
     now = datetime.now(UTC).isoformat(timespec="seconds")
     what = "grown" if "history" in earlier else "laid out"
     history = [*earlier.get("history", []), f"{now} {what} on {platform.node()}"]
+    source = earlier.get("model_source", models.source_digest(campaign.model))
     return {
         "Conventions": "CF-1.11",
         "mdr_dask_layout": earlier.get("mdr_dask_layout", LAYOUT),
@@ -346,6 +330,7 @@ def _study_attributes(campaign: Campaign, earlier: Mapping[str, Any]) -> dict[st
         "accuracy": campaign.accuracy,
         "campaign": campaign.text,
         **_measured(campaign),
+        **({"model_source": source} if source else {}),
         "source": Path(campaign.source).name,
         "host": platform.node(),
         "python": platform.python_version(),

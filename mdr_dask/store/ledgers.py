@@ -20,27 +20,19 @@ from mdr_dask.store.files import chunk_name, group_name, guarded, listed, read_m
 from mdr_dask.store.layout import RECORD, layout_faults
 from mdr_dask.store.study import array_of, document
 
-#: Largest number of faults that a message names.
+#: Largest number of faults that a message names; `verify` names all of them.
 NAMED = 3
 
 
 @dataclass(frozen=True)
 class Blocks:
-    """The blocks of a group.
-
-    Parameters
-    ----------
-    series : str
-        Name of the group.
-    grid, lengths : tuple of int
-        Number of blocks along each dimension, and length of a block.
-    further : mapping of str to int
-        For each array, the number of dimensions that the ledger does not have. The first array is the ledger itself.
-    """
+    """The blocks of a group."""
 
     series: str
+    # Number of blocks along each dimension, and length of a block.
     grid: tuple[int, ...]
     lengths: tuple[int, ...]
+    # For each array, the number of dimensions that the ledger does not have. The first array is the ledger itself.
     further: Mapping[str, int]
 
     @classmethod
@@ -112,7 +104,7 @@ def _read(url: str, blocks: Blocks, metadata: Mapping[str, Any]) -> NDArray[np.i
     return np.asarray(whole[tuple(map(slice, metadata["shape"]))])
 
 
-def require_sound(url: str, series: Sequence[str], to_run: bool = False) -> None:
+def require_undamaged(url: str, series: Sequence[str], to_run: bool = False) -> None:
     """Raise StoreError if the layout of a study is damaged or a chunk of a finished block is missing.
 
     Only the layout and the ledger are read, not the values. `mdr_dask.store.verify` compares every file with its

@@ -24,7 +24,7 @@ import time
 import uuid
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from glob import escape
 from pathlib import Path
 from typing import Any
@@ -50,12 +50,9 @@ except ImportError:  # this system has no such locks: runs make claims instead
     fcntl = None  # type: ignore[assignment]
 
 #: `BEAT`: time in s between two signs of life of a run with a claim. `SILENCE`: time in s without a sign of life after
-#: which the run counts as ended.
+#: which the run counts as ended: several signs may be lost, and clocks may differ by some seconds.
 BEAT = 10.0
 SILENCE = 60.0
-#: Claims are listed at most this number of times. They are listed again if the last claim in the list was deleted
-#: before it could be read.
-LISTINGS = 10
 #: Time in s for which a process tries to acquire a lock that another process holds. The other process may hold the lock
 #: only for an instant, to check whether it is free.
 GLANCE = 0.5
@@ -66,7 +63,7 @@ KNOCK, PATIENCE = 0.1, 4.0
 NO_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP}
 READ_ONLY = {errno.EACCES, errno.EPERM, errno.EROFS}
 
-_GATE = "entrance"
+_GATE = "gate"
 _PART = "part-"
 
 log = logging.getLogger("mdr_dask.store")
@@ -74,36 +71,21 @@ log = logging.getLogger("mdr_dask.store")
 
 @dataclass(frozen=True)
 class Lock:
-    """A lock that a run holds. The tasks of the run need it to write.
+    """A lock that a run holds. The tasks of the run need it to write."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the lock; the exclusive lock has an empty name.
-    owner : str
-        Unique identifier of the run. It is empty if the run can only read.
-    claim : int or None
-        Number of the claim. None for a lock of the operating system.
-    begun : tuple of str
-        Blocks that earlier runs had begun but not ended when they crashed or were killed, as recorded by `note_begun`.
-    """
-
+    # Name of the lock; the exclusive lock has an empty name.
     name: str
+    # Unique identifier of the run. It is empty if the run can only read.
     owner: str
+    # Number of the claim. None for a lock of the operating system.
     claim: int | None = None
-    begun: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, order=True)
 class Part:
-    """One of several disjoint sets of blocks; a separate process computes each set.
+    """One of several disjoint sets of blocks; a separate process computes each set."""
 
-    Parameters
-    ----------
-    number, count : int
-        Number of the part, counted from 1, and number of parts.
-    """
-
+    # Number of the part, counted from 1, and number of parts.
     number: int
     count: int
 
@@ -128,14 +110,9 @@ class Part:
 
 @contextmanager
 def exclusive(url: str) -> Iterator[Lock]:
-    """Lock a study for one run.
+    """Lock a study for one run; raise StoreBusyError if another run or a part is active in the store.
 
-    Raises
-    ------
-    StoreBusyError
-        If another run or a part is active in the store; the message names it.
-    StoreError
-        If locking fails. In a read-only store it does not fail, but the lock allows only reading.
+    In a read-only store the lock allows only reading. If locking fails for another reason, raise StoreError.
     """
     with ExitStack() as held:
         with gate(url):
@@ -144,9 +121,9 @@ def exclusive(url: str) -> Iterator[Lock]:
                 raise StoreBusyError(f"{url}: {_named(parts)} running on this store; wait for them, or stop them")
             lock = held.enter_context(acquire(url))
             if lock.owner:
-                begun = [block for name in _part_locks(url) for block in _remove_lock(url, name)]
-                lock = replace(lock, begun=(*lock.begun, *begun))
-            if lock.owner:
+                for name in _part_locks(url) if local(url) is not None else ():
+                    _retire(url, name)
+                    _lock_file(url, name).unlink(missing_ok=True)
                 sweep(url)
         yield lock
 
@@ -155,13 +132,8 @@ def exclusive(url: str) -> Iterator[Lock]:
 def shared(url: str, part: Part) -> Iterator[Lock]:
     """Lock one part of a study; the other parts of the same division may run at the same time.
 
-    Raises
-    ------
-    StoreBusyError
-        If another process runs this part, runs the whole study exclusively, or runs a part of the study that was
-        divided into a different number of parts.
-    StoreError
-        If locking fails. In a read-only store it does not fail, but the lock allows only reading.
+    Raise StoreBusyError if another process runs this part, runs the whole study exclusively, or runs a part of the
+    study that was divided into a different number of parts. Otherwise as for `exclusive`.
     """
     with ExitStack() as held:
         with gate(url), acquire(url):
@@ -219,21 +191,9 @@ def _ranges(numbers: list[int]) -> str:
 
 @contextmanager
 def acquire(url: str, name: str = "") -> Iterator[Lock]:
-    """Hold a lock of a study. If the store is read-only, the lock allows only reading.
+    """Hold the lock with a name; the exclusive lock has an empty name. In a read-only store, it allows only reading.
 
-    Parameters
-    ----------
-    url : str
-        Path or URL of the store.
-    name : str
-        Name of the lock; the exclusive lock has an empty name.
-
-    Raises
-    ------
-    StoreBusyError
-        If another process holds the lock; the message names that process.
-    StoreError
-        If locking fails for another reason.
+    If another process holds the lock, raise StoreBusyError, which names that process.
     """
     if local(url) is None:
         with _claimed(url, name) as lock:
@@ -259,17 +219,10 @@ def acquire(url: str, name: str = "") -> Iterator[Lock]:
 
 @contextmanager
 def while_locked(url: str, lock: Lock) -> Iterator[None]:
-    """Check that a run still holds its lock.
+    """Check that a run still holds its lock; raise StoreBusyError if not, and StoreError if the store can only be read.
 
     With a lock of the operating system, no other run can take over the lock until this context ends. A claim is only
     checked at the beginning.
-
-    Raises
-    ------
-    StoreBusyError
-        If the run has ended, or another run has taken over its lock.
-    StoreError
-        If the store can only be read.
     """
     if not lock.owner:
         raise StoreError(f"{url}: the study is not finished, and nothing can be written here (permission denied)")
@@ -290,15 +243,6 @@ def while_locked(url: str, lock: Lock) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
-
-
-def note_begun(url: str, lock: Lock, begun: list[str]) -> None:
-    """Record which blocks a run has begun. If this process crashes, the next run reads this record."""
-    if lock.claim is None and local(url) is not None:
-        content = "\n".join([_this_process(), *begun]) + "\n"
-        with guarded(url, "noting a block"), _runner(url, lock).open("r+") as file:
-            file.write(content)
-            file.truncate()
 
 
 def _lock_file(url: str, name: str = "") -> Path:
@@ -398,7 +342,7 @@ def _holder(url: str, name: str = "") -> str:
     names = [_read_claim(url, _claim(name, number)).get("who", "") for number in _numbers(url, name)]
     for runner in _runners(url, name) if local(url) is not None else ():
         with suppress(OSError):
-            names.append(runner.read_text().partition("\n")[0])
+            names.append(runner.read_text())
     return next(filter(None, names), "another process")
 
 
@@ -421,44 +365,30 @@ def _registered(url: str, name: str) -> Iterator[Lock]:
 
     While a task writes, it holds a shared lock on the runner file of its run.
     """
-    begun: list[str] = []
-    for runner in _runners(url, name):
-        begun += _retire(url, runner)
-    lock = Lock(name, uuid.uuid4().hex, begun=tuple(begun))
-    mine = _runner(url, lock)
+    _retire(url, name)
+    lock = Lock(name, uuid.uuid4().hex)
     with guarded(url, "locking it"):
-        mine.write_text("\n".join([_this_process(), *begun]) + "\n")
+        _runner(url, lock).write_text(_this_process())
     try:
         yield lock
     finally:
-        _retire(url, mine)
+        _retire(url, name)
 
 
-def _retire(url: str, runner: Path) -> list[str]:
-    """Remove the runner file of an ended run when none of its tasks is writing; return the blocks that it had begun."""
+def _retire(url: str, name: str) -> None:
+    """Remove the runner files of a lock when no task of their runs is writing."""
     give_up = time.monotonic() + SILENCE
-    with guarded(url, "removing the file of a run"), runner.open("rb+") as file:
-        while True:
-            who, *begun = file.read().decode("utf-8", "replace").splitlines() or [""]
-            try:
-                _flock(file.fileno())
-            except BlockingIOError:
-                if time.monotonic() > give_up:
-                    raise _busy(url, f"a task of {who or 'a run that has ended'}") from None
-                time.sleep(GLANCE / 10)
-                file.seek(0)
-            else:
-                runner.unlink(missing_ok=True)
-                return begun
-
-
-def _remove_lock(url: str, name: str) -> list[str]:
-    """Remove the files of a lock that no process holds; return the blocks that its last holder had begun."""
-    if local(url) is None:
-        return []
-    begun = [block for runner in _runners(url, name) for block in _retire(url, runner)]
-    _lock_file(url, name).unlink(missing_ok=True)
-    return begun
+    for runner in _runners(url, name):
+        with guarded(url, "removing the file of a run"), runner.open("rb+") as file:
+            while True:
+                try:
+                    _flock(file.fileno())
+                    break
+                except BlockingIOError:
+                    if time.monotonic() > give_up:
+                        raise _busy(url, f"a task of {_holder(url, name)}") from None
+                    time.sleep(GLANCE / 10)
+            runner.unlink(missing_ok=True)
 
 
 def _claims(name: str) -> str:
@@ -505,14 +435,9 @@ def _claimed(url: str, name: str) -> Iterator[Lock]:
 
 def _make_claim(url: str, name: str, owner: str) -> int:
     """Make the next claim and return its number; raise StoreBusyError if the owner of the last claim is active."""
-    for _ in range(LISTINGS):
-        standing = _numbers(url, name)
-        if not standing or not _is_alive(url, name, max(standing)):
-            break
-        if read_bytes(url, _claim(name, max(standing))) is not None:  # if it is missing, its owner has just ended
-            raise _busy(url, _read_claim(url, _claim(name, max(standing))).get("who", "another process"))
-    else:
-        raise _busy(url, "another process")
+    standing = _numbers(url, name)
+    if standing and _is_alive(url, name, max(standing)):
+        raise _busy(url, _read_claim(url, _claim(name, max(standing))).get("who", "another process"))
     number = max(standing, default=0) + 1
     content = json.dumps({"owner": owner, "who": _this_process(), "time": time.time()}).encode()
     if not create(url, _claim(name, number), content):

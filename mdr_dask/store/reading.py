@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from mdr_dask.errors import StoreError
 from mdr_dask.store.files import bytes_of, group_name
-from mdr_dask.store.ledgers import require_sound
+from mdr_dask.store.ledgers import require_undamaged
 from mdr_dask.store.study import require_valid_file, series_names
 
 if TYPE_CHECKING:
@@ -44,28 +44,15 @@ def is_damage(error: Exception) -> bool:
 
 
 def datasets(url: str) -> dict[str, xr.Dataset]:
-    """Open a study for reading, finished or not.
+    """Open a study for reading, finished or not; return every group by the name of its series.
 
-    Parameters
-    ----------
-    url : str
-        Path or URL of the store.
-
-    Returns
-    -------
-    dict of str to Dataset
-        Every group by the name of its series. The values of numeric axes are in ascending order. The results of a study
-        without series have the name ``""``, or ``"-"`` if series were added later. Arrays are loaded when they are
-        used. In a group larger than `LAZY_BYTES` they are Dask arrays, which are computed chunk by chunk.
-
-    Raises
-    ------
-    StoreError
-        If there is no study of mdr_dask at `url`.
+    The values of numeric axes are in ascending order. The results of a study without series have the name ``""``, or
+    ``"-"`` if series were added later. Arrays are loaded when they are used. In a group larger than `LAZY_BYTES` they
+    are Dask arrays, which are computed chunk by chunk. Raise StoreError if there is no study of mdr_dask at `url`.
     """
     with readable(url):
         names = series_names(url)
-        require_sound(url, names)
+        require_undamaged(url, names)
         return {name: _open_sorted(url, name) for name in names}
 
 

@@ -15,7 +15,16 @@ from functools import lru_cache
 from typing import Any
 
 from mdr_dask.plan import RECORDS_TOGETHER, BlockIndex
-from mdr_dask.store.files import chunk_name, group_name, listed, read_bytes, read_many, remove, unsealed, write_stages
+from mdr_dask.store.files import (
+    chunk_name,
+    group_name,
+    listed,
+    read_bytes,
+    read_many,
+    remove,
+    without_digest,
+    write_stages,
+)
 
 log = logging.getLogger("mdr_dask.store")
 
@@ -34,7 +43,7 @@ def name_of(series: str, index: BlockIndex, attempt: int) -> str:
 
 def decoded(line: bytes) -> dict[str, Any] | None:
     """Return a record, or None if it is damaged. Records of version 0.1 have no digest and count as undamaged."""
-    record = unsealed(line)
+    record = without_digest(line)
     try:
         return record if record is not None and _is_one(record) else None
     except (TypeError, KeyError, AttributeError):

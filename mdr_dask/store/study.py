@@ -11,7 +11,18 @@ from zarr.abc.store import Store
 from zarr.storage import StorePath
 
 from mdr_dask.errors import StoreError
-from mdr_dask.store.files import KEPT, LAYOUT, ROOT, group_name, guarded, local, parsed, read_bytes, require_bucket
+from mdr_dask.store.files import (
+    KEPT,
+    LAYOUT,
+    RECORD_FOLDER,
+    ROOT,
+    group_name,
+    guarded,
+    local,
+    parsed,
+    read_bytes,
+    require_bucket,
+)
 from mdr_dask.store.schema import faults
 
 _HINTS = {".yaml": "; 'mdr-dask run {}' runs a campaign", ".zip": "; unpack it first"}
@@ -20,12 +31,7 @@ _HINTS = {".yaml": "; 'mdr-dask run {}' runs a campaign", ".zip": "; unpack it f
 def document(url: str, series: str = "") -> Mapping[str, Any] | None:
     """Return the checked metadata of a group, or None if the group does not exist.
 
-    The result is cached, so do not change it.
-
-    Raises
-    ------
-    StoreError
-        If this program did not write the metadata.
+    The result is cached, so do not change it. Raise StoreError if this program did not write the metadata.
     """
     content = read_bytes(url, "zarr.json")
     if content is None:
@@ -102,13 +108,7 @@ def refuse_file(url: str, expected: str = "the folder of a store") -> None:
 
 
 def exists(url: str) -> bool:
-    """Return whether there is a study at a path or URL.
-
-    Raises
-    ------
-    StoreError
-        If there is something at this place that is not a study.
-    """
+    """Return whether there is a study at a path or URL; raise StoreError if there is something else."""
     refuse_file(url, "the folder of a store or nothing")
     path, found = local(url), _root_attributes(url)
     if found is None and path is not None and path.is_dir():
@@ -126,7 +126,7 @@ def is_study(url: str) -> bool:
 def _root_attributes(url: str) -> dict[str, Any] | None:
     """Return the attributes of the Zarr group at a path or URL, or None if there is no group."""
     found = document(url)
-    if found is None and read_bytes(url, "layout.json") is not None:
+    if found is None and read_bytes(url, f"{RECORD_FOLDER}/zarr.json") is not None:
         raise StoreError(f"{url}: zarr.json is missing; 'mdr-dask verify --repair {url}' writes it again")
     return None if found is None else dict(found.get("attributes", {}))
 
@@ -139,10 +139,7 @@ def only_claimed(found: Mapping[str, Any]) -> bool:
 def attributes(url: str) -> dict[str, Any]:
     """Return the attributes of a study.
 
-    Raises
-    ------
-    StoreError
-        If there is no study of mdr_dask at `url`, or if a later version with another layout wrote it.
+    Raise StoreError if there is no study of mdr_dask at `url`, or if a later version with another layout wrote it.
     """
     refuse_file(url)
     found = _root_attributes(url)

@@ -7,16 +7,12 @@ import uuid
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from operator import itemgetter
-from typing import Any
-
-import zarr
 
 from mdr_dask.errors import StoreBusyError
 from mdr_dask.plan import BlockIndex
 from mdr_dask.store.files import (
     CLAIMS,
     LAYOUT,
-    bytes_of,
     digest,
     group_name,
     listed,
@@ -62,23 +58,13 @@ class Group:
 
 @dataclass
 class Inspection:
-    """What was found in a store.
-
-    Parameters
-    ----------
-    findings : list of Finding
-        All faulty files.
-    notes : list of str
-        Messages about facts that are no damage, for example that a run was interrupted.
-    groups : list of Group
-        The groups of the store.
-    files, blocks : int
-        Number of files in the store, and number of blocks that are in the ledgers.
-    """
+    """What was found in a store."""
 
     findings: list[Finding] = field(default_factory=list)
+    # Messages about facts that are no damage, for example that a run was interrupted.
     notes: list[str] = field(default_factory=list)
     groups: list[Group] = field(default_factory=list)
+    # Number of files in the store, and number of blocks that are in the ledgers.
     files: int = 0
     blocks: int = 0
 
@@ -86,12 +72,7 @@ class Inspection:
 def verify(url: str) -> Inspection:
     """Read every file of a store and compare it with what was written.
 
-    Raises
-    ------
-    StoreError
-        If there is no store of mdr_dask, or it cannot be read.
-    StoreBusyError
-        If a run is active in the store.
+    Raise StoreError if there is no store of mdr_dask or it cannot be read, and StoreBusyError if a run is active in it.
     """
     refuse_file(url)
     if who := ", ".join(active_runs(url)):
@@ -104,14 +85,7 @@ def repair(url: str) -> tuple[Inspection, Inspection]:
 
     Damaged metadata are written again. Damaged coordinates and damaged blocks are removed, and the next run writes them
     again. Damaged records, and foreign files in the folders of chunks and records, are removed. Other foreign files are
-    kept.
-
-    Raises
-    ------
-    StoreError
-        If there is no store of mdr_dask, or it cannot be written.
-    StoreBusyError
-        If a run is active in the store.
+    kept. Errors are those of `verify`; a store that cannot be written is one, too.
     """
     refuse_file(url)
     with exclusive(url):
@@ -176,46 +150,11 @@ def _check_layout(url: str, found: Inspection, present: set[str]) -> set[str]:
             found.groups.append(Group(Blocks.of(name, group)))
     if record is None:
         if root["attributes"]["mdr_dask_layout"] < LAYOUT:
-            found.notes.append("made by version 0.1, without digests: files that changed places are not found")
-        found.findings += _unrecorded_faults(url, root)
+            found.notes.append("made by version 0.1, without digests: its files cannot be checked")
         return {RECORD, "zarr.json", *metadata_files(root), *coordinate_files(root, present)}
     if digest(content) in record.files["zarr.json"][:-1]:
         found.notes.append("a run was stopped while it wrote the layout; the next run continues")
     return {RECORD, *record.files}
-
-
-def _unrecorded_faults(url: str, root: Mapping[str, Any]) -> Iterator[Finding]:
-    """Yield the faults of metadata and coordinates that can be found although there is no record of the layout."""
-    known = metadata_files(root)
-    for name, content in read_many(url, known):
-        if content is None:
-            yield Finding("missing", name, "part of the layout")
-        elif _parsed(content) != json.loads(known[name]):
-            yield Finding("damaged", name, "not as in the metadata of the study")
-    members = root["consolidated_metadata"]["metadata"]
-    for name in coordinate_files(root, [f"{name}/c" for name in members]):
-        if fault := _reading(url, name.removesuffix("/c")):
-            yield Finding("damaged", name, fault)
-
-
-def _parsed(content: bytes) -> Any:
-    try:
-        return json.loads(content)
-    except (ValueError, RecursionError):
-        return None
-
-
-def _reading(url: str, path: str, block: BlockIndex | None = None) -> str | None:
-    """Read an array or one of its blocks; return the error of Zarr as text, or None if reading succeeds."""
-    try:
-        array: Any = zarr.open_group(bytes_of(url), mode="r", use_consolidated=True, zarr_format=3)[path]
-        if block is None:
-            array[...]
-        else:
-            array.blocks[block]
-    except Exception as error:  # a damaged file may cause any error in Zarr and its codecs
-        return str(error) or type(error).__name__
-    return None
 
 
 def _check_records(url: str, group: Group, found: Inspection, present: set[str]) -> set[str]:
@@ -258,7 +197,7 @@ def _check_blocks(url: str, group: Group, found: Inspection, present: set[str]) 
             continue
         found.blocks += 1
         contents = {names[name]: content for name, content in read_many(url, names)}
-        faults = list(_faults(url, group, block, histories.get(block, []), contents))
+        faults = list(_faults(group, block, histories.get(block, []), contents))
         if faults:
             group.bad_blocks.add(block)
             found.findings += faults
@@ -289,11 +228,7 @@ def _histories(url: str, group: Group) -> tuple[dict[BlockIndex, History], set[B
 
 
 def _faults(
-    url: str,
-    group: Group,
-    block: BlockIndex,
-    history: History,
-    contents: Mapping[str, bytes | None],
+    group: Group, block: BlockIndex, history: History, contents: Mapping[str, bytes | None]
 ) -> Iterator[Finding]:
     """Yield the faults of a block that is in the ledger."""
     if not history:
@@ -304,10 +239,8 @@ def _faults(
         file, written = group.blocks.chunk(name, block), {chunks[name] for chunks in history if name in chunks}
         expected = written if name == "status" else _expected(history, status, name)
         if not written:  # records of version 0.1 have no digests
-            fault = content is not None and _reading(url, group_name(group.blocks.series, name), block)
-            if fault:
-                yield Finding("damaged", file, fault)
-        elif content is None:
+            continue
+        if content is None:
             yield from [Finding("missing", file, "a chunk of a block that is done")] if expected else []
         elif digest(content) not in (expected or written):
             is_older = digest(content) in written

@@ -78,7 +78,6 @@ RUBBING = Model(
         Output("pressure", "Pa", "pressure along the line", dims=("radius",), default=False),
     ),
     compute=_compute,
-    seconds=lambda block: 1e-3 * block.cases,
 )
 
 

@@ -183,14 +183,14 @@ def positions(parameters: EhlLineParameters) -> FloatArray:
 distinct = deferred("mdr_dask.models.ehl_line.solve", "distinct")
 
 
-def seconds(block: Block[EhlLineParameters]) -> float:
-    """Return the estimated time of `compute` in seconds.
+def operations(block: Block[EhlLineParameters]) -> float:
+    """Return the approximate number of operations of `compute`.
 
-    A solution takes about 6 ms, but more if an accurate pressure spike requires the finest grid.
+    A solution needs about 6 million, but more if an accurate pressure spike requires the finest grid.
     """
     accuracy = block.accuracy or ACCURACY
     is_sharp = block.accuracy is not None and {"pressure", "spike_pressure", "spike_position"} & set(block.outputs)
-    each = 1.5 if is_sharp else 0.006 * float(np.clip((ACCURACY / accuracy) ** 0.4, 0.8, 30.0))
+    each = 1.5e9 if is_sharp else 6e6 * float(np.clip((ACCURACY / accuracy) ** 0.4, 0.8, 30.0))
     return each * float(distinct(block))
 
 
@@ -215,7 +215,7 @@ MODEL = Model(
     parameters=EhlLineParameters,
     outputs=OUTPUTS,
     compute=deferred("mdr_dask.models.ehl_line.solve", "compute"),
-    seconds=seconds,
+    operations=operations,
     whole=("slide_roll_ratio", "eyring_stress"),
     coordinates=coordinates,
     distinct=distinct,
@@ -231,5 +231,4 @@ MODEL = Model(
         Number("moes_load", "load_parameter * (2 * speed_parameter) ** -0.5", "Moes' load parameter M"),
         Number("moes_lubricant", "material_parameter * (2 * speed_parameter) ** 0.25", "Moes' lubricant parameter L"),
     ),
-    compiling=7.0,
 )

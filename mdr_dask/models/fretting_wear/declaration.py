@@ -308,7 +308,7 @@ MODEL = Model(
     parameters=FrettingWear,
     outputs=OUTPUTS,
     compute=deferred(_SOLVE, "compute"),
-    seconds=deferred(_SOLVE, "seconds"),
+    operations=deferred(_SOLVE, "operations"),
     whole=(
         *("cycles", "path", "wear_coefficient", "hardness"),
         *("friction", "amplitude", "effective_shear_modulus", "contact_modulus", "depth", "normal_force"),
@@ -326,5 +326,4 @@ MODEL = Model(
             "worn volume over that of gross slip by Archard's law",
         ),
     ),
-    compiling=5.0,
 )

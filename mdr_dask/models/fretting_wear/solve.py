@@ -89,29 +89,29 @@ def distinct(block: Block[FrettingWear]) -> int:
     return sum(_solves_of(task, wanted) for task, wanted in _tasks(block, numbers, status).items())
 
 
-def seconds(block: Block[FrettingWear]) -> float:
-    """Return the estimated time of a block in seconds."""
+def operations(block: Block[FrettingWear]) -> float:
+    """Return the approximate number of operations of a block."""
     parameters, size = block.parameters, block.cases * len(block.realisations)
     if _is_plain(block):
-        return 0.01 + 1e-5 * size
+        return 1e7 + 1e4 * size
     if parameters.history:
-        return 0.01 + 1.2e-7 * parameters.cells**3 * size
+        return 1e7 + 120.0 * parameters.cells**3 * size
     accuracy = _first_resolution(block.accuracy, parameters.hold)
     followed, forced = _followed(parameters.hold, accuracy), parameters.hold == "force"
-    rules_take = {"limit": followed if forced else 1e-3, "fast": 1e-3, "exact": followed}
-    each = rules_take[parameters.wear_rule]
+    of_rules = {"limit": followed if forced else 1e6, "fast": 1e6, "exact": followed}
+    each = of_rules[parameters.wear_rule]
     numbers, _ = reduce_block(block)
     moments = _count(numbers.exponent, numbers.level, numbers.cycles, numbers.xi)
     solves = moments if parameters.wear_rule == "fast" else _count(numbers.exponent, numbers.level)
-    moment = 4e-3 if parameters.wear_rule == "exact" else 7e-4
-    return float(0.01 + each * solves + moment * moments + 5e-5 * size)
+    moment = 4e6 if parameters.wear_rule == "exact" else 7e5
+    return float(1e7 + each * solves + moment * moments + 5e4 * size)
 
 
 def _followed(hold: str, accuracy: float) -> float:
-    """Return the estimated time in s of one evolution and its errors, without the time to evaluate it at each N."""
+    """Return the operations of one evolution and its errors, without those to evaluate it at each N."""
     if hold == "force":
-        return 0.09 * float(max(COARSEST_OF_MOVING / accuracy, 1.0) ** 1.1)
-    return 0.012 * float((_USUAL / accuracy) ** 0.6)
+        return 9e7 * float(max(COARSEST_OF_MOVING / accuracy, 1.0) ** 1.1)
+    return 1.2e7 * float((_USUAL / accuracy) ** 0.6)
 
 
 def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str], NDArray[np.int8]]:

@@ -309,19 +309,19 @@ OF_LINES = {
 }
 
 
-def seconds(block: Block[MixedLubrication]) -> float:
-    """Return the estimated time of a block in seconds, from the points of the first two lines of every case."""
+def operations(block: Block[MixedLubrication]) -> float:
+    """Return the approximate number of operations of a block, from the points of the first two lines of every case."""
     columns = (block.column(name) for name in ("points", "shortest_wavelength", "roller_radius"))
-    millions = np.empty(block.cases)
+    points_of = np.empty(block.cases)
     for case, (points, shortest, radius) in enumerate(zip(*columns, strict=True)):
         waves = WAVES if shortest == "auto" else 2 * np.pi * radius / shortest
-        millions[case] = (3 * LEAST_PER_WAVE * waves if points == "auto" else 1.5 * points) / 1e6
+        points_of[case] = 3 * LEAST_PER_WAVE * waves if points == "auto" else 1.5 * points
     creep = np.asarray(block.column("slide_roll_ratio"), dtype=np.float64) != 0
-    of_case = 0.003 + np.where(creep, 0.06, 0.011) * millions
-    films = 0.06 * float(np.sum(block.column("film_formula") == "ehl"))
+    of_case = 3e6 + np.where(creep, 60.0, 11.0) * points_of
+    films = 6e7 * float(np.sum(block.column("film_formula") == "ehl"))
     keys = [path for path in block.columns if path.partition(".")[0] in OF_LINES]
-    lines = {tuple(str(block.columns[key][k]) for key in keys): millions[k] for k in range(block.cases)}
-    return films + len(block.realisations) * float(0.04 * sum(lines.values()) + np.sum(of_case))
+    lines = {tuple(str(block.columns[key][k]) for key in keys): points_of[k] for k in range(block.cases)}
+    return films + len(block.realisations) * float(40.0 * sum(lines.values()) + np.sum(of_case))
 
 
 MODEL = Model(
@@ -331,7 +331,7 @@ MODEL = Model(
     parameters=MixedLubrication,
     outputs=OUTPUTS,
     compute=deferred("mdr_dask.models.mixed_lubrication.solve", "compute"),
-    seconds=seconds,
+    operations=operations,
     whole=(
         "normal_force",
         "rotation_speed",
@@ -363,5 +363,4 @@ MODEL = Model(
             "contact length divided by the Hertzian width",
         ),
     ),
-    compiling=2.0,
 )

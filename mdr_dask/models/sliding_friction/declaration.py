@@ -47,7 +47,7 @@ MODEL = Model(
     parameters=SlidingFriction,
     outputs=OUTPUTS,
     compute=deferred(SOLVE, "compute"),
-    seconds=deferred(SOLVE, "seconds"),
+    operations=deferred(SOLVE, "operations"),
     whole=("normal_force", "velocity", "shear_modulus", "relaxation_time", "rms_roughness"),
     distinct=deferred(SOLVE, "distinct"),
     notes=lambda sets: (*frequency_notes(sets), *load_notes(sets)),
@@ -60,5 +60,4 @@ MODEL = Model(
             "coefficient of friction / (sqrt 2 x rms slope)",
         ),
     ),
-    compiling=10.0,
 )

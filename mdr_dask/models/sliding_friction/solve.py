@@ -22,7 +22,7 @@ from mdr_dask.physics.surfaces.rough_line import RoughLine
 ACCURACY = 0.01  # relative accuracy if the campaign does not give an accuracy
 USUAL_ON_PLANES, USUAL = 2, 16  # nodes per Nyquist point on the finest grid that is usually needed
 BYTES_A_NODE = 150  # peak memory per node in bytes, for a line and one case on it; measured: 20 to 130 bytes
-SECONDS_A_NODE = 1e-8  # time in s that a sweep needs for a node, order of magnitude
+OPERATIONS_A_NODE = 10  # operations of a sweep for each node
 
 #: Outputs that have errors, and the corresponding columns of a steady state.
 OUTPUTS = dict(
@@ -164,16 +164,16 @@ def _lines(block: Block[SlidingFriction], setting: Setting) -> int:
     return len(block.realisations) if setting.roughness.is_random else 1
 
 
-def seconds(block: Block[SlidingFriction]) -> float:
-    """Return the order of magnitude of the computing time of a block in s, from the number of nodes in all sweeps."""
+def operations(block: Block[SlidingFriction]) -> float:
+    """Return the approximate number of operations of a block, from the number of nodes in all sweeps."""
     problems, nodes = sliding_problems(block), 0.0
     for setting, case, members in _groups(block, problems):
         solves = problems.different(members)[0].size
         visits = 1 if setting.terms is None else 4 * (4 + len(setting.terms.moduli))  # sweeps per case
         grid = 2 if case.oversampling == "auto" else case.oversampling
-        # generating a line takes as long as about ten sweeps; a sweep counts half, because most grids are coarser
+        # a line needs as many operations as about ten sweeps; a sweep counts half, because most grids are coarser
         nodes += _lines(block, setting) * setting.roughness.points * grid * (10 + 0.5 * solves * visits)
-    return 1e-4 + SECONDS_A_NODE * nodes
+    return 1e5 + OPERATIONS_A_NODE * nodes
 
 
 def memory(block: Block[SlidingFriction]) -> float:

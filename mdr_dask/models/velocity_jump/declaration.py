@@ -121,7 +121,7 @@ MODEL = Model(
     parameters=VelocityJump,
     outputs=OUTPUTS,
     compute=deferred(SOLVE, "compute"),
-    seconds=deferred(SOLVE, "seconds"),
+    operations=deferred(SOLVE, "operations"),
     whole=("velocity", "normal_force", "velocity_change", "shear_modulus", "relaxation_time", "rms_roughness"),
     coordinates=coordinates,
     distinct=deferred(SOLVE, "distinct"),
@@ -134,5 +134,4 @@ MODEL = Model(
         ),
     ),
     notes=lambda sets: (*frequency_notes(sets), *load_notes(sets)),
-    compiling=18.0,
 )

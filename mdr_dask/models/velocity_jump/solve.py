@@ -38,9 +38,9 @@ from mdr_dask.physics.transients.elements.loading_history import Trace, trace
 from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
 ACCURACY = 0.01  # relative accuracy of steady friction and of the jump, if the campaign does not give an accuracy
-# computing time in s, order of magnitude: for a jump, multiplied by the number of nodes and the steps per decade; for a
-# history, multiplied by the square of the number of nodes
-SECONDS_MARCHED, SECONDS_FOLLOWED = 2e-8, 3.5e-8
+# operations: for a jump, multiplied by the number of nodes and the steps per decade; for a history, multiplied by the
+# square of the number of nodes
+OPERATIONS_MARCHED, OPERATIONS_FOLLOWED = 20, 35
 FLAT = 1e-12  # a line is flat if its rms height is at most this fraction of its largest absolute height
 HISTORY_ORDER = 2  # order of convergence of the results of a history in cell size and time step
 
@@ -294,14 +294,14 @@ def distinct(block: Block[VelocityJump]) -> int:
     return different * len(block.realisations)
 
 
-def seconds(block: Block[VelocityJump]) -> float:
-    """Return the computing time of a block in s, estimated from the numbers of nodes and moments."""
-    total = 1e-3
+def operations(block: Block[VelocityJump]) -> float:
+    """Return the approximate number of operations of a block, from the numbers of nodes and moments."""
+    total = 1e6
     for group in _groups(block, sliding_problems(block)):
         nodes = group.setting.roughness.points * group.oversampling
         if isinstance(group, _Marched):
-            per_case = nodes * group.steps * SECONDS_MARCHED
+            per_case = nodes * group.steps * OPERATIONS_MARCHED
             total += group.different[0].size * per_case * len(block.realisations)
         else:
-            total += nodes**2 * SECONDS_FOLLOWED * len(block.realisations)
+            total += nodes**2 * OPERATIONS_FOLLOWED * len(block.realisations)
     return total
