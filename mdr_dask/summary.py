@@ -8,7 +8,9 @@ from typing import Any
 
 from mdr_dask import models
 from mdr_dask.campaign import Axis, Campaign, Refinement
+from mdr_dask.campaign.fields import yaml_text
 from mdr_dask.campaign.written import written_units
+from mdr_dask.models.base import unit_of
 from mdr_dask.plan import Estimate, estimate
 from mdr_dask.units import seconds, shown
 
@@ -69,8 +71,36 @@ def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
         for axis in series.axes:
             unit = units.get(axis.path, axis.unit or "1")
             yield f"{indent}{axis.name:{width}s}  {axis_range(axis, unit, written.get(axis.name, ''))}"
+    if defaults := _defaults(campaign):
+        yield f"  not given: {', '.join(defaults)}"
     yield from (f"  {note}" for note in costs.notes)
     yield from (f"  {line}" for line in cost_lines(costs))
+
+
+def _defaults(campaign: Campaign) -> list[str]:
+    """Return the parameters that have an effect and that the campaign file leaves at their defaults, with the values.
+
+    The names of the series follow if other series give the parameter. Parameters that are zero or empty are left out.
+    """
+    found: dict[str, list[str]] = {}
+    for series in campaign.series:
+        given, varied = series.parameters, {axis.path.partition(".")[0] for axis in series.axes}
+        unmet = {
+            name
+            for name, (other, value) in given.requires.items()
+            if other not in varied and getattr(given, other) != value
+        }
+        for name in type(given).model_fields.keys() - given.model_fields_set - varied - given.inactive.keys() - unmet:
+            if value := getattr(given, name):
+                unit = unit_of(type(given), name)
+                is_number = isinstance(value, int | float) and not isinstance(value, bool)
+                text = shown(value, unit or "1") if is_number else yaml_text(value)
+                found.setdefault(f"{name} = {text}", []).append(series.name)
+    order = list(type(campaign.series[0].parameters).model_fields)
+    return [
+        text if len(names) == len(campaign.series) else f"{text} ({', '.join(names)})"
+        for text, names in sorted(found.items(), key=lambda item: order.index(item[0].partition(" ")[0]))
+    ]
 
 
 def axis_range(axis: Axis, unit: str, written: str = "") -> str:

@@ -174,3 +174,21 @@ def test_a_file_of_a_list_that_is_not_there_is_one_problem(tmp_path, capsys):
     assert main(["check", str(path)]) == 2
     (problem,) = capsys.readouterr().err.splitlines()
     assert "parameters.surface.map.files[0]: no such file: " in problem
+
+
+def test_check_names_the_defaults_that_have_an_effect(capsys):
+    Path("gear.yaml").write_text(
+        "name: gear\nmodel: mixed_lubrication\nparameters:\n  normal_force: 500 N\n  rotation_speed: 100 rpm\n"
+        "  temperature: 60 degC\n  rms_roughness: 0.2 um\n  roller_width: 8 mm\n"
+    )
+    Path("ball.yaml").write_text(
+        "name: ball\nmodel: fretting_wear\nparameters:\n  indenter: {shape: parabola}\n  stick_radius: 0.5\n"
+        "  cycles: [1, 2]\n  wear_rule: exact\n"
+    )
+    assert main(["check", "gear.yaml", "ball.yaml"]) == 0
+    gear, ball = (line for line in capsys.readouterr().out.splitlines() if "not given: " in line)
+    for text in ("oil = mobilgear_shc_xmp_320", "roller_radius = 50 mm"):
+        assert text in gear
+    assert "roller_width" not in gear
+    assert "extent = 1.6" in ball
+    assert "xi = " not in ball  # the exact rule does not use it

@@ -12,7 +12,7 @@ import pytest
 
 import mdr_dask
 from mdr_dask import __version__, plots
-from mdr_dask.cli import main
+from mdr_dask.cli import cli, main
 from mdr_dask.plots.base import Plot
 from mdr_dask.store import datasets
 
@@ -149,7 +149,31 @@ def test_a_figure_of_an_output_has_its_data_and_their_origin_beside_it(filled, c
     np.testing.assert_array_equal(shown.loc[shown["what"] == "data", "y"], data["y"])
 
 
-def test_outputs_of_a_model_of_ones_own_have_figures_too(tmp_path, monkeypatch):
+def test_a_warning_is_printed_once_for_all_figures(filled, capsys, monkeypatch):
+    message = {"series": "", "status": "done", "case": {}, "attempt": 0}
+    texts = ["the film is thin: ratio 0.2; the load is high", "the film is thin: ratio 0.3", "the load is high"]
+    found = [message | {"message": text} for text in texts]
+    monkeypatch.setattr("mdr_dask.questions.progress.messages", lambda *_: found)
+    assert main(["plot", filled, "velocity", "force", "-o", "drawn"]) == 0
+    errors = capsys.readouterr().err.splitlines()
+    assert f"all figures: warning: the film is thin (2 results of {filled})" in errors
+    assert sum("warning: the load is high" in line for line in errors) == 1
+    assert "warning: the film is thin" in Path("drawn/small-force.csv").read_text()
+
+
+@pytest.mark.parametrize("command", ["plot", "fit", "sensitivity", "master-curve", "surface"])
+def test_commands_that_draw_have_the_same_options(command):
+    options = {name for option in cli.commands[command].params for name in option.opts}
+    assert {"--size", "--title", "--style"} <= options
+    assert "--plot" in options or command == "plot"
+
+
+def test_the_look_of_a_figure_needs_a_figure(filled, capsys):
+    assert main(["fit", filled, "calibration", "--size", "85mm"]) == 2
+    assert "need --plot FILE" in capsys.readouterr().err
+
+
+def test_outputs_of_a_model_of_ones_own_have_figures_too(tmp_path, monkeypatch, capsys):
     view = "--over normal_force --by sliding_distance"
     page = (Path(__file__).parents[1] / "docs/own-model.md").read_text()
     module, campaign = (re.search(rf"^```{kind}\n(.*?)^```", page, flags=re.M | re.S)[1] for kind in ("python", "yaml"))
@@ -159,7 +183,14 @@ def test_outputs_of_a_model_of_ones_own_have_figures_too(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.delitem(sys.modules, "wear_rate", raising=False)
     assert main(["run", "pin.yaml", "--quiet"]) == 0
+    capsys.readouterr()
     assert main(["plot", "results/pin.zarr"]) == 0
+    listed = capsys.readouterr().out
+    assert "wear_volume" in listed.splitlines()[0]
+    assert "axes: normal_force, sliding_distance" in listed
+    assert main(["plot", "results/pin.zarr", "--all", "-o", "all"]) == 0
+    against = pd.read_csv("all/pin-wear_volume.csv", comment="#")
+    assert set(against["normal_force"]) == set(datasets("results/pin.zarr")[""]["normal_force"].values)
     units = ["--units", "wear_volume=m^3"]
     assert main(["plot", "results/pin.zarr", "wear_volume", *view.split(), *units, "-o", "own.svg"]) == 0
     table = pd.read_csv("own.csv", comment="#")

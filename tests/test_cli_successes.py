@@ -12,7 +12,6 @@ from planted import SLIDING
 
 from mdr_dask import campaign, fits
 from mdr_dask.cli import main
-from mdr_dask.cli.results import list_names
 
 TABLE = Path(__file__).parent / "data/dma/time_user_raw.csv"
 
@@ -45,8 +44,6 @@ def test_laws_of_a_store_are_listed_each_with_its_sentence(store, capsys):
     known = fits.available("sliding_friction")
     assert [line.split()[0] for line in printed.splitlines() if not line.startswith(" ")] == list(known)
     assert all(law.summary in " ".join(printed.split()) for law in known.values())
-    list_names("toy", {})
-    assert capsys.readouterr().out == "none for toy\n"
 
 
 def test_a_table_can_be_given_to_a_calibration_and_to_nothing_else(store, capsys):
@@ -59,7 +56,7 @@ def test_a_table_can_be_given_to_a_calibration_and_to_nothing_else(store, capsys
     (found,) = json.loads(capsys.readouterr().out)["rows"]
     assert found["normal_force_low"] < force < found["normal_force_high"]
     assert main(["fit", store, "plateau", "--measured", "rig.csv"]) == 2
-    assert "--measured and --figure can be used only with `calibration`" in capsys.readouterr().err
+    assert "--measured and --plot can be used only with `calibration`" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from mdr_dask.cli.options import select_option, tell, units_option, where_option
+from mdr_dask.cli.options import look_options, select_option, tell, units_option, where_option
+from mdr_dask.cli.printing import say
 from mdr_dask.cli.results import list_names, require_known
 from mdr_dask.cli.writing import FIGURES, format_option, require_suffix, writing
 
@@ -49,9 +51,7 @@ class Drawing(click.Command):
 )
 @units_option
 @click.option("--measured", metavar="FILE", help="Also draw the measured points of this table, with error bars.")
-@click.option("--title", metavar="TEXT", help="Title; '' for none.  [a description, but none with --size]")
-@click.option("--size", metavar="WIDTH[xHEIGHT]", help="Size on paper: 85mm, 85x60mm.")
-@click.option("--style", metavar="FILE", help="Style file of matplotlib, or the name of one of its styles.")
+@look_options
 @click.option(
     "--output", "-o", type=click.Path(path_type=Path), help="File of a single figure, or folder of several figures."
 )
@@ -68,13 +68,16 @@ def plot(
     measured: str | None,
     output: Path | None,
     suffix: str,
-    **look: Any,
+    units: dict[str, str],
+    look: dict[str, Any],
+    **axes: Any,
 ) -> None:
-    """Draw figures by name, or any output against any axis; without a name, list the figures.
+    """Draw figures by name, or any output against any axis; without a name, list figures, outputs and axes.
 
-    The data of every figure are written to a table next to it, FIGURE.csv. If a study has more axes than a figure can
-    show, each further axis is fixed at one value, which is printed. Choose another value with --select. Several stores
-    can be drawn in one figure.
+    Without --over and --effects, an output is drawn against the axis with the most values. The data of every figure
+    are written to a table next to it, FIGURE.csv. If a study has more axes than a figure can show, each further axis
+    is fixed at one value, which is printed. Choose another value with --select. Several stores can be drawn in one
+    figure.
 
     \b
     mdr-dask plot results/quickstart.zarr velocity -o quickstart.png
@@ -90,17 +93,17 @@ def plot(
     from mdr_dask.store import readable
 
     urls, names = _split(words)
-    known = _known_to_all(urls)
-    if not names and not everything:
-        list_names(_model(urls[0]), {name: figure.summary for name, figure in known.items()})
-        return
-    figures = _requested(names, everything, known, urls, look)
-    places = _places(output, list(figures), urls, suffix, alone=len(names) == 1 and not everything)
-    width, height = page.size(look["size"]) if look["size"] else (None, None)
-    asked = page.Page(width, height, look["title"], look["units"] or {})
-    with page.drawing_for(asked, look["style"]), readable(", ".join(urls)):
+    asked = page.requested(**look, units=units)
+    notes: dict[str, list[str]] = {}
+    with page.drawing_for(asked), readable(", ".join(urls)):
         groups = {key: data for url in urls for key, data in _groups(url, urls, series).items()}
-        _require_quantities(asked.units, groups)
+        known = _known_to_all(urls, groups)
+        if not names and not everything:
+            _list(known, groups)
+            return
+        figures = _requested(names, everything, known, groups, axes)
+        places = _places(output, list(figures), urls, suffix, alone=len(names) == 1 and not everything)
+        _require_quantities(units, groups)
         groups = selection.select_all(groups, selections, tell)
         if where:
             groups = selection.where_all(groups, where)
@@ -112,8 +115,11 @@ def plot(
             groups, figures = with_points(groups, figures, measured)
         for (name, figure), path in zip(figures.items(), places, strict=True):
             origin = provenance(name, urls, str(context.meta.get(COMMAND, "")))
-            _draw(figure, groups, path, origin, everything)
-    if unused := look["units"].keys() - asked.used:
+            notes[path.name] = _draw(figure, groups, path, origin, everything)
+    _tell_notes(notes)
+    if warnings:
+        tell(f"details of the warnings: mdr-dask status {urls[0]} --messages")
+    if unused := units.keys() - asked.used:
         tell(f"--units {', '.join(sorted(unused))}: not shown in any figure that was drawn")
 
 
@@ -139,7 +145,7 @@ def _with_notes(figure: Plot, where: str, warnings: list[str]) -> Plot:
 
 
 def _warnings(urls: Sequence[str]) -> list[str]:
-    """Return the warnings of finished results. Equal warnings appear once, with the number of results."""
+    """Return the warnings of finished results, without their details; equal warnings appear once."""
     from mdr_dask import store as stores
     from mdr_dask.questions import progress
 
@@ -147,11 +153,8 @@ def _warnings(urls: Sequence[str]) -> list[str]:
     for url in urls:
         studies = stores.datasets(url)
         messages = [message for name, data in studies.items() for message in progress.messages(url, name, data)]
-        done = [message for message in messages if message["status"] == "done"]
-        found += [
-            f"{group.results} result{'s' * (group.results > 1)} in the store: {group.reason}"
-            for group in progress.grouped(done, studies)
-        ]
+        warnings = progress.warnings(messages)
+        found += [f"{text} ({count} result{'s' * (count > 1)} of {url})" for text, count in warnings.items()]
     return found
 
 
@@ -166,64 +169,74 @@ def _split(words: Sequence[str]) -> tuple[list[str], list[str]]:
     return list(words[:count]), list(words[count:])
 
 
-def _known_to_all(urls: Sequence[str]) -> dict[str, Plot]:
-    """Return the named figures that exist for the models of all stores."""
+def _known_to_all(urls: Sequence[str], groups: Mapping[str, xr.Dataset]) -> dict[str, Plot]:
+    """Return the figures that exist for all stores."""
     from mdr_dask import plots
+    from mdr_dask.store import attributes
 
-    each = [plots.available(_model(url)) for url in urls]
+    each = [plots.figures_of(str(attributes(url)["model"]), groups) for url in urls]
     return {name: figure for name, figure in each[0].items() if all(name in other for other in each)}
 
 
-def _model(url: str) -> str:
-    from mdr_dask.store import attributes
+def _list(known: Mapping[str, Plot], groups: Mapping[str, xr.Dataset]) -> None:
+    """Print the figures, the outputs and the axes of a study."""
+    from mdr_dask.plots.view import varied
 
-    return str(attributes(url)["model"])
+    list_names({name: figure.summary for name, figure in known.items()})
+    errors = {array.attrs.get("ancillary_variables") for data in groups.values() for array in data.data_vars.values()}
+    outputs = [name for name in _outputs_of(groups) if name not in errors]
+    axes = dict.fromkeys(axis for data in groups.values() for axis in varied(data, "status"))
+    if outputs and axes:
+        say(f"any output can be drawn against any axis, such as {outputs[0]} --over {next(iter(axes))}")
+    for title, names in (("outputs", outputs), ("axes", axes)):
+        if names:
+            say(f"{title}: {', '.join(names)}")
 
 
-def _outputs_of(urls: Sequence[str]) -> list[str]:
-    from mdr_dask import store as stores
-
-    found = [name for url in urls for data in stores.datasets(url).values() for name in map(str, data.data_vars)]
+def _outputs_of(groups: Mapping[str, xr.Dataset]) -> list[str]:
+    found = (name for data in groups.values() for name in map(str, data.data_vars))
     return [name for name in dict.fromkeys(found) if name != "status"]
 
 
 def _requested(
-    names: Sequence[str], everything: bool, known: Mapping[str, Plot], urls: Sequence[str], look: Mapping[str, Any]
+    names: Sequence[str],
+    everything: bool,
+    known: Mapping[str, Plot],
+    groups: Mapping[str, xr.Dataset],
+    axes: Mapping[str, Any],
 ) -> dict[str, Plot]:
     """Return the requested figures, by the names for their files."""
-    from mdr_dask.errors import did_you_mean
-
-    outputs, model = _outputs_of(urls), _model(urls[0])
-    given = [option for option in OF_OUTPUTS if look.get(option)]
-    if not (look["over"] or look["effects"]):
-        for name in names:
-            if name in outputs and name not in known:
-                raise click.UsageError(f"{name} is an output: add --over AXIS, or --effects")
-            if name not in known and "mean" in (hint := did_you_mean(name, [*known, *outputs])):
-                raise click.UsageError(f"no figure and no output {name!r}{hint}")
-        require_known(names, list(known), f"figure of {model}")
-        if given:
-            raise click.UsageError(
-                f"--{given[0]} needs an output with --over or --effects; the axes of a named figure are fixed"
-            )
-        return dict(known) if everything else {name: known[name] for name in names}
+    given = [option for option in OF_OUTPUTS if axes[option]]
     if everything:
-        raise click.UsageError("expected --all, or outputs with --over or --effects, got both")
-    require_known(names, outputs, "output in this study")
-    ending = f"-over-{'-'.join(look['over'])}" if look["over"] else "-effects"
-    return {f"{name}{ending}": _of_output(name, look) for name in names}
+        if names or given:
+            raise click.UsageError("expected either --all or names of figures and outputs, got both")
+        return dict(known)
+    of_outputs = [name for name in names if given or name not in known]
+    outputs = _outputs_of(groups)
+    if given and (fixed := [name for name in names if name in known and name not in outputs]):
+        raise click.UsageError(f"--{given[0]} needs an output; the axes of the figure {fixed[0]} are fixed")
+    require_known(of_outputs, outputs if given else [*known, *outputs], "output" if given else "figure or output")
+    ending = f"-over-{'-'.join(axes['over'])}" if axes["over"] else "-effects" if axes["effects"] else ""
+    return {
+        f"{name}{ending}" if name in of_outputs else name: _of_output(name, groups, axes)
+        if name in of_outputs
+        else known[name]
+        for name in names
+    }
 
 
-def _of_output(name: str, look: Mapping[str, Any]) -> Plot:
-    from mdr_dask.plots.view import View, figure_of
+def _of_output(name: str, groups: Mapping[str, xr.Dataset], axes: Mapping[str, Any]) -> Plot:
+    from mdr_dask.plots.view import View, figure_of, main_axis
 
-    over = tuple(axis.replace(".", "_") for axis in look["over"])
-    if len(over) > 2 or (over and look["effects"]):
+    over = tuple(axis.replace(".", "_") for axis in axes["over"])
+    if len(over) > 2 or (over and axes["effects"]):
         raise click.UsageError("expected --over once, --over twice (for a map), or --effects")
-    log = look["log"]
+    log = axes["log"]
     if log is not None and log != "none" and not set(log) <= set("xyz"):
         raise click.UsageError(f"expected --log with letters of xyz, or 'none', got {log!r}")
-    by, panels = (look[key].replace(".", "_") for key in ("by", "panels"))
+    by, panels = (axes[key].replace(".", "_") for key in ("by", "panels"))
+    if not over and not axes["effects"]:
+        over = main_axis(groups, name, without=(by, panels))
     return figure_of(View(name, over, by, panels, "" if log == "none" else log))
 
 
@@ -246,8 +259,10 @@ def _name_of(url: str, urls: Sequence[str], series: str) -> str:
     return f"{store} {series}".strip()
 
 
-def _draw(figure: Plot, groups: Mapping[str, xr.Dataset], path: Path, origin: dict[str, str], one_of: bool) -> None:
-    """Draw a figure to a file, with its data in a table next to it.
+def _draw(
+    figure: Plot, groups: Mapping[str, xr.Dataset], path: Path, origin: dict[str, str], one_of: bool
+) -> list[str]:
+    """Draw a figure to a file, with its data in a table next to it; return notes that the picture does not show.
 
     If the figure cannot be drawn, raise an error, or only print it if this is one of several figures (`one_of`).
     """
@@ -258,27 +273,39 @@ def _draw(figure: Plot, groups: Mapping[str, xr.Dataset], path: Path, origin: di
     except (DataError, FitError) as error:
         if not one_of:
             raise
-        click.echo(f"{figure.name}: left out: {error}", err=True)
-        return
-    save(description, path, origin)
-    click.echo(str(path))
+        tell(f"{figure.name}: left out: {error}")
+        return []
+    return _save(description, path, origin)
 
 
-def save(description: Figure, path: Path, origin: Mapping[str, str]) -> None:
-    """Draw a figure, write its data to a table next to it, and print notes that the picture does not show."""
+def save(draw: Callable[[], Figure], path: Path, origin: Mapping[str, str], look: Mapping[str, Any]) -> None:
+    """Draw a single figure to a file, write its data next to it, and print notes that the picture does not show."""
+    from mdr_dask.plots import page
+
+    with page.drawing_for(page.requested(**look)):
+        _tell_notes({path.name: _save(draw(), path, origin)})
+
+
+def _save(description: Figure, path: Path, origin: Mapping[str, str]) -> list[str]:
     from mdr_dask.plots import labels, page, render
 
     drawn = render.render(description)
     drawn.origin = origin
     with writing(render.table_beside(path)), writing(path):
         drawn.save(path)
+    click.echo(str(path))
     asked = page.current()
-    if asked.title is not None or asked.width is not None:
-        for text in (description.fixed, *(f"warning: {warning}" for warning in description.warnings)):
-            if text:
-                click.echo(f"{path.name}: {labels.plain(text)}", err=True)
-    if description.left_out:
-        click.echo(f"{path.name}: not drawn: {labels.plain('; '.join(description.left_out))}", err=True)
+    notes = [description.fixed] if asked.title is not None or asked.width is not None else []
+    notes += [f"not drawn: {text}" for text in description.left_out]
+    notes += [f"warning: {warning}" for warning in description.warnings]
+    return [labels.plain(note) for note in notes if note]
+
+
+def _tell_notes(notes: Mapping[str, Sequence[str]]) -> None:
+    """Print the notes about figures, each of them once, after the names of the figures that it is about."""
+    for note in dict.fromkeys(chain.from_iterable(notes.values())):
+        about = [name for name, own in notes.items() if note in own]
+        tell(f"{'all figures' if len(about) == len(notes) > 1 else ', '.join(about)}: {note}")
 
 
 def _places(output: Path | None, names: Sequence[str], urls: Sequence[str], suffix: str, alone: bool) -> list[Path]:

@@ -8,11 +8,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mdr_dask.cli.figures import COMMAND, save
-from mdr_dask.cli.options import csv_option, json_option, limit_option, select_option, series_option, tell
-from mdr_dask.cli.printing import print_aligned, print_rows, say, short, table, with_intervals
+from mdr_dask.cli.options import (
+    csv_option,
+    figure_options,
+    json_option,
+    limit_option,
+    select_option,
+    series_option,
+    tell,
+)
+from mdr_dask.cli.printing import print_aligned, print_rows, say, short, table, titled, with_intervals
 from mdr_dask.cli.results import list_names, require_known, store_argument
 from mdr_dask.cli.sensitivity import Asking
-from mdr_dask.cli.writing import FIGURES, require_suffix
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,9 +35,7 @@ if TYPE_CHECKING:
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
     help="Table of measured points for `calibration`; replaces the table of the campaign.",
 )
-@click.option(
-    "--figure", "-o", type=click.Path(path_type=Path), help="Draw `calibration`: FILE.png, FILE.pdf or FILE.svg."
-)
+@figure_options("--plot", "-o")
 @limit_option
 @json_option
 @csv_option
@@ -43,6 +48,7 @@ def fit(
     selections: tuple[str, ...],
     measured: Path | None,
     figure: Path | None,
+    look: dict[str, Any],
     limit: int,
     form: str | None,
 ) -> None:
@@ -61,15 +67,14 @@ def fit(
     from mdr_dask.fits.calibration import with_table
     from mdr_dask.questions import selection
 
-    require_suffix(figure, FIGURES)
     model = stores.attributes(store)["model"]
     known = room.available(model)
     if not names:
-        list_names(model, {name: law.summary for name, law in known.items()})
+        list_names({name: law.summary for name, law in known.items()})
         return
     require_known(names, list(known), f"law for {model}")
     if (measured or figure) and names != ("calibration",):
-        raise click.UsageError("--measured and --figure can be used only with `calibration`")
+        raise click.UsageError("--measured and --plot can be used only with `calibration`")
     groups = stores.datasets(store)
     if series is not None:
         groups = {series: selection.group(groups, series)}
@@ -86,9 +91,8 @@ def fit(
         from mdr_dask.plots import available
         from mdr_dask.plots.base import provenance
 
-        drawn = available(model)["calibration"].describe(groups)
-        save(drawn, figure, provenance("calibration", [store], str(context.meta[COMMAND])))
-        tell(str(figure))
+        drawn = available(model)["calibration"]
+        save(lambda: drawn.describe(groups), figure, provenance("calibration", [store], context.meta[COMMAND]), look)
 
 
 def _print(result: xr.Dataset, group: str, form: str | None, limit: int) -> None:
@@ -104,8 +108,8 @@ def _print(result: xr.Dataset, group: str, form: str | None, limit: int) -> None
 def _print_constants(row: dict[str, Any], units: dict[str, str]) -> None:
     """Print a table of the constants with their 95 % and 68 % intervals, and then the other results of the fit."""
     constants = [name for name in units if f"{name}_low_68" in units]
-    columns: list[list[Any]] = [constants, *([row[name + end] for name in constants] for end in _ENDS.values())]
-    print_aligned(["", *_ENDS, "unit"], [*columns, [units[name] for name in constants]])
+    names = [titled(name, units[name]) for name in constants]
+    print_aligned(["", *_ENDS], [names, *([row[name + end] for name in constants] for end in _ENDS.values())])
     ends = {name + end for name in constants for end in _ENDS.values()}
     for name in (name for name in units if name not in ends):
         unit = "" if units[name] == "1" else f" {units[name]}"

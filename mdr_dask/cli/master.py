@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mdr_dask.cli.options import csv_option, json_option, select_option, series_option, tell
+from mdr_dask.cli.options import csv_option, figure_options, json_option, select_option, series_option, tell
 from mdr_dask.cli.printing import print_json, print_rows, table
 from mdr_dask.cli.results import Reading
-from mdr_dask.cli.writing import FIGURES, require_suffix, writing
+from mdr_dask.cli.writing import require_suffix, writing
 from mdr_dask.errors import DataError
 from mdr_dask.version import __version__
 
@@ -57,8 +57,7 @@ KEPT = (".json", ".csv")
 @click.option(
     "--keep", "-o", type=click.Path(path_type=Path), help="Keep all in FILE.json, a later SOURCE; FILE.csv: the table."
 )
-@click.option("--plot", "figure", type=click.Path(path_type=Path), help="Draw all into FILE.png, .pdf or .svg.")
-@click.option("--size", metavar="WIDTH[xHEIGHT]", help="Printed size of the figure: 85mm, 170x120mm.")
+@figure_options("--plot")
 @click.option("--show", "part", type=click.Choice(PARTS), default=PARTS[0], show_default=True, help="What to print.")
 @json_option
 @csv_option
@@ -73,7 +72,7 @@ def master_curve(
     reference: float | None,
     keep: Path | None,
     figure: Path | None,
-    size: str | None,
+    look: dict[str, Any],
     part: str,
     form: str | None,
 ) -> None:
@@ -90,7 +89,6 @@ def master_curve(
     mdr-dask master-curve factors.json --reference 60 --show curve --csv
     """
     require_suffix(keep, KEPT)
-    require_suffix(figure, FIGURES)
     from mdr_dask.fits.master_curve import master_curve as superpose
     from mdr_dask.fits.master_curve import rereferenced
 
@@ -108,11 +106,10 @@ def master_curve(
             _keep(curve, part, keep)
     if figure is not None:
         from mdr_dask.cli.figures import save
-        from mdr_dask.plots import page
         from mdr_dask.plots.master_curve import draw_master_curve
 
-        with page.drawing_for(page.Page(*(page.size(size) if size else (None, None))), None):
-            save(draw_master_curve(curve), figure, {"mdr_dask": f"{__version__}, master-curve", "source": source})
+        origin = {"mdr_dask": f"{__version__}, master-curve", "source": source}
+        save(lambda: draw_master_curve(curve), figure, origin, look)
     _print(curve, part, form)
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
 from typing import Any
 
 import click
 
 from mdr_dask.cli.printing import say
+from mdr_dask.cli.writing import FIGURES, require_suffix
 
 
 def tell(sentence: str) -> None:
@@ -56,6 +58,52 @@ limit_option = click.option(
     show_default=True,
     help="Largest number of rows to print; 0 for all.",
 )
+_LOOK = (
+    click.option("--size", metavar="WIDTH[xHEIGHT]", help="Size of a figure on paper: 85mm, 85x60mm."),
+    click.option("--title", metavar="TEXT", help="Title; '' for none.  [a description, but none with --size]"),
+    click.option("--style", metavar="FILE", help="Style file of matplotlib, or the name of one of its styles."),
+)
+
+
+def _figure(_: click.Context, __: click.Parameter, path: Path | None) -> Path | None:
+    require_suffix(path, FIGURES)
+    return path
+
+
+def look_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options for the look of figures; the command gets them as a dictionary `look`."""
+
+    @wraps(command)
+    def wrapped(*given: Any, size: str | None, title: str | None, style: str | None, **rest: Any) -> Any:
+        return command(*given, look={"size": size, "title": title, "style": style}, **rest)
+
+    for option in reversed(_LOOK):
+        wrapped = option(wrapped)
+    return wrapped
+
+
+def figure_options(*names: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Add an option for the file of a figure, with all its spellings `names`, and the options for its look.
+
+    The command gets the file as `figure`, and the look as `look`.
+    """
+
+    def add(command: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(command)
+        def wrapped(*given: Any, figure: Path | None, look: dict[str, Any], **rest: Any) -> Any:
+            if figure is None and any(value is not None for value in look.values()):
+                raise click.UsageError(f"--size, --title and --style need {names[0]} FILE")
+            return command(*given, figure=figure, look=look, **rest)
+
+        text = "Draw a figure to FILE.png, .pdf or .svg, and write its data to FILE.csv."
+        kind = click.Path(path_type=Path)
+        return click.option(*names, "figure", metavar="FILE", type=kind, callback=_figure, help=text)(
+            look_options(wrapped)
+        )
+
+    return add
+
+
 _QUESTION = (
     series_option,
     select_option,

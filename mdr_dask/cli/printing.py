@@ -110,12 +110,13 @@ def print_aligned(titles: Sequence[str], columns: Sequence[Sequence[Any]], keys:
 
 
 def _print_table(titles: Sequence[str], cells: Sequence[Sequence[str]], keys: int) -> None:
-    heads = [_heading(title, max(map(len, column), default=0)) for title, column in zip(titles, cells, strict=True)]
-    widths = [max(map(len, [*head, *column])) for head, column in zip(heads, cells, strict=True)]
-    needed = [*widths[:-1], min(widths[-1], WRAPPED) if _is_text(cells[-1]) else widths[-1]]
-    if sum(needed) + GAP * (len(needed) - 1) <= terminal_width():
-        _print_block(heads, cells, widths)
-        return
+    wrapped = [_heading(title, max(map(len, column), default=0)) for title, column in zip(titles, cells, strict=True)]
+    for heads in ([[title] for title in titles], wrapped):
+        widths = [max(map(len, [*head, *column])) for head, column in zip(heads, cells, strict=True)]
+        needed = [*widths[:-1], min(widths[-1], WRAPPED) if _is_text(cells[-1]) else widths[-1]]
+        if sum(needed) + GAP * (len(needed) - 1) <= terminal_width():
+            _print_block(heads, cells, widths)
+            return
     if len(cells[0]) == 1:
         size = max(map(len, titles))
         for title, column in zip(titles, cells, strict=True):

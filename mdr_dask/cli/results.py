@@ -165,10 +165,8 @@ def _answer(
     click.echo(f"{output}: {rows} rows of {', '.join(answer.units)}")
 
 
-def list_names(model: str, summaries: dict[str, str]) -> None:
+def list_names(summaries: dict[str, str]) -> None:
     """Print each name with one line of description."""
-    if not summaries:
-        click.echo(f"none for {model}")
     width = max(map(len, summaries), default=0)
     for name, summary in summaries.items():
         click.echo(hanging(f"{name.ljust(width)}  ", summary))

@@ -7,10 +7,9 @@ from pathlib import Path
 import click
 
 from mdr_dask.cli.figures import COMMAND, Drawing, save
-from mdr_dask.cli.options import csv_option, json_option, select_option, series_option, tell
+from mdr_dask.cli.options import csv_option, figure_options, json_option, select_option, series_option, tell
 from mdr_dask.cli.printing import print_json, print_rows, table, with_intervals
 from mdr_dask.cli.results import Reading, store_argument
-from mdr_dask.cli.writing import FIGURES, require_suffix
 
 
 class Asking(Drawing, Reading):
@@ -22,9 +21,7 @@ class Asking(Drawing, Reading):
 @click.argument("output")
 @series_option
 @select_option
-@click.option(
-    "--figure", "-o", type=click.Path(path_type=Path), help="Draw the indices: FILE.png, FILE.pdf or FILE.svg."
-)
+@figure_options("--plot", "-o")
 @json_option
 @csv_option
 @click.pass_context
@@ -35,6 +32,7 @@ def sensitivity(
     series: str | None,
     selections: tuple[str, ...],
     figure: Path | None,
+    look: dict[str, Any],
     form: str | None,
 ) -> None:
     """Compute which parameters matter for an output: Sobol indices of a sampled study, with 95 % intervals.
@@ -51,7 +49,6 @@ def sensitivity(
     from mdr_dask.fits.sensitivity import sobol_indices
     from mdr_dask.questions import selection
 
-    require_suffix(figure, FIGURES)
     dataset = selection.select(selection.group(stores.datasets(store), series), selections, tell)
     found = sobol_indices(selection.outputs(dataset, (output,)), output)
     rows, units = table(found)
@@ -66,8 +63,7 @@ def sensitivity(
         from mdr_dask.plots.base import provenance
         from mdr_dask.plots.sensitivity import sensitivity as drawn
 
-        save(drawn(found), figure, provenance("sensitivity", [store], str(context.meta[COMMAND])))
-        tell(str(figure))
+        save(lambda: drawn(found), figure, provenance("sensitivity", [store], context.meta[COMMAND]), look)
 
 
 def _sentences(attributes: dict[str, object]) -> list[str]:
@@ -75,7 +71,7 @@ def _sentences(attributes: dict[str, object]) -> list[str]:
     return [
         *([f"{left} of {attributes['cases']} cases without a value are left out"] if left else []),
         *(
-            ["with one realisation, scatter between rough lines counts as an interaction"]
+            ["with one realisation, scatter between realisations counts as an interaction"]
             if attributes["realisations"] == 1
             else []
         ),

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mdr_dask.cli.options import csv_option, json_option
+from mdr_dask.cli.options import csv_option, figure_options, json_option
 from mdr_dask.cli.printing import print_rows, with_intervals
-from mdr_dask.cli.writing import FIGURES, require_suffix, writing
+from mdr_dask.cli.writing import require_suffix, writing
 from mdr_dask.version import __version__
 
 if TYPE_CHECKING:
@@ -35,12 +35,7 @@ KINDS = ("map", "scan", "spectrum")
 @click.option("--longest-wavelength", help="Leave out longer wavelengths.")
 @click.option("--shortest-wavelength", help="Leave out shorter wavelengths.  [those that contain only noise]")
 @click.option("--spectrum", "-o", type=click.Path(path_type=Path), help="Write C2D to FILE.csv, for a campaign.")
-@click.option(
-    "--plot",
-    "figure",
-    type=click.Path(path_type=Path),
-    help="Draw the spectra to FILE.png, .pdf or .svg, and their table to FILE.csv.",
-)
+@figure_options("--plot")
 @json_option
 @csv_option
 def surface(
@@ -48,6 +43,7 @@ def surface(
     kind: str | None,
     spectrum: Path | None,
     figure: Path | None,
+    look: dict[str, Any],
     form: str | None,
     **options: Any,
 ) -> None:
@@ -63,7 +59,6 @@ def surface(
     mdr-dask surface scan1.csv scan2.csv scan3.csv
     """
     require_suffix(spectrum, (".csv", ".txt"))
-    require_suffix(figure, FIGURES)
     if figure is not None and spectrum is not None and figure.with_suffix(".csv") == spectrum:
         raise click.UsageError(f"{spectrum} is the table of the figure {figure}: give the spectrum another name")
     from mdr_dask.errors import DataError
@@ -84,7 +79,7 @@ def surface(
 
         sources = ", ".join(Path(file.name).name for file in read.measured.files)
         origin = {"mdr_dask": f"{__version__}, surface", "files": sources, "method": _method(read)}
-        save(draw_surface(found, spectra_of(read)), figure, origin)
+        save(lambda: draw_surface(found, spectra_of(read)), figure, origin, look)
     rows, units = [report.row for report in found], dict(UNITS)
     if form is None:
         known = [name for name in units if any(row[name] == row[name] for row in rows)]

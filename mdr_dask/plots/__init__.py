@@ -7,10 +7,15 @@ the series of a store; `named` makes it for the figures that have a name. The de
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib import import_module
 from importlib.metadata import entry_points
+from typing import TYPE_CHECKING
 
 from mdr_dask.plots.base import Plot
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: Modules of this package that have a tuple ``PLOTS``.
 SUBJECTS = ("named", "history", "calibration", "master_curve")
@@ -24,3 +29,16 @@ def available(model: str) -> dict[str, Plot]:
     own = (import_module(f"mdr_dask.plots.{module}").PLOTS for module in SUBJECTS)
     others = (entry.load() for entry in entry_points(group=GROUP))
     return {plot.name: plot for plots in (*own, *others) for plot in plots if model in plot.models or not plot.models}
+
+
+def figures_of(model: str, groups: Mapping[str, xr.Dataset]) -> dict[str, Plot]:
+    """Return the named figures of a model; if it has none of its own, add a figure of each output of a study."""
+    from mdr_dask.plots.view import View, figure_of, main_axis, varied
+
+    known = available(model)
+    if any(plot.models for plot in known.values()):
+        return known
+    outputs = {str(name): data for data in groups.values() for name in data.data_vars if name != "status"}
+    drawn = [name for name, data in outputs.items() if set(data[name].dims) <= set(data["status"].dims)]
+    drawn = [name for name in drawn if varied(outputs[name], name)]
+    return {name: figure_of(View(name, main_axis(groups, name))) for name in drawn} | known

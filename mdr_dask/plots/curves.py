@@ -228,7 +228,8 @@ def _split(data: xr.Dataset, dims: list[str], joined: bool) -> tuple[list[Curve]
     curves = []
     for part, label, cell in zip(parts, named, cells, strict=True):
         k = cell[1] if second else 0
-        curves.append(Curve(part, label, shades[cell[0]], colours.LINES[k] if joined else "", colours.MARKERS[k]))
+        marker = "." if bar and joined else colours.MARKERS[k]  # small, because there are many curves
+        curves.append(Curve(part, label, shades[cell[0]], colours.LINES[k] if joined else "", marker))
     keys = []
     if bar is None:
         for k in range(data.sizes[first]):

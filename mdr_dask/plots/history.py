@@ -32,8 +32,9 @@ def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Return a figure of friction (and velocity and force if they change) against time; a column for each series."""
     needed = (BEFORE, JUMP, FRICTION)
     found = {name: data for name, data in groups.items() if all(output in data for output in needed)}
+    found = {name: data for name, data in found.items() if data[FRICTION].notnull().any()}
     if not found:
-        raise DataError(f"expected a series with the outputs {', '.join(needed)}")
+        raise DataError(f"expected a series with finished results of {', '.join(needed)}")
     families = {name: curves.family(data, FRICTION, TIME) for name, data in found.items()}
     kept, left_out = curves.with_one_legend(families)
     rest, kept = kept[MOST_PANELS:], kept[:MOST_PANELS]

@@ -31,6 +31,8 @@ SCREEN: dict[Any, Any] = {"legend.fontsize": 8, "lines.linewidth": 1.2, "lines.m
 #: `INCH`: length of an inch in metres. `LEAST`, `MOST`: smallest and largest width and height of a figure in metres.
 INCH = 0.0254
 LEAST, MOST = 0.02, 1.0
+#: Largest height in inches of a figure whose width alone was requested: 230 mm, the height of text on a journal page.
+TALLEST = 0.23 / INCH
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,8 @@ class Page:
         Size in inches. With None for the height, the height follows from the content.
     title : str, optional
         Title. With None, the figure has a description as its title, or no title if a size was requested.
+    style : str, optional
+        A style file of matplotlib, or the name of a style. Its settings take precedence over those of the page.
     units : mapping of str to str
         Requested units by the name of the quantity.
     used : set of str
@@ -54,6 +58,7 @@ class Page:
     width: float | None = None
     height: float | None = None
     title: str | None = None
+    style: str | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     used: set[str] = field(default_factory=set)
     cycle: tuple[Mapping[str, str], ...] = ()
@@ -67,26 +72,30 @@ class Page:
 _PAGE: ContextVar[Page | None] = ContextVar("page", default=None)
 
 
-@contextmanager
-def drawing_for(page: Page, style: str | None = None) -> Iterator[None]:
-    """Draw the figures of a ``with`` statement for a page.
+def requested(
+    size: str | None = None,
+    title: str | None = None,
+    style: str | None = None,
+    units: Mapping[str, str] | None = None,
+) -> Page:
+    """Return the page for the texts of the options of a command; see `sides` for the size, and `Page`."""
+    width, height = sides(size) if size else (None, None)
+    return Page(width, height, title, style, units or {})
 
-    Parameters
-    ----------
-    page : Page
-        Size, title and units.
-    style : str, optional
-        A style file of matplotlib, or the name of a style. Settings of the style take precedence over those of the
-        page.
+
+@contextmanager
+def drawing_for(page: Page) -> Iterator[None]:
+    """Draw the figures of a ``with`` statement for a page.
 
     Raises
     ------
     DataError
-        If there is no such style.
+        If the style of the page does not exist.
     """
     from matplotlib import rc_context, rc_params_from_file
     from matplotlib.style import context, library
 
+    style = page.style
     if style is not None and not (Path(style).is_file() or style in library):
         hint = did_you_mean(style, [*library])
         near = hint if "mean" in hint else " (such as 'grayscale' or 'seaborn-v0_8-paper')"
@@ -115,7 +124,7 @@ def current() -> Page:
     return _PAGE.get() or Page()
 
 
-def size(text: str) -> tuple[float, float | None]:
+def sides(text: str) -> tuple[float, float | None]:
     """Return width and height in inches from a text such as ``85x60mm``, or ``85mm`` for the width alone.
 
     Raises

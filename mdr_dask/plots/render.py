@@ -26,16 +26,18 @@ from mdr_dask.plots.figure import Axis, Bar, Figure, Key, Panel, Trace, edges
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Widths in inches. `ALONE`: a single panel on a screen. `BESIDE`: a panel next to another panel. `LEAST_PANEL`: the
-#: narrowest panel in a figure whose width was requested.
-ALONE, BESIDE, LEAST_PANEL = 6.4, 4.2, 2.2
-#: `LEAST_HEIGHT`: least height of a panel in inches. `MOST_COLUMNS`: largest number of panels in a row.
+#: Widths in inches. `ALONE`: a single panel on a screen. `BESIDE`: a panel next to another panel. `WIDE`, `NARROW`:
+#: usual and least width of a panel in a figure whose width was requested.
+ALONE, BESIDE, WIDE, NARROW = 6.4, 4.2, 2.2, 1.5
+#: `LEAST_HEIGHT`: least height of a panel in inches. `MOST_COLUMNS`: usual largest number of panels in a row.
 LEAST_HEIGHT, MOST_COLUMNS = 1.3, 3
-#: Largest share of a requested height that the legend may take; entries that do not fit are left out.
+#: `SLENDER`: largest height of a figure over its width, unless its panels would be lower than `LEAST_HEIGHT`.
+SLENDER = 2.0
+#: Largest share of the height that the legend may take; entries that do not fit are left out.
 LEGEND_SHARE = 0.35
 #: Least distance between the texts of two ticks, in points.
 GAP = 3
-#: Largest number of lines of a title.
+#: Largest number of lines of a title; texts that do not fit are left out.
 MOST_LINES = 7
 #: Curves with at least this number of points are drawn without markers.
 MANY_POINTS = 60
@@ -89,8 +91,7 @@ def table_beside(path: str | Path) -> Path:
 def render(description: Figure) -> Drawn:
     """Draw a figure with matplotlib and return it."""
     panels, asked = description.panels, page.current()
-    columns = _columns(description)
-    rows = -(-len(panels) // (columns * description.stack)) * description.stack
+    rows, columns = _grid(description)
     width = asked.width or (ALONE if columns == 1 else BESIDE * columns)
     height = rows * max(LEAST_HEIGHT, description.ratio * width / columns)
     figure = Drawn(description, figsize=(width, asked.height or height))
@@ -107,16 +108,29 @@ def render(description: Figure) -> Drawn:
     keys = [key if key.marker in markers else replace(key, marker="") for key in keys]
     legend = _legend(figure, keys) if keys else 0.0
     if asked.height is None:
-        figure.set_size_inches(width, height + legend + _height_of_title(figure))
+        beside = legend + _height_of_title(figure)
+        if asked.width:
+            most = max(SLENDER * width, rows * LEAST_HEIGHT + beside)
+            height = min(height, min(most, page.TALLEST) - beside)
+        figure.set_size_inches(width, height + beside)
     _fit(figure, places)
     return figure
 
 
-def _columns(description: Figure) -> int:
-    asked, count = page.current(), len(description.panels)
-    free = MOST_COLUMNS if asked.width is None else max(1, min(MOST_COLUMNS, int(asked.width / LEAST_PANEL)))
-    stacks = -(-count // description.stack)
-    return min(2 if stacks == 4 else free, free, stacks)
+def _grid(description: Figure) -> tuple[int, int]:
+    """Return the numbers of rows and columns of panels.
+
+    If a width was requested, panels become narrower where the rows would not fit on a page.
+    """
+    width, stack = page.current().width, description.stack
+    stacks = -(-len(description.panels) // stack)
+    columns = MOST_COLUMNS if width is None else max(1, min(MOST_COLUMNS, int(width / WIDE)))
+    columns = min(2 if stacks == 4 else columns, columns, stacks)
+    if width is not None:
+        fitting = int((1 - LEGEND_SHARE) * page.TALLEST / LEAST_HEIGHT)
+        while -(-stacks // columns) * stack > fitting and columns < min(stacks, int(width / NARROW)):
+            columns += 1
+    return -(-stacks // columns) * stack, columns
 
 
 def _axes(figure: Drawn, description: Figure, rows: int, columns: int) -> list[Axes]:
@@ -278,10 +292,14 @@ def _title(figure: Drawn, description: Figure) -> None:
     if not lines:
         return
     size = mpl.rcParams["axes.titlesize" if len(lines) == 1 else "legend.fontsize"]
-    broken = "\n".join(_broken(figure, line, 0.97 * figure.get_figwidth(), size) for line in lines).split("\n")
-    if len(broken) > MOST_LINES:
-        broken = [*broken[: MOST_LINES - 1], "more: see the table beside the figure"]
-    figure.suptitle("\n".join(broken), fontsize=size)
+    shown: list[str] = []
+    for line in lines:
+        broken = _broken(figure, line, 0.97 * figure.get_figwidth(), size).split("\n")
+        if len(shown) + len(broken) > MOST_LINES:
+            shown.append("more: see the table beside the figure")
+            break
+        shown += broken
+    figure.suptitle("\n".join(shown), fontsize=size)
 
 
 def _height_of_title(figure: Drawn) -> float:
@@ -323,9 +341,10 @@ def _handle(key: Key) -> Any:
 def _legend(figure: Drawn, keys: list[Key]) -> float:
     """Draw one legend below all panels, with as many columns as fit, and return its height in inches.
 
-    If a height was requested, entries that do not fit are left out.
+    If a size was requested, entries that do not fit are left out.
     """
-    width, height = figure.get_size_inches()
+    width, asked = figure.get_figwidth(), page.current()
+    most = LEGEND_SHARE * (asked.height or (page.TALLEST if asked.width else np.inf))
     size = mpl.rcParams["legend.fontsize"]
     kept = [Key(_broken(figure, k.label, 0.8 * width, size), k.colour, k.line, k.marker) for k in keys]
     while True:
@@ -339,7 +358,7 @@ def _legend(figure: Drawn, keys: list[Key]) -> float:
                 break
             legend.remove()
         used = float(extent.height / figure.dpi)
-        if page.current().height is None or used <= LEGEND_SHARE * height or len(kept) <= 1:
+        if used <= most or len(kept) <= 1:
             return used
         legend.remove()
         kept = kept[: len(kept) // 2]

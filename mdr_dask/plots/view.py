@@ -6,7 +6,7 @@ A `View` describes such a figure, and `draw` makes it.
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -88,6 +88,23 @@ class View:
         return labels.is_geometric(values) if self.log is None else which in self.log and positive
 
 
+def main_axis(groups: Mapping[str, xr.Dataset], output: str, without: Sequence[str] = ()) -> tuple[str, ...]:
+    """Return the parameter with the most values, as `View.over` for an output.
+
+    It is none of the parameters `without`. For a sampled study, the result is empty, so that main effects are drawn.
+    """
+    found: dict[str, int] = {}
+    for data in (data for data in groups.values() if output in data):
+        own = [str(dim) for dim in data[output].dims if dim not in (*curves.axes_of(data, output), "realisation")]
+        if own:
+            return (own[0],)
+        if any(_is_sampled(data, dim) for dim in curves.axes_of(data, output)):
+            return ()
+        found |= {name: max(found.get(name, 0), data[name].size) for name in varied(data, output)}
+    left = [name for name in found if name not in without]
+    return (max(left, key=lambda name: found[name]),) if left else ()
+
+
 class _Part(NamedTuple):
     """The series in one panel by their names, and the title of the panel."""
 
@@ -98,7 +115,8 @@ class _Part(NamedTuple):
 def figure_of(view: View) -> Plot:
     """Return the figure of a view; its name is the name of the output."""
     over = " and ".join(view.along) or "every parameter that varies"
-    return Plot(view.names[0], (), f"{view.names[0]} against {over}", lambda groups: draw(groups, view))
+    summary = f"{view.names[0]} against {over}".replace("_", " ")
+    return Plot(view.names[0], (), summary, lambda groups: draw(groups, view))
 
 
 def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
@@ -128,11 +146,11 @@ def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
     if len(figures) > 1:
         alike = len({len(figure.panels) for figure in figures}) == 1
         groups_of = zip(*(figure.panels for figure in figures), strict=True) if alike else [f.panels for f in figures]
+        whole.stack = len(figures) if alike and (len(figures) <= 3 or len(whole.panels) > 1) else 1
         whole.panels = [panel for group in groups_of for panel in group]
-        whole.stack = len(figures) if alike else 1
         for k, panel in enumerate(whole.panels):
             panel.title = panel.title if k % whole.stack == 0 else ""
-        whole.ratio, whole.share_y = 0.45, False
+        whole.ratio, whole.share_y = 0.45 if whole.stack > 1 else 0.7, False
     whole.leave_out([sentence for figure in figures for sentence in figure.left_out])
     whole.leave_out(reasons)
     return whole
@@ -147,7 +165,12 @@ def _holding(groups: Mapping[str, xr.Dataset], view: View, output: str) -> tuple
     found: dict[str, xr.Dataset] = {}
     reasons: dict[str, list[str]] = {}
     for name, data in groups.items():
-        reason = _unfit(data, view, output) if output in data else f"{output} was not computed"
+        if output not in data:
+            reason = f"{output} was not computed"
+        elif not data[output].notnull().any():
+            reason = f"no case has a value of {output}; see mdr-dask status"
+        else:
+            reason = _unfit(data, view, output)
         if reason:
             reasons.setdefault(reason, []).append(name)
         else:
@@ -159,14 +182,14 @@ def _holding(groups: Mapping[str, xr.Dataset], view: View, output: str) -> tuple
 def _unfit(data: xr.Dataset, view: View, output: str) -> str:
     """Return the reason why a series cannot be drawn as requested; empty if it can be drawn."""
     own = [str(dim) for dim in data[output].dims if dim not in (*curves.axes_of(data, output), "realisation")]
-    known = [*_varied(data, output), *own]
+    known = [*varied(data, output), *own]
     for name in (*view.along, view.by, view.panels):
         if name and name not in known:
-            along = f"{output} varies along {', '.join(known) or 'nothing'}"
+            others = f"varied: {', '.join(known) or 'nothing'}"
             if name in data.coords and data[name].ndim == 0:
-                return f"{labels.plain(labels.named(name, data[name]))} is fixed; {along}"
+                return f"{labels.plain(labels.named(name, data[name]))} is fixed; {others}"
             hint = did_you_mean(name, known)
-            return f"no axis {name!r}{hint if 'mean' in hint else ''}; {along}"
+            return f"no axis {name!r}{hint if 'mean' in hint else ''}; {others}"
     if rest := [dim for dim in own if dim not in view.along]:
         return f"{output} varies along {rest[0]}: --over {rest[0]}, or --select {rest[0]}=VALUE"
     dims = [(name, curves.along_dim(data, name, output)) for name in (*view.along, view.by, view.panels) if name]
@@ -178,7 +201,8 @@ def _unfit(data: xr.Dataset, view: View, output: str) -> str:
     return ""
 
 
-def _varied(data: xr.Dataset, output: str) -> list[str]:
+def varied(data: xr.Dataset, output: str) -> list[str]:
+    """Return the parameters along which an output of a series varies."""
     return [name for dim in curves.axes_of(data, output) for name in curves.parameters_along(data, dim)]
 
 
@@ -204,8 +228,9 @@ def _places(data: xr.Dataset, name: str) -> xr.DataArray:
 def _axis(name: str, arrays: list[xr.DataArray], view: View, which: str) -> Axis:
     """Return the axis of a parameter: linear, logarithmic, or with words as ticks."""
     first = arrays[0]
-    own = name in curves.OWN and first.attrs.get("units", "1") == "1"
-    label = labels.meaning(first, name) if own else labels.label(name, first)
+    label = labels.label(name, first)
+    if name in curves.OWN:
+        label = labels.with_unit(labels.meaning(first, name), labels.quantity(name, first).unit)
     if first.dtype.kind not in "fiu":
         words = [textwrap.fill(str(word), LONGEST_WORD) for word in np.atleast_1d(first.values)]
         return Axis(label, ticks=[*enumerate(words)])
@@ -413,8 +438,6 @@ def _map(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
         left_out += sentences
         drawn.append((part.title, data, curves.mean(data, output)))
     every = np.concatenate([np.ravel(value.value) for _, _, value in drawn])
-    if not np.isfinite(every).any():
-        raise DataError(f"expected {output} of some case, got none that succeeded")
     bar = colours.bar(labels.label(output, drawn[0][1][output]), every, None if view.log is None else "z" in view.log)
     panels = []
     for title, data, value in drawn:
@@ -451,7 +474,7 @@ def _effects(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure
             f"expected one series, without --by and --panels, got {', '.join(found)}: effects fill a figure"
         )
     ((_, data),) = found.items()
-    names = _varied(data, output)
+    names = varied(data, output)
     if not names:
         raise DataError(f"{output} varies along nothing: it has no effects")
     how = labels.quantity(output, data[output])
@@ -489,8 +512,6 @@ def _bins(data: xr.Dataset, output: str, name: str, dim: str) -> tuple[xr.DataAr
     """Sort the cases of a sampled study by one parameter, divide them into groups, and return the group means."""
     cases = aggregation.mean(data[output])
     cases = cases.mean([each for each in cases.dims if each != dim]).dropna(dim)
-    if not cases.size:
-        raise DataError(f"expected {output} of some case, got none that succeeded")
     order = np.argsort(cases[name].values, kind="stable")
     count = int(np.clip(cases.size // IN_A_BIN, 1, MOST_BINS))
     groups = [cases.isel({dim: part}) for part in np.array_split(order, count)]

@@ -66,22 +66,67 @@ def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]
 def grouped(found: Sequence[dict[str, Any]], studies: Mapping[str, xr.Dataset]) -> list[Group]:
     """Group messages that differ only in their numbers, in the order of their first appearance.
 
-    `studies` are the groups of the study by series; they contain the units of the axes.
+    Several warnings of one result are grouped one by one. `studies` are the groups of the study by series; they
+    contain the units of the axes, in which the messages are written.
     """
-    groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
+    wanted = {name: _units(study) for name, study in studies.items()}
+    groups: dict[tuple[str, str, str], list[tuple[str, Any]]] = {}
     for message in found:
-        template = _NUMBER.sub("#", message["message"])
-        groups.setdefault((message["series"], message["status"], template), []).append(message)
+        series, status = message["series"], message["status"]
+        for text in message["message"].split("; ") if status == "done" else [message["message"]]:
+            text = _converted(text, wanted.get(series, {}))
+            groups.setdefault((series, status, _NUMBER.sub("#", text)), []).append((text, message["case"]))
     return [
         Group(
             series,
             "warning" if status == "done" else status,
-            _merged([message["message"] for message in alike]),
+            _merged([text for text, _ in alike]),
             len(alike),
-            _cases([message["case"] for message in alike], studies.get(series)),
+            _cases([case for _, case in alike], studies.get(series)),
         )
         for (series, status, _), alike in groups.items()
     ]
+
+
+def warnings(found: Sequence[dict[str, Any]]) -> dict[str, int]:
+    """Return the warnings of finished results without the details after a colon, and the number of their results."""
+    groups: dict[str, list[str]] = {}
+    for message in (each for each in found if each["status"] == "done"):
+        for text in dict.fromkeys(text.partition(": ")[0] for text in message["message"].split("; ")):
+            groups.setdefault(_NUMBER.sub("#", text), []).append(text)
+    return {_merged(alike): len(alike) for alike in groups.values()}
+
+
+#: A number or a range of numbers with a SI unit for which users often prefer another unit.
+_QUANTITY = re.compile(
+    r"(?<![\w.])(-?[\d.]+(?:e[-+]?\d+)?)((?:,? (?:to|and|or) -?[\d.]+(?:e[-+]?\d+)?)?) (K|rad/s|m/s|m|N|Pa|s)\b(?!\^)"
+)
+
+
+def _units(study: xr.Dataset) -> dict[str, str]:
+    """Return the unit in which the campaign file of a study writes all quantities of a SI unit, by SI unit."""
+    found: dict[str, set[str]] = {"K": {"degC"}}
+    written = as_written(study)
+    for name, unit in written.items():
+        found.setdefault(str(study[name].attrs.get("units", "1")), set()).add(unit)
+    own = {unit for name, unit in written.items() if str(study[name].attrs.get("units", "1")) == "K"}
+    return {unit: min(each) for unit, each in (found | ({"K": own} if own else {})).items() if len(each) == 1}
+
+
+def _converted(text: str, units: Mapping[str, str]) -> str:
+    """Return a message whose quantities have the units of a campaign file."""
+
+    def convert(found: re.Match[str]) -> str:
+        first, rest, unit = found.groups()
+        if unit not in units:
+            return found[0]
+        return f"{_in(first, unit, units)}{_NUMBER.sub(lambda number: _in(number[0], unit, units), rest)} {units[unit]}"
+
+    return _QUANTITY.sub(convert, text)
+
+
+def _in(number: str, unit: str, units: Mapping[str, str]) -> str:
+    return shown(float(number), unit, 6, units[unit]).partition(" ")[0]
 
 
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")

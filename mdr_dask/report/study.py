@@ -131,7 +131,7 @@ def _study(
     records = [record for name in groups for record in store.records(url, name)]
     drawn = list(
         drawn_of(
-            {name: plot for name, plot in plots.available(model).items() if not (omitted and plot.fitted)},
+            {name: plot for name, plot in plots.figures_of(model, groups).items() if not (omitted and plot.fitted)},
             groups,
             lambda name: provenance(name, [url], f"mdr-dask plot {shlex.quote(url)} {name}"),
         )

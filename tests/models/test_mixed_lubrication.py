@@ -132,7 +132,7 @@ def test_what_misses_the_accuracy_is_named():
     result = MODEL.compute(dataclasses.replace(asked, accuracy=1e-6))
     error = result.values["breakthrough_probability_error"] / result.values["breakthrough_probability"]
     assert result.messages[0, 0] == (
-        f"an accuracy of 1e-06 is missed: breakthrough_probability by {error[0, 0]:.2g} (estimated); increase points"
+        f"an accuracy of 1e-06 is missed: breakthrough_probability by {error[0, 0]:.2g} (estimated) (increase points)"
     )
 
 

@@ -6,6 +6,7 @@ import xarray as xr
 from overlaps import problems
 
 from mdr_dask.plots import page
+from mdr_dask.plots.figure import Axis, Figure, Key, Panel, Trace, columns
 from mdr_dask.plots.render import render
 from mdr_dask.plots.view import View, draw
 
@@ -41,7 +42,7 @@ def study(curves, second=1, words=False, name="a_parameter_with_a_rather_long_na
 @pytest.mark.parametrize("case", [(1, 1, False), (5, 1, False), (25, 1, False), (6, 3, False), (25, 3, True)])
 def test_nothing_overlaps_and_nothing_is_cut(size, case):
     curves, second, words = case
-    asked = page.Page(*(page.size(size) if size else ()))
+    asked = page.requested(size)
     with page.drawing_for(asked):
         figure = render(draw({"": study(curves, second, words)}, View("mu", "velocity")))
         assert not list(problems(figure))
@@ -53,30 +54,56 @@ def test_nothing_overlaps_and_nothing_is_cut(size, case):
 
 @pytest.mark.parametrize("view", [View("mu", ("velocity", "load")), View("mu"), View("mu", "velocity", panels="load")])
 def test_maps_effects_and_panels_do_not_overlap(view):
-    with page.drawing_for(page.Page(*page.size("85mm"))):
+    with page.drawing_for(page.requested("85mm")):
         figure = render(draw({"": study(5, 4)}, view))
         assert not list(problems(figure))
 
 
+@pytest.mark.parametrize("size", ["85mm", "170mm"])
+@pytest.mark.parametrize(("count", "stack", "ratio"), [(3, 1, 0.85), (12, 1, 0.7), (15, 3, 0.45), (6, 1, 0.3)])
+def test_a_figure_of_a_requested_width_fits_on_a_page(size, count, stack, ratio):
+    x, y = np.linspace(0, 1, 5), np.linspace(0, 3, 5)
+    panels = [
+        Panel(Axis("velocity [m/s]"), Axis(f"output {k}"), [Trace("curve", columns(x=x, y=y), line="-")])
+        for k in range(count)
+    ]
+    panels[0].keys = [Key(f"a surface with a long name, number {k}", "#000000") for k in range(25)]
+    with page.drawing_for(page.requested(size)):
+        figure = render(Figure(panels, "", stack=stack, ratio=ratio))
+        assert not list(problems(figure))
+    assert figure.get_figheight() * 25.4 < 231
+    sizes = [axes.get_window_extent() for axes in figure.axes]
+    assert all(1 / 6 < box.height / box.width < 3 for box in sizes)
+    assert min(box.height for box in sizes) / figure.dpi > 0.4
+
+
+def test_a_title_is_not_cut_within_a_sentence():
+    description = draw({"": study(3)}, View("mu", "velocity"))
+    description.warnings = [f"warning number {k} with {'many words ' * 12}at the end" for k in range(5)]
+    title = render(description).get_suptitle().replace("\n", " ")
+    assert title.count("warning number") == title.count("at the end") > 0
+    assert title.endswith("more: see the table beside the figure")
+
+
 def test_a_title_can_be_set_and_switched_off():
     for title, size, shown in (("Mine", "85mm", "Mine"), ("", "", ""), (None, "85mm", "")):
-        with page.drawing_for(page.Page(*(page.size(size) if size else (None, None)), title=title)):
+        with page.drawing_for(page.requested(size, title)):
             assert render(draw({"": study(3)}, View("mu", "velocity"))).get_suptitle() == shown
 
 
 def test_styles_of_matplotlib_are_used():
-    with page.drawing_for(page.Page(), "grayscale"):
+    with page.drawing_for(page.requested(style="grayscale")):
         figure = render(draw({"": study(4)}, View("mu", "velocity")))
     lines = [line for line in figure.axes[0].lines if line.get_gid() == "curve"]
     assert len({line.get_linestyle() for line in lines}) == 4
-    with pytest.raises(Exception, match="expected a style file"), page.drawing_for(page.Page(), "greyscale"):
+    with pytest.raises(Exception, match="expected a style file"), page.drawing_for(page.requested(style="greyscale")):
         pass
 
 
 @pytest.mark.parametrize("text", ["85", "1mm", "85 x 60", "2 m", "wide"])
 def test_bad_sizes_are_refused(text):
     with pytest.raises(Exception, match="expected"):
-        page.size(text)
+        page.requested(text)
 
 
 def test_matplotlib_draws_the_data_of_the_description():

@@ -95,7 +95,7 @@ def test_nothing_overlaps_and_no_panel_is_empty(name, size, stores):
     text, _ = FIGURES.get(name, (JUMP, []))
     groups = stores(text)
     (data,) = groups.values()
-    with page.drawing_for(page.Page(*page.size(size))):
+    with page.drawing_for(page.requested(size)):
         figure = available(data.attrs["model"])[name].figure(groups)
         assert not list(problems(figure))
     assert all(axes.has_data() for axes in figure.axes)

@@ -66,7 +66,7 @@ def test_without_by_a_second_axis_has_line_styles(groups):
 def test_the_unit_of_the_campaign_or_of_the_user_is_shown(groups):
     figure = described(groups, MU, "normal_force", by="velocity")
     assert figure.panels[0].x.label.endswith("[N]")
-    with page.drawing_for(page.Page(units={"velocity": "km/h"})):
+    with page.drawing_for(page.requested(units={"velocity": "km/h"})):
         figure = described(groups, MU, "velocity", by="normal_force")
     assert figure.panels[0].x.label == "velocity $v$ [km/h]"
     drawn = rows(figure)

@@ -7,6 +7,7 @@ import xarray as xr
 from mdr_dask.aggregation import aggregate
 from mdr_dask.campaign.written import written_units
 from mdr_dask.errors import DataError
+from mdr_dask.questions import progress
 from mdr_dask.questions.units import in_units, parse_units
 
 
@@ -52,3 +53,15 @@ def test_what_cannot_be_converted_is_one_sentence(means, text, told):
 def test_a_damaged_campaign_has_few_units_or_none(text):
     """A store may hold anything: its numbers are shown all the same."""
     assert written_units(text) == ({"length": "mm"} if "mm" in text else {})
+
+
+def test_messages_have_the_units_of_the_campaign(tmp_path):
+    campaign = "model: m\nparameters:\n  speed: [1 rpm, 2 rpm]\n  heat: 300 K\n  oil: 5 mm\n"
+    coords = {"speed": ("speed", [1.0, 2.0], {"units": "rad/s"}), "oil": ((), 5e-3, {"units": "m"})}
+    study = xr.Dataset(coords=coords, attrs={"campaign": campaign})
+    text = "expected a temperature of 313.15 to 373.15 K, got 253.15 K at 10.471976 rad/s, film 2e-06 m, area 1 m^2"
+    message = {"series": "", "status": "failed", "case": {"speed": 1.0}, "message": text}
+    (group,) = progress.grouped([message], {"": study})
+    assert group.reason == (
+        "expected a temperature of 40 to 100 degC, got -20 degC at 100 rpm, film 0.002 mm, area 1 m^2"
+    )

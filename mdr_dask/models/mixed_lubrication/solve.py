@@ -147,7 +147,7 @@ def _realise(
             "contact_resistance": numbers["contact_resistance"]
             * max(1.0, length / found_length if found_length else 1.0),
         }
-        advice = "" if operation.case.points == "auto" else "; increase points"
+        advice = "" if operation.case.points == "auto" else " (increase points)"
         _note(result, index, position, _missed(block, numbers, floors_here, advice))
         _store(result, block, index, position, numbers | arrays[k])
 
