@@ -275,7 +275,9 @@ def _draw(
             raise
         tell(f"{figure.name}: left out: {error}")
         return []
-    return _save(description, path, origin)
+    notes = _save(description, path, origin)
+    click.echo(str(path))
+    return notes
 
 
 def save(draw: Callable[[], Figure], path: Path, origin: Mapping[str, str], look: Mapping[str, Any]) -> None:
@@ -284,6 +286,7 @@ def save(draw: Callable[[], Figure], path: Path, origin: Mapping[str, str], look
 
     with page.drawing_for(page.requested(**look)):
         _tell_notes({path.name: _save(draw(), path, origin)})
+    tell(str(path))
 
 
 def _save(description: Figure, path: Path, origin: Mapping[str, str]) -> list[str]:
@@ -293,7 +296,6 @@ def _save(description: Figure, path: Path, origin: Mapping[str, str]) -> list[st
     drawn.origin = origin
     with writing(render.table_beside(path)), writing(path):
         drawn.save(path)
-    click.echo(str(path))
     asked = page.current()
     notes = [description.fixed] if asked.title is not None or asked.width is not None else []
     notes += [f"not drawn: {text}" for text in description.left_out]
