@@ -127,7 +127,7 @@ def _grid(description: Figure) -> tuple[int, int]:
     columns = MOST_COLUMNS if width is None else max(1, min(MOST_COLUMNS, int(width / WIDE)))
     columns = min(2 if stacks == 4 else columns, columns, stacks)
     if width is not None:
-        fitting = int((1 - LEGEND_SHARE) * page.TALLEST / LEAST_HEIGHT)
+        fitting = int(page.TALLEST / LEAST_HEIGHT)
         while -(-stacks // columns) * stack > fitting and columns < min(stacks, int(width / NARROW)):
             columns += 1
     return -(-stacks // columns) * stack, columns
@@ -365,8 +365,11 @@ def _legend(figure: Drawn, keys: list[Key]) -> float:
 
 
 def _fit(figure: Drawn, places: list[Axes]) -> None:
-    """Break labels into lines that are not longer than their axes, and thin out ticks that overlap."""
-    for _ in range(2):
+    """Break labels into lines that are not longer than their axes, and thin out ticks that overlap.
+
+    Each change may move the axes, so this is repeated, four times at most.
+    """
+    for _ in range(4):
         figure.draw_without_rendering()
         changed = False
         for axes in figure.axes:
