@@ -174,5 +174,5 @@ def test_rest_is_static() -> None:
 
 
 def test_elastic_solid_is_refused() -> None:
-    with pytest.raises(ValueError, match="expected a solid with a Prony term or a dashpot"):
+    with pytest.raises(ValueError, match="expected a viscoelastic solid"):
         foundation([], [], 0.0)
