@@ -7,8 +7,8 @@ from importlib.metadata import entry_points
 
 from mdr_dask.fits.base import Fit
 
-#: Modules of this package that have a tuple ``FITS``, and the models to whose stores these fits apply. A module is
-#: imported only for its models. If the tuple of models is empty, the fits apply to every model.
+#: Modules of this package that have a tuple ``FITS``, and the models to whose stores these fits apply; an empty tuple
+#: means all models. A module is imported only if its fits apply.
 SUBJECTS: dict[str, tuple[str, ...]] = {
     "calibration": (),
     "ehl": ("ehl_line",),

@@ -12,26 +12,26 @@ from mdr_dask.errors import CampaignError, FitError, did_you_mean
 from mdr_dask.fits import available
 from mdr_dask.fits.base import Fit
 
-#: To find out whether a constant depends on a case, the mean of the case is shifted by this fraction of its standard
-#: error. The shift is so small that the fit still selects the same cases.
+#: To find out whether a constant depends on a case, the results of the case are shifted by this fraction of their
+#: standard error. The shift is so small that the fit still selects the same cases.
 STEP = 1e-3
-#: Largest number of groups of neighbouring values along a dimension; the groups are shifted one after the other.
+#: Largest number of groups into which the values along a dimension are divided. One group is shifted at a time.
 GROUPS = 32
-#: A group of cases is left out if a shift by one standard error changes the constant by less than this share of the
-#: half width of its interval.
+#: A group of cases needs no more realisations if a shift by one standard error changes the constant by less than this
+#: fraction of the half width of its interval.
 NEGLIGIBLE = 0.01
-#: Relative change of the scatter, by which the fit is repeated. The half widths for the original and for the changed
-#: scatter are then extrapolated linearly to zero scatter.
+#: To extrapolate to zero scatter, the fit is repeated with the scatter changed by this fraction.
 LESS = 0.01
 
 
 def require_known(campaign: Campaign) -> None:
-    """Raise an error if a campaign names a constant in ``until`` that no fit of its model gives.
+    """Check the constants that a campaign names in ``until``.
 
     Raises
     ------
     CampaignError
-        If there are unknown constants. The message has one sentence for each of them.
+        If no fit of the model gives such a constant, or if outputs and constants are named together with an adaptive
+        axis. The message has one sentence for each wrong name.
     """
     known = available(campaign.model) if campaign.replication.answers else {}
     is_adaptive = any(axis.refinement for one in campaign.series for axis in one.axes)
@@ -44,7 +44,7 @@ def require_known(campaign: Campaign) -> None:
             has = ", ".join(known[name].constants_of(campaign)) or "none"
             wrong = f"expected a constant with an interval of the fit {name} ({has}), got {constant!r}"
         elif campaign.replication.until and is_adaptive:
-            wrong = "with an adaptive axis expected either outputs or constants, got both"
+            wrong = "with an adaptive axis, expected either outputs or constants, got both"
         else:
             continue
         problems.append(f"{tolerance.place or campaign.source}: realisations.until.{answer}: {wrong}")
@@ -71,7 +71,7 @@ def half_widths(
 
 
 def is_wide(value: xr.DataArray, half: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
-    """Return where an interval is too wide; an interval without finite ends does not count, as the law fails there."""
+    """Return where an interval is wider than the tolerance allows; False where an interval has no finite ends."""
     return (half > _allowed(value, tolerance)) & np.isfinite(half)
 
 
@@ -81,12 +81,12 @@ def _allowed(value: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
 
 
 def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.DataArray]:
-    """Return the half width that an interval would have if realisations did not scatter, by series.
+    """Return the half width that an interval would have without scatter of the realisations, by series.
 
-    This half width is due to grid errors and to the misfit of the law. More realisations do not reduce it. The fit is
-    repeated with the scatter multiplied by ``1 - LESS`` and by ``1 + LESS``, and the change of the half width is
-    extrapolated linearly to zero scatter. The smaller of the two results is returned: one of the two changes may alter
-    the verdict on the law, and the half width then jumps.
+    This half width is due to grid errors and to the misfit of the law, and more realisations do not reduce it. The fit
+    is repeated with the scatter multiplied by ``1 - LESS``, and the half width is extrapolated linearly to zero
+    scatter. The same is done with ``1 + LESS``. The smaller of the two results is returned, because the half width
+    jumps if a change of the scatter alters the verdict on the law.
     """
     now = half_widths(fit, constant, groups)
 
@@ -99,7 +99,7 @@ def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -
 
 
 def _scattered(data: xr.Dataset, scale: float) -> xr.Dataset:
-    """Return a study with the same means, in which the scatter of the realisations is multiplied by `scale`."""
+    """Return a study with the same means over the realisations, and their scatter multiplied by `scale`."""
     found = {}
     for name in _results(data):
         mean = data[name].mean("realisation")
@@ -110,15 +110,15 @@ def _scattered(data: xr.Dataset, scale: float) -> xr.Dataset:
 def still_wide(
     fit: Fit, constant: str, groups: Mapping[str, xr.Dataset], tolerance: Tolerance, at_most: int
 ) -> dict[str, xr.DataArray]:
-    """Return for each series where an interval is too wide but may become narrow enough with more realisations.
+    """Return, for each series, where an interval is too wide and more realisations are worth while.
 
-    More realisations are useless in one case: the half width due to scatter alone is already within the tolerance, but
-    the total half width would exceed the tolerance even with `at_most` realisations.
+    They are not worth while if the half width due to scatter alone is already within the tolerance, but the total half
+    width would exceed the tolerance even with `at_most` realisations.
 
     Raises
     ------
     FitError
-        Under the same conditions as in `half_widths`.
+        If the law cannot be fitted, or the fit does not give this constant.
     """
     found = half_widths(fit, constant, groups)
     wide = {name: is_wide(*both, tolerance) for name, both in found.items()}
@@ -136,13 +136,12 @@ def still_wide(
 def cases_behind(
     fit: Fit, constant: str, groups: Mapping[str, xr.Dataset], name: str, wide: xr.DataArray
 ) -> xr.DataArray:
-    """Return the cases of a series that affect a constant with too wide an interval.
+    """Return the cases of a series that affect a constant whose interval is too wide.
 
-    Along every dimension that the constant itself does not have, neighbouring values are collected in groups. For one
-    group after the other, the results are shifted by a small fraction of their standard error, and the fit is repeated.
-    If the constant changes, the group matters. A case is chosen if, along each of these dimensions, it belongs to a
-    group that matters. Therefore whole rows and columns are chosen, and all cases that a fit compares get the same
-    generated lines.
+    The values along each dimension that the constant itself does not have are divided into groups of neighbours. The
+    results of one group at a time are shifted by a small fraction of their standard error, and the fit is repeated. If
+    the constant changes, it depends on this group. A case is chosen if the constant depends on its groups along all of
+    these dimensions. In this way, all cases that a fit compares get the same number of realisations.
 
     Parameters
     ----------
@@ -153,11 +152,12 @@ def cases_behind(
     name : str
         Name of the series whose cases are returned.
     wide : bool array
-        For each element of the constant, whether its interval is too wide.
+        Where the interval of the constant is too wide.
 
     Returns
     -------
-    bool array over the dimensions of the cases
+    bool array
+        Whether each case is chosen, over the dimensions of the cases.
     """
     data = groups[name]
     sizes = {str(dim): size for dim, size in data["status"].sizes.items() if dim != "realisation"}
@@ -198,9 +198,10 @@ def _over(dims: list[str], flags: xr.DataArray) -> xr.DataArray:
 
 
 def _steps(data: xr.Dataset, inner: list[str]) -> dict[str, xr.DataArray]:
-    """Return the shift of each output of every case; all realisations of a case are shifted equally.
+    """Return the shift of each output of every case.
 
-    Signs and sizes are random, because equal shifts would cancel in differences between cases.
+    All realisations of a case are shifted equally. The shifts of different cases have random signs and sizes, because
+    equal shifts would cancel in differences between cases.
     """
     generator, shape = np.random.Generator(np.random.Philox(0)), [data.sizes[dim] for dim in inner]
     found = {}
@@ -212,6 +213,6 @@ def _steps(data: xr.Dataset, inner: list[str]) -> dict[str, xr.DataArray]:
 
 
 def _results(data: xr.Dataset) -> list[str]:
-    """Return the names of the outputs that differ between realisations, without the companions (`<output>_error`)."""
+    """Return the names of the outputs that have values for each realisation; their errors are not among them."""
     beside = {"status", *(array.attrs.get("ancillary_variables") for array in data.data_vars.values())}
     return [str(key) for key, array in data.data_vars.items() if key not in beside and "realisation" in array.dims]

@@ -1,11 +1,12 @@
 """The class `Fit`: a law, with a function that fits its constants to the series of a store and tests the law.
 
-Every result has a variable ``law_holds``: a sentence about the law with the constants that its source states. The
-sentence begins with *yes*, *approximately*, *no* or *not tested*. If constants are fitted, ``fitted_law_holds`` is the
-corresponding sentence about the law with the fitted constants. Scatter and errors may not explain the departures of the
-data from the fitted law. These departures then count as an error of every case and widen the intervals (see `fitted`);
-some fits give NaN for the ends of the intervals instead. A constant that the data do not determine is NaN (see
-`undetermined`).
+Every result has a variable ``law_holds``: a sentence that begins with *yes*, *approximately*, *no* or *not tested*. It
+is about the law with the constants that the source of the law states. If constants are fitted, ``fitted_law_holds`` is
+the corresponding sentence about the law with the fitted constants.
+
+If the data depart from the fitted law by more than scatter and errors explain, these departures count as an error of
+every case, and the intervals of the constants become wider (see `fitted`). A constant that the data do not determine is
+NaN (see `undetermined`).
 """
 
 from __future__ import annotations
@@ -49,8 +50,8 @@ class Fit:
     apart : bool
         Whether each series of a store is fitted separately. ``compute`` then gets a mapping with one series.
     constants : tuple of str, or callable, Campaign -> tuple of str
-        Constants for which the fit gives an interval. A campaign may add realisations until such an interval is narrow
-        enough (``until: {name.constant: 1 %}``).
+        Constants for which the fit gives an interval. A campaign can request realisations until such an interval is
+        narrow enough (``until: {name.constant: 1 %}``).
     """
 
     name: str
@@ -61,7 +62,7 @@ class Fit:
     constants: tuple[str, ...] | Callable[[Campaign], tuple[str, ...]] = ()
 
     def constants_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """Return the constants that a campaign may name in ``until``, to choose its number of realisations."""
+        """Return the constants that a campaign may name in ``until``."""
         return self.constants(campaign) if callable(self.constants) else self.constants
 
     def results(self, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
@@ -86,7 +87,7 @@ class Fit:
 
 
 def require(data: xr.Dataset, *names: str) -> None:
-    """Raise FitError if the study lacks one of these parameters of a Kelvin body on a generated line."""
+    """Raise FitError if a study lacks one of these parameters of a Kelvin body on a generated line."""
     missing = [name for name in names if name not in data.variables]
     if missing:
         raise FitError(
@@ -107,7 +108,10 @@ def _judged(result: xr.Dataset) -> xr.Dataset:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A law fitted to a stack of data (`mdr_dask.bootstrap` defines stacks).
+    """A law fitted to a stack of data.
+
+    A stack is an array whose first row holds the data. Its further rows hold the data for resampled realisations, and
+    the data shifted by their errors (see `mdr_dask.bootstrap`).
 
     Attributes
     ----------
@@ -125,11 +129,11 @@ class Fitted:
 
     @property
     def rms(self) -> float:
-        """Return the root mean square of the residuals of the data."""
+        """Root mean square of the residuals of the data."""
         return float(np.sqrt(np.mean(self.residuals[0] ** 2)))
 
     def holds(self, where: Callable[[int], str] | None = None) -> str:
-        """Return a sentence on whether the law with the fitted constants holds (`where`: see `verdict`)."""
+        """Return a sentence on whether the law with the fitted constants holds; `where` describes a case in words."""
         if np.isnan(self.constants[0]).any():
             return f"not tested: these cases do not determine the constants; departs by {100 * self.rms:.2g} % rms"
         return verdict(self.residuals, self.count, self.constants.shape[1], where)
@@ -142,7 +146,9 @@ def fitted(
     count: int,
     stated: FloatArray | None = None,
 ) -> Fitted:
-    """Fit a law; if scatter and errors do not explain the residuals, the residuals count as an error of every case.
+    """Fit a law to a stack of data.
+
+    If scatter and errors do not explain the residuals, the residuals count as an error of every case.
 
     Parameters
     ----------
@@ -156,8 +162,8 @@ def fitted(
     count : int
         Number of realisations that were resampled.
     stated : array, shape (p,), optional
-        Constants that the source of the law states. A constant also counts as undetermined if the data would not
-        determine it in a law with the stated constants.
+        Constants that the source of the law states. If they are given, a constant is NaN also if data that follow the
+        law with the stated constants would not determine it.
     """
     constants = fit(data)
     residuals = left(data, constants)
@@ -175,9 +181,9 @@ def fitted(
 def undetermined(effects: FloatArray) -> BoolArray:
     """Return which constants of a law the data do not determine.
 
-    One constant is changed by 1, and the other constants are fitted again. If the law then changes by less than
-    `WITHIN` in every case, the constant is undetermined: departures of this size are allowed for a law that holds, and
-    they alone would decide the fitted value.
+    One constant is changed by 1, and the other constants are fitted again. If this changes the law by less than
+    `WITHIN` in every case, the constant is undetermined: a law may hold although the data depart from it by as much, so
+    that the fitted value is arbitrary.
 
     Parameters
     ----------
@@ -213,9 +219,9 @@ def verdict(
     constants : int
         Number of constants fitted to these data.
     where : callable, int -> str, optional
-        Returns a description of a case; used for the case with the largest departure.
+        Describes a case in words. The sentence contains this description of the case with the largest departure.
     excluded : bool
-        Whether the interval of a fitted constant excludes the stated value. If so, scatter does not explain the
+        Whether the interval of a fitted constant excludes the stated value, so that scatter does not explain the
         departures.
     """
     if residuals.shape[1] <= constants:
@@ -242,24 +248,22 @@ def law_holds(
 ) -> str:
     """Return a sentence on whether a law holds.
 
-    Scatter never improves a verdict. If scatter may hide a departure beyond `WITHIN`, the law holds at best
-    approximately. If scatter may hide a departure beyond `APPROXIMATE`, small departures do not confirm the law, and it
-    is not tested.
+    If scatter may hide departures larger than `WITHIN`, the verdict is at best *approximately*. If scatter may hide
+    departures larger than `APPROXIMATE`, small departures do not confirm the law, and the verdict is *not tested*.
 
     Parameters
     ----------
     departures : array
         Relative departures of the data from the law.
     chance : float or None
-        Probability that scatter and errors alone cause departures of this size. NaN if the probability is unknown; None
-        if scatter and errors cannot cause such departures.
+        Probability that scatter and errors alone cause departures of this size. NaN if it is unknown; None if they
+        cannot cause such departures.
     constants : int
         Number of constants fitted to these data.
     where : str
         Description of the case with the largest departure.
     scatter : float
-        With a probability of 5 %, scatter and errors alone cause an rms departure larger than this. NaN if it is
-        unknown.
+        Rms departure that scatter and errors alone exceed with a probability of 5 %; NaN if it is unknown.
     """
     if departures.size <= constants:
         return f"not tested: {departures.size} cases for {constants} constants leave nothing to compare"
@@ -299,7 +303,7 @@ def _signed(number: float, digits: str) -> str:
 
 
 def _plain(number: str) -> str:
-    """Return a percentage written without an exponent; a percentage below 1e-4 % becomes 0."""
+    """Write a percentage without an exponent; a percentage below 1e-4 % becomes 0."""
     if "e-" in number:
         return "0"
     return f"{float(number):.0f}" if "e+" in number else number

@@ -1,4 +1,8 @@
-"""Calibration: estimate unknown parameters of a study from measured points, by their posterior density."""
+"""Calibration: estimate unknown parameters of a study from measured points.
+
+The unknowns are the axes of the study that are not columns of the table of measured points. Their posterior density is
+computed on cells, which divide the ranges of these axes (see `mdr_dask.fits.posterior`).
+"""
 
 from __future__ import annotations
 
@@ -24,30 +28,31 @@ from mdr_dask.fits.posterior import DEVIATIONS, Noise, Posterior, distance, like
 from mdr_dask.fits.prediction import Prediction, prediction
 from mdr_dask.tables import decoded
 
-#: Smallest error of measurement that is considered, relative to the rms of the residuals of the best prediction.
+#: Smallest error of measurement that is considered possible, divided by the rms residual of the best prediction.
 LEAST = 0.2
-#: Smallest residual that is used, relative to the measured values. Smaller residuals may be due to rounding.
+#: Smaller residuals, relative to the measured values, may be due to rounding and are replaced by this one.
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """The result of a calibration: the posterior density of the unknowns of a study.
+    """The result of a calibration.
 
     Parameters
     ----------
     measured : Measured
+        The measured points.
     prediction : Prediction
         Prediction of the study at the measured points.
     posterior : Posterior
+        Posterior density of the unknowns.
     noises : list of Noise
-        Errors of measurement that were considered.
+        Possible errors of measurement.
     units : dict of str to str
         Units of the unknowns, the conditions and the output.
     contradicted : Residuals or None
-        The residuals, if the errors of measurement in the table do not explain them; otherwise None. In the case of
-        unexplained residuals, the posterior is computed with larger errors of measurement, which do explain the
-        residuals. The intervals thus include the misfit.
+        None if the errors of measurement in the table explain the residuals. Otherwise the residuals; the posterior is
+        then computed with larger errors of measurement, which explain them, so that the intervals include the misfit.
     """
 
     measured: Measured
@@ -64,12 +69,12 @@ class Calibration:
 
     @cached_property
     def values(self) -> FloatArray:
-        """The unknowns in SI, shape (cells, unknowns)."""
+        """The unknowns in SI units at the centre of each cell, shape (cells, unknowns)."""
         return self.prediction.values(self.posterior.places)
 
     @cached_property
     def ends(self) -> list[identifiability.Ends]:
-        """For each unknown, which ends of its axis the data leave open."""
+        """For each unknown, whether the data leave the ends of its axis open (see `identifiability.OPEN`)."""
         return identifiability.open_ends(self.posterior)
 
     @cached_property
@@ -79,7 +84,7 @@ class Calibration:
 
     @cached_property
     def products(self) -> list[identifiability.Product]:
-        """Products of powers of the undetermined unknowns that the data determine."""
+        """Products of powers of undetermined unknowns. The data determine the products, but not their factors."""
         return identifiability.products(self.posterior, self.values, self.free)
 
     def name_and_unit(self, product: identifiability.Product) -> tuple[str, str]:
@@ -91,7 +96,7 @@ class Calibration:
 
     @cached_property
     def residuals(self) -> Residuals:
-        """Residuals of the best prediction."""
+        """Residuals of the prediction in the cell of the highest density."""
         if self.contradicted is not None:
             return self.contradicted
         measured, predicted = self.measured, self.prediction(self.posterior.places[[self.posterior.best]])
@@ -123,22 +128,22 @@ class Calibration:
 
     @cached_property
     def best(self) -> FloatArray:
-        """Prediction of the best cell, shape (points,)."""
+        """Prediction in the cell of the highest density, shape (points,)."""
         place = self.posterior.places[self.posterior.best]
         best: FloatArray = self.prediction(place[None]).mean[0]
         return best
 
 
 def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
-    """Return the posterior of the unknowns of a study from measured points.
+    """Estimate the unknowns of a study from measured points.
 
     Parameters
     ----------
     dataset : Dataset
-        A group of a study that is a grid. The axes that are not measured conditions are the unknowns; there may be one
-        to four. The prior of each unknown is uniform over its axis, or uniform in the logarithm if the axis is spaced
-        logarithmically.
+        A group of a study that is a grid, with one to four unknowns. The prior of an unknown is uniform over its axis,
+        or uniform in the logarithm if the axis is spaced logarithmically.
     measured : Measured
+        The measured points.
 
     Raises
     ------
@@ -148,10 +153,11 @@ def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
     Notes
     -----
     The likelihood is a normal distribution. Its covariance has four parts: the errors of measurement; the scatter of
-    the lines, which all cases share; half of the estimated errors of grid and interpolation as an error common to all
-    points; and the other half as an error that is independent for each point. If the table gives no errors of
-    measurement, two kinds are considered: errors equal for all points, and errors proportional to the values. The prior
-    of the logarithm of their size is uniform.
+    the rough lines, which is common to all points; half of the estimated errors of grid and interpolation, as an error
+    common to all points; and the other half, as an error that is independent for each point.
+
+    If the table gives no errors of measurement, two kinds are considered: errors that are equal for all points, and
+    errors proportional to the values. Their size is unknown; its logarithm has a uniform prior.
     """
     predicted = prediction(dataset, measured)
     named = (*predicted.unknowns, *measured.conditions, measured.output)
@@ -174,16 +180,16 @@ def _posterior(predicted: Prediction, measured: Measured, noises: list[Noise]) -
 
 
 def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
-    """Return possible errors of measurement, about as large as the residuals.
+    """Return possible errors of measurement, which are about as large as the residuals.
 
-    There are two kinds: equal errors for all points, and errors proportional to the values if all values are positive.
+    The errors are equal for all points or, if all values are positive, proportional to the values.
     """
     values, count = measured.values, measured.values.size
     unknowns = len(predicted.unknowns)
     if count <= unknowns:
         raise FitError(
-            f"{count} measured points without errors cannot determine {unknowns} unknowns; add points, or a column "
-            "standard_error"
+            f"expected more than {unknowns} measured points for {unknowns} unknowns, because the table has no errors "
+            f"of measurement, got {count}; add points, or a column standard_error"
         )
     shares = bool(np.all(values > 0))
     least = np.full(2, np.inf)
@@ -204,10 +210,10 @@ def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
 
 
 def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
-    """Return possible sizes of the error of measurement.
+    """Return possible sizes of the error of measurement, from the rms residual of the best prediction.
 
-    The smallest size is `LEAST` times the rms of the residuals. The residuals give a one-sided 99.9 % interval of the
-    error; its upper end is the largest size.
+    The smallest size is `LEAST` times the rms residual. The largest is the size that the error exceeds with a
+    probability of 0.1 %, given these residuals.
     """
     spare = max(1, count - unknowns)
     most = min(100.0, float(np.sqrt(count / (2 * gammaincinv(spare / 2, 0.001)))))
@@ -215,16 +221,18 @@ def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
 
 
 def measured_of(dataset: xr.Dataset) -> Measured:
-    """Return the table of measured points in a study.
+    """Return the measured points that are stored with a study.
 
     Raises
     ------
     FitError, DataError
-        If there is no table, or the table has no column for an output of the study.
+        If the study has no table of measured points, or the table has no column for an output of the study.
     """
     table = dataset.attrs.get("measured")
     if not table:
-        raise FitError("no table of measurements: give measured: {table: rig.csv} in the campaign, or --measured FILE")
+        raise FitError(
+            "expected a table of measurements: give measured: {table: rig.csv} in the campaign, or --measured FILE"
+        )
     companions = {dataset[name].attrs.get("ancillary_variables") for name in dataset.data_vars}
     outputs = {
         str(name): str(array.attrs.get("units", "1"))
@@ -242,13 +250,13 @@ def measured_of(dataset: xr.Dataset) -> Measured:
 
 
 def with_table(groups: Mapping[str, xr.Dataset], table: Any) -> dict[str, xr.Dataset]:
-    """Return the groups of a study with another table of measurements, given as a path or a pandas DataFrame."""
+    """Return the groups of a study with another table of measured points, given as a path or a pandas DataFrame."""
     named = {"name": "measured", "text": table.to_csv(index=False)} if hasattr(table, "to_csv") else read_file(table)
     return {key: data.assign_attrs(measured=named) for key, data in groups.items()}
 
 
 def read_file(path: str | Path) -> dict[str, str]:
-    """Return the table in a file, in the form in which a study stores it."""
+    """Return name and text of a table in a file, as a study stores them."""
     path = Path(path)
     try:
         return {"name": path.name, "text": decoded(path.read_bytes(), str(path))}
@@ -283,16 +291,17 @@ def summary(found: Calibration) -> xr.Dataset:
     output = found.measured.output
     if found.measured.errors is None and are_shares:
         share = float(np.mean(errors / np.abs(found.best)))
-        variables["relative_measurement_error"] = ((), share, {**pure, "long_name": "estimated from the residuals"})
+        about = {**pure, "long_name": "relative error of measurement, estimated from the residuals"}
+        variables["relative_measurement_error"] = ((), share, about)
     elif found.measured.errors is None:
-        about = {"units": found.units[output], "long_name": "estimated from the residuals"}
+        about = {"units": found.units[output], "long_name": "error of measurement, estimated from the residuals"}
         variables["measurement_error"] = ((), float(errors[0]), about)
     if np.isfinite(found.residuals.chi_squared):
         variables["chi_squared"] = ((), found.residuals.chi_squared, pure)
     variables |= {
         "degrees_of_freedom": ((), found.residuals.freedom, pure),
-        "rms_residual": ((), found.residuals.relative, {**pure, "long_name": "rms residual over rms measured"}),
-        "determined": ((), sentence(found), {**pure, "long_name": "what the data determine"}),
+        "rms_residual": ((), found.residuals.relative, {**pure, "long_name": "rms residual over rms measured value"}),
+        "determined": ((), sentence(found), {**pure, "long_name": "unknowns that the data determine"}),
         "law_holds": ((), found.law_holds, pure),
     }
     counts = {"output": output, "points": found.measured.values.size, "realisations": found.prediction.realisations}
@@ -311,7 +320,7 @@ def _intervals(values: FloatArray, weights: FloatArray) -> dict[str, float]:
 
 
 def _bound(found: Calibration, k: int) -> dict[str, float]:
-    """Return the one-sided interval of an unknown with one open end; empty if another unknown is undetermined."""
+    """Return the one-sided interval of unknown k; empty unless k is the only undetermined one and has one open end."""
     low, high = found.ends[k]
     if found.free != [k] or low == high:
         return {}
@@ -325,41 +334,36 @@ def _correlation(found: Calibration, one: int, other: int) -> float:
 
 
 def sentence(found: Calibration) -> str:
-    """Return a sentence on what the data determine; the verdict precedes it if the model does not explain the data."""
-    if found.law_holds.startswith("no:"):
-        return f"the model does not explain the measured points; with errors that would explain them, {_known(found)}"
-    return _known(found)
-
-
-def _known(found: Calibration) -> str:
-    """Return a sentence on which unknowns the data determine, and which they do not."""
+    """Return a sentence on which unknowns the data determine, and on whether the model explains the data."""
+    start = (
+        "the model does not explain the measured points; for errors of measurement that would explain the residuals, "
+        if found.law_holds.startswith("no:")
+        else ""
+    )
     free = [found.unknowns[k] for k in found.free]
     if not free:
-        return "every unknown is determined"
+        return f"{start}every unknown is determined"
     known = [name for name in found.unknowns if name not in free]
     for product in found.products:
         name, unit = found.name_and_unit(product)
         ends = _intervals(product.values, found.posterior.weights)
         half = (ends["_high"] - ends["_low"]) / 2 / ends[""]
-        known.append(f"{name} ({ends['']:.3g}{'' if unit == '1' else ' ' + unit} +- {half:.2g} of it)")
+        known.append(f"{name} ({ends['']:.3g}{'' if unit == '1' else ' ' + unit} +- {100 * half:.2g} %)")
+    only = f"only {' and '.join(known)} {'is' if len(known) == 1 else 'are'} determined; " if known else ""
     for k in found.free:
         bound = _bound(found, k)
         if bound:
-            side = (
-                f"from below, at {bound['_low']:.4g}" if found.ends[k].high else f"from above, at {bound['_high']:.4g}"
-            )
-            return " and ".join([*known, f"{free[0]} is bounded {side}, only"])
+            side, end = ("below", bound["_low"]) if found.ends[k].high else ("above", bound["_high"])
+            return f"{start}{only}{free[0]} is only bounded from {side}, at {end:.4g}"
     no_number = f"no number is given for {' and '.join(free)}"
-    if not known:
-        return f"nothing is determined within the ranges of the study; {no_number}"
-    return f"only {' and '.join(known)} {'is' if len(known) == 1 else 'are'} determined; {no_number}"
+    return f"{start}{only or 'nothing is determined within the ranges of the study; '}{no_number}"
 
 
 FITS: tuple[Fit, ...] = (
     Fit(
         "calibration",
         (),
-        "axes of a study that are not columns of the table `measured`, from its points: values, intervals, law_holds",
+        "unknown parameters from the table `measured`: the axes of the study that are not columns of this table",
         calibration,
         apart=True,
         constants=unknowns,

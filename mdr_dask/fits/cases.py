@@ -1,6 +1,7 @@
-"""What fits share: the cases of a series as arrays, laws fitted to them, and results as variables.
+"""Functions that many fits use: the cases of a series as arrays, laws fitted to them, and results as variables.
 
-`mdr_dask.bootstrap` defines the stacks from which intervals are computed.
+A *stack* is an array from which intervals are computed: its first row holds the means, and its further rows hold the
+means of resampled realisations and the means shifted by their errors (see `mdr_dask.bootstrap`).
 """
 
 from __future__ import annotations
@@ -27,14 +28,14 @@ def each(
     fit: Callable[[xr.Dataset], Variables],
     *outputs: str,
 ) -> xr.Dataset:
-    """Fit a law to some dimensions of the data, separately for every combination of values of the other dimensions.
+    """Fit a law to all cases along some dimensions, separately for every combination of values of the others.
 
     Parameters
     ----------
     series : mapping of str to Dataset
         One series.
     inner : callable
-        Returns the dimensions that one fit needs, such as those of load and velocity.
+        Returns the dimensions of the cases that one fit combines, such as those of load and velocity.
     fit : callable
         Returns the results of the fit for one combination of values of the other dimensions.
     *outputs : str
@@ -48,7 +49,7 @@ def each(
     data = next(iter(series.values()))
     missing = [name for name in outputs if name not in data]
     if missing:
-        raise FitError(f"expected the outputs {', '.join(outputs)} in the store, got none of {', '.join(missing)}")
+        raise FitError(f"expected the outputs {', '.join(outputs)}, got a store without {', '.join(missing)}")
     data = data.load()
     used = ["realisation", *inner(data)]
     outer = [str(dim) for dim in data[outputs[0]].dims if dim not in used]
@@ -69,12 +70,12 @@ def dimensions(data: xr.Dataset, *names: str) -> list[str]:
 
 
 def one_value(data: xr.Dataset, name: str) -> float:
-    """Return the value of a parameter that all cases share; raise FitError if the study lacks it, or if it varies."""
+    """Return a parameter that is equal in all cases; raise FitError if the study lacks it, or if it varies."""
     require(data, name)
     values = data[name]
     if values.size != 1:
         raise FitError(
-            f"expected one {name}, or an axis for it, got {values.size} values of a sampled study: each has its own law"
+            f"expected the same {name} in all cases, or an axis for it, got a sampled study with {values.size} values"
         )
     return float(values.item())
 
@@ -95,24 +96,27 @@ class Table(NamedTuple):
     columns: tuple[FloatArray, ...]
 
     def stack(self, used: Any = slice(None)) -> FloatArray:
-        """Return the stack of the means of some cases, shape (1 + RESAMPLES + 2 groups, cases)."""
+        """Return the stack of the means of the `used` cases, shape (1 + RESAMPLES + 2 groups, cases)."""
         return bootstrap.with_errors(bootstrap.means(self.values[used].T), self.mean_error(used))
 
     def logarithms(self, used: Any = slice(None)) -> FloatArray:
-        """Return the stack of the logarithms of the means; an infinite grid error counts as 100 % of the mean."""
+        """Return the stack of the logarithms of the means of the `used` cases.
+
+        An infinite discretisation error counts as 100 % of the mean.
+        """
         means = bootstrap.means(self.values[used].T)
         relative = self.mean_error(used) / means[0]
         return bootstrap.with_errors(bootstrap.logarithms(means), np.where(np.isinf(relative), 1.0, relative))
 
     def mean_error(self, used: Any = slice(None)) -> FloatArray:
-        """Return the discretisation error of the mean of some cases; 0 if it is unknown."""
+        """Return the discretisation errors of the means of the `used` cases; 0 where they are unknown."""
         known = ~np.isnan(self.error[used])
         total = np.where(known, np.abs(self.error[used]), 0.0).sum(axis=1)
         mean: FloatArray = total / np.maximum(known.sum(axis=1), 1)
         return mean
 
     def count(self, used: Any = slice(None)) -> int:
-        """Return the smallest number of successful realisations among some cases."""
+        """Return the smallest number of successful realisations of the `used` cases."""
         return int(np.isfinite(self.values[used]).sum(axis=1).min())
 
     def mean(self) -> FloatArray:
@@ -139,7 +143,10 @@ def table_of(data: xr.Dataset, scale: Any, *columns: xr.DataArray, output: str =
 
 
 def linear(design: FloatArray, logs: FloatArray, count: int) -> Fitted:
-    """Fit a law that is linear in its constants to a stack of logarithms; `design` has the shape (constants, cases)."""
+    """Fit a law that is linear in its constants to a stack of logarithms.
+
+    `design` are the derivatives of the law with respect to its constants, shape (constants, cases).
+    """
     solve = np.linalg.pinv(design)
     return fitted(lambda rows: rows @ solve, lambda rows, constants: rows - constants @ design, logs, count)
 
@@ -150,7 +157,10 @@ def power_law(x: FloatArray, logs: FloatArray, count: int) -> Fitted:
 
 
 def stated_power(x: FloatArray, logs: FloatArray, power: float, count: int, where: Callable[[int], str]) -> str:
-    """Return a sentence on whether data, given as a stack of logarithms, follow a stated power with a free factor."""
+    """Return a sentence on whether data follow a power law with a stated exponent and any factor.
+
+    `x` are the logarithms of the abscissa, and `logs` is the stack of the logarithms of the data.
+    """
     rest = logs - power * x
     free = power_law(x, logs, count).constants[:, 0]
     if np.isnan(free[0]):
@@ -171,7 +181,7 @@ def nonlinear(
     Parameters
     ----------
     model : callable
-        Takes constants, shape (rows, p), and returns the logarithm of the law, shape (rows or 1, cases).
+        Takes constants, shape (rows, p), and returns the logarithms of the law, shape (rows or 1, cases).
     stated : array, shape (p,)
         Constants that the source of the law states: exponents, or logarithms of factors.
     logs : array, shape (1 + RESAMPLES + 2 groups, cases)
@@ -179,7 +189,7 @@ def nonlinear(
     count : int
         Number of realisations that were resampled.
     where : callable, int -> str
-        Returns a description of a case.
+        Describes a case in words.
 
     Returns
     -------
@@ -202,7 +212,7 @@ def nonlinear(
 
 
 def rms(left: FloatArray) -> float:
-    """Return the root mean square of residuals."""
+    """Return the root mean square."""
     return float(np.sqrt(np.mean(left**2)))
 
 

@@ -1,4 +1,4 @@
-"""Fit film formulas to computed films: the film is proportional to powers of W (load), U (speed) and G (material)."""
+"""Fit film formulas: the film thickness is a product of powers of W (load), U (speed) and G (material)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _GROUPS = {"load": "W", "speed": "U", "material": "G"}
 
 
 def _logarithms(dataset: xr.Dataset, output: str) -> FloatArray:
-    """Return ln W, ln U, ln G and ln(h/R) of the cases with a film thickness h, shape (4, cases)."""
+    """Return ln W, ln U, ln G and ln(h/R) of all cases with a computed film thickness h, shape (4, cases)."""
     film = dataset[output].isel(realisation=0)
     table = np.stack([np.ravel(array) for array in xr.broadcast(*groups_of(dataset.coords.get), film)]).astype(
         np.float64
@@ -37,7 +37,7 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     freedom = design.shape[0] - int(varied.sum())
     if freedom < 1 or not varied[1:].any():
         raise FitError(
-            f"expected films at more points than constants with W, U or G varied, got {design.shape[0]} points"
+            f"expected films at more points than constants, with different W, U or G, got {design.shape[0]} points"
         )
     constants, width = np.full(4, np.nan), np.full(4, np.nan)
     solution, *_ = np.linalg.lstsq(design[:, varied], table[3], rcond=None)
@@ -51,11 +51,11 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _films(data: xr.Dataset) -> Variables:
-    """Fit ``h/R = factor W^load U^speed G^material`` to the central and the minimum film.
+    """Fit ``h/R = factor W^load U^speed G^material`` to the central and to the minimum film thickness.
 
     An exponent is NaN if its parameter (W, U or G) does not vary, or varies only together with the other two. Computed
-    films have no scatter. Therefore the intervals measure the misfit of the formula. ``law_holds`` refers to the
-    formula of Pan and Hamrock with its published constants.
+    films have no scatter, so the intervals follow from the misfit of the formula. ``law_holds`` is about the formula of
+    Pan and Hamrock with its published constants.
     """
     found: Variables = {}
     departures, of_stated = [], []
@@ -67,10 +67,10 @@ def _films(data: xr.Dataset) -> Variables:
         ends = {"": constants, "_low": constants - width, "_high": constants + width}
         for k, name in enumerate(("factor", "load", "speed", "material")):
             for end, value in ends.items():
-                about = f"exponent of {_GROUPS[name]}" if k else "factor of the power law"
+                about = f"exponent of {_GROUPS[name]} in h/R" if k else "factor of the power law for h/R"
                 found |= measure(f"{film}_{name}{end}", float(value[k] if k else np.exp(value[k])), about)
-        found |= measure(f"{film}_rms", rms(residuals), "rms residual of ln h")
-        found |= measure(f"{film}_worst", float(np.abs(residuals).max()), "largest residual of ln h")
+        found |= measure(f"{film}_rms", rms(residuals), "rms relative departure from the fitted formula")
+        found |= measure(f"{film}_worst", float(np.abs(residuals).max()), "largest relative departure from it")
         departures.append(residuals)
         of_stated.append(table[3] - np.log(formula(*np.exp(table[:3]))))
     sentences = (law_holds(np.concatenate(each), None) for each in (of_stated, departures))
@@ -92,7 +92,7 @@ FITS: tuple[Fit, ...] = (
     Fit(
         "film_exponents",
         ("ehl_line",),
-        "h/R = factor W^load U^speed G^material through a map of films, beside Pan and Hamrock (eq. 5.3)",
+        "h/R = factor W^load U^speed G^material for a map of films; compared with Pan and Hamrock (eq. 5.3)",
         _film_exponents,
         apart=True,
     ),

@@ -1,8 +1,11 @@
 """Fit the laws of steady sliding friction (thesis eqs. 3.11 to 3.18) to a store.
 
 Symbols: mu is the coefficient of friction, F_N the normal force, v the velocity, L the length of the line and h its rms
-height, G the shear modulus and tau the relaxation time. `mdr_dask.bootstrap` defines the stacks from which intervals
-are computed.
+height, G the shear modulus and tau the relaxation time.
+
+Friction against velocity has four regions. It is proportional to the velocity in region I, grows more slowly in
+region II, is at its plateau in region III, and falls in region IV. The load has two zones: the line is in partial
+contact in zone 1, at low loads, and in full contact in zone 2.
 """
 
 from __future__ import annotations
@@ -37,15 +40,16 @@ from mdr_dask.physics.sliding import laws
 
 MODELS = ("sliding_friction",)
 FRICTION = "friction_coefficient"
-ZONE_ONE = (0.01, 0.3)  # range of F_N / (G h L) in zone 1; other limits change alpha by up to 0.02, beta by up to 0.14
-LINEAR = 0.05  # in region I, mu / v changes by less than this fraction between neighbouring velocities
+# loads F_N / (G h L) that are used in zone 1; with other limits, alpha changes by up to 0.02, and beta by up to 0.14
+ZONE_ONE = (0.01, 0.3)
+LINEAR = 0.05  # velocities are in region I if mu / v differs by less than this fraction between neighbours
 NEEDS_SLOPE = "not tested: the study has no output contact_slope"
 
 
 def spectral_slope(data: xr.Dataset) -> xr.DataArray:
-    """Return the spectral rms slope, from the store or from the parameters of a generated line.
+    """Return the rms slope of the line; it is computed from the spectrum if the store does not have it.
 
-    The slope is NaN for a smooth line, for which friction divided by slope has no meaning.
+    The slope is NaN for a smooth line, for which friction divided by the slope has no meaning.
     """
     if "rms_slope" in data:
         stored = data["rms_slope"].mean("realisation")
@@ -71,7 +75,7 @@ KELVIN = ("shear_modulus", "relaxation_time", "rms_roughness", "length")
 
 
 def loads_and_velocities(data: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
-    """Return the load F_N / (G h L) and the velocity v tau slope / (sqrt 2 h) of all cases, both dimensionless."""
+    """Return the dimensionless load F_N / (G h L) and velocity v tau slope / (sqrt 2 h) of all cases."""
     require(data, *KELVIN)
     slope = spectral_slope(data)
     force = laws.force_number(data["normal_force"], data["shear_modulus"], data["rms_roughness"], data["length"])
@@ -94,11 +98,10 @@ def at_load(force: FloatArray) -> Callable[[int], str]:
 
 
 def _first_linear(friction: FloatArray, velocity: FloatArray) -> int | None:
-    """Return the index of the lowest velocity at which friction is proportional to velocity.
+    """Return the index of the lowest velocity at which friction is proportional to the velocity, or None.
 
-    Friction at two neighbouring velocities is compared, using the realisations that succeeded at both velocities. The
-    index is not always 0: with the time stepping of the papers, friction at low velocity does not fall below a spurious
-    lower limit. The result is None if friction is not proportional to velocity anywhere.
+    Friction at two neighbouring velocities is compared, for the realisations that succeeded at both. The index may
+    exceed 0: with the time stepping of the original papers, friction at low velocities has a spurious lower limit.
     """
     if velocity.size == 1:
         return 0
@@ -117,7 +120,7 @@ def loads_of_zone_one(force: FloatArray, known: NDArray[np.bool_]) -> list[NDArr
 
 
 def _zone_one(data: xr.Dataset) -> Variables:
-    """Fit ln (mu / v) against ln F_N in zone 1 and region I."""
+    """Fit the power law of mu / v against the load, in zone 1 and region I."""
     table = table_of(data, spectral_slope(data), *loads_and_velocities(data))
     force, velocity = table.columns
     rate = table.mean() / (np.sqrt(2) * velocity)
@@ -137,9 +140,9 @@ def _zone_one(data: xr.Dataset) -> Variables:
     found = power_law(x, logs, count)
     where = at_load(force[used])
     return {
-        **constant("alpha", -found.constants[:, 0], count, "exponent of the force in zone 1"),
-        **measure("alpha_stated", stated, "H / (1 + H) (eq. 3.13)"),
-        **constant("beta", np.exp(found.constants[:, 1]), count, "factor of the law of zone 1", positive=True),
+        **constant("alpha", -found.constants[:, 0], count, "exponent alpha of the law of zone 1"),
+        **measure("alpha_stated", stated, "alpha = H / (1 + H) by eq. 3.13"),
+        **constant("beta", np.exp(found.constants[:, 1]), count, "factor beta of the law of zone 1", positive=True),
         **measure("rms_error", found.rms, "rms relative departure from the law with the fitted constants"),
         **measure("loads", len(used), "number of loads in zone 1"),
         **holds(stated_power(x, logs, -stated, count, where), found.holds(where)),
@@ -147,35 +150,50 @@ def _zone_one(data: xr.Dataset) -> Variables:
 
 
 def _plateau(data: xr.Dataset) -> Variables:
-    """Return the largest friction over all velocities; compare it with the slopes of the whole line and in contact."""
+    """Find the largest friction over all velocities; compare it with the rms slopes of the line and in the contact."""
     require(data, "shear_modulus", "relaxation_time")
     velocities, form = _velocities(data)
     table = table_of(data, spectral_slope(data), velocities)
     known = np.flatnonzero(np.isfinite(table.mean()))
     velocity = table.columns[0][known]
     if velocity.size < 3 or not table.mean()[known].max() > 0:
-        raise FitError("expected friction at three or more velocities, for a maximum over them")
+        raise FitError(f"expected friction at three or more velocities, to find its maximum, got {velocity.size}")
     known = known[np.argsort(velocity)]
     x, count, stack = np.log(table.columns[0][known]), table.count(known), table.stack(known)
     found = top.highest(x, stack, count)
     ends = bootstrap.interval(found.rise, count)
     reached = _reached(x, found, (float(ends[0]), float(ends[1])), form)
     flat = stack[0] > (1 - top.FLAT) * stack[0].max()
-    height = constant("plateau", found.height, count, "largest friction coefficient over rms slope of the line")
+    height = constant("plateau", found.height, count, "largest mu divided by the rms slope of the line")
     if reached.startswith("no:"):
         height |= {f"plateau_{end}": xr.Variable((), np.nan, height["plateau"].attrs) for end in ("low", "high")}
     return {
         **height,
-        **measure("plateau_stated", math.sqrt(2), "sqrt 2 (eq. 3.15)"),
-        **measure("decades", float(np.ptp(x[flat]) / np.log(10)), f"decades of velocity within {top.FLAT:.0%} of it"),
-        **text("reached", reached, "whether friction reaches its largest value within the velocities"),
+        **measure("plateau_stated", math.sqrt(2), "sqrt 2, the plateau by eq. 3.15"),
+        **measure(
+            "decades", float(np.ptp(x[flat]) / np.log(10)), f"decades of velocity within {top.FLAT:.0%} of plateau"
+        ),
+        **text("reached", reached, "whether friction reaches its maximum within the range of velocities"),
         **_root_two(data, found.height, known[flat], count, reached),
     }
 
 
 def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], count: int, reached: str) -> Variables:
-    """Test mu = sqrt 2 slope with the slope in contact, as in eq. 3.15, and with the slope of the whole line."""
-    meaning = "largest friction coefficient over rms slope in contact"
+    """Test mu = sqrt 2 times the rms slope, with the slope in contact (eq. 3.15) and with the slope of the line.
+
+    Parameters
+    ----------
+    data : Dataset
+    height : array, shape (rows,)
+        Stack of the largest friction divided by the rms slope of the line.
+    flat : int array
+        Indices of the cases on the plateau.
+    count : int
+        Number of realisations.
+    reached : str
+        Sentence on whether friction reaches its maximum.
+    """
+    meaning = "largest mu divided by the rms slope in contact"
     if "contact_slope" in data:
         friction, slope = table_of(data, 1.0), table_of(data, 1.0, output="contact_slope")
         ratio = np.exp(bootstrap.difference(friction.logarithms(flat), slope.logarithms(flat)).mean(axis=1))
@@ -194,14 +212,26 @@ def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], coun
 
 
 def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str]:
-    """Return the velocity numbers (v tau if the study has no rms height), and a format to write one of them."""
+    """Return the dimensionless velocities and a format to write one of them; v tau if the study has no rms height."""
     if "rms_roughness" in data:
         return loads_and_velocities(data)[1], "v tau slope / (sqrt 2 h) = {:.2g}"
     return data["velocity"] * data["relaxation_time"], "v tau = {:.2g} m"
 
 
 def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: str) -> str:
-    """Return a sentence on whether friction has a maximum or levels off, or still changes at an end of the range."""
+    """Return a sentence on whether friction reaches a maximum or a constant value within the range of velocities.
+
+    Parameters
+    ----------
+    x : array, shape (velocities,)
+        Logarithms of velocity.
+    found : Top
+        The largest friction.
+    ends : (float, float)
+        Ends of the interval of d ln(friction) / d ln(velocity) at the largest friction.
+    place : str
+        Format to write the velocity of the maximum.
+    """
     at, rise = float(found.place[0]), float(found.rise[0])
     change = f"d ln mu / d ln v = {rise:.2g}"
     known = bool(np.isfinite(ends[0]))
@@ -212,14 +242,14 @@ def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: st
         end = "still rises at the largest velocity" if rise > 0 else "already falls at the lowest velocity"
         return f"no: the plateau is not reached, friction {end}, {change}"
     if abs(rise) > top.FLAT or (known and max(map(abs, ends)) > top.FLAT):
-        return f"not tested: because of the scatter it is open whether friction {end}, {change}"
+        return f"not tested: because of the scatter, it is uncertain whether friction {end}, {change}"
     if x[0] < at < x[-1] and abs(rise) < 1e-9:
         return f"yes: friction is largest at {place.format(np.exp(at))}"
-    return f"yes: friction is level at the end of the velocities, {change}"
+    return f"yes: friction is constant at the end of the range of velocities, {change}"
 
 
 def rising(force: FloatArray, velocity: FloatArray, mean: FloatArray, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the known cases in regions I to III: at each load, those up to the velocity of the largest friction."""
+    """Return which of the known cases are in regions I to III: at each load, the velocities up to the maximum."""
     used = known & (mean > 0)
     for load in np.unique(force[used]):
         same = np.flatnonzero(used & (force == load))
@@ -236,8 +266,8 @@ def _interpolation(data: xr.Dataset) -> Variables:
     used = rising(force, velocity, np.nan_to_num(table.mean()), force >= ZONE_ONE[0])
     if np.count_nonzero(used) < 5 or np.unique(velocity[used]).size < 3:
         raise FitError(
-            f"expected five cases with F_N / (G h L) above {ZONE_ONE[0]} at three velocities or more below region IV,"
-            f" got {int(used.sum())}"
+            f"expected five cases with F_N / (G h L) above {ZONE_ONE[0]}, at three or more velocities up to the largest"
+            f" friction, got {int(used.sum())}"
         )
     force, velocity, count = force[used], velocity[used], table.count(used)
 
@@ -251,10 +281,10 @@ def _interpolation(data: xr.Dataset) -> Variables:
     stated = laws.alpha(one_value(data, "hurst"))
     found, verdicts = nonlinear(model, np.array([stated, np.log(laws.BETA)]), table.logarithms(used), count, where)
     return {
-        **constant("alpha", found.constants[:, 0], count, "exponent of the force in the interpolation law"),
-        **measure("alpha_stated", stated, "H / (1 + H) (eq. 3.13)"),
-        **constant("beta", np.exp(found.constants[:, 1]), count, "factor of the interpolation law", positive=True),
-        **measure("cases", int(used.sum()), "number of cases fitted"),
+        **constant("alpha", found.constants[:, 0], count, "exponent alpha of eq. 3.17"),
+        **measure("alpha_stated", stated, "alpha = H / (1 + H) by eq. 3.13"),
+        **constant("beta", np.exp(found.constants[:, 1]), count, "factor beta of eq. 3.17", positive=True),
+        **measure("cases", int(used.sum()), "number of fitted cases"),
         **verdicts,
     }
 
@@ -271,7 +301,7 @@ FITS: tuple[Fit, ...] = (
     Fit(
         "plateau",
         MODELS,
-        "largest mu / slope over the velocities, beside sqrt 2 (eq. 3.15)",
+        "largest mu / slope over the velocities, compared with sqrt 2 (eq. 3.15)",
         lambda series: each(series, _velocity_axes, _plateau, FRICTION),
         apart=True,
         constants=("plateau", "plateau_of_contact"),
@@ -279,7 +309,7 @@ FITS: tuple[Fit, ...] = (
     Fit(
         "interpolation",
         MODELS,
-        "alpha and beta of the law of regions I to III and both zones (eq. 3.17)",
+        "alpha and beta of the law for both zones and regions I to III (eq. 3.17)",
         lambda series: each(series, load_and_velocity_axes, _interpolation, FRICTION),
         apart=True,
         constants=("alpha", "beta"),

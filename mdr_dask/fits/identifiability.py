@@ -1,4 +1,8 @@
-"""Find the unknowns that the data determine, and products of powers of the other unknowns that are determined."""
+"""Find the unknowns of a calibration that the data determine.
+
+The data may determine a product of powers of several unknowns, such as ``relaxation_time x rms_roughness^2``, although
+they do not determine the unknowns themselves.
+"""
 
 from __future__ import annotations
 
@@ -11,18 +15,18 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.posterior import Posterior
 
-#: The data leave an end of an axis open if ln(density) at this end is less than `OPEN` below the maximum of
-#: ln(density). For a normal density, the end then lies within two standard errors of the maximum.
+#: The data leave an end of an axis open if they hardly exclude this end: the logarithm of the posterior density at the
+#: end is less than `OPEN` below its maximum. For a normal density, this means within two standard errors.
 OPEN = 2.0
 #: An unknown is also undetermined if the unknowns with an open end explain more than this share of its variance.
 LINKED = 0.25
 #: A product is determined if the data reduce its spread to less than this fraction of the spread without data.
 NARROW = 0.25
-#: Exponents are rounded to halves or thirds if the spread of the product grows by at most this factor.
+#: Exponents of a product are rounded to halves or thirds if its spread grows by at most this factor.
 ROUNDED = 1.15
 #: Probability of each interval, by the suffix of the names of its ends.
 LEVELS = {"": 0.95, "_68": 0.6827}
-#: Suffixes of the names of the median and of the ends of the intervals. `SHARES` has the corresponding quantiles.
+#: Suffixes of the names of the median and of the ends of the intervals, and the corresponding probabilities.
 ENDS = ("", *(f"_{end}{kind}" for kind in LEVELS for end in ("low", "high")))
 SHARES = (0.5, *(0.5 + sign * level / 2 for level in LEVELS.values() for sign in (-1, 1)))
 
@@ -35,7 +39,7 @@ class Ends(NamedTuple):
 
 
 def open_ends(found: Posterior) -> list[Ends]:
-    """Return for each unknown which ends of its axis the data leave open."""
+    """Return for each unknown whether the data leave the ends of its axis open."""
     highest = found.density.max()
     ends = []
     for place in found.places.T:
@@ -47,8 +51,8 @@ def open_ends(found: Posterior) -> list[Ends]:
 def undetermined(found: Posterior, ends: Sequence[Ends]) -> list[int]:
     """Return the indices of the unknowns that the data do not determine.
 
-    These are the unknowns with an open end of their axis (see `OPEN`), and the unknowns whose posterior depends
-    strongly on an unknown with an open end (see `LINKED`).
+    The data leave an end of their axis open (see `OPEN`), or their values depend strongly on such an unknown (see
+    `LINKED`).
     """
     free = [k for k, end in enumerate(ends) if any(end)]
     if not free:
@@ -70,7 +74,7 @@ def _explained(centred: FloatArray, weights: FloatArray, k: int, by: list[int]) 
 
 
 class Product(NamedTuple):
-    """A product of powers of unknowns, which the data determine although they do not determine the unknowns themselves.
+    """A product of powers of unknowns that the data determine.
 
     Attributes
     ----------
@@ -90,8 +94,9 @@ def products(found: Posterior, values: FloatArray, free: Sequence[int]) -> list[
     Parameters
     ----------
     found : Posterior
+        Posterior density of all unknowns.
     values : array, shape (cells, unknowns)
-        The unknowns in SI.
+        The unknowns in SI units at the centre of each cell.
     free : sequence of int
         Indices of the unknowns that the data do not determine.
     """
@@ -124,7 +129,7 @@ def _reduced(rows: FloatArray) -> FloatArray:
 
 
 def _product(found: Posterior, logarithms: FloatArray, free: Sequence[int], row: FloatArray, unknowns: int) -> Product:
-    """Return a product; exponents are rounded to simple fractions if this hardly increases its spread."""
+    """Return a product; its exponents are rounded to simple fractions if this hardly increases its spread."""
     best = _spread(logarithms @ row, found.weights)
     for denominator in (1, 2, 3):
         plain = np.round(row * denominator) / denominator

@@ -1,4 +1,8 @@
-"""Fit the law of rough indenters (thesis eqs. 3.34 to 3.40) to a store."""
+"""Fit the law of friction for rough indenters (thesis eqs. 3.34 to 3.40).
+
+The law is mu / (sqrt 2 s) = (1 + xi^-n)^(-1/n) with the exponent n = 1.5. Here mu is the coefficient of friction, s the
+rms slope of the roughness, and xi is mu at low velocity, by eqs. 3.34 and 3.38, divided by sqrt 2 s.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +22,7 @@ BODY = 0.3  # the law applies up to this ratio of the rms slopes of the body in 
 
 
 def _body(data: xr.Dataset) -> tuple[Any, float]:
-    """Return coefficient c and exponent n of the line c |x|^n that replaces the indenter."""
+    """Return coefficient c and exponent n of the profile c |x|^n that replaces the indenter."""
     from mdr_dask.physics.surfaces import shapes as indenter  # it imports numba
 
     if "indenter_angle" in data.coords:
@@ -32,14 +36,14 @@ def _body(data: xr.Dataset) -> tuple[Any, float]:
 
 
 def _half_width(data: xr.Dataset) -> Any:
-    """Return the half width of the static contact without roughness."""
+    """Return the half width of the contact at rest and without roughness, in m."""
     coefficient, exponent = _body(data)
     load = data["normal_force"] / (4 * data["shear_modulus"])
     return ((exponent + 1) * load / (2 * exponent * coefficient)) ** (1 / (exponent + 1))
 
 
 def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
-    """Return the argument of the law of rough indenters: mu at low velocity / (sqrt 2 slope) (eqs. 3.34, 3.38)."""
+    """Return the argument xi of the law of rough indenters (see the docstring of the module)."""
     require(data, *KELVIN)
     low = laws.indenter_low(
         _half_width(data),
@@ -53,10 +57,10 @@ def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
 
 
 def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
-    """Return the cases to which the law of rough indenters applies.
+    """Return whether the law of rough indenters applies to each case.
 
-    In these cases the body is flat compared with the roughness, it is pressed in by more than the rms height, and the
-    velocity does not exceed the velocity of the largest friction, at which region IV begins.
+    The indenter must be flat compared with the roughness and pressed in by more than the rms height. The velocity must
+    not exceed the velocity of the largest friction.
     """
     coefficient, exponent = _body(data)
     width = _half_width(data)
@@ -81,9 +85,9 @@ def _indenter(data: xr.Dataset) -> Variables:
         errors = [f"{which}_error{suffix}" for suffix in ("", "_stated") for which in ("rms", "largest")]
         names = ["exponent", "exponent_low", "exponent_high", *errors]
         reason = (
-            f"not tested: {used.sum()} of {known.sum()} cases lie within the law, three are needed; in the others the"
-            f" body is steep against the roughness or barely pressed in, or the velocity lies beyond the largest"
-            f" friction"
+            f"not tested: the law applies to {used.sum()} of {known.sum()} cases, three are needed; in the others, the"
+            " indenter is steep compared with the roughness, is pressed in by less than the rms height, or slides"
+            " faster than at the largest friction"
         )
         return {name: xr.Variable((), np.nan, {"units": "1"}) for name in names} | measured | holds(reason, reason)
     xi, count = xi[used], table.count(used)
@@ -99,7 +103,7 @@ def _indenter(data: xr.Dataset) -> Variables:
 
     found, verdicts = nonlinear(model, np.log([laws.INDENTER_EXPONENT]), logs, count, where)
     return {
-        **constant("exponent", np.exp(found.constants[:, 0]), count, "exponent of the law of rough indenters", True),
+        **constant("exponent", np.exp(found.constants[:, 0]), count, "exponent n of the law of rough indenters", True),
         **measured,
         **verdicts,
     }
@@ -113,7 +117,7 @@ FITS: tuple[Fit, ...] = (
     Fit(
         "indenter",
         MODELS,
-        "exponent of mu / (sqrt 2 slope) = (1 + xi^-alpha)^(-1/alpha) for rough indenters (eq. 3.40)",
+        "exponent n of mu / (sqrt 2 slope) = (1 + xi^-n)^(-1/n) for rough indenters (eq. 3.40)",
         lambda series: each(series, _indenter_axes, _indenter, FRICTION),
         apart=True,
         constants=("exponent",),

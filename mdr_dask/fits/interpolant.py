@@ -1,4 +1,4 @@
-"""Make a dense table of an output of a study and its error; any program can interpolate this table linearly."""
+"""Convert an output of a study to a law: a dense table of the output and its error, for linear interpolation."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mdr_dask.fits.interpolation import FEWEST, LEFT, Scale, chord_error, cubic,
 from mdr_dask.models.base import Status
 from mdr_dask.questions.selection import written_apart
 
-#: Largest number of values of a table, and largest number of intervals of the table per interval of the study.
+#: Largest number of values of a table, and largest number of its intervals for one interval between computed values.
 LARGEST, PIECES = 2_000_000, 16
 
 
@@ -32,16 +32,16 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     Parameters
     ----------
     dataset : Dataset
-        A group of a study that is a grid. An axis with a single value becomes a fixed parameter. An axis of words
-        remains an axis of the table, without interpolation.
+        A group of a study that is a grid. An axis with a single value becomes a fixed parameter. An axis of words, or
+        with fewer than four numbers, remains an axis of the table without interpolation.
     output : str
         One of its outputs.
 
     Returns
     -------
     Dataset
-        ``<output>`` and ``<output>_error``. The error is the half width of the 95 % interval of the mean (scatter and
-        grid) plus the error of interpolation.
+        ``<output>`` and ``<output>_error``. The error is the half width of the 95 % interval of the mean, which
+        includes scatter and discretisation errors, plus the error of interpolation.
 
     Raises
     ------
@@ -50,11 +50,11 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
 
     Notes
     -----
-    To estimate the error of interpolation, every second value of each axis is left out and predicted from the other
-    values: first the values with odd indices are left out, then those with even indices.
+    To estimate the error of interpolation, the values with odd indices along an axis are left out and predicted from
+    the other values; then the same is done for the values with even indices.
     """
     if "case" in dataset.dims:
-        raise FitError("expected a grid, this is a sampled study: its cases have no axes")
+        raise FitError("expected a grid, got a sampled study, whose cases have no axes")
     mean, half = (array.squeeze() for array in _means(dataset, output))
     scale = Scale.of(mean.to_numpy()[mean.notnull().to_numpy()], spread=True)
     mean, half = _filled(mean, half, scale)
@@ -62,7 +62,8 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     if not axes:
         raise FitError(f"expected an axis of at least {FEWEST} numbers, got none")
     mean, half = (array.transpose(..., *axes) for array in (mean, half))
-    grids = {axis: dense(mean[axis].to_numpy(), _pieces(mean, axes)) for axis in axes}
+    pieces = int(np.clip((LARGEST / mean.size) ** (1 / len(axes)), 1, PIECES))
+    grids = {axis: dense(mean[axis].to_numpy(), pieces) for axis in axes}
     places = {k - len(axes): mean[axis].to_numpy() for k, axis in enumerate(axes)}
     table = scale.of_values(mean.to_numpy())
     error = half.to_numpy() + sum(left_out_error(scale, table, place, k) for k, place in places.items())
@@ -83,13 +84,15 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
 
 
 def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray]:
-    """Return the mean of an output, and the half width of its interval; if it has no interval, its grid error."""
+    """Return the mean of an output and the half width of its interval, or its discretisation error without interval."""
     if "realisation" not in dataset[output].dims:
         return dataset[output], xr.zeros_like(dataset[output])
     kept = [name for name in (output, dataset[output].attrs.get("ancillary_variables")) if name in dataset]
     reduced = aggregate(dataset[kept], ("mean", "interval", "grid_error"))
     mean, ends = reduced[f"{output}_mean"].load(), reduced[f"{output}_interval"].load()
-    missing = int((mean.isnull() & ~_spared(dataset)).sum())
+    missing = int(mean.isnull().sum())
+    if missing and "status" in dataset:  # an adaptive axis leaves out cases that it does not need
+        missing = int((mean.isnull() & ~(dataset["status"] == Status.NOT_NEEDED).all("realisation")).sum())
     if missing:
         raise FitError(
             f"{output}: {missing} of {mean.size} cases have no value; finish the run, or select a complete part by "
@@ -100,15 +103,8 @@ def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray
     return mean, half.fillna(0.0 if grid is None else grid.fillna(0.0)).where(mean.notnull())
 
 
-def _spared(dataset: xr.Dataset) -> xr.DataArray:
-    """Return the cases that were not computed because the adaptive axes do not need them."""
-    if "status" not in dataset:
-        return xr.DataArray(False)
-    return (dataset["status"] == Status.NOT_NEEDED).all("realisation")
-
-
 def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.DataArray, xr.DataArray]:
-    """Interpolate the cases that adaptive axes left out, and add the error of this interpolation."""
+    """Interpolate the cases that an adaptive axis left out, and add the error of this interpolation."""
     axes = [k for k, dim in enumerate(mean.dims) if _is_numeric(mean, str(dim))]
     table, error = scale.of_values(mean.to_numpy()).copy(), half.to_numpy().copy()
     for axis in axes * 2:  # twice, because values filled along one axis are used along the other axes
@@ -122,12 +118,11 @@ def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.Da
 
 
 def _between(scale: Scale, places: FloatArray, line: FloatArray, error: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return values along an axis, with missing values interpolated, and the errors of all values."""
+    """Return the values along an axis, with missing values interpolated, and the errors of all values."""
     known = np.isfinite(line)
     filled = cubic(places[known], line[known], places, 0, Scale.of(places))
-    left_out = (
-        left_out_error(scale, line[known], places[known], 0) / LEFT
-    )  # without the factor LEFT, because gaps at missing values are as wide as those in the estimate of the error
+    # the factor LEFT is removed, because gaps at missing values are as wide as those from which the error is estimated
+    left_out = left_out_error(scale, line[known], places[known], 0) / LEFT
     between = np.interp(places, places[known], error[known] + left_out)
     inside = (places >= places[known][0]) & (places <= places[known][-1])
     return np.where(inside, filled, np.nan), np.where(known, error, between)
@@ -135,12 +130,6 @@ def _between(scale: Scale, places: FloatArray, line: FloatArray, error: FloatArr
 
 def _is_numeric(mean: xr.DataArray, dim: str) -> bool:
     return dim in mean.coords and mean[dim].dtype.kind in "fiu" and mean.sizes[dim] >= FEWEST
-
-
-def _pieces(mean: xr.DataArray, axes: list[str]) -> int:
-    """Return the number of table intervals per interval of the study."""
-    room = (LARGEST / mean.size) ** (1 / len(axes))
-    return int(np.clip(room, 1, PIECES))
 
 
 def _provenance(dataset: xr.Dataset) -> dict[str, str]:
@@ -158,7 +147,7 @@ def _provenance(dataset: xr.Dataset) -> dict[str, str]:
 
 
 class Law:
-    """A law from a file written by ``mdr-dask law``; it can be evaluated at many points.
+    """A law from a file that ``mdr-dask law`` wrote. Call it to evaluate it at many points.
 
     Parameters
     ----------
@@ -188,7 +177,7 @@ class Law:
         Parameters
         ----------
         **places : array_like
-            A number or an array for every axis, in SI; the arrays are broadcast against each other.
+            A number or an array for every axis, in SI units; the arrays are broadcast against each other.
 
         Raises
         ------

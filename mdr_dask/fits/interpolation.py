@@ -8,10 +8,10 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 
-#: Least number of values of an axis: even if every second value is left out, enough values for a curve must remain.
+#: Smallest number of values along an axis: if every second one is left out, enough must remain for a curve.
 FEWEST = 4
-#: The error of interpolation between all values, divided by the error if only every second value is used. The ratio is
-#: 1/4 for an error of second order; at a kink it would be 1/2.
+#: Error of interpolation between all values, divided by the error between every second value. The ratio is 1/4 for an
+#: error of second order; at a kink it would be 1/2.
 LEFT = 0.25
 
 
@@ -23,10 +23,10 @@ class Scale:
 
     @classmethod
     def of(cls, numbers: FloatArray, spread: bool = False) -> Scale:
-        """Return the scale on which ascending numbers are more evenly spaced; it is linear unless all are positive.
+        """Return the scale for some numbers; it is linear unless all numbers are positive.
 
-        With `spread`, the numbers may have any order, and the criterion is another one: the scale is logarithmic if the
-        numbers span more than a decade.
+        Without `spread`, the numbers must ascend, and the scale is the one on which they are more evenly spaced. With
+        `spread`, the scale is logarithmic if the numbers span more than a decade.
         """
         if numbers.min() <= 0:
             return cls(False)
@@ -46,7 +46,7 @@ class Scale:
 
 
 def dense(places: FloatArray, pieces: int) -> FloatArray:
-    """Divide each interval between places into equal pieces on their scale; the result includes the given places."""
+    """Divide each interval between places into equal pieces on their scale; return all places, old and new."""
     scale = Scale.of(places)
     cut = [np.linspace(a, b, pieces, endpoint=False) for a, b in pairwise(scale.of_values(places))]
     grid = scale.back(np.concatenate([*cut, scale.of_values(places[-1:])]))
@@ -57,7 +57,7 @@ def dense(places: FloatArray, pieces: int) -> FloatArray:
 def cubic(
     places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int, scale: Scale | None = None
 ) -> FloatArray:
-    """Interpolate values along an axis at other places by monotone cubics; `scale` is that of the axis by default."""
+    """Interpolate values along an axis at the wanted places by monotone cubics, by default on `Scale.of` the places."""
     from scipy.interpolate import PchipInterpolator
 
     scale = scale or Scale.of(places)
@@ -68,7 +68,7 @@ def cubic(
 def linear(
     places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int, scale: Scale | None = None
 ) -> FloatArray:
-    """Interpolate values along an axis at other places linearly; `scale` as in `cubic`."""
+    """Interpolate values along an axis at the wanted places linearly, by default on `Scale.of` the places."""
     from scipy.interpolate import make_interp_spline
 
     scale = scale or Scale.of(places)
@@ -76,10 +76,10 @@ def linear(
 
 
 def left_out_error(scale: Scale, table: FloatArray, places: FloatArray, axis: int) -> FloatArray:
-    """Return the error of interpolation at every place of an axis, estimated by leaving out every second value.
+    """Estimate the error of interpolation at every place of an axis by leaving out every second value.
 
-    `table` contains values on `scale`, but the returned error is the error of the numbers themselves. The error of each
-    place is the largest of the estimates at this place and at its two neighbours.
+    `table` contains values on `scale`, but the returned error is that of the numbers themselves. The error of a place
+    is the largest of the estimates at this place and at its two neighbours.
     """
     values, truth = np.moveaxis(table, axis, -1), np.moveaxis(scale.back(table), axis, -1)
     most = np.zeros_like(truth)
@@ -93,7 +93,7 @@ def left_out_error(scale: Scale, table: FloatArray, places: FloatArray, axis: in
 
 
 def chord_error(table: FloatArray, grid: FloatArray, axis: int) -> FloatArray:
-    """Return the error of linear interpolation in a table: the second derivative times spacing^2 / 8."""
+    """Estimate the error of linear interpolation in a table: the second derivative times spacing^2 / 8."""
     values, steps = np.moveaxis(table, axis, -1), np.diff(grid)
     bend = np.abs(np.diff(np.diff(values) / steps)) / (steps[1:] + steps[:-1])
     inside = bend * np.maximum(steps[1:], steps[:-1]) ** 2 / 4

@@ -1,7 +1,12 @@
-"""Friction just after a jump of the velocity: its size, its law and the limits of the law (thesis eqs. 4.8 to 4.11).
+"""The jump of friction that a jump of the velocity causes: its size and its law (thesis eqs. 4.8 to 4.11).
 
-The velocity jumps at time t_0 from v_1 to v_2 = v_1 + dv. Friction is mu_1 before the jump and mu_2 long after it;
-d_mu_0 is the sudden change of friction at t_0. The symbol s means the rms slope.
+Symbols: The velocity jumps at the time t_0 from v_1 to v_2 = v_1 + dv. The coefficient of friction mu is mu_1 before
+the jump and mu_2 long after it. It changes by d_mu_0 at t_0, and relaxes from mu(t_0+) = mu_1 + d_mu_0 to mu_2 after
+it. The rms slope is s.
+
+Eq. 4.11 is d_mu_0 v_1 / (dv s) = [(s / mu_1)^2 + 1 / c^2]^(-1/2) with the constant c = 0.4. For slow sliding (region I)
+it becomes eq. 4.9, d_mu_0 / mu_1 = dv / v_1. On the plateau of friction it becomes eq. 4.10, in which the left side
+is c.
 """
 
 from __future__ import annotations
@@ -35,8 +40,8 @@ MODELS = ("velocity_jump",)
 LEVELS = ("friction_coefficient_before", "friction_coefficient_jump", "friction_coefficient_after")
 LEAST = 2  # smallest number of successful realisations of a case
 
-LAW = 0.4  # constant of eqs. 4.10 and 4.11 in the thesis
-REGION_ONE = 0.1  # up to this mu_1 / s, eqs. 4.9 and 4.11 differ by less than 3 %
+LAW = 0.4  # the constant c by the thesis
+REGION_ONE = 0.1  # below this mu_1 / s, friction counts as in region I; eqs. 4.9 and 4.11 then differ by less than 3 %
 PLATEAU = 1.1  # above this mu_1 / s, friction counts as on its plateau, where mu_1 / s is 1.26 to 1.44
 
 NUMBERS = {
@@ -44,15 +49,15 @@ NUMBERS = {
     "jump_over_slope": "d_mu_0 v_1 / (dv rms_slope)",
     "zeta": "zeta = (d_mu_0 / mu_1) / (dv / v_1), eq. 4.8",
     "xi": "xi = ((mu_2 - mu_1) / mu_1) / (dv / v_1), eq. 4.8",
-    "relaxing_over_slope": "relaxing part mu(t_0+) - mu_2 over rms_slope",
+    "relaxing_over_slope": "(mu(t_0+) - mu_2) / rms_slope: the relaxing part of friction",
     "direct_effect": "a = d_mu_0 / ln(v_2 / v_1)",
     "evolution_effect": "b = (mu(t_0+) - mu_2) / ln(v_2 / v_1)",
-    "velocity_dependence": "a - b = (mu_2 - mu_1) / ln(v_2 / v_1): above 0 friction grows with the velocity",
+    "velocity_dependence": "a - b = (mu_2 - mu_1) / ln(v_2 / v_1); positive if friction grows with the velocity",
 }
 
 
 def is_jump(data: xr.Dataset) -> bool:
-    """Return whether the loading history of all cases of a series is a sudden jump of the velocity."""
+    """Return whether the loading history of every case of a series is a jump of the velocity."""
     varied = any(axis["path"].split(".")[0] == "protocol" for axis in data.attrs.get("axes", []))
     history = json.loads(data.attrs.get("parameters", "{}")).get("protocol") or {}
     return not varied and history.get("shape", "jump") == "jump"
@@ -61,7 +66,9 @@ def is_jump(data: xr.Dataset) -> bool:
 def each_jump(
     series: Series, inner: Callable[[xr.Dataset], list[str]], fit: Callable[[xr.Dataset], Variables], *outputs: str
 ) -> xr.Dataset:
-    """Fit a law of jumps as `mdr_dask.fits.cases.each` does; the levels of friction and the slope are always needed.
+    """Fit a law as `mdr_dask.fits.cases.each` does, after checking that the series has jumps of the velocity.
+
+    The outputs `LEVELS` and ``rms_slope`` are always needed, `outputs` in addition.
 
     Raises
     ------
@@ -76,18 +83,13 @@ def each_jump(
     return each(series, inner, fit, *LEVELS, "rms_slope", *outputs)
 
 
-def single(data: xr.Dataset) -> list[str]:
-    """Return no dimensions, because every case is fitted on its own."""
-    return []
-
-
 class Jumps(NamedTuple):
-    """The levels of friction in some cases.
+    """Friction before, at and after the jump, in some cases.
 
     Attributes
     ----------
     before, jump, after : array, shape (1 + RESAMPLES + 2 groups, cases)
-        Stacks of mu_1, d_mu_0 and mu_2.
+        Stacks of mu_1, d_mu_0 and mu_2 (see `mdr_dask.bootstrap`).
     change, slope : array, shape (cases,)
         dv / v_1 and the rms slope. The slope is NaN for smooth lines.
     counts : int array, shape (cases,)
@@ -106,7 +108,7 @@ class Jumps(NamedTuple):
         return int(self.counts[used].min(initial=np.iinfo(np.intp).max))
 
     def numbers(self) -> dict[str, FloatArray]:
-        """Return stacks of all `NUMBERS`; zeta and xi are infinite or NaN where mu_1 is 0."""
+        """Return the stacks of all `NUMBERS`, by name; zeta and xi are infinite or NaN where mu_1 is 0."""
         before, jump, after, change, slope, _ = self
         logarithm = np.log1p(change)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -124,7 +126,7 @@ class Jumps(NamedTuple):
 
 
 def jumps_of(data: xr.Dataset) -> Jumps:
-    """Return the levels of friction in all cases."""
+    """Return friction before, at and after the jump in all cases of a series."""
     tables = [table_of(data, 1.0, data["velocity_change"], output=name) for name in LEVELS]
     values = np.stack([table.values.T for table in tables], axis=1)
     values = values + 0 * values.sum(axis=1, keepdims=True)  # a NaN in one level makes all three NaN
@@ -138,25 +140,12 @@ def jumps_of(data: xr.Dataset) -> Jumps:
 
 
 def _kinetics(case: xr.Dataset) -> Variables:
-    """Return the dimensionless numbers of the jump of a case, and the effects a and b of rate and state."""
+    """Return the `NUMBERS` of a case with their intervals."""
     jumps = jumps_of(case)
     found: Variables = {}
     for name, stack in jumps.numbers().items():
         found |= constant(name, stack[:, 0], int(jumps.counts[0]), NUMBERS[name])
     return found
-
-
-#: Limits of eq. 4.11. Each entry has the value of the limit, the name of the verdict, and the meanings of the mean and
-#: of the verdict.
-LIMITS = {
-    "zeta": (1.0, "zeta_holds", "mean zeta in region I; 1 by eq. 4.9", "whether zeta = 1 in region I (eq. 4.9)"),
-    "plateau_jump": (
-        LAW,
-        "plateau_holds",
-        "mean d_mu_0 v_1 / (dv rms_slope) on the plateau; 0.4 by eq. 4.10",
-        "whether it is 0.4 on the plateau (eq. 4.10)",
-    ),
-}
 
 
 def jump_law(before: FloatArray, constant: float | FloatArray) -> FloatArray:
@@ -166,7 +155,7 @@ def jump_law(before: FloatArray, constant: float | FloatArray) -> FloatArray:
 
 
 def _jump_law(data: xr.Dataset) -> Variables:
-    """Fit the constant of eq. 4.11 to all cases in regions I to III, and test its limits, eqs. 4.9 and 4.10."""
+    """Fit the constant of eq. 4.11 to all cases whose friction does not fall with the velocity; test eqs. 4.9, 4.10."""
     jumps = jumps_of(data)
     numbers = jumps.numbers()
     before, jump, zeta = numbers["before_over_slope"], numbers["jump_over_slope"], numbers["zeta"]
@@ -175,23 +164,29 @@ def _jump_law(data: xr.Dataset) -> Variables:
     known = rising & ~np.any(before <= 0, axis=0) & ~np.any(jump <= 0, axis=0)
     slow, fast = (before[0] < REGION_ONE) & np.isfinite(zeta[0]), (before[0] > PLATEAU) & rising
     if np.count_nonzero(known) < 2 and not slow.any() and not fast.any():
-        raise FitError(f"expected two or more cases in regions I to III whose friction jumps, got {int(known.sum())}")
+        raise FitError(
+            "expected two or more cases in which friction jumps and does not fall with the velocity, got "
+            f"{int(known.sum())}"
+        )
+    of_zeta = "mean zeta in region I; 1 by eq. 4.9", "whether zeta = 1 in region I (eq. 4.9)"
+    of_plateau = f"mean {NUMBERS['jump_over_slope']} on the plateau; 0.4 by eq. 4.10", "whether it is 0.4 (eq. 4.10)"
     return {
         **_constant(before[:, known], jump[:, known], jumps.count(known)),
-        **_limit("zeta", zeta[:, slow], jumps.count(slow)),
-        **_limit("plateau_jump", jump[:, fast], jumps.count(fast)),
+        **_limit("zeta", "zeta_holds", 1.0, zeta[:, slow], jumps.count(slow), *of_zeta),
+        **_limit("plateau_jump", "plateau_holds", LAW, jump[:, fast], jumps.count(fast), *of_plateau),
     }
 
 
 def _constant(before: FloatArray, jump: FloatArray, count: int) -> Variables:
-    """Return the constant of eq. 4.11 for some cases, from stacks of mu_1 / s and of d_mu_0 v_1 / (dv s)."""
-    measured = measure("constant_stated", LAW, "0.4") | measure("cases", jump.shape[1], "cases in regions I to III")
+    """Fit the constant of eq. 4.11 to stacks of mu_1 / s and of d_mu_0 v_1 / (dv s)."""
+    measured = measure("constant_stated", LAW, "constant c by the thesis")
+    measured |= measure("cases", jump.shape[1], "number of cases in regions I to III")
     if jump.shape[1] < 2:
         reason = "not tested: the constant needs two cases"
         return measured | holds(reason, reason)
 
     def model(constants: FloatArray) -> FloatArray:
-        # additional rows hold data shifted by the departures from the law; they use mu_1 of the first row
+        # rows of data shifted by the departures from the law are additional; they belong to mu_1 of the first row
         law: FloatArray = np.log(jump_law(before if len(constants) == len(before) else before[:1], np.exp(constants)))
         return law
 
@@ -200,34 +195,39 @@ def _constant(before: FloatArray, jump: FloatArray, count: int) -> Variables:
 
     found, verdicts = nonlinear(model, np.log([LAW]), np.log(jump), count, where)
     if np.isnan(found.constants[0, 0]):
-        reason = f"not tested: mu_1 / rms_slope is at most {before[0].max():.2g}, where the constant plays no part"
+        reason = f"not tested: mu_1 / rms_slope is at most {before[0].max():.2g}; the constant has no effect there"
         verdicts = verdicts | holds(reason)
     stack = np.exp(found.constants[:, 0])
     return constant("constant", stack, count, "constant c of eq. 4.11", positive=True) | measured | verdicts
 
 
-def _limit(name: str, stack: FloatArray, count: int) -> Variables:
-    """Return the mean of a number over the cases of a region, and a sentence on whether the mean equals the limit."""
-    limit, verdict_name, meaning, question = LIMITS[name]
+def _limit(
+    name: str, verdict_name: str, stated: float, stack: FloatArray, count: int, meaning: str, question: str
+) -> Variables:
+    """Return the mean of a number over some cases, and a sentence on whether the number has its stated value.
+
+    `meaning` describes the mean, and `question` the sentence.
+    """
     if not stack.shape[1]:
         nothing = constant(name, np.full(1 + bootstrap.RESAMPLES, np.nan), count, meaning)
         return nothing | text(verdict_name, "not tested: no case in this region", question)
     mean = constant(name, stack.mean(axis=1), count, meaning)
-    return mean | text(verdict_name, verdict(stack / limit - 1, count), question)
+    return mean | text(verdict_name, verdict(stack / stated - 1, count), question)
 
 
 TRENDS = {
-    "zeta": "zeta of eq. 4.8 in the limit of a small jump",
-    "zeta_trend": "relative change of zeta with dv / v_1",
-    "xi": "xi of eq. 4.8 in the limit of a small jump",
-    "xi_trend": "change of xi with dv / v_1, over zeta",
+    "zeta": "zeta of eq. 4.8, extrapolated to dv = 0",
+    "zeta_trend": "slope of zeta against dv / v_1, divided by zeta at dv = 0",
+    "xi": "xi of eq. 4.8, extrapolated to dv = 0",
+    "xi_trend": "slope of xi against dv / v_1, divided by zeta at dv = 0",
 }
 
 
 def _jump_linearity(data: xr.Dataset) -> Variables:
     """Fit straight lines to zeta and xi against dv / v_1; according to eq. 4.8, zeta and xi are constant."""
     if np.unique(data["velocity_change"]).size < 3:
-        raise FitError("expected a series with jumps dv / v_1 of three sizes or more")
+        sizes = np.unique(data["velocity_change"]).size
+        raise FitError(f"expected jumps dv / v_1 of three sizes or more, got {sizes}")
     jumps = jumps_of(data)
     numbers = jumps.numbers()
     both = np.stack([numbers["zeta"], numbers["xi"]], axis=1)
@@ -256,7 +256,7 @@ def _jump_linearity(data: xr.Dataset) -> Variables:
     sentence = flat.holds(lambda k: f"dv / v_1 = {change[k % change.size]:.2g}, relative to zeta")
     return (
         found
-        | measure("rms_error", flat.rms, "rms departure from the means of zeta and xi, over zeta")
+        | measure("rms_error", flat.rms, "rms departure of zeta and xi from their means, divided by the mean zeta")
         | holds(sentence)
     )
 
@@ -265,8 +265,8 @@ FITS: tuple[Fit, ...] = (
     Fit(
         "kinetics",
         MODELS,
-        "jump of every case: d_mu_0 v_1 / (dv s), zeta, xi, relaxing part, and a and b of rate and state",
-        lambda series: each_jump(series, single, _kinetics),
+        "numbers of the jump of every case: d_mu_0 v_1 / (dv s), zeta, xi, relaxing part, a and b of rate and state",
+        lambda series: each_jump(series, lambda data: [], _kinetics),
         apart=True,
         constants=tuple(NUMBERS),
     ),

@@ -1,4 +1,8 @@
-"""Test a model against measured points: by chi squared if their errors are known, else by a trend of the residuals."""
+"""Test a model against measured points.
+
+If the errors of measurement are known, chi squared is used. Otherwise a trend of the residuals counts against the
+model.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,7 @@ from scipy.special import chdtrc, fdtrc
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import APPROXIMATE, DOUBTFUL, WITHIN
 
-#: A trend of the residuals counts against the model if the probability that it is due to chance is below this.
+#: A trend of the residuals counts against the model if chance causes such a trend with a probability below this.
 TREND = 0.005
 #: Least number of points whose residuals can show a trend.
 FEWEST = 6
@@ -47,13 +51,16 @@ class Residuals(NamedTuple):
 
 
 def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str:
-    """Return a sentence on whether the model explains the points; *not tested* if errors would hide any misfit."""
+    """Return a sentence on whether the model explains the measured points, with the verdicts of a law.
+
+    The verdict is *not tested* if the errors are so large that they would hide any misfit.
+    """
     size = f"residuals are {100 * residuals.relative:.2g} % of the measured values, rms"
     hidden = (
         f"not tested: errors of {100 * residuals.errors:.2g} % of the measured values would hide any misfit; {size}"
     )
     if residuals.freedom < 1:
-        return "not tested: there are no more points than constants"
+        return "not tested: there are no more points than constants that the data determine"
     if np.isfinite(residuals.chi_squared):
         test = f"chi squared {residuals.chi_squared:.3g}, {residuals.freedom} degrees of freedom"
         about = f"({test}, probability {residuals.chance:.2g}); {size}"
@@ -67,15 +74,14 @@ def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str
         return f"no: the residuals have a trend along {along} (by chance with probability {probability:.1g}); {size}"
     if residuals.errors > APPROXIMATE:
         return hidden
-    return f"yes: the residuals have no trend that counts (by chance with probability {probability:.2g}); {size}"
+    return f"yes: the residuals have no significant trend (by chance with probability {probability:.2g}); {size}"
 
 
 def trend(scaled: FloatArray, conditions: Mapping[str, FloatArray]) -> tuple[float, str]:
-    """Return the probability that a trend of the residuals is due to chance, and the condition that shows the trend.
+    """Return the probability that chance causes such a trend of the residuals, and the condition along which it occurs.
 
-    For each condition, a parabola is fitted to the residuals against the rank of the condition. The smallest
-    probability of all conditions is multiplied by the number of conditions, because the best of several tests is
-    chosen.
+    A parabola is fitted to the residuals against the rank of each condition. The condition with the smallest
+    probability is returned. This probability is multiplied by the number of conditions, because several were tried.
     """
     worst, along = 1.0, ""
     for name, values in conditions.items():

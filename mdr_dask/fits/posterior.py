@@ -1,4 +1,8 @@
-"""The posterior density of a few unknowns, on cells that are refined where the density is high."""
+"""The posterior density of a few unknowns.
+
+Each unknown is mapped to the interval from 0 to 1, by its linear or logarithmic axis. The resulting unit cube is
+divided into cells, which are divided further where the density is high.
+"""
 
 from __future__ import annotations
 
@@ -13,60 +17,61 @@ from mdr_dask.fits.prediction import Predicted, Prediction
 
 #: Number of cells along each unknown before refinement, by the number of unknowns.
 START = {1: 64, 2: 24, 3: 12, 4: 8}
-#: `BEST`: least number of cells that are refined, by the number of unknowns. `MOST`: largest number of cells after a
-#: refinement.
+#: `BEST`: smallest number of cells that are divided in a refinement, by the number of unknowns. `MOST`: largest number
+#: of cells after a refinement.
 BEST, MOST = {1: 32, 2: 256, 3: 768, 4: 1536}, 160_000
 #: Cells are left out if their ln(density) is more than this below the maximum. Together, such cells have a probability
 #: below 1e-5.
 REACH = 14.0
-#: Refinement ends when ln(density) varies within a cell by less than this, on average over the cells.
+#: Refinement ends when ln(density) varies by less than this between the parts of a cell, on average over the cells.
 SMOOTH = 0.6
 #: Largest number of refinements.
 LEVELS = 16
 #: Number of sizes of the error of measurement that are considered if the table states no error.
 DEVIATIONS = 14
-#: Largest number of elements of an array in one step of the likelihood.
+#: The likelihood is evaluated in steps, in order that no array has more elements than this.
 _STEP = 2**21
 
 
 class Noise(NamedTuple):
-    """Errors of measurement, of one known size or of several possible sizes.
+    """Errors of measurement: their pattern over the points, and their size, which may be unknown.
 
     Attributes
     ----------
     sizes : array, shape (sizes,)
-        Factors by which `pattern` is multiplied; a single factor 1 if the errors are known.
+        Possible factors of the pattern; only 1 if the errors are known.
     pattern : array, shape (points,), or None
-        Standard deviations of the points for the factor 1; None for errors proportional to the predicted values.
+        Standard deviations of the points for the factor 1; None if these are the absolute predicted values.
     """
 
     sizes: FloatArray
     pattern: FloatArray | None
 
     def variances(self, mean: FloatArray) -> FloatArray:
-        """Return variances, shape (sizes, sets, points)."""
+        """Return the variances for predicted values of shape (sets, points); shape (sizes, sets, points)."""
         pattern = np.abs(mean) if self.pattern is None else np.broadcast_to(self.pattern, mean.shape)
         square: FloatArray = self.sizes[:, None, None] ** 2 * pattern**2
         return square
 
 
 def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) -> Callable[[FloatArray], FloatArray]:
-    """Return the likelihood of measured values for a prediction, including the errors of the prediction.
+    """Return the likelihood of measured values as a function of the unknowns.
 
     Parameters
     ----------
     prediction : Prediction
+        Prediction of the measured values, with errors that are taken into account.
     values : array, shape (points,)
         Measured values.
     noises : list of Noise
-        Possible errors of measurement. All elements of the list have the same prior probability, and within one element
-        all sizes have the same prior probability.
+        Possible errors of measurement. All elements have the same prior probability, and so have all sizes within one
+        element.
 
     Returns
     -------
     callable
-        Takes places in the unit cube, shape (sets, unknowns), and returns log-likelihoods, shape (sets, sizes of all
-        noises).
+        Takes places in the unit cube, shape (sets, unknowns), and returns logarithms of the likelihood, shape (sets,
+        sizes of all noises).
     """
 
     def of(places: FloatArray) -> FloatArray:
@@ -84,10 +89,10 @@ def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) 
 
 
 def distance(values: FloatArray, predicted: Predicted, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return chi squared and the logarithm of the determinant of the covariance, each of shape (sets,).
+    """Return chi squared of the measured values, and the logarithm of the determinant of the covariance; shape (sets,).
 
-    The covariance is diagonal except for a few errors that all points share. Woodbury's identity includes these errors
-    without inverting a large matrix.
+    `noise` are the variances of the errors of measurement. The covariance is diagonal, apart from a few errors that all
+    points share. Woodbury's identity avoids the inversion of a large matrix.
     """
     variance = np.maximum(predicted.alone + noise, np.finfo(float).tiny)
     residual = values - predicted.mean
@@ -106,11 +111,11 @@ class Posterior(NamedTuple):
     Attributes
     ----------
     places : array, shape (cells, unknowns)
-        Centres of the cells; 0 and 1 are the ends of the linear or logarithmic axes.
+        Centres of the cells.
     weights : array, shape (cells,)
         Probability of each cell; the sum is 1.
     density : array, shape (cells,)
-        Logarithm of the density, up to a constant.
+        Logarithm of the density, apart from an additive constant.
     noise : array, shape (cells, sizes)
         Probability of each size of the error of measurement in each cell.
     width : float
@@ -130,7 +135,7 @@ class Posterior(NamedTuple):
 
 
 def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> Posterior:
-    """Return the posterior density on cells of the unit cube, refined where it is high; the prior is uniform.
+    """Return the posterior density on cells of the unit cube, for a uniform prior.
 
     Parameters
     ----------
@@ -158,9 +163,9 @@ def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> 
 
 
 def _kept(density: FloatArray, fewest: int, most: int) -> NDArray[np.intp]:
-    """Return the cells to refine: all cells of high density, but at least `fewest`.
+    """Return the indices of the cells to divide: all cells of high density, but at least `fewest` cells.
 
-    If there are more than `most` such cells, a random selection of them is refined.
+    If there are more than `most` such cells, a random selection of them is divided.
     """
     order = np.argsort(density)[::-1]
     number = max(int((density > density.max() - REACH).sum()), min(fewest, density.size))

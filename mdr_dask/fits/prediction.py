@@ -20,27 +20,28 @@ from mdr_dask.questions.selection import written_apart
 if TYPE_CHECKING:
     from scipy.interpolate import RegularGridInterpolator
 
-#: `MOST`: largest number of unknowns. `LARGEST`: largest number of values of the dense table that is interpolated
-#: linearly.
-MOST, LARGEST = 4, 4e6
-#: Largest number of table intervals per interval of the study.
-PIECES = 16
+#: Largest number of unknowns.
+MOST = 4
+#: Means are interpolated linearly in a dense table: largest number of its values, and largest number of its intervals
+#: for one interval between computed values.
+LARGEST, PIECES = 4e6, 16
 #: Relative difference up to which a measured and a computed value of a parameter count as equal.
 SAME = 1e-6
-#: The scatter that all cases share, because they use the same lines, is represented by a few modes. `MODES` is their
-#: largest number, `SHARE` the share of the variance that is enough.
+#: The scatter of different cases is correlated, because they use the same rough lines. A few modes represent it:
+#: largest number of modes, and share of the variance that they must represent.
 MODES, SHARE = 6, 0.999
 
 
 class Predicted(NamedTuple):
-    """Prediction for several sets of unknowns.
+    """Predicted values of the output at the measured points, for several sets of unknowns.
 
     Attributes
     ----------
     mean : array, shape (sets, points)
+        Mean over the realisations.
     together : array, shape (sets, points, modes)
-        Errors that all points share; each mode is a vector of standard deviations. These errors are due to the scatter
-        of the lines, the grid and the interpolation.
+        Errors that all points share, due to the scatter of the lines, the grid and the interpolation. Each mode is a
+        vector of standard deviations.
     alone : array, shape (sets, points)
         Variance of the errors that are independent for each point.
     """
@@ -52,14 +53,14 @@ class Predicted(NamedTuple):
 
 @dataclass(frozen=True)
 class Prediction:
-    """Means at the measured points and their errors, interpolated over the unknowns of a study.
+    """The output at the measured points and its errors, interpolated over the unknowns of a study.
 
     Parameters
     ----------
     unknowns : dict of str to array
-        Computed values of each unknown, ascending.
+        Values of each unknown in the study, ascending.
     realisations : int
-        Number of lines.
+        Number of realisations in the study.
     logarithmic : bool
         Whether the logarithm of the output is interpolated.
     """
@@ -77,15 +78,14 @@ class Prediction:
 
     def values(self, places: FloatArray) -> FloatArray:
         """Return the unknowns at places in the unit cube, where 0 and 1 are the ends of their axes."""
-        return np.stack([self._of(k, places[:, k]) for k in range(places.shape[1])], axis=1)
-
-    def _of(self, k: int, place: FloatArray) -> FloatArray:
-        scale, axis = self.scales[k], [*self.unknowns.values()][k]
-        low, high = scale.of_values(axis[[0, -1]])
-        return scale.back(low + (high - low) * place)
+        found = []
+        for scale, axis, place in zip(self.scales, self.unknowns.values(), places.T, strict=True):
+            low, high = scale.of_values(axis[[0, -1]])
+            found.append(scale.back(low + (high - low) * place))
+        return np.stack(found, axis=1)
 
     def __call__(self, places: FloatArray) -> Predicted:
-        """Predict at places in the unit cube, shape (sets, unknowns)."""
+        """Return the prediction for places in the unit cube, shape (sets, unknowns)."""
         mean = self._mean(places)
         errors = self._errors(places)
         alone, systematic, modes = errors[..., 0], errors[..., 1], errors[..., 2:]
@@ -95,7 +95,7 @@ class Prediction:
 
 
 def prediction(dataset: xr.Dataset, measured: Measured) -> Prediction:
-    """Return the prediction of a study at measured points.
+    """Return the prediction of a study at the measured points, as a function of the unknowns.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def prediction(dataset: xr.Dataset, measured: Measured) -> Prediction:
     """
     output = dataset[measured.output]
     if "case" in output.dims:
-        raise FitError("calibration needs a grid, this is a sampled study: its cases have no axes")
+        raise FitError("expected a grid, got a sampled study, whose cases have no axes")
     dataset = _at_fixed(dataset, measured)
     unknowns = _unknowns(dataset, measured)
     along = [str(dim) for dim in dataset[measured.output].dims if dim in measured.conditions]
@@ -120,9 +120,14 @@ def prediction(dataset: xr.Dataset, measured: Measured) -> Prediction:
         ],
         axis=-2,
     )
-    _require_whole(at_points, measured, unknowns)
-    count = dataset.sizes.get("realisation", 1)
-    return _interpolators(at_points, unknowns, count, logarithmic)
+    missing = at_points[..., 1] > 0
+    if missing.any():
+        raise FitError(
+            f"{measured.output}: {int(missing.sum())} of the {missing.size} values that are needed to compare the "
+            f"study with {measured.source} are missing; finish the run, or select a complete part by --select "
+            f"{next(iter(unknowns))}=..."
+        )
+    return _interpolators(at_points, unknowns, dataset.sizes.get("realisation", 1), logarithmic)
 
 
 def _at_fixed(dataset: xr.Dataset, measured: Measured) -> xr.Dataset:
@@ -143,8 +148,8 @@ def _at_fixed(dataset: xr.Dataset, measured: Measured) -> xr.Dataset:
             worst = int(np.flatnonzero(off)[0])
             measured_at, *known = written_apart(str(held.attrs.get("units", "1")), wanted[worst], *ends)
             place = f"{measured.source}:{measured.lines[worst].number}"
-            has = f"has it from {' to '.join(known)}" if held.ndim else f"holds it at {known[0]}"
-            raise DataError(f"{place}: {name} of {measured_at}: this study {has}")
+            range_of_study = " to ".join(known) if held.ndim else f"{known[0]} only"
+            raise DataError(f"{place}: {name} is {measured_at}, but this study has {range_of_study}")
     return dataset
 
 
@@ -153,15 +158,15 @@ def _unknowns(dataset: xr.Dataset, measured: Measured) -> dict[str, FloatArray]:
     free = [str(d) for d in dataset[measured.output].dims if d != "realisation" and d not in measured.conditions]
     for name in free:
         if name not in dataset.coords or dataset[name].dtype.kind not in "fiu":
-            raise FitError(f"the axis {name} has words: choose one of them with --select")
+            raise FitError(f"expected numbers on the axis {name}, got words: choose one of them with --select")
         if dataset.sizes[name] < FEWEST:
             raise FitError(
                 f"expected at least {FEWEST} values of the unknown {name}, got {dataset.sizes[name]}; add values to "
-                "the campaign, or name it in the table if it was measured"
+                f"the campaign, or a column {name} to the table if it was measured"
             )
     if not 1 <= len(free) <= MOST:
-        found = ", ".join(free) or "none: every axis is a column of the table"
-        raise FitError(f"expected one to {MOST} unknowns, which are axes that the table does not name, got {found}")
+        found = ", ".join(free) or "none"
+        raise FitError(f"expected one to {MOST} axes of the study that are not columns of the table, got {found}")
     return {name: dataset[name].to_numpy().astype(np.float64) for name in free}
 
 
@@ -174,10 +179,11 @@ def _is_computed(axis: FloatArray, wanted: FloatArray) -> bool:
 def _fields(
     dataset: xr.Dataset, output: str, along: Sequence[str], unknowns: Sequence[str], between: Mapping[str, bool]
 ) -> tuple[FloatArray, bool]:
-    """Return the fields that are interpolated, and whether the field of the mean contains logarithms.
+    """Return the numbers of every case that are interpolated, and whether the means are replaced by their logarithms.
 
-    The shape is (conditions ..., unknowns ..., fields). The fields are the mean, a flag for a missing mean, the
-    independent scatter, the error of grid and interpolation, and the common modes of the scatter.
+    The shape is (conditions ..., unknowns ..., numbers). The numbers of a case are its mean, a flag for a missing mean,
+    the part of the scatter that is independent of other cases, the error of grid and interpolation, and the modes of
+    the common scatter.
     """
     order = [*along, *unknowns]
     array = dataset[output]
@@ -209,7 +215,7 @@ def _fields(
 
 
 def _and_neighbours(absent: NDArray[np.bool_], axis: int) -> NDArray[np.bool_]:
-    """Return missing cases and their neighbours, because cubics at the neighbours depend on the missing cases."""
+    """Return the missing cases and their neighbours: a cubic between two cases also depends on the next cases."""
     along = np.moveaxis(absent, axis, 0).copy()
     before = along.copy()
     along[1:] |= before[:-1]
@@ -221,23 +227,24 @@ def _long_enough(dataset: xr.Dataset, axis: str) -> FloatArray:
     places: FloatArray = dataset[axis].to_numpy().astype(np.float64)
     if places.size < FEWEST:
         raise FitError(
-            f"measured points lie between the {places.size} values of {axis}: expected at least {FEWEST} values of it, "
-            "or those that were measured"
+            f"expected at least {FEWEST} values of {axis}, because measured points lie between its values, got "
+            f"{places.size}; add values to the campaign, such as those of the measured points"
         )
     return places
 
 
 def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the part of the standard error that is independent for each case, and the common modes of the scatter.
+    """Return the part of the standard error that is independent for each case, and the modes of the common scatter.
 
-    The errors of the means of different cases are correlated, because all cases are computed on the same lines. The
-    scatter is multiplied by a factor from Student's t, because a few lines do not determine it well.
+    The scatter is multiplied by a factor from Student's t, because a few realisations do not determine it well.
     """
     count = deviations.shape[-1]
     if count < 2:
         return np.zeros_like(mean), np.zeros((*mean.shape, 0))
     spare = np.maximum(number * (number - 1), 1)
-    each = np.nan_to_num(deviations) * (_widened(number) / np.sqrt(spare))[..., None]
+    few = np.maximum(number, 2)
+    widened = bootstrap.widening(few) * np.sqrt((few - 1) / few)  # quantile of Student's t over that of the normal law
+    each = np.nan_to_num(deviations) * (widened / np.sqrt(spare))[..., None]
     size = np.where(np.abs(mean) > 0, np.abs(mean), 1.0)
     relative = np.nan_to_num(each / size[..., None]).reshape(-1, count)
     power, lines = np.linalg.eigh(relative.T @ relative)
@@ -248,15 +255,8 @@ def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray)
     return np.sqrt(rest), modes
 
 
-def _widened(number: NDArray[np.intp]) -> FloatArray:
-    """Return, for a number of lines, the 97.5 % quantile of Student's t divided by that of the normal distribution."""
-    few = np.maximum(number, 2)
-    widened: FloatArray = bootstrap.widening(few) * np.sqrt((few - 1) / few)
-    return widened
-
-
 def _at_point(fields: FloatArray, axes: Sequence[FloatArray], place: Sequence[float]) -> FloatArray:
-    """Return the fields at a measured point, interpolated along the first dimensions, one condition after the other."""
+    """Interpolate the numbers of the cases (see `_fields`) to a measured point, one condition after the other."""
     for axis, wanted in zip(axes, place, strict=True):
         nearest = int(np.argmin(np.abs(axis - wanted)))
         if _is_computed(axis, np.array([wanted])):
@@ -272,20 +272,10 @@ def _at_point(fields: FloatArray, axes: Sequence[FloatArray], place: Sequence[fl
     return fields
 
 
-def _require_whole(at_points: FloatArray, measured: Measured, unknowns: Mapping[str, FloatArray]) -> None:
-    missing = at_points[..., 1] > 0
-    if missing.any():
-        raise FitError(
-            f"{measured.output}: of the {missing.size} values that {measured.source} is compared with, "
-            f"{int(missing.sum())} "
-            f"are not in the study; finish the run, or select a complete part by --select {next(iter(unknowns))}=..."
-        )
-
-
 def _interpolators(
     at_points: FloatArray, unknowns: Mapping[str, FloatArray], count: int, logarithmic: bool
 ) -> Prediction:
-    """Return a prediction that interpolates linearly: means on a dense table, errors on the grid of the study."""
+    """Return a prediction that interpolates linearly: means in a dense table, errors between the computed values."""
     from scipy.interpolate import RegularGridInterpolator
 
     scales = [Scale.of(values) for values in unknowns.values()]

@@ -1,6 +1,12 @@
 """Relaxation of friction after a jump of the velocity: one exponential and its rate (thesis eqs. 4.5 to 4.15).
 
-`mdr_dask.fits.jumps` defines the symbols. In addition, t' = (t - t_0) / tau.
+Symbols: The velocity jumps at the time t_0 from v_1 to v_2 = v_1 + dv. The coefficient of friction mu is mu_1 before
+the jump and mu_2 long after it; it changes by d_mu_0 at t_0. The rms slope is s. The body has the relaxation time tau,
+and t' = (t - t_0) / tau. The largest wave number of the roughness is q_max.
+
+By eqs. 4.13 to 4.15, mu - mu_2 is proportional to exp(-b t') and begins at mu_1 + d_mu_0 - mu_2, with d_mu_0 by
+eq. 4.11. By eq. 4.12, the rate b is a power of v_1 tau q_max. The power is 1 below v_1 tau q_max = 1, and 1 - H above
+it, with the Hurst exponent H.
 """
 
 from __future__ import annotations
@@ -26,24 +32,23 @@ from mdr_dask.fits.cases import (
     table_of,
     text,
 )
-from mdr_dask.fits.jumps import LAW, LEAST, LEVELS, MODELS, each_jump, jump_law, jumps_of, single
+from mdr_dask.fits.jumps import LAW, LEAST, LEVELS, MODELS, each_jump, jump_law, jumps_of
 
-WINDOW = 8.0  # length of the fitted part of a trace, in units of 1 / (rate by eq. 4.12)
-FLOOR = 0.01  # assumed grid error at every moment, as a fraction of the largest value of the trace (docs/kinetics.md)
+WINDOW = 8.0  # the exponential is fitted up to t' = WINDOW / (rate by eq. 4.12)
+FLOOR = 0.01  # assumed grid error of mu - mu_2 at every moment, divided by its largest value (docs/kinetics.md)
 GRID = 400  # number of rates that are tried, evenly spaced on a logarithmic scale
 
 TRUSTED = 0.5  # a rate is used to fit the power law if the half width of the interval of ln(rate) is below this
 SURE = 0.1  # added in quadrature to the error of ln(rate) in the weights, so that no single rate dominates the fit
-INSTANT = 1e-9  # no relaxation is fitted if the relaxing part of friction is smaller than this times the rms slope
+INSTANT = 1e-9  # no relaxation is fitted if mu - mu_2 is always smaller than this times the rms slope
 
 TRACE = "friction_coefficient"
 #: Constants of the relaxation of a case, with units and meanings.
 FIELDS = {
-    "rate": ("1", "rate b of one exponential in t' = (t - t_0) / tau, eq. 4.5; weights 1 / variance of the mean"),
-    "integral_rate": ("1", "relaxing part at t_0+ over its integral in t': a rate without a model"),
-    "relaxation_duration": ("s", "tau / b"),
-    "relaxation_length": ("m", "v_2 tau / b: slip length D_c of rate and state"),
-    "length_times_wavenumber": ("1", "q_max v_2 tau / b: 1 if the length is that of the smallest asperities"),
+    "rate": ("1", "rate b of one exponential exp(-b t') with t' = (t - t_0) / tau (eq. 4.5)"),
+    "integral_rate": ("1", "mu - mu_2 just after t_0, divided by its integral over t': a rate without a model"),
+    "relaxation_duration": ("s", "tau / b: time in which mu - mu_2 decreases by the factor e"),
+    "relaxation_length": ("m", "v_2 tau / b: slip length D_c of rate-and-state laws"),
 }
 
 
@@ -51,20 +56,20 @@ FIELDS = {
 
 
 class Relaxation(NamedTuple):
-    """One exponential fitted to a mean trace.
+    """One exponential fitted to a trace, which is the mean of mu - mu_2 as a function of time.
 
     Attributes
     ----------
-    rate, amplitude, integral_rate : array, shape (rows,)
-        Stacks of the fitted rate, of the amplitude, and of the rate that follows from the integral of the trace. If
-        scatter and errors do not explain the departures of the trace from one exponential, `rate` has additional rows
-        at its end: rates fitted to the trace shifted by these departures, and the integral rate.
+    rate, integral_rate : array, shape (rows,)
+        Stacks of the fitted rate, and of the rate that follows from the integral of the trace (see
+        `mdr_dask.bootstrap`). If scatter and errors do not explain the departures of the trace from one exponential,
+        `rate` has additional rows at its end: rates fitted to the trace shifted by these departures, and the integral
+        rate. They widen the interval.
     holds : str
-        Whether one exponential fits; departures are relative to the largest relaxing part.
+        Sentence on whether one exponential fits; its departures are relative to the largest value of the trace.
     """
 
     rate: FloatArray
-    amplitude: FloatArray
     integral_rate: FloatArray
     holds: str
 
@@ -73,18 +78,6 @@ def widths(time: FloatArray) -> FloatArray:
     """Return the weights of the trapezoidal rule."""
     step = np.diff(time)
     weights: FloatArray = 0.5 * (np.append(step, 0.0) + np.append(0.0, step))
-    return weights
-
-
-def point_weights(time: FloatArray, trace: FloatArray, error: FloatArray) -> FloatArray:
-    """Return the weight of each moment of a mean trace: its duration divided by its variance.
-
-    On a logarithmic grid, the early moments are dense and their neighbours carry the same information. Weights in
-    proportion to the duration correct for this.
-    """
-    variance = error**2 + (FLOOR * np.abs(trace).max()) ** 2
-    weights: FloatArray = widths(time) / variance
-    weights /= weights.sum()
     return weights
 
 
@@ -97,8 +90,8 @@ def tried_rates(time: FloatArray) -> FloatArray:
 def exponential(time: FloatArray, traces: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Fit one exponential to each of many traces by weighted least squares.
 
-    For each of `GRID` rates, the best amplitude follows in closed form. A parabola through the best rate and its
-    neighbours then gives the rate to about 1e-4.
+    `GRID` rates are tried, each with its best amplitude. A parabola through the best rate and its two neighbours then
+    gives the rate with a relative error of about 1e-4.
 
     Parameters
     ----------
@@ -126,12 +119,12 @@ def exponential(time: FloatArray, traces: FloatArray, weights: FloatArray) -> tu
 
 
 def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count: int, expected: float) -> Relaxation:
-    """Fit one exponential to the relaxation of a mean trace.
+    """Fit one exponential to the relaxation of friction, up to t' = `WINDOW` / `expected`.
 
     Parameters
     ----------
     time : array, shape (m,)
-        (t - t_0) / tau, beginning with 0.
+        t', beginning with 0.
     traces : array, shape (1 + RESAMPLES + 2 groups, m)
         Stack of mu - mu_2 over the realisations.
     error : array, shape (m,)
@@ -139,11 +132,13 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
     count : int
         Number of realisations.
     expected : float
-        Rate by eq. 4.12. It determines the fitted part of the trace, t' <= 8 / expected.
+        Rate by eq. 4.12.
     """
-    inside = time <= window(time, expected)
+    inside = time <= max(WINDOW / expected, time[min(8, time.size - 1)])  # at least eight moments after the first one
     t, y = time[inside], traces[:, inside]
-    weights = point_weights(t, y[0], error[inside])
+    # A moment counts by the duration that it represents, because neighbours on a dense grid carry the same information.
+    weights = widths(t) / (error[inside] ** 2 + (FLOOR * np.abs(y[0]).max()) ** 2)
+    weights /= weights.sum()
     rate, amplitude = exponential(t, y, weights)
     residuals = y - amplitude[:, None] * np.exp(-rate[:, None] * t)
     chance = min(bootstrap.chance(residuals * weight, count) for weight in (np.sqrt(weights), 1.0))
@@ -151,49 +146,40 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
     slowest, fastest = tried_rates(t)[[1, -2]]
     outside = (rate < 1.001 * slowest) | (rate > 0.999 * fastest)
     if not chance >= DOUBTFUL:
-        rates, amplitudes = exponential(t, bootstrap.moved(y[0], residuals[0]), weights)
-        rate, amplitude = np.concatenate([rate, rates, integral[:1], rate[:1]]), np.concatenate([amplitude, amplitudes])
+        rates, _ = exponential(t, bootstrap.moved(y[0], residuals[0]), weights)
+        rate = np.concatenate([rate, rates, integral[:1], rate[:1]])
     if outside[0] or outside.mean() > bootstrap.TAILS[0]:  # a rate at an end of the tried range is not an estimate
         rate = np.full_like(rate, np.nan)
     relative = residuals / np.abs(y[0]).max()
     holds = law_holds(relative[0], chance, 2, scatter=bootstrap.scatter(relative, count))
-    return Relaxation(rate, amplitude, integral, holds)
-
-
-def window(time: FloatArray, expected: float) -> float:
-    """Return the last moment of the fit; the fit includes at least eight moments after the first one."""
-    return float(time[time <= max(WINDOW / expected, time[min(8, time.size - 1)])][-1])
+    return Relaxation(rate, integral, holds)
 
 
 # the relaxation of a case, and its laws
 
 
 def law_rate(number: float, hurst: float) -> float:
-    """Return the rate of eq. 4.12 from v_1 tau q_max; its power is 1 below v_1 tau q_max = 1 and 1 - H above 1."""
+    """Return the rate by eq. 4.12 from the number v_1 tau q_max and the Hurst exponent."""
     return number if number < 1 else number ** (1 - hurst)
-
-
-def _wavenumber(case: xr.Dataset) -> float:
-    """Return q_max = pi points / length."""
-    return np.pi * one_value(case, "points") / one_value(case, "length")
 
 
 def _passing_number(case: xr.Dataset) -> float:
     """Return v_1 tau q_max: the relaxation time divided by the time in which the body slides by 1 / q_max."""
-    return one_value(case, "velocity") * one_value(case, "relaxation_time") * _wavenumber(case)
+    wavenumber = np.pi * one_value(case, "points") / one_value(case, "length")
+    return one_value(case, "velocity") * one_value(case, "relaxation_time") * wavenumber
 
 
 def _outputs(case: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the transient of a case.
+    """Return the friction of a case as a function of time.
 
     Returns
     -------
     time : array, shape (m,)
         t', beginning with 0.
     values : array, shape (realisations, 2 + m)
-        mu_1, d_mu_0, mu_2, and mu at all times but the first.
+        mu_1, d_mu_0, mu_2, and mu at all times except the first.
     error : array, shape (2 + m,)
-        Grid errors of the means of these values.
+        Discretisation errors of the means of these values.
     """
     tables = [table_of(case, 1.0, output=name) for name in (*LEVELS, TRACE)]
     values = np.concatenate([table.values for table in tables]).T
@@ -202,10 +188,9 @@ def _outputs(case: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _fit_case(case: xr.Dataset) -> Relaxation | None:
-    """Fit one exponential to a case; None for a case with too few realisations or without relaxation.
+    """Fit one exponential to a case; return None if it has too few realisations, or if friction does not relax.
 
-    The error of mu includes the error of mu_2. Therefore the error of mu - mu_2 is the error of mu minus the error of
-    mu_2.
+    The discretisation error of mu includes that of mu_2. Therefore the error of mu - mu_2 is the difference of both.
     """
     time, values, error = _outputs(case)
     before, jump, after = values[:, :3].T
@@ -223,72 +208,47 @@ def _fit_case(case: xr.Dataset) -> Relaxation | None:
     return relaxation_of(time, traces, good.std(axis=0, ddof=1) / np.sqrt(len(good)), len(good), expected)
 
 
-def relaxation_law(
-    before: FloatArray, after: FloatArray, slope: float, change: float, rate: float, time: FloatArray
-) -> FloatArray:
-    """Return mu(t) after a jump by eqs. 4.13 and 4.14, shape (rows, times).
-
-    Parameters
-    ----------
-    before, after : array, shape (rows,)
-        mu_1 and mu_2.
-    slope, change, rate : float
-        Rms slope, dv / v_1, and rate b of eq. 4.12.
-    time : array
-        (t - t_0) / tau.
-    """
-    start = before + slope * change * jump_law(before / slope, LAW)
-    transient: FloatArray = after[:, None] + (start - after)[:, None] * np.exp(-rate * time)
-    return transient
-
-
 def _closed_law(case: xr.Dataset, rate: float) -> Variables:
-    """Compare the transient of a case with the closed law of eqs. 4.13 to 4.15.
-
-    ``rms_error`` is the rms difference between law and transient over all times, divided by d_mu_0. For
-    ``rms_error_of_rate``, the law has the computed jump in place of eq. 4.11, so that only the rate is tested.
-    """
+    """Compare the friction of a case after the jump with eqs. 4.13 to 4.15."""
     time, values, error = _outputs(case)
     means = bootstrap.means(bootstrap.complete(values))
-    whole = of_rate = np.nan
+    rms_error = np.nan
     sentence = "not tested: fewer than two realisations succeeded, or their friction does not jump"
     if np.all(np.isfinite(values), axis=1).sum() >= LEAST and means[0, 1] != 0:
         jumps = jumps_of(case)
         stack = np.concatenate([means, bootstrap.moved(means[0], error)])
         before, jump, after = stack[:, :3].T
         transient = np.column_stack([before + jump, stack[:, 3:]])
-        law = relaxation_law(before, after, float(jumps.slope[0]), float(jumps.change[0]), rate, time)
-        decay = after[:, None] + (before + jump - after)[:, None] * np.exp(-rate * time)
+        slope, change = float(jumps.slope[0]), float(jumps.change[0])
+        start = before + slope * change * jump_law(before / slope, LAW)
+        law = after[:, None] + (start - after)[:, None] * np.exp(-rate * time)
         departures = (law - transient) / abs(jump[0])
-        whole, of_rate = rms(departures[0]), rms((decay - transient)[0]) / abs(jump[0])
+        rms_error = rms(departures[0])
         sentence = verdict(departures, int(jumps.counts[0]), 0, lambda j: f"t' = {time[j]:.2g}, relative to the jump")
     return {
-        **measure("rms_error", whole, "rms over the times of transient less closed law, over d_mu_0"),
-        **measure("rms_error_of_rate", of_rate, "the same with the computed jump: error of the rate alone"),
+        **measure("rms_error", rms_error, "rms departure of mu from eqs. 4.13 to 4.15 over all times, over d_mu_0"),
         **holds(sentence),
     }
 
 
 def _relaxation(case: xr.Dataset) -> Variables:
-    """Return rate, time and length of the relaxation of a case, and compare it with the law of eqs. 4.13 to 4.15."""
+    """Return the constants of the relaxation of a case, and compare the case with eqs. 4.13 to 4.15."""
     found, count = _fit_case(case), int(jumps_of(case).counts[0])
     nothing = np.full(1 + bootstrap.RESAMPLES, np.nan)
     rate, integral = (found.rate, found.integral_rate) if found else (nothing, nothing)
     with np.errstate(divide="ignore"):  # the rate of a trace that does not relax is zero
         duration = one_value(case, "relaxation_time") / rate
     length = one_value(case, "velocity") * (1 + one_value(case, "velocity_change")) * duration
-    stacks = (rate, integral, duration, length, length * _wavenumber(case))
+    stacks = (rate, integral, duration, length)
     constants: Variables = {}
     for (name, (unit, meaning)), stack in zip(FIELDS.items(), stacks, strict=True):
         constants |= constant(name, stack, count, meaning, name != "integral_rate", unit)
     passing = _passing_number(case)
     expected = law_rate(passing, one_value(case, "hurst"))
-    last = window(_outputs(case)[0], expected) if found else np.nan
     return {
-        **measure("passing_number", passing, "v_1 tau q_max"),
+        **measure("passing_number", passing, "v_1 tau q_max: relaxation time over the time to slide by 1 / q_max"),
         **constants,
-        **measure("law_rate", expected, "(v_1 tau q_max)^a with a = 1 below and 1 - H above 1, eq. 4.12"),
-        **measure("window", last, "last t' of the fit"),
+        **measure("law_rate", expected, "rate b by eq. 4.12"),
         **_closed_law(case, expected),
         **text(
             "fitted_law_holds", found.holds if found else "not tested: nothing relaxes", "whether one exponential fits"
@@ -300,7 +260,7 @@ def _relaxation(case: xr.Dataset) -> Variables:
 
 
 def _rate_power(data: xr.Dataset) -> Variables:
-    """Fit rate ~ (v_1 tau q_max)^power below and above v_1 tau q_max = 1."""
+    """Fit the rates to a power of v_1 tau q_max, below and above v_1 tau q_max = 1."""
     axes = [str(dim) for dim in data[LEVELS[0]].dims if dim != "realisation"]
     cells = np.ndindex(*(data.sizes[dim] for dim in axes))
     cases = [data.isel(dict(zip(axes, cell, strict=True))) for cell in cells]
@@ -322,7 +282,7 @@ def _rate_power(data: xr.Dataset) -> Variables:
 
 
 def _side_by_side(found: list[Relaxation | None]) -> FloatArray:
-    """Return the stacks of the rates of all cases as columns; a shorter column is filled with its first value."""
+    """Return the stacks of the rates of all cases as columns; shorter columns are filled with their first value."""
     most = 1 + bootstrap.RESAMPLES + 2 * bootstrap.GROUPS
     stacks = [one.rate[:most] if one else np.full(1, np.nan) for one in found]
     columns = np.empty((max(1 + bootstrap.RESAMPLES, *(stack.size for stack in stacks)), len(stacks)))
@@ -333,7 +293,7 @@ def _side_by_side(found: list[Relaxation | None]) -> FloatArray:
 
 
 def _power(x: FloatArray, rates: FloatArray, error: FloatArray, stated: float, count: int) -> Variables:
-    """Fit the power of the rates in one regime.
+    """Fit the rates to a power of v_1 tau q_max, either below or above v_1 tau q_max = 1.
 
     Parameters
     ----------
@@ -368,11 +328,11 @@ def _power(x: FloatArray, rates: FloatArray, error: FloatArray, stated: float, c
 
         of_fitted, of_stated = found.holds(where), verdict(rest, count, 1, where, excluded=excluded)
     return {
-        **constant("power", power, count, "power a of b against v_1 tau q_max"),
-        **measure("power_stated", stated, "1 below and 1 - H above v_1 tau q_max = 1"),
-        **measure("factor", float(factor), "b at v_1 tau q_max = 1 by the power law"),
+        **constant("power", power, count, "exponent of v_1 tau q_max in the law of the rate b"),
+        **measure("power_stated", stated, "1 below v_1 tau q_max = 1, and 1 - H above it"),
+        **measure("factor", float(factor), "b at v_1 tau q_max = 1 by the fitted power law"),
         **measure("rms_error", error_of_fit, "rms relative departure from the law with the fitted power"),
-        **measure("cases", x.size, "rates known well enough"),
+        **measure("cases", x.size, "number of rates that are known well enough"),
         **holds(of_stated, of_fitted),
     }
 
@@ -392,15 +352,15 @@ FITS: tuple[Fit, ...] = (
     Fit(
         "relaxation",
         MODELS,
-        "mu = mu_2 + mu* exp(-b t') of every case: rate b, time, slip length; closed law of eqs. 4.13 to 4.15",
-        lambda series: each_jump(series, single, _relaxation, TRACE),
+        "mu = mu_2 + mu* exp(-b t') for every case: rate b, duration, slip length; law of eqs. 4.13 to 4.15",
+        lambda series: each_jump(series, lambda data: [], _relaxation, TRACE),
         apart=True,
         constants=tuple(FIELDS),
     ),
     Fit(
         "rate_power",
         MODELS,
-        "b = factor (v_1 tau q_max)^a for every H, below and above v_1 tau q_max = 1 (eq. 4.12)",
+        "b = factor (v_1 tau q_max)^power, below and above v_1 tau q_max = 1 (eq. 4.12)",
         _fit_power,
         apart=True,
         constants=("power",),

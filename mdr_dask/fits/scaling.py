@@ -1,4 +1,8 @@
-"""Fit contact growth, slope in contact, and the general scaling of sliding friction (thesis eqs. 3.12 to 3.23)."""
+"""Fit contact growth, slope in contact, and the general scaling of sliding friction (thesis eqs. 3.12 to 3.23).
+
+`mdr_dask.fits.friction` defines the zones and regions of the law of friction. L is the length of the line, L_cont the
+length in contact, and q_max the largest wave number of the roughness.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +49,7 @@ SLOPE_FOLLOWED = "whether friction beyond its maximum is proportional to the slo
 
 
 def _contact_growth(data: xr.Dataset) -> Variables:
-    """Fit the power of the contact length against the load in zone 1, at the lowest velocity."""
+    """Fit the power law of the length in contact against the load, in zone 1 and at the lowest velocity."""
     table = table_of(data, 1.0, *loads_and_velocities(data), output="contact_fraction")
     force, velocity = table.columns
     used = [int(same[np.argmin(velocity[same])]) for same in loads_of_zone_one(force, table.mean() > 0)]
@@ -56,9 +60,9 @@ def _contact_growth(data: xr.Dataset) -> Variables:
     found = power_law(x, logs, count)
     level = np.exp(found.constants[:, 1])
     return {
-        **constant("exponent", found.constants[:, 0], count, "exponent of the load in the contact length"),
-        **measure("exponent_stated", stated, "1 / (1 + H) (after eq. 3.12)"),
-        **constant("factor", level, count, "L_cont / L at F_N = G h L by the power law", positive=True),
+        **constant("exponent", found.constants[:, 0], count, "exponent of the load in the law of the contact length"),
+        **measure("exponent_stated", stated, "exponent 1 / (1 + H) by the thesis (after eq. 3.12)"),
+        **constant("factor", level, count, "L_cont / L at F_N = G h L by the fitted power law", positive=True),
         **_balance(data, used),
         **measure("rms_error", found.rms, "rms relative departure from the law with the fitted constants"),
         **measure("loads", len(used), "number of loads in zone 1"),
@@ -67,7 +71,10 @@ def _contact_growth(data: xr.Dataset) -> Variables:
 
 
 def _balance(data: xr.Dataset, used: list[int]) -> Variables:
-    """Return (slope in contact) / (slope of the line) and mu / (mu by eq. 3.12); empty if an output is missing."""
+    """Return the slope in contact divided by that of the line, and mu divided by mu of eq. 3.12.
+
+    The result is empty if the store lacks an output.
+    """
     if not {"contact_slope", "friction_coefficient"} <= set(data.data_vars):
         return {}
     slope = spectral_slope(data)
@@ -75,11 +82,11 @@ def _balance(data: xr.Dataset, used: list[int]) -> Variables:
     found = {
         "slope_in_contact": (
             table_of(data, slope, output="contact_slope"),
-            "rms slope in contact over that of the line, mean over the loads",
+            "rms slope in contact divided by that of the line, mean over the loads",
         ),
         "mu_over_law": (
             table_of(data, slope * law * (data["contact_slope"] / slope) ** 2),
-            "mu over 4 eta v L_cont slope_cont^2 / F_N (eq. 3.12), mean over the loads",
+            "mu divided by 4 eta v L_cont slope_cont^2 / F_N (eq. 3.12), mean over the loads",
         ),
     }
     return {
@@ -90,7 +97,9 @@ def _balance(data: xr.Dataset, used: list[int]) -> Variables:
 
 
 def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> FloatArray:
-    """Return (slope in contact) / (slope of the line) by eq. 3.21; NaN for a contact shorter than the shortest wave.
+    """Return the slope in contact divided by that of the line, by eq. 3.21.
+
+    Eq. 3.21 includes only waves that are shorter than the length in contact. The result is NaN if there are none.
 
     Parameters
     ----------
@@ -111,7 +120,7 @@ def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> Floa
 
 
 def _contact_slope(data: xr.Dataset) -> Variables:
-    """Compare the slope in contact with eq. 3.21 after fitting its factor, and compare friction with this slope."""
+    """Compare the slope in contact with eq. 3.21 times a fitted factor, and friction with the slope in contact."""
     hurst, points = one_value(data, "hurst"), one_value(data, "points")
     slopes = table_of(data, spectral_slope(data), output="contact_slope")
     fractions = table_of(data, 1.0, output="contact_fraction")
@@ -126,17 +135,16 @@ def _contact_slope(data: xr.Dataset) -> Variables:
     if np.ptp(np.log(fraction)) < WITHIN:  # as the factor is fitted, equal contact lengths cannot contradict the law
         holding = f"not tested: the lengths in contact of these cases differ by less than {WITHIN:.0%}"
     return {
-        **constant("factor", np.exp(found.constants[:, 0]), count, "slope in contact over eq. 3.21", positive=True),
-        **measure("range", float(np.exp(np.ptp(law[0]))), "largest over smallest slope by eq. 3.21"),
+        **constant("factor", np.exp(found.constants[:, 0]), count, "slope in contact divided by eq. 3.21", True),
         **measure("rms_error", found.rms, "rms relative departure from eq. 3.21 with the fitted factor"),
-        **measure("cases", int(used.size), "cases whose contact is longer than the shortest wave"),
+        **measure("cases", int(used.size), "number of cases whose contact is longer than the shortest wave"),
         **_friction_of_slope(data),
         **holds(holding),
     }
 
 
 def _friction_of_slope(data: xr.Dataset) -> Variables:
-    """Test the explanation of region IV: beyond its maximum, friction falls in proportion to the slope in contact."""
+    """Test whether friction beyond its maximum (region IV) falls in proportion to the slope in contact."""
     if not {"friction_coefficient", *KELVIN} <= set(data.variables):
         return {}
     table = table_of(data, 1.0, *loads_and_velocities(data))
@@ -152,28 +160,30 @@ def _friction_of_slope(data: xr.Dataset) -> Variables:
     found = linear(np.ones((1, beyond.size)), ratios, count)
     ratio = np.exp(found.constants[:, 0])
     where = at_load(force[beyond])
-    meaning = "friction coefficient over slope in contact beyond the largest friction; 2 / sqrt 3 for one parabolic tip"
+    meaning = "mu divided by the slope in contact, beyond the largest friction; 2 / sqrt 3 for one parabolic tip"
     return {
         **constant("friction_over_slope", ratio, count, meaning, positive=True),
-        **measure("fall", float(mean[beyond].max() / mean[beyond].min()), "largest over smallest friction there"),
+        **measure(
+            "fall", float(mean[beyond].max() / mean[beyond].min()), "largest over smallest mu beyond the maximum"
+        ),
         **text("friction_follows", found.holds(where), SLOPE_FOLLOWED),
     }
 
 
 class Collapse(NamedTuple):
-    """Curves that were shifted onto a common curve.
+    """The shifts of several curves onto a common curve.
 
     Attributes
     ----------
     shifts : array, shape (rows, 2, curves)
-        Stack of the shifts along ln velocity and ln friction; the shifts of the reference curve are 0.
+        Stack of the shifts along ln velocity and ln friction (see `mdr_dask.bootstrap`). The shifts of the reference
+        curve are 0.
     residuals : array, shape (rows, points)
         Stack of the distances of the points from the common curve.
     constants : int
         Number of fitted constants: heights of the common curve at its knots, and shifts.
     vague : array, shape (curves,)
-        Whether a shift of the curve is undetermined. This happens to straight curves and to curves next to a straight
-        curve.
+        Whether a shift of the curve is undetermined, because the curve or the curve beside it is straight.
     """
 
     shifts: FloatArray
@@ -185,10 +195,9 @@ class Collapse(NamedTuple):
 def collapse(
     x: FloatArray, rows: FloatArray, curve: NDArray[np.intp], start: FloatArray, reference: int, vertical: bool = True
 ) -> Collapse:
-    """Shift curves onto a common curve, a natural cubic spline, by least squares.
+    """Shift curves onto a common curve by least squares; the common curve is a natural cubic spline.
 
-    The least-squares problem is solved for the first row of the stack. The shifts of the other rows follow from this
-    solution by linearisation.
+    The problem is solved for the first row of the stack. The shifts of the other rows follow by linearisation.
 
     Parameters
     ----------
@@ -199,7 +208,7 @@ def collapse(
     curve : int array, shape (points,)
         Index of the curve to which each point belongs.
     start : array, shape (curves,)
-        Shifts along x at which the search starts. A second search starts at zero, and the better result is used.
+        Shifts along x from which the search starts. A second search starts from 0, and the better result is used.
     reference : int
         Index of the curve that is not shifted.
     vertical : bool
@@ -244,10 +253,9 @@ def collapse(
 
 
 def _natural(knots: FloatArray, place: FloatArray) -> FloatArray:
-    """Return the values, shape (places, knots), of the cardinal splines of some knots at some places.
+    """Return the matrix that gives a natural cubic spline at some places from its heights at the knots.
 
-    Cardinal spline k is the natural cubic spline that is 1 at knot k and 0 at every other knot. Outside the range of
-    the knots, the spline continues as a straight line.
+    The shape is (places, knots). Outside the range of the knots, the spline continues as a straight line.
     """
     from scipy.interpolate import CubicSpline
 
@@ -258,7 +266,7 @@ def _natural(knots: FloatArray, place: FloatArray) -> FloatArray:
 
 
 def _collapse(data: xr.Dataset) -> Variables:
-    """Shift the curves of friction against velocity at all loads onto one common curve, in regions I to III."""
+    """Shift the curves of friction against velocity, up to its maximum, at all loads onto one common curve."""
     table = table_of(data, spectral_slope(data), *loads_and_velocities(data))
     force, velocity = table.columns
     known = rising(force, velocity, np.nan_to_num(table.mean()), np.ones(force.size, dtype=bool))
@@ -285,21 +293,20 @@ def _collapse(data: xr.Dataset) -> Variables:
     rms, spread = (float(np.sqrt(np.mean(left[0] ** 2))) for left in (found.residuals, before))
     return {
         **measure("rms_error", rms, "rms relative distance of the points from the common curve"),
-        **measure("rms_before", spread, "the same before shifting"),
-        **measure("collapsed", 1 - (rms / spread) ** 2, "share of the spread that shifting removes"),
-        **measure("cases", int(used.size), "number of cases shifted"),
+        **measure("rms_before", spread, "rms relative distance of the points from a common curve before shifting"),
+        **measure("cases", int(used.size), "number of points of the shifted curves"),
         **_shifts(np.unique(force), loads, found, start - start[reference], count),
         **holds(stated, verdict(found.residuals, count, found.constants, where)),
     }
 
 
 def _shifts(forces: FloatArray, loads: FloatArray, found: Collapse, stated: FloatArray, count: int) -> Variables:
-    """Return the shifts of all loads in decades; NaN for loads without a curve and for undetermined shifts."""
+    """Return the shifts of the curves of all loads in decades; NaN for undetermined shifts, and without a curve."""
     decades = np.where(found.vague, np.nan, found.shifts / np.log(10))
     columns = {"horizontal_stated": (stated / np.log(10), "shift along log velocity by eqs. 3.17 and 3.23")}
     for k, name in enumerate(("horizontal", "vertical")):
         low, high = bootstrap.interval(decades[:, k], count)
-        meaning = f"shift along the {'velocity' if k == 0 else 'friction'} in decades"
+        meaning = f"shift along log {'velocity' if k == 0 else 'friction'} in decades"
         values = {name: decades[0, k], f"{name}_low": low, f"{name}_high": high}
         columns |= {key: (value, meaning) for key, value in values.items()}
     result = {"force_number": xr.Variable("curve", forces, {"units": "1", "long_name": "F_N / (G h L) of every curve"})}
@@ -314,7 +321,7 @@ FITS: tuple[Fit, ...] = (
     Fit(
         "contact_growth",
         MODELS,
-        "L_cont / L = factor (F_N / (G h L))^exponent in zone 1, beside 1 / (1 + H), and mu over eq. 3.12",
+        "L_cont / L = factor (F_N / (G h L))^exponent in zone 1, with 1 / (1 + H) by the thesis; mu over eq. 3.12",
         lambda series: each(series, load_and_velocity_axes, _contact_growth, "contact_fraction"),
         apart=True,
         constants=("exponent", "factor", "slope_in_contact", "mu_over_law"),

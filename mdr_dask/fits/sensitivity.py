@@ -1,8 +1,7 @@
 """Sobol indices: the share of the variance of an output that each input of a study explains.
 
-The output is the mean over realisations. Each index is a ratio of two means of products; each product multiplies the
-outputs of two cases. Products of two results of the same realisation are left out, because they contain the variance of
-the scatter.
+The output is the mean over realisations. Variances are computed from products of the outputs of two cases. Products of
+two results of the same realisation are left out, because they contain the variance of the scatter.
 """
 
 from __future__ import annotations
@@ -18,35 +17,35 @@ from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError, distinguishable
 
-#: Inputs can be compared if the half width of the interval of each index is at most this.
+#: There are enough points if the half width of the interval of each index is at most this.
 NARROW = 0.1
-#: Least number of points from which an index is computed.
+#: Smallest number of points from which an index is computed.
 FEWEST = 16
-#: Groups of points for the jackknife.
+#: Number of groups into which the points are divided for the jackknife.
 GROUPS = 20
 
 
 def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
     """Return the Sobol indices of an output for every varied input of a sampled study.
 
-    For Saltelli's design, first-order indices follow Saltelli et al. (2010), and total indices follow Jansen
-    (1999). Any other sampled design gives first-order indices only: the cases are sorted by an input, and the outputs
-    of neighbours are multiplied (Gamboa et al., 2022, with several neighbours).
+    For Saltelli's design, first-order indices are computed by the formula of Saltelli et al. (2010), and total indices
+    by that of Jansen (1999). Any other sampled design gives first-order indices only: the cases are sorted by an input,
+    and the outputs of neighbours are multiplied (Gamboa et al., 2022, but with several neighbours).
 
     Parameters
     ----------
     dataset : Dataset
         A group of a study with the dimension ``case``.
     output : str
-        An output that has no dimensions besides those of cases and realisations.
+        An output with one number for each case and realisation.
 
     Returns
     -------
     Dataset
-        Over ``parameter``: ``first`` and ``total`` with the ends of their 95 % intervals, ``<index>_low`` and
-        ``<index>_high``; NaN for an index that the design does not give. ``attrs`` contain the number of cases, the
-        number of cases without a value, the number of realisations, and ``advice``, a sentence on whether there are
-        enough points.
+        Along ``parameter``, the indices ``first`` and ``total`` with the ends of their 95 % intervals, ``<index>_low``
+        and ``<index>_high``; NaN for an index that the design does not give. The attributes are ``output``, the numbers
+        of ``cases``, of cases without a value (``left_out``) and of ``realisations``, and ``advice``, a sentence on
+        whether there are enough points.
 
     Raises
     ------
@@ -55,10 +54,10 @@ def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
 
     Notes
     -----
-    Failed cases are left out. In Saltelli's design, the index of an input needs three cases for each base point. A base
-    point is left out of this index if one of its three cases failed. The intervals are those of a jackknife over groups
-    of points and over realisations. Points of a Sobol sequence are more even than random points. Therefore the
-    intervals are too wide rather than too narrow.
+    Failed cases are left out. In Saltelli's design, the index of an input needs three cases for each base point; if one
+    of them failed, the base point is left out. The intervals follow from a jackknife over groups of points and over
+    realisations. Points of a Sobol sequence fill space more evenly than random points. Therefore the intervals are
+    rather too wide than too narrow.
 
     References
     ----------
@@ -88,13 +87,13 @@ def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
 def _inputs(dataset: xr.Dataset) -> dict[str, FloatArray]:
     if "case" not in dataset.dims:
         raise FitError(
-            "indices need a sampled study, this one is a grid: sampling: {saltelli: n}, {sobol: n}, "
-            "{latin_hypercube: n} or a table of cases"
+            "expected a sampled study, got a grid; give sampling: {saltelli: n}, {sobol: n}, {latin_hypercube: n} or "
+            "a table of cases"
         )
     varied = {name: coord for name, coord in dataset.coords.items() if coord.dims == ("case",) and name != "case"}
     words = [str(name) for name, coord in varied.items() if coord.dtype.kind not in "fiu"]
     if words:
-        raise FitError(f"{words[0]}: indices need numbers, this input has words; --select one of them")
+        raise FitError(f"expected numbers for the input {words[0]}, got words: choose one of them with --select")
     found = {str(name): coord.to_numpy().astype(np.float64) for name, coord in varied.items()}
     return {name: column for name, column in found.items() if np.ptp(column) > 0}
 
@@ -107,7 +106,10 @@ def _values(dataset: xr.Dataset, output: str) -> tuple[FloatArray, int]:
     array = dataset[output]
     others = [str(dim) for dim in array.dims if dim not in ("case", "realisation")]
     if others:
-        raise FitError(f"{output} has the dimension {others[0]} of its own: choose one with --select")
+        raise FitError(
+            f"expected one number of {output} for each case, got values along the dimension {others[0]}: choose one "
+            "with --select"
+        )
     if "realisation" not in array.dims:
         array = array.expand_dims("realisation")
     values: FloatArray = array.transpose("realisation", "case").to_numpy().astype(np.float64)
@@ -119,12 +121,15 @@ def _values(dataset: xr.Dataset, output: str) -> tuple[FloatArray, int]:
     if known.sum() < FEWEST:
         raise FitError(f"{output}: expected at least {FEWEST} cases with a value, got {int(known.sum())}")
     if np.ptp(mean[known]) == 0:
-        raise FitError(f"{output} is the same in every case: there is nothing to explain")
+        raise FitError(f"expected an output that varies, but {output} is the same in every case")
     return values, int((~known).sum())
 
 
 def _is_saltelli(columns: FloatArray) -> bool:
-    """Return whether the cases are Saltelli's design: points a, b, and a with each input in turn taken from b."""
+    """Return whether the cases are Saltelli's design.
+
+    Each group of cases has a point a, a point b, and, for each input, the point a with this input taken from b.
+    """
     inputs, cases = columns.shape
     if cases % (inputs + 2):
         return False
@@ -135,9 +140,9 @@ def _is_saltelli(columns: FloatArray) -> bool:
 
 
 def _product(left: FloatArray, right: FloatArray) -> FloatArray:
-    """Return for each point the product of both outputs, averaged over pairs of different realisations.
+    """Return for each point the mean of left times right, over all pairs of different realisations.
 
-    With only one realisation, return the product of the two outputs.
+    With only one realisation, the product of its two outputs is returned.
     """
     count = len(left)
     if count == 1:
@@ -147,9 +152,9 @@ def _product(left: FloatArray, right: FloatArray) -> FloatArray:
 
 
 def _exchanged(values: FloatArray) -> FloatArray:
-    """Return the first-order and the total index of one input, from outputs of shape (lines, points, 3).
+    """Return the first-order and the total index of one input, from outputs of shape (realisations, points, 3).
 
-    The last dimension has the output at point a, at point b, and at point a with this input taken from b.
+    The last dimension holds the outputs at point a, at point b, and at point a with this input taken from b.
     """
     a, b, mixed = np.moveaxis(values[:, np.isfinite(values).all(axis=(0, 2))], 2, 0)
     if a.shape[1] < FEWEST:
@@ -163,10 +168,10 @@ def _exchanged(values: FloatArray) -> FloatArray:
 def _of_neighbours(values: FloatArray) -> FloatArray:
     """Return value and interval ends of the first-order index, and NaN for the total index, shape (3, 2).
 
-    There are two estimates. The first uses only products of neighbours; it is right for random points. The second also
-    includes the product of each point with itself; it is right for points that fill space evenly, such as a Sobol
-    sequence: there, the other inputs of neighbours differ systematically. The index is the middle of both estimates,
-    and the interval contains both estimates.
+    There are two estimates. The first uses products of neighbours only, and is right for random points. The second also
+    uses the product of each point with itself, and is right for points that fill space evenly, such as a Sobol
+    sequence, because neighbours then differ systematically in their other inputs. The index is the mean of both
+    estimates, and its interval contains both.
     """
     (without, with_itself), (low, _), (_, high) = _with_interval(values, _neighbours)
     first = [(without + with_itself) / 2, low, high]
@@ -174,7 +179,7 @@ def _of_neighbours(values: FloatArray) -> FloatArray:
 
 
 def _neighbours(values: FloatArray) -> FloatArray:
-    """Return two estimates of the first-order index (see `_of_neighbours`) from outputs sorted by an input."""
+    """Return the two estimates of `_of_neighbours` from outputs that are sorted by the input."""
     most = max(1, int(np.sqrt(values.shape[1]) / 2))
     own, square = _product(values, values).mean(), values.mean() ** 2
     near = np.mean([_product(values[:, k:], values[:, :-k]).mean() for k in range(1, most + 1)])
@@ -184,13 +189,14 @@ def _neighbours(values: FloatArray) -> FloatArray:
 
 
 def _with_interval(values: FloatArray, indices: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    """Return indices and the ends of their intervals, shape (3, indices); the intervals follow from a jackknife.
+    """Return indices and the ends of their intervals by a jackknife, shape (3, indices).
 
     Parameters
     ----------
-    values : array, shape (lines, points, ...)
+    values : array, shape (realisations, points, ...)
+        Outputs.
     indices : callable
-        Takes values and returns indices.
+        Computes the indices from such an array.
     """
     middle, lines = indices(values), len(values)
     group = np.random.Generator(np.random.Philox(0)).permutation(values.shape[1]) % GROUPS
@@ -201,7 +207,7 @@ def _with_interval(values: FloatArray, indices: Callable[[FloatArray], FloatArra
 
 
 def _jackknife(parts: list[FloatArray]) -> FloatArray:
-    """Return the half width of the interval from the indices that are obtained without each part in turn."""
+    """Return the half width of an interval from the indices that result without each part of the data in turn."""
     count = len(parts)
     error = np.sqrt((count - 1) / count * np.sum((np.array(parts) - np.mean(parts, axis=0)) ** 2, axis=0))
     half: FloatArray = t.ppf(bootstrap.TAILS[1], count - 1) * error

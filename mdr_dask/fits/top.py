@@ -1,4 +1,4 @@
-"""The maximum of friction against velocity, from stacks of `mdr_dask.bootstrap`."""
+"""Find the maximum of friction against velocity."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import DOUBTFUL
 
-#: Fits use the points at most this fraction below the maximum. The fractions are tried in turn until a parabola fits.
+#: A parabola is fitted to the points that are below the maximum by at most this fraction. The fractions are tried in
+#: turn until a parabola fits.
 TOPS = (0.3, 0.2, 0.1, 0.05)
-FLAT = 0.05  # points at most this fraction below the maximum count as plateau
+FLAT = 0.05  # points that are below the maximum by at most this fraction count as plateau
 
 
 def smoothed(mean: FloatArray) -> FloatArray:
-    """Return a smoothed curve, which is used only to choose the points that are fitted."""
+    """Return a smoothed curve, from which the points that are fitted are chosen."""
     smooth = mean.copy()
     for _ in range(2):
         smooth[1:-1] = (smooth[:-2] + 2 * smooth[1:-1] + smooth[2:]) / 4
@@ -29,10 +30,11 @@ class Top(NamedTuple):
     Attributes
     ----------
     height : array, shape (rows,)
-        Stack of the maximum, corrected for its bias; residuals of the parabola count as an error.
+        Stack of the maximum, corrected for its bias (see `mdr_dask.bootstrap`). Residuals of the parabola count as an
+        error.
     place, rise : array, shape (rows,)
-        Stacks of the logarithm of the velocity of the maximum, and of d ln(friction) / d ln(velocity) there. This slope
-        is not 0 if the maximum is at an end of the range of velocities.
+        Stacks of the logarithm of the velocity at the maximum, and of d ln(friction) / d ln(velocity) there. This slope
+        is 0 unless the maximum is at an end of the range of velocities.
     """
 
     height: FloatArray
@@ -41,7 +43,9 @@ class Top(NamedTuple):
 
 
 def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
-    """Fit a parabola to as many points near the largest friction as scatter and errors allow.
+    """Fit a parabola to the points near the largest friction, to as many of them as possible.
+
+    The residuals must not exceed what scatter and errors explain.
 
     Parameters
     ----------
@@ -80,7 +84,7 @@ def _about_the_top(mean: FloatArray, drop: float) -> slice:
 
 
 def _parabola(x: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return for every row the maximum of its parabola, the place and slope of the maximum, and the residuals."""
+    """Fit a parabola to every row; return its maximum, the place of the maximum, the slope there, and the residuals."""
     centre, half = x.mean(), np.ptp(x) / 2
     u = (x - centre) / half
     design = np.vstack([np.ones_like(u), u, u**2])

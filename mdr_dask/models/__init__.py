@@ -34,7 +34,7 @@ GROUP = "mdr_dask.models"
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of all installed models: first the models of this package, then the models of other packages."""
+    """Return the names of all installed models: first those of this package, then those of other packages."""
     return (*NAMES, *(name for name in _installed() if name not in NAMES))
 
 

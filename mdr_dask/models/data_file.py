@@ -14,14 +14,14 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.tables import decoded, described
 
-#: Size of a file in bytes, from which on there are no notes about its columns.
+#: Larger files, in bytes, get no note about their columns.
 LARGEST_TABLE = 10**7
 
 
 class DataFile(BaseModel):
-    """A file that a campaign names.
+    """A file that a campaign names, with the SHA-256 digest of its content when the campaign was read.
 
-    When the campaign is read, the digest of the file is stored. When the file is used, its digest must be the same.
+    The content can be read only as long as it still has this digest.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -53,7 +53,7 @@ class DataFile(BaseModel):
 
     @contextmanager
     def in_errors(self) -> Iterator[None]:
-        """Put the name of the file before the messages of errors that are raised in a ``with`` statement."""
+        """In a ``with`` statement, put the name of the file before the message of any DataError."""
         try:
             yield
         except DataError as problem:
@@ -65,7 +65,7 @@ class DataFile(BaseModel):
 
 
 def check_in_campaign(info: ValidationInfo, check: Callable[[], object]) -> None:
-    """Call a function while a campaign is read; convert its DataError to the ValueError that pydantic expects."""
+    """If a campaign is being read, call a function; convert its DataError to the ValueError that pydantic expects."""
     if info.context is not None:
         try:
             check()

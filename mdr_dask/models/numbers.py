@@ -1,4 +1,4 @@
-"""Find the parameters of a case that are numbers, by the names of their coordinates in a store."""
+"""List the parameters of a case that are numbers, under the names that they have in a store."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from mdr_dask.models.data_file import DataFile
 
 
 def numbers_of(parameters: BaseModel, prefix: str = "") -> dict[str, tuple[float, str, str]]:
-    """Return value, unit and meaning of each parameter that is a number and has an effect.
+    """Return value, unit and meaning of each parameter that is a number and has an effect on the result.
 
-    The names of nested parameters are joined by ``_``.
+    The name of a nested parameter is its path, joined by ``_``: ``indenter_angle``.
     """
     found: dict[str, tuple[float, str, str]] = {}
     idle = parameters.inactive if isinstance(parameters, Parameters) else {}

@@ -1,4 +1,4 @@
-"""Unknowns from measured points: coverage of the intervals, and undetermined unknowns."""
+"""Calibration: coverage of the intervals of the unknowns, and unknowns that the data do not determine."""
 
 import json
 
@@ -25,18 +25,18 @@ TRUE = {"relaxation_time": 7e-4, "rms_roughness": 1.3e-6}
 
 
 def friction(force, velocity, time, height):
-    """Return friction that grows as the root of the height and has two regimes of the velocity."""
+    """Return friction in proportion to the root of the height, with two regimes of the velocity."""
     reduced = (force / 4 + force**0.4) / (1e4 * velocity * time)
     return 0.3 * np.sqrt(height / 1e-6) / np.sqrt(1 + reduced**2)
 
 
 def slow(force, velocity, time, height):
-    """Region I of a rough indenter: v tau slope^2."""
+    """Return friction as in region I, which depends on relaxation time and height only by tau h^2."""
     return 2e9 * velocity * time * (height / 1e-3) ** 2 / force
 
 
 def study(lines=1, scatter=0.0, seed=0, function=friction):
-    """Return a study whose lines differ in height and slope of their friction, alike in all cases."""
+    """Return a study in which the friction of each line has its own level and slope, the same in all cases."""
     rng = np.random.default_rng(seed)
     grid = np.meshgrid(*(values for values, _ in AXES.values()), indexing="ij")
     level, tilt = scatter * rng.normal(size=(2, lines))
@@ -58,7 +58,7 @@ def table(rng, points=12, noise=0.03, given=True, function=friction, velocities=
     ("lines", "scatter", "given", "tables"), [(1, 0.0, True, 60), (5, 0.1, True, 60), (1, 0.0, False, 12)]
 )
 def test_intervals_contain_the_truth_at_their_rate(lines, scatter, given, tables):
-    """Each table comes with lines of its own; a binomial leaves the bounds once in a thousand times or less."""
+    """Every table has its own lines. By chance, the test fails at most once in a thousand times."""
     rng = np.random.default_rng(2)
     held = {0.95: [], 0.6827: []}
     for k in range(tables):
@@ -67,13 +67,13 @@ def test_intervals_contain_the_truth_at_their_rate(lines, scatter, given, tables
             held[0.95].append(found[f"{name}_low"] < true < found[f"{name}_high"])
             held[0.6827].append(found[f"{name}_low_68"] < true < found[f"{name}_high_68"])
     for level, hits in held.items():
-        # the two unknowns of a table err together
+        # the errors of the two unknowns of a table are correlated, so that only the tables count
         assert abs(np.mean(hits) - level) < 3.3 * np.sqrt(level * (1 - level) / tables)
 
 
 @pytest.mark.parametrize(("given", "tables"), [(True, 5), (False, 1)])
 def test_only_what_the_data_determine_has_a_number(given, tables):
-    """In region I friction depends on v tau slope^2 alone; this product is determined as well as the points are."""
+    """In region I, the data determine only the product tau h^2, as exactly as the measured points."""
     rng = np.random.default_rng(5)
     held = 0
     for _ in range(tables):
@@ -84,7 +84,7 @@ def test_only_what_the_data_determine_has_a_number(given, tables):
         true = TRUE["relaxation_time"] * TRUE["rms_roughness"] ** 2
         assert found[product].attrs["units"] == "s m^2"
         held += bool(found[f"{product}_low"] < true < found[f"{product}_high"])
-        # 3 % at each of twelve points, twice that within 95 %
+        # 3 % at each of twelve points: the interval is four standard errors wide, and twice this width is allowed
         assert float(found[f"{product}_high"] / found[f"{product}_low"]) < 1 + 4 * 0.03 / np.sqrt(12) * 2
         assert not any(name.startswith("correlation") for name in found)
         assert "only relaxation_time x rms_roughness^2" in found["determined"].item()
@@ -109,7 +109,7 @@ def test_an_unknown_may_be_bounded_from_one_side_only():
 
 @pytest.mark.parametrize("lines", [1, 5])
 def test_an_axis_of_one_value_is_no_unknown_and_changes_nothing(lines):
-    """Neither a condition held by the study nor an unknown of one value; lines are lines, however few."""
+    """This holds for a condition and for an unknown, with one realisation and with several."""
     rng = np.random.default_rng(4)
     data, measured = study(lines, 0.1), table(rng, velocities=(0.1, 0.1))
     with_axes = data.isel(rms_roughness=[3]).sel(velocity=[AXES["velocity"][0][5]])
@@ -147,7 +147,7 @@ def test_a_misfit_is_reported_and_widens_the_interval():
 
 
 def test_constants_of_wlf_from_friction_against_velocity_and_temperature():
-    """Temperatures in degrees are conditions; both constants are held, and near what the points can tell."""
+    """The temperature is a condition, in degrees Celsius. Both intervals contain the truth and are narrow."""
     temperature, velocity = np.linspace(273.15, 333.15, 5), np.geomspace(1e-3, 1.0, 9)
     axes = {"temperature": (temperature, "K"), "velocity": (velocity, "m/s")}
     axes |= {"c1": (np.geomspace(4, 16, 7), "1"), "c2": (np.geomspace(60.0, 240.0, 7), "K")}
@@ -200,15 +200,19 @@ RIG = "normal_force [N], velocity [m/s], mu, standard_error\n1, 0.01, 0.05, 0.00
         (
             RIG.replace("1, 0.1,", "1, 30,"),
             {},
-            r"rig.csv:3: velocity of 30 m/s: this study has it from 0.001 m/s to 1 m/s",
+            r"rig.csv:3: velocity is 30 m/s, but this study has 0.001 m/s to 1 m/s",
         ),
         (RIG, {"relaxation_time": slice(3)}, "expected at least 4 values of the unknown relaxation_time, got 3"),
-        (RIG, {"velocity": slice(3)}, "this study has it from"),
-        (RIG, {"relaxation_time": 0, "rms_roughness": 0}, "expected one to 4 unknowns.* got none: every axis is a"),
+        (RIG, {"velocity": slice(3)}, "but this study has"),
+        (
+            RIG,
+            {"relaxation_time": 0, "rms_roughness": 0},
+            "expected one to 4 axes of the study that are not columns of the table, got none",
+        ),
         (
             RIG.replace(", standard_error", "").replace(", 0.001", ""),
             {},
-            "2 measured points without errors cannot determine 2",
+            "expected more than 2 measured points for 2 unknowns",
         ),
     ],
 )
@@ -219,21 +223,21 @@ def test_bad_input_is_refused_with_its_reason(text, change, message):
 
 
 def test_a_study_without_a_table_half_filled_or_sampled_is_refused():
-    with pytest.raises(FitError, match=r"no table of measurements: give measured: \{table: rig.csv\}"):
+    with pytest.raises(FitError, match=r"expected a table of measurements: give measured: \{table: rig.csv\}"):
         calibration({"": study()})
     table_ = {"name": "rig.csv", "text": RIG}
     half = study().where(study()["relaxation_time"] < 1e-3).assign_attrs(measured=table_)
     with pytest.raises(
-        FitError, match=r"mu: of the \d+ values that rig.csv is compared with, \d+ are not in the study"
+        FitError, match=r"mu: \d+ of the \d+ values that are needed to compare the study with rig.csv are missing"
     ):
         calibration({"": half})
     sampled = study().stack(case=[*AXES]).reset_index("case").assign_attrs(measured=table_)
-    with pytest.raises(FitError, match="calibration needs a grid"):
+    with pytest.raises(FitError, match="expected a grid"):
         calibration({"": sampled})
 
 
 def test_calibration_of_an_external_model_from_python_and_the_command_line(toy, tmp_path, capsys):
-    """A study of an external model, with the table of its campaign and another one, as JSON and as a figure."""
+    """A study of an external model, with the table of its campaign and with another table, as JSON and figure."""
     assert "calibration" in available("toy")
     campaign = tmp_path / "rig.yaml"
     campaign.write_text(TOY)
@@ -259,5 +263,5 @@ def test_an_unknown_error_of_measurement_is_estimated(given):
     found = summary(calibrate(study(), table(np.random.default_rng(8), points=40, given=given)))
     estimated = {name for name in found if "measurement_error" in str(name)}
     assert len(estimated) == (not given)
-    if not given:  # equal shares were planted; forty residuals determine their size to an eighth
+    if not given:  # the planted errors are proportional to the values; forty residuals determine their size to 12 %
         assert found["relative_measurement_error"].item() == pytest.approx(0.03, rel=0.35)

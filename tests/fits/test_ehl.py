@@ -1,4 +1,4 @@
-"""Film exponents: exact on a power law, and near the known ones on films that were solved."""
+"""Film exponents: exact for a power law, and close to known exponents for computed films."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_power_law_is_recovered() -> None:
 
 
 def test_a_bent_law_is_named_and_its_interval_is_wide() -> None:
-    """The speed exponent goes from 0.4 to 1 over the map, as from an elastic to a rigid contact."""
+    """The exponent of the speed changes from 0.4 to 1 over the map, as from an elastic to a rigid contact."""
     speeds = np.geomspace(1e-13, 1e-9, 9)
     data = power_law(GRID[0], speeds, GRID[2])
     logarithm = np.log(speeds / 1e-11)
@@ -48,12 +48,12 @@ def test_a_bent_law_is_named_and_its_interval_is_wide() -> None:
     assert str(fit["law_holds"].item()).startswith("no: departs by")
     straight = film_exponents({"": data})
     assert str(straight["law_holds"].item()).startswith("yes")
-    assert fit["central_speed_high"] - fit["central_speed_low"] > 0.08  # 0.02 by scatter alone
+    assert fit["central_speed_high"] - fit["central_speed_low"] > 0.08  # scatter alone would give 0.02
 
 
 @pytest.mark.slow
 def test_interval_contains_the_exponent_at_its_rate() -> None:
-    """Of 200 noisy maps 95 % contain the speed exponent; 3 sigma of that count is 4.6 points."""
+    """95 % of the intervals of 200 noisy maps contain the exponent; three standard errors are 4.6 %."""
     inside = 0
     for seed in range(200):
         data = power_law(*GRID)
@@ -97,7 +97,7 @@ def test_one_point_more_than_constants_is_enough() -> None:
 
 
 def test_parameters_that_vary_only_together_have_no_exponents() -> None:
-    """Another modulus of the bodies changes W, U and G by powers of the same factor."""
+    """A change of the modulus changes W, U and G by powers of the same factor."""
     one = power_law(np.array([1e-4]), np.array([1e-10]), np.array([2000.0])).central_film.item()
     stiffness = np.geomspace(1.0, 10.0, 8)
     film = one * stiffness ** (0.166 - 0.692 + 0.47)

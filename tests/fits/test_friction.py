@@ -29,14 +29,14 @@ def test_laws_are_found_again_in_data_made_by_them(forces):
     assert found["beta"].values == pytest.approx(1.5, rel=1e-6)
     assert found["rms_error"].values == pytest.approx(0, abs=1e-6)
     zone = FIT["zone_one"]({"": made})
-    # the law is not yet its own limit at a force number of 0.3: the second term of eq. 3.18 bends it
+    # at a force number of 0.3, the second term of eq. 3.18 is not yet negligible, so that the law is no exact power law
     assert zone["alpha"].values == pytest.approx(0.35, abs=0.1)
 
 
 def test_the_interpolation_law_holds_as_stated(forces):
     found = FIT["interpolation"]({"": forces})
     assert np.all(found["rms_error"] <= found["rms_error_stated"] + 1e-9)
-    assert np.all(found["rms_error_stated"] < 0.16)  # 11 % of long lines; 12 short ones scatter by as much again
+    assert np.all(found["rms_error_stated"] < 0.16)  # 11 % for long lines, and the scatter of 12 short lines
 
 
 @pytest.mark.slow
@@ -77,14 +77,15 @@ def test_the_top_of_a_mirrored_curve_is_the_mirrored_top(curve, lines):
     chance = np.random.default_rng(5)
     x = np.linspace(-4.0, 4.0, 15) + chance.uniform(-0.1, 0.1, 15)
     stack = bootstrap.means(CURVES[curve](x) * (1 + 0.03 * chance.standard_normal((lines, 15))))
-    rows = slice(1 if lines == 1 else 1 + bootstrap.RESAMPLES)  # one line has no others, and errors have no mirror
+    # one line has no resamples; rows shifted by errors are not mirrored
+    rows = slice(1 if lines == 1 else 1 + bootstrap.RESAMPLES)
     here, there = top.highest(x, stack, lines), top.highest(-x[::-1], stack[:, ::-1], lines)
     for one, other, sign in zip(here, there, (1, -1, -1), strict=True):
         np.testing.assert_allclose(other[rows], sign * one[rows], rtol=1e-6, atol=1e-9)
 
 
-def test_a_lost_line_of_three_leaves_a_plateau():
-    """Some resamples draw nothing but the lost line."""
+def test_a_failed_line_of_three_leaves_a_plateau():
+    """Some resamples contain only the failed line."""
     x = np.linspace(-1, 1, 5)
     lines = np.array([1.0, 1.02, 0.97])[:, None] * (1 - 0.3 * x**2)
     lines[1, 2] = np.nan
@@ -115,7 +116,7 @@ def test_indenters_follow_their_law(shape):
 
 
 def test_bodies_outside_their_law_are_left_out():
-    """A cone on less and less roughness: its own hysteresis and region IV are not fitted."""
+    """A cone on three roughnesses: cases without enough roughness, and velocities of region IV, are left out."""
     data = store(
         {"rms_roughness": [1e-7, 1e-6, 5e-5], "velocity": np.geomspace(1e-3, 1e3, 13)},
         realisations=4,
@@ -158,7 +159,7 @@ def test_zone_one_has_the_known_constants():
         here = found.sel(hurst=hurst)
         for name, value in zip(("alpha", "beta"), constants, strict=True):
             sigma = float(here[f"{name}_high"] - here[f"{name}_low"]) / (2 * 1.96)
-            # 60 realisations here, 200 there: 4 sigma of both, plus 0.02 for the range of loads
+            # four standard errors of 60 realisations here and 200 in the reference, plus 0.02 for the range of loads
             assert abs(float(here[name]) - value) < 4 * sigma * np.sqrt(1 + 60 / 200) + 0.02
 
 

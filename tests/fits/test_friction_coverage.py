@@ -14,9 +14,9 @@ from mdr_dask.physics.sliding import laws
 
 pytestmark = pytest.mark.slow
 FIT = available("sliding_friction")
-LEAST = 0.9  # 95 % less 2.3 standard deviations of a share of 100 studies
+LEAST = 0.9  # 95 % minus 2.3 standard deviations of a fraction of 100 studies
 LINES = pytest.mark.parametrize("lines", [5, 30])
-# scatter that all cases of a line share, and scatter of every case
+# relative scatter that is common to all cases of a line, and relative scatter of every single case
 SHARED, OWN = (0.1, 0.02), (0.05, 0.1)
 
 ZONE = {"normal_force": np.geomspace(1e-3, 3e-2, 8)}
@@ -81,7 +81,7 @@ class Case(NamedTuple):
     verdict: str = "fitted_law_holds"
 
     def found(self, lines, studies=100, scatter=OWN, grid=0.0):
-        """Fit every study; those fits that need all dimensions of a study are made one by one."""
+        """Fit every study; fits that need all dimensions of a study are made one after another."""
         data = planted(self.axes, lines, studies, scatter, grid, **self.outputs)
         found = FIT[self.fit].compute({"": data})
         if "study" in found.dims:
@@ -122,7 +122,7 @@ def test_intervals_contain_planted_constants(case, lines, scatter):
     found = CASES[case].found(lines, scatter=scatter)
     for name, value in CASES[case].truth.items():
         assert coverage(found, name, value) >= LEAST
-        # no bias from taking a maximum: the largest of noisy means is up to 7 % too high here
+        # the plateau is unbiased, although the largest of the noisy means is up to 7 % too high here
         assert name != "plateau" or float(found[name].mean()) == pytest.approx(value, rel=0.025)
     assert not_contradicted(found, lines, CASES[case].verdict) >= LEAST
 
@@ -130,7 +130,7 @@ def test_intervals_contain_planted_constants(case, lines, scatter):
 @pytest.mark.parametrize(("lines", "grid"), [(5, 0.2), (30, 0.02)])
 @pytest.mark.parametrize("case", ["zone_one", "interpolation", "indenter", "broad"])
 def test_a_stated_error_of_the_grid_is_part_of_the_interval(case, lines, grid):
-    """All friction is too high by the stated error: the scatter of the lines alone would miss the truth."""
+    """All friction is too high by the stated error, so that an interval from scatter alone would miss the truth."""
     found = CASES[case].found(lines, 20, (0.01, 0.01), grid)
     for name, value in CASES[case].truth.items():
         assert coverage(found, name, value) >= LEAST
@@ -173,7 +173,7 @@ WRONG = {
 @LINES
 @pytest.mark.parametrize("case", WRONG)
 def test_another_law_is_named_and_widens_the_interval(case, lines):
-    """The interval of the scatter alone would be 0.02 wide; `truth` holds the least width."""
+    """From scatter alone, the interval would be 0.02 wide; `truth` contains the smallest allowed width."""
     found = WRONG[case].found(lines, 10, (0.05, 0.02))
     assert judged(found, "yes", WRONG[case].verdict) == 0
     for name, width in WRONG[case].truth.items():

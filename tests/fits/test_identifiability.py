@@ -8,7 +8,7 @@ from mdr_dask.fits.posterior import Posterior
 
 
 def posterior(likely, unknowns):
-    """Even places in a unit cube, of which those are likely whose logarithms meet a condition to a hundredth."""
+    """Return a posterior on a unit cube: places are likely if their logarithms fulfil a condition within 0.01."""
     axes = np.linspace(0, 1, 41)
     places = np.stack(np.meshgrid(*unknowns * [axes], indexing="ij"), axis=-1).reshape(-1, unknowns)
     density = -0.5 * sum((each(places) / 0.01) ** 2 for each in likely)
@@ -17,7 +17,7 @@ def posterior(likely, unknowns):
 
 
 def test_of_three_unknowns_two_products_are_determined():
-    """The data determine x y and y z alone: any two products that span the same space are right."""
+    """The data determine only x y and y z. Any two products that span the same space are correct."""
     found = posterior([lambda p: p[:, 0] + p[:, 1] - 1, lambda p: p[:, 1] + p[:, 2] - 1], 3)
     found_products = products(found, np.exp(found.places), [0, 1, 2])
     assert len(found_products) == 2

@@ -1,4 +1,4 @@
-"""Laws as tables: the stated error holds for linear interpolation by xarray; bad studies are refused."""
+"""Laws as tables: the stated errors of linear interpolation, and studies from which no law can be made."""
 
 from pathlib import Path
 
@@ -51,7 +51,7 @@ def test_random_points_lie_within_the_stated_error(shape, realisations, noise):
     found = table.interp(force=("point", force), velocity=("point", velocity))
     error = np.abs(found.mu - SHAPES[shape][0](force, velocity))
     assert np.mean(error <= found.mu_error + 1e-12) >= 0.95
-    # and the error is not useless
+    # and the error is small enough to be useful
     assert float(found.mu_error.median()) < max(0.12 * float(np.abs(found.mu).median()), 3 * noise)
 
 
@@ -112,8 +112,8 @@ def test_the_command(toy, tmp_path, monkeypatch, capsys):
     assert main(["law", "results/a.zarr", "height", "-o", "height.csv"]) == 2
 
 
-@pytest.mark.parametrize("shape", ["changing sign", "friction"])  # over the values, and over their logarithms
-def test_cases_that_adaptive_axes_left_out_have_the_error_of_what_lies_between(shape):
+@pytest.mark.parametrize("shape", ["changing sign", "friction"])  # interpolated on a linear and on a logarithmic scale
+def test_cases_that_adaptive_axes_left_out_have_the_error_of_interpolation(shape):
     data = study(shape)
     data["status"] = ("force", "velocity", "realisation"), np.full(data.mu.shape, Status.DONE)
     left_out = np.zeros(data.mu.shape, dtype=bool)

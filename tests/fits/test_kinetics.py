@@ -15,7 +15,7 @@ POINTS, LENGTH, TAU = 5000, 0.01, 1e-3
 def store(
     speeds: np.ndarray, hurst: float, power: float, realisations: int = 12, noise: float = 0.02, shape: float = 1.0
 ) -> xr.Dataset:
-    """Return a store whose relaxation is exp(-(b t')^shape) with b = x^power, x = v_1 tau q_max, d_mu_0 by 4.11."""
+    """Return a store that relaxes as exp(-(b t')^shape), with b = (v_1 tau q_max)^power and d_mu_0 by eq. 4.11."""
     rng = np.random.default_rng(1)
     x = speeds * TAU * np.pi * POINTS / LENGTH
     before = np.minimum(0.05 * x**0.7, 1.3)[:, None] * (1 + 0.1 * rng.standard_normal((speeds.size, realisations)))
@@ -42,7 +42,7 @@ ABOVE = np.geomspace(1e-3, 1, 7)
 
 
 def axes(data: xr.Dataset, name: str, values: list[float]) -> xr.Dataset:
-    """Return the same store along one more axis."""
+    """Return copies of a store along an additional axis."""
     return xr.concat([data.assign_coords({name: value}) for value in values], name, coords="minimal", compat="override")
 
 
@@ -62,11 +62,10 @@ def test_rate_of_an_exponential_is_found() -> None:
     assert np.allclose(found["rate"], found["passing_number"] ** 0.3, rtol=1e-3)
     assert np.all(found["rate_low"] <= found["rate"] + 1e-9)
     assert np.all(found["fitted_law_holds"].str.startswith("yes: "))
-    # the trapezoidal rule on 12 moments a decade
+    # the error of the trapezoidal rule with 12 moments per decade is 2 %
     assert np.allclose(found["integral_rate"], found["rate"], rtol=0.02)
     assert np.allclose(found["relaxation_duration"], TAU / found["rate"])
     assert np.allclose(found["relaxation_length"], 1.2 * found["velocity"] * found["relaxation_duration"])
-    assert np.allclose(found["length_times_wavenumber"], 1.2 * found["passing_number"] / found["rate"])
 
 
 def test_a_stretched_decay_is_no_exponential_and_its_rate_has_a_wide_interval() -> None:
@@ -75,14 +74,13 @@ def test_a_stretched_decay_is_no_exponential_and_its_rate_has_a_wide_interval() 
     assert found["rate_low"] <= found["integral_rate"] <= found["rate_high"]
 
 
-def test_the_closed_law_is_judged_with_its_own_jump_and_rate() -> None:
-    """The planted jump has the constant 0.42 in place of 0.4, and a fifth of it relaxes."""
+def test_the_closed_law_is_tested_with_its_own_jump_and_rate() -> None:
+    """The planted jump has the constant 0.42 instead of 0.4, and a fifth of it relaxes."""
     found = FIT["relaxation"].compute({"": store(ABOVE, 0.7, 0.3)})
     assert np.all(found["law_holds"].str.startswith("yes"))
     assert np.all(found["rms_error"] < 0.05)
-    assert np.all(found["rms_error_of_rate"] < 1e-9)
-    other = FIT["relaxation"].compute({"": store(ABOVE, 0.2, 0.3)})  # planted rates grow with 0.3, not with 0.8
-    assert np.all(other["rms_error_of_rate"][2:] > found["rms_error_of_rate"][2:])
+    other = FIT["relaxation"].compute({"": store(ABOVE, 0.2, 0.3)})  # the planted power is 0.3, that of the law is 0.8
+    assert np.all(other["rms_error"][2:] > found["rms_error"][2:])
 
 
 def test_nothing_relaxes_in_full_contact() -> None:
@@ -96,7 +94,7 @@ def test_nothing_relaxes_in_full_contact() -> None:
 
 def test_constant_of_the_jump_law_is_found() -> None:
     found = FIT["jump_law"].compute({"": store(ABOVE, 0.7, 0.3)}).squeeze()
-    # the mean over realisations of a curved law differs from the law of the mean by the square of the scatter
+    # the law is curved, so that its mean over realisations differs from the law of the mean values
     assert found["constant"].item() == pytest.approx(0.42, rel=0.02)
     assert found["constant_low"].item() < found["constant"].item() < found["constant_high"].item()
     both = FIT["jump_law"].compute({"": axes(store(ABOVE, 0.7, 0.3), "hurst", [0.7, 0.8])})
@@ -115,7 +113,7 @@ def test_limits_of_the_jump() -> None:
     data = store(np.geomspace(1e-6, 1e3, 10), 0.7, 0.3, noise=0.0)
     found = FIT["jump_law"].compute({"": data}).squeeze()
     before = data["friction_coefficient_before"].mean("realisation").values / SLOPE
-    low = before[before < 0.1]  # the store follows eq. 4.11 with 0.42
+    low = before[before < 0.1]  # the store follows eq. 4.11 with the constant 0.42
     assert found["zeta"].item() == pytest.approx(np.mean(jump_law(low, 0.42) / low), rel=0.01)
     assert found["plateau_jump"].item() == pytest.approx(np.mean(jump_law(before[before > 1.1], 0.42)), rel=0.01)
     assert found["zeta_holds"].item().startswith("yes")
@@ -148,7 +146,7 @@ def test_power_of_the_rate_in_both_regimes() -> None:
         {"slow": store(below, 0.3, 1.0), "fast": store(ABOVE, 0.3, 0.7), "one": store(ABOVE[:1], 0.3, 0.7)}
     )
     assert set(powers) == {"slow", "fast"}
-    # slow traces end before they have relaxed
+    # the slow traces end before friction has relaxed
     assert powers["slow"]["power"].sel(regime="below").item() == pytest.approx(1.0, abs=0.05)
     assert np.isnan(powers["slow"]["power"].sel(regime="above").item())
     assert powers["fast"]["power"].sel(regime="above").item() == pytest.approx(0.7, abs=1e-3)

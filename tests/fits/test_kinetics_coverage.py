@@ -11,8 +11,8 @@ FIT = available("velocity_jump")
 TIMES = np.geomspace(1e-3, 20, 40)
 POINTS, LENGTH, TAU, SLOPE, CHANGE = 5000, 0.01, 1e-3, 0.07, 0.2
 WAVENUMBER = np.pi * POINTS / LENGTH
-SHARE = 0.25  # of the jump that relaxes
-LEAST = 0.9  # 95 % less 2.3 standard deviations of a share of 100 stores
+SHARE = 0.25  # part of the jump that relaxes
+LEAST = 0.9  # 95 % minus 2.3 standard deviations of a fraction of 100 stores
 pytestmark = pytest.mark.slow
 LINES = pytest.mark.parametrize("lines", [5, 30])
 
@@ -52,7 +52,7 @@ def studies(speeds: np.ndarray, stores: int, lines: int, power: float = 0.5, sha
 
 
 def coverage(found: xr.Dataset, name: str, truth: object) -> float:
-    """Return the share of the intervals there are that hold the truth."""
+    """Return the fraction of the intervals with finite ends that contain the truth."""
     known = found[f"{name}_low"].notnull()
     held = (found[f"{name}_low"] <= truth) & (truth <= found[f"{name}_high"])
     return float(held.where(known).mean())
@@ -67,7 +67,7 @@ JUMP = CHANGE * jump_law(np.array(BEFORE), 0.42)
 
 
 def of_each_store(data: xr.Dataset) -> xr.Dataset:
-    """Fit the jump law to every store for itself."""
+    """Fit the jump law to each store separately."""
     stores = [FIT["jump_law"].compute({"": data.isel(normal_force=k)}) for k in range(data.sizes["normal_force"])]
     return xr.concat(stores, "store")
 
@@ -92,10 +92,10 @@ def test_jump_and_rate_and_state_terms(lines: int) -> None:
 @LINES
 def test_rate_and_when_one_exponential_is_enough(lines: int) -> None:
     found = FIT["relaxation"].compute({"": studies(np.array([0.05]), 100, lines)})
-    # the trapezoidal rule on 9 moments a decade adds 2 %
+    # the error of the trapezoidal rule with 9 moments per decade is 2 %
     for name, truth in (("rate", RATE), ("integral_rate", 0.98 * RATE)):
         assert coverage(found, name, truth) >= LEAST
-    # the truth is one exponential, and is doubted by chance only
+    # the planted relaxation is one exponential, so that only chance gives another verdict
     assert judged(found, "no:") < 0.08
 
 
@@ -103,7 +103,7 @@ def test_rate_and_when_one_exponential_is_enough(lines: int) -> None:
 def test_power_of_the_rate_of_lines_that_all_velocities_share(lines: int) -> None:
     found = FIT["rate_power"].compute({"": studies(np.geomspace(1e-3, 1, 3), 100, lines)}).sel(regime="above")
     assert coverage(found, "power", 0.5) >= LEAST
-    # five lines do not determine every rate to a factor of 1.6
+    # five lines do not determine every rate within a factor of 1.6
     unknown = found["power"].isnull()
     assert np.all(found["fitted_law_holds"].where(unknown, "not tested").str.startswith("not tested"))
     assert judged(found, "no:") < 0.08
@@ -120,7 +120,7 @@ def test_constant_and_limits_of_the_jump(lines: int) -> None:
 
 
 def stated(data: xr.Dataset, grid: float) -> xr.Dataset:
-    """Return studies whose coefficients of friction are all wrong by a share that their companions state."""
+    """Return studies in which all coefficients of friction have the relative error that the store states."""
     for name in ("friction_coefficient_before", "friction_coefficient_jump", "friction_coefficient_after"):
         data[f"{name}_error"] = grid * np.abs(data[name])
         data[name] = ((1 + grid) * data[name]).assign_attrs(ancillary_variables=f"{name}_error")
@@ -139,7 +139,7 @@ def test_a_stated_error_of_the_grid_is_part_of_the_interval(lines: int) -> None:
 
 @LINES
 def test_a_stated_error_of_the_trace_is_part_of_the_interval(lines: int) -> None:
-    """The trace is wrong by 4 % of its relaxing part for a while, and mu_2, which is subtracted from it, is wrong."""
+    """A part of the trace has an error of 4 % of mu - mu_2, and mu_2, which is subtracted, has an error, too."""
     data = studies(np.array([0.05]), 60, lines)
     after = data["friction_coefficient_after"]
     start = data["friction_coefficient_before"] + data["friction_coefficient_jump"] - after
@@ -157,7 +157,7 @@ def test_a_stated_error_of_the_trace_is_part_of_the_interval(lines: int) -> None
 
 @LINES
 def test_jumps_by_another_law_are_named(lines: int) -> None:
-    """Jumps that grow with the square of mu_1."""
+    """The planted jumps are proportional to the square of mu_1."""
     data = studies(np.geomspace(1e-4, 1, 6), 3, lines).isel(normal_force=0)
     before = data["friction_coefficient_before"]
     found = FIT["jump_law"].compute({"": data.assign(friction_coefficient_jump=before**2)})
@@ -169,7 +169,7 @@ def test_jumps_by_another_law_are_named(lines: int) -> None:
 @LINES
 @pytest.mark.parametrize("same", [True, False])
 def test_rates_with_a_step_are_named(lines: int, same: bool) -> None:
-    """A step by three in the rates, of lines that all have one rate or rates of their own."""
+    """The rates have a step by a factor of three; all lines have the same rates, or each line has its own."""
     data = studies(np.geomspace(1e-3, 1, 6), 2, lines, power=0.3)
     late = data["relaxation_times"] * 3.0
     fast = data["friction_coefficient"].interp(relaxation_times=np.clip(late, TIMES[0], TIMES[-1]))

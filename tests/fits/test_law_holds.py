@@ -16,7 +16,7 @@ from mdr_dask.fits.base import Fit, fitted, law_holds, verdict
         ([0.08, -0.22, 0.05], 0.3, 0, "approximately: departs by 14 % rms, at most 22 % at x = 1"),
         ([0.08, -0.22, 0.05], 0.0, 0, "approximately: departs by 14 % rms, at most 22 % at x = 1"),
         ([0.3, -0.4, 0.2], 0.0, 0, "no: departs by 31 % rms, at most 40 % at x = 1"),
-        ([0.0] * 99 + [0.4], 0.0, 0, "no: departs by 4 % rms, at most 40 %"),  # one bad case of many counts
+        ([0.0] * 99 + [0.4], 0.0, 0, "no: departs by 4 % rms, at most 40 %"),  # a single bad case counts
         ([0.3, -0.4, 0.2], 0.0, 3, "not tested: 3 cases for 3 constants"),
         ([0.3, -0.4, 0.2], np.nan, 0, "not tested: too few realisations"),
         ([-0.17], 0.0, 0, "no: departs by -17 %"),
@@ -32,7 +32,7 @@ RANKS = {"not tested": 0, "no": 0, "approximately": 1, "yes": 2}
 @pytest.mark.parametrize(("off", "best"), [(0.0, "yes"), (0.1, "approximately"), (0.6, "no")])
 @pytest.mark.parametrize("cases", [1, 12])
 def test_fewer_realisations_give_no_better_verdict(off, best, cases):
-    """Scatter of each realisation is as large as the mean; two of them give no verdict."""
+    """The scatter of a realisation is as large as the mean; with two realisations, there is no verdict."""
     for seed in range(5):
         values = 1 + off + np.random.default_rng(seed).normal(size=(4_000, cases))
         found = {}
@@ -60,8 +60,8 @@ LOG_LOADS = np.repeat(np.linspace(0.0, 1.0, 4), 3)
     [
         ([1 + 0 * LOG_LOADS, LOG_LOADS], [True, True]),
         ([1 + 0 * LOG_LOADS, 0.05 * LOG_LOADS], [True, False]),  # nearly equal loads
-        ([1 + 0 * LOG_LOADS, 1e-3 * LOG_LOADS**2, 0 * LOG_LOADS], [True, False, False]),  # constants that play no part
-        ([1 + 0 * LOG_LOADS, LOG_LOADS, 2 * LOG_LOADS], [True, False, False]),  # two constants of which one is enough
+        ([1 + 0 * LOG_LOADS, 1e-3 * LOG_LOADS**2, 0 * LOG_LOADS], [True, False, False]),  # constants without effect
+        ([1 + 0 * LOG_LOADS, LOG_LOADS, 2 * LOG_LOADS], [True, False, False]),  # two constants with the same effect
     ],
 )
 @pytest.mark.parametrize("misfit", [0.0, 0.2])

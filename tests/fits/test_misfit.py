@@ -10,14 +10,14 @@ DRAWS, POINTS = 600, 30
 
 
 def noise(seed: int) -> np.ndarray:
-    """Return residuals of a fit with a free constant: their mean is zero."""
+    """Return random residuals with the mean zero, as of a fit with a free constant."""
     drawn = np.random.default_rng(seed).standard_normal((DRAWS, POINTS))
     return drawn - drawn.mean(axis=1, keepdims=True)
 
 
 @pytest.mark.parametrize("count", [1, 3])
 def test_noise_has_a_trend_as_often_as_its_probability(count):
-    """For one condition exactly as often; for several conditions, of which the worst counts, not more often."""
+    """This holds exactly for one condition. With several conditions, trends are found at most as often."""
     random = np.random.default_rng(2)
     conditions = {f"condition {k}": random.permutation(POINTS).astype(float) for k in range(count)}
     found = np.array([trend(residuals, conditions)[0] for residuals in noise(1)])
@@ -25,7 +25,9 @@ def test_noise_has_a_trend_as_often_as_its_probability(count):
     for level in (0.05, 0.2, 0.5):
         below, spread = np.mean(found < level), 4 * np.sqrt(level * (1 - level) / DRAWS)
         assert below < level + spread
-        assert below > (level if count == 1 else 0.6 * level) - spread  # all of three apart: 1 - (1 - level / 3)^3
+        assert (
+            below > (level if count == 1 else 0.6 * level) - spread
+        )  # for three independent conditions, it is 1 - (1 - level / 3)^3
     assert np.mean(found == 1) == pytest.approx(0.0 if count == 1 else (2 / 3) ** 3, abs=4 * np.sqrt(0.21 / DRAWS))
 
 

@@ -1,4 +1,4 @@
-"""Sobol indices against Ishigami's function, whose indices are known, and by the command line."""
+"""Sobol indices of Ishigami's function, whose indices are known, and the command."""
 
 import json
 
@@ -21,7 +21,7 @@ def ishigami(x):
 
 
 def exchanged(points):
-    """Saltelli's cases, written a second time: a, b, a with the first input of b, ..."""
+    """Return the cases of Saltelli's design: a, b, a with the first input of b, and so on."""
     a, b = np.hsplit(points, 2)
     cases = []
     for one, other in zip(a, b, strict=True):
@@ -62,7 +62,7 @@ def held(found, kind, truth):
 )
 def test_intervals_hold_the_truth(design, number, failed, realisations, noise):
     found = [sobol_indices(study(design, number, seed, failed, realisations, noise), "y") for seed in range(12)]
-    # of 36 intervals that hold 95 %, fewer than 31 hold once in ninety times
+    # with a probability of 1/90, fewer than 31 of 36 intervals of 95 % contain the truth
     assert np.sum([held(one, "first", FIRST) for one in found]) >= 31
     if design == "saltelli":
         assert np.sum([held(one, "total", TOTAL) for one in found]) >= 31
@@ -71,7 +71,7 @@ def test_intervals_hold_the_truth(design, number, failed, realisations, noise):
 
 
 def test_scatter_of_realisations_does_not_count():
-    # the noise is 9 / 13.8 of the variance of the function: with its mean over four every index would be 14 % smaller
+    # if the noise counted, its mean over four realisations would make every index 14 % smaller
     means = np.mean([sobol_indices(study("saltelli", 256, s, 0.0, 4, 3.0), "y").first for s in range(30)], axis=0)
     assert means == pytest.approx(FIRST, abs=0.035)
 
@@ -95,9 +95,12 @@ def test_too_few_points_are_reported_with_the_number_needed():
     [
         (lambda d: d.isel(case=slice(10)), "at least 16 cases with a value, got 10"),
         (lambda d: d.assign(y=0 * d.y), "the same in every case"),
-        (lambda d: d.rename(case="x"), "this one is a grid"),
-        (lambda d: d.assign(y=d.y.expand_dims(time=3)), "dimension time of its own"),
-        (lambda d: d.assign_coords(x1=("case", np.full(d.sizes["case"], "a"))), "this input has words"),
+        (lambda d: d.rename(case="x"), "got a grid"),
+        (lambda d: d.assign(y=d.y.expand_dims(time=3)), "got values along the dimension time"),
+        (
+            lambda d: d.assign_coords(x1=("case", np.full(d.sizes["case"], "a"))),
+            "expected numbers for the input x1, got words",
+        ),
     ],
 )
 def test_bad_studies_are_refused_with_the_reason(change, what):
@@ -141,8 +144,8 @@ def test_the_command_prints_rows_draws_and_refuses(toy, tmp_path, monkeypatch, c
         assert main(["sensitivity", "results/a.zarr", "height", *form]) == 0
         printed[bool(form)] = capsys.readouterr().out
     low, high = (f"{rows[0][f'first_{end}']:.4g}" for end in ("low", "high"))
-    assert f" ({low}, {high}) " in printed[False]  # an interval for a reader
-    assert "first_low" in printed[True].splitlines()[0]  # two columns for a program
+    assert f" ({low}, {high}) " in printed[False]  # the table shows the interval in brackets
+    assert "first_low" in printed[True].splitlines()[0]  # the CSV has two columns
     assert main(["sensitivity", "results/a.zarr", "heigth"]) == 2
     assert "did you mean 'height'" in capsys.readouterr().err
     assert main(["sensitivity", "results/a.zarr", "trace"]) == 2

@@ -1,8 +1,8 @@
 """A change of the units of length, mass and time changes every output by the power that its unit implies.
 
-Factors are powers of two, so that nothing is rounded by the change itself. What is left out of a row's units is fixed
-by a number with a unit in the physics: the poles of Roelands' and Dowson's laws (pressure, viscosity), gas constant and
-degrees.
+Factors are powers of two, so that the change of units causes no rounding errors. In some rows, not all units can be
+changed freely, because the physics contains numbers with a unit: the constants of the laws of Roelands and of Dowson
+and Higginson (pressure, viscosity), the gas constant, and the zero of the Celsius scale.
 """
 
 import re
@@ -99,7 +99,7 @@ ROLLERS = {
     "trace_points": 100,
     "layer_thickness": 5e-9,
 }
-#: What to compute, what may be free, and how far rounding goes: one row for each way through a model.
+#: Model, parameters, and the units that may be changed freely; one row for each solver.
 ROWS = {
     "friction": ("sliding_friction", LINE | KELVIN, FREE),
     "friction, roll-off": (
@@ -109,7 +109,7 @@ ROWS = {
     ),
     "friction, papers' steps": ("sliding_friction", LINE | KELVIN | {"scheme": "backward_euler"}, FREE),
     "friction, cone": ("sliding_friction", LINE | KELVIN | {"indenter": {"shape": "cone", "angle": 0.05}}, FREE),
-    "friction, arms": ("sliding_friction", LINE | TERMS, FREE),
+    "friction, Prony terms": ("sliding_friction", LINE | TERMS, FREE),
     "jump": ("velocity_jump", JUMP | KELVIN, FREE),
     "steps": (
         "velocity_jump",
@@ -166,8 +166,8 @@ ROWS = {
     ),
 }
 
-#: Outputs without a value: no last state is steady, and a spike of the pressure within one cell has no height
-#: (docs/ehl.md).
+#: Outputs without a value: friction in the steady state if the last state is not steady, and the error of a pressure
+#: spike that is narrower than a cell (docs/ehl.md).
 NO_VALUE = {
     "steps": {"friction_coefficient_after", "friction_coefficient_after_error"},
     "oscillation": {"friction_coefficient_after", "friction_coefficient_after_error"},

@@ -1,4 +1,4 @@
-"""The model ehl_line: parameters, units, sharing, failures as data."""
+"""The model ehl_line: parameters, units, shared solutions, errors and failed cases."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mdr_dask.models.ehl_line.declaration import ACCURACY, MODEL, STEEL, EhlLine
 from mdr_dask.models.ehl_line.solve import compute, distinct
 
 CHECKED = {"load_parameter": 2.0452e-5, "speed_parameter": 1e-11, "material_parameter": 5007.0}
-#: The same contact in units: R = 20 mm, eta0 = 0.1 Pa s.
+#: The same contact by quantities with units: R = 20 mm, eta0 = 0.1 Pa s.
 DIMENSIONAL = {
     "line_load": 2.0452e-5 * 2 * STEEL * 0.02,
     "mean_velocity": 1e-11 * 2 * STEEL * 0.02 / 0.1,
@@ -39,7 +39,7 @@ def block(
 def test_checked_figures() -> None:
     result = compute(block(("central_film", "minimum_film")))
     assert result.status.tolist() == [[Status.DONE]]
-    assert result.values["central_film"][0, 0] == pytest.approx(2.54033e-5, rel=1e-3)  # the accuracy asked for
+    assert result.values["central_film"][0, 0] == pytest.approx(2.54033e-5, rel=1e-3)  # the accuracy of the model
     assert result.values["minimum_film"][0, 0] == pytest.approx(2.13780e-5, rel=1e-3)
     for name in ("central_film", "minimum_film"):
         assert 0 < result.values[f"{name}_error"][0, 0] <= ACCURACY * result.values[name][0, 0]
@@ -67,7 +67,7 @@ def test_profiles_lie_on_the_positions() -> None:
     p0 = 2 * STEEL * np.sqrt(2.0452e-5 / (2 * np.pi))
     half_width = 0.02 * np.sqrt(8 * 2.0452e-5 / np.pi)
     load = np.trapezoid(pressure, position) * half_width
-    assert load == pytest.approx(DIMENSIONAL["line_load"], rel=0.01)  # what lies upstream of -4
+    assert load == pytest.approx(DIMENSIONAL["line_load"], rel=0.01)  # the load upstream of x/a = -4 is missing
     assert pressure.max() > p0
 
 
@@ -91,7 +91,7 @@ def test_cases_share_what_is_the_same() -> None:
 
 
 def test_errors_are_absolute_and_in_the_unit_of_their_output() -> None:
-    """Film errors scale from h/R to metres; those of a profile cover a finer solution, position by position."""
+    """Errors of films are converted from h/R to m. Errors of a profile contain the difference to a finer solution."""
     names = ("central_film", "minimum_film", "central_film_thickness", "film", "pressure", "rolling_coefficient")
     asked = block(names, **DIMENSIONAL)
     here = compute(asked).values
@@ -114,7 +114,7 @@ def test_a_film_thicker_than_a_tenth_of_the_radius_is_warned_of() -> None:
 
 
 def test_extremes_are_data_not_warnings() -> None:
-    """No case of an absurd box raises, warns, or gives a film that is not positive."""
+    """For extreme parameters, no case raises or warns, or gives a film that is not positive."""
     random = np.random.default_rng(3)
     columns = {
         "load_parameter": 10 ** random.uniform(-9, -1, 12),
@@ -138,7 +138,7 @@ def test_extremes_are_data_not_warnings() -> None:
         ({}, "expected either load_parameter or line_load, got neither"),
         (CHECKED | {"line_load": 1.0}, "got load_parameter and line_load"),
         ({k: v for k, v in DIMENSIONAL.items() if k != "radius"}, "line_load needs radius"),
-        (CHECKED | {"viscosity_law": "roelands"}, "roelands needs viscosity"),
+        (CHECKED | {"viscosity_law": "roelands"}, "roelands needs the parameter viscosity"),
         (CHECKED | {"speed_parameter": 0.0}, "greater than 0"),
         (CHECKED | {"inlet": 1.0}, "less than 0"),
         (CHECKED | {"profile_start": 3.0}, "expected profile_end above profile_start 3, got 2"),

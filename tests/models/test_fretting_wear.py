@@ -222,7 +222,7 @@ def test_a_relative_accuracy_is_met_or_the_output_that_misses_it_is_named():
         else:
             assert set(result.messages) == {(case, position) for case in (0, 1) for position in (0, 1)}
             assert all("wear_volume " in text and "worn_profile " in text for text in result.messages.values())
-            assert all("an accuracy of 1e-08 is missed: " in text for text in result.messages.values())
+            assert all("an accuracy of 1e-08 is missed; " in text for text in result.messages.values())
         alone = MODEL.compute(Block(parameters, {"cycles": columns["cycles"][1:]}, 1, (0,), 1, names, accuracy))
         assert alone.values["wear_volume"][0, 0] == result.values["wear_volume"][1, 0]
 

@@ -21,7 +21,7 @@ def block(parameters, columns, realisations=(0, 1), accuracy=None):
 
 
 def test_temperature_and_velocity_are_interchangeable():
-    """Times a_T and velocity / a_T are the same case: here a_T = 10."""
+    """Relaxation times multiplied by a_T = 10 have the same effect as the velocity multiplied by a_T."""
     law = {"wlf": {"c1": 11.0, "c2": 110.0, "reference": 300.0}}
     warm = {"standard_solid": SOLID, "temperature": 290.0} | law
     cool = MODEL.compute(block(LINE | LOAD | {"material": warm}, {"velocity": [0.01]}))

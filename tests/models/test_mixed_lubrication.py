@@ -19,7 +19,7 @@ from mdr_dask.units import to_si
 MODEL = load("mixed_lubrication")
 RPM = 2 * np.pi / 60
 ALL = tuple(output.name for output in MODEL.outputs)
-#: A small line for what is exact at any size: 2a is 105 to 420 um, the line 6.3 mm.
+#: A short line of 6.3 mm, for tests that are exact at any length; the contact width 2a is 105 to 420 um.
 SMALL = {
     "rms_roughness": 2e-7,
     "points": 20_000,
@@ -60,7 +60,7 @@ def test_every_output_has_the_declared_shape_and_no_gaps():
 
 
 def test_trace_agrees_with_its_mean():
-    """The trace on as many angles as points has the mean and the share that the scalar outputs say."""
+    """With as many angles as points, mean and fraction of the trace are the scalar outputs."""
     values = MODEL.compute(block(trace_points=20_000)).values
     trace = values["contact_length_trace"][0, 0]
     assert np.mean(trace > 0) == pytest.approx(values["breakthrough_probability"][0, 0], rel=1e-12)
@@ -101,7 +101,7 @@ def test_an_automatic_number_of_points_meets_the_accuracy_or_warns():
 
 @pytest.mark.slow
 def test_pieces_shorter_than_the_spacing_are_judged_right():
-    """Around 0.31 m, 20 000 points are 16 um apart, 15 times the longest pieces that break; 1 280 000 resolve them."""
+    """20 000 points are 16 um apart, 15 times the longest piece in contact; 1 280 000 points resolve it."""
     rollers = {"roller_radius": 0.05, "layer_thickness": 1e-10, "shortest_wavelength": 5e-5}
     coarse, fine = (MODEL.compute(block(points=points, **rollers)).values for points in (20_000, 1_280_000))
     for name in ("breakthrough_probability", "contact_length"):
@@ -132,7 +132,8 @@ def test_what_misses_the_accuracy_is_named():
     result = MODEL.compute(dataclasses.replace(asked, accuracy=1e-6))
     error = result.values["breakthrough_probability_error"] / result.values["breakthrough_probability"]
     assert result.messages[0, 0] == (
-        f"an accuracy of 1e-06 is missed: breakthrough_probability by {error[0, 0]:.2g} (estimated) (increase points)"
+        "an accuracy of 1e-06 is missed; estimated relative errors: "
+        f"breakthrough_probability {error[0, 0]:.2g} (increase points)"
     )
 
 
@@ -149,7 +150,7 @@ RIG = {
 
 @pytest.mark.parametrize("law", ["barus", "roelands"])
 def test_film_of_the_full_solution_is_that_of_the_line_contact_in_metres(law):
-    """At 40 C the asperities carry nothing: the film is the solver's, with units put together here once more."""
+    """At 40 degC, the asperities carry no load, and the film is that of the line contact, converted to m here."""
     found = MODEL.compute(block(["film"], film_formula="ehl", viscosity_law=law, **RIG | {"temperature": 313.15}))
     data = oil.OILS["mobilgear_shc_xmp_320"]
     viscosity, alpha = float(data.dynamic(313.15)), float(data.alpha(313.15))
@@ -173,19 +174,19 @@ def stribeck(speeds, outputs=("film", "film_ratio", "asperity_load_share", "fric
 
 @pytest.mark.parametrize("formula", ["pan_hamrock", "dowson_higginson"])
 def test_friction_rises_to_boundary_friction_as_the_speed_goes_to_zero(formula):
-    """Monotone from the film ratio of one down, and within 5 % of boundary friction at last."""
+    """Friction is monotone below a film ratio of 1, and within 5 % of boundary friction at the lowest speed."""
     force = 200.0
     found = stribeck(np.geomspace(1e-6, 1000, 40), normal_force=force, film_formula=formula, boundary_friction=0.12)
     friction, ratio = found["friction_coefficient"], found["film_ratio"]
     assert np.all(np.diff(ratio) > -1e-9)
-    assert np.all(np.diff(friction[ratio < 1]) <= 1e-7)  # a film between dry asperities still resists
+    assert np.all(np.diff(friction[ratio < 1]) <= 1e-7)  # the film between the asperities still causes some friction
     assert friction[0] == pytest.approx(0.12, rel=0.05)
     assert friction[-1] < 0.01
     assert np.all(np.diff(found["asperity_load_share"]) <= 1e-9)
 
 
 def test_friction_is_that_of_asperities_and_film():
-    """With an oil that hardly resists, it is boundary friction times the share; without asperities the film's alone."""
+    """With an oil of very low viscosity, only the asperities cause friction; without asperities, only the film does."""
     thin = stribeck([0.1, 1.0, 10.0], eyring_stress=1e-3)
     np.testing.assert_allclose(thin["friction_coefficient"], 0.1 * thin["asperity_load_share"], rtol=1e-6)
     none, some = (stribeck([10.0], boundary_friction=mu)["friction_coefficient"] for mu in (0.0, 0.1))
@@ -195,7 +196,7 @@ def test_friction_is_that_of_asperities_and_film():
 
 @pytest.mark.parametrize("formula", ["pan_hamrock", "ehl"])
 def test_the_film_is_never_thinner_for_its_asperities(formula):
-    """Smooth rollers have the film of the whole load."""
+    """Without asperities, the film carries the whole load."""
     speeds = [1.0, 10.0, 100.0, 1000.0]
     rough = stribeck(speeds, film_formula=formula)
     smooth = stribeck(speeds, film_formula=formula, rms_roughness=1e-12)
@@ -224,7 +225,7 @@ def own_oil(tmp_path, text, **changes):
 
 @pytest.mark.parametrize("kind", ["kinematic", "dynamic"])
 def test_a_table_of_viscosities_is_the_oil_that_it_was_made_of(kind, tmp_path):
-    """Both kinds; then with a row that is off, which `check` names."""
+    """Tables of both kinds of viscosity; and a table with one wrong row, which `check` names."""
     given = OilData(
         temperature_1=313.15, viscosity_1=220e-6, temperature_2=373.15, viscosity_2=19e-6, density=870.0,
         density_temperature=300.0,
@@ -241,7 +242,7 @@ def test_a_table_of_viscosities_is_the_oil_that_it_was_made_of(kind, tmp_path):
     assert (read.lowest, read.highest) == (293.15, 373.15)
     values[2] *= 1.05
     notes = own_oil(tmp_path, f"T [degC];Viscosity [{unit}]\n{rows()}", highest_temperature=400.05).oil.notes()
-    assert re.search(r"ASTM D341 through 5 kinematic viscosities, .*; \+4 % off at 60 degC", notes[0])
+    assert re.search(r"ASTM D341 through 5 kinematic viscosities, .*; largest deviation \+4 % at 60 degC", notes[0])
     ends = re.search(r"viscosities, (\S+) to (\S+) mm\^2/s", notes[0]).groups()
     assert [float(end) for end in ends] == pytest.approx([1e6 * given.kinematic(T) for T in (293.15, 373.15)], rel=0.05)
     assert notes[1:] == ("oil: the viscosity is extrapolated above 100 degC, to 126.9 degC",)
@@ -307,16 +308,18 @@ def test_measured_profiles_take_the_place_of_generated_lines(tmp_path):
     result = MODEL.compute(block(realisations=(0, 1, 2), **files))
     values = result.values["contact_length"][0]
     assert np.all(result.status == Status.DONE)
-    assert len(set(values.tolist())) == 3  # the second line is turned against the first
-    # the tilt and mean of the file are gone: combined rms of two moving averages of nine
+    assert len(set(values.tolist())) == 3  # the rings have other offsets
+    # mean and tilt of the file are removed; each line is a moving average of nine points
     assert result.values["film_ratio"][0, 0] == pytest.approx(4e-7 / (6e-7 / 3 * np.sqrt(2)), rel=0.1)
     scaled = MODEL.compute(block(**files | {"rms_roughness": 2e-7})).values["film_ratio"][0, 0]
-    assert scaled == pytest.approx(4e-7 / (2e-7 * np.sqrt(2)), rel=1e-3)  # the cut line is not quite of unit rms
+    assert scaled == pytest.approx(
+        4e-7 / (2e-7 * np.sqrt(2)), rel=1e-3
+    )  # the rms height of the cut line is not exactly 1
 
 
 @pytest.mark.slow
 def test_creep_on_measured_profiles_has_the_mean_of_pure_rolling_and_of_swapped_rollers(tmp_path):
-    """With S = -1 a revolution covers half of line 1: a fixed start would bias the mean by 20 standard errors."""
+    """With S = -1, a revolution covers half of line 1; a fixed start would shift the mean by 20 standard errors."""
     files = profiles(tmp_path)
     files["surface_1"]["profile"] = write_profile(
         tmp_path / "uneven.csv", 1e-6, 5e-7 * np.sin(np.arange(4000) ** 2 / 4e4) * (np.arange(4000) > 2000)
@@ -359,7 +362,7 @@ def test_cases_beyond_the_tested_range_have_a_warning(changes, message):
 
 @pytest.mark.parametrize(("errors", "revolutions"), [(True, 4), (False, 7)])
 def test_errors_within_revolutions_end_a_campaign_early(errors, revolutions, tmp_path):
-    """Four revolutions with a small error within each are enough; without that error, seven are needed."""
+    """Four revolutions are enough if each has a small standard error of its own; without it, seven are needed."""
     given = {name: value for name, value in SMALL.items() if name not in ("film_thickness", "trace_points")}
     campaign = {
         "model": "mixed_lubrication",

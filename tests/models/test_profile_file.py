@@ -41,7 +41,7 @@ def test_unit_can_be_given(tmp_path):
         line_of(ProfileFile.model_validate({"file": str(tmp_path / "line.csv"), "unit": "ich", "x_unit": "um"}))
 
 
-def test_a_line_without_units_is_no_road_of_20_metres(tmp_path):
+def test_a_line_without_units_is_not_taken_to_be_in_metres(tmp_path):
     write(tmp_path / "line.csv", header="x,z\n")
     with pytest.raises(DataError, match=r"line.csv:1:1: column x: expected its unit, such as 'x \[mm\]'"):
         line_of(ProfileFile.model_validate(str(tmp_path / "line.csv")))

@@ -33,11 +33,11 @@ def block(columns: dict[str, np.ndarray] | None = None, **changes: object) -> Bl
 
 
 def test_one_step_is_the_jump() -> None:
-    """The general way and the quick one agree within their errors."""
-    step, quick = (compute(block(oversampling=16, **change)).values for change in ({"protocol": STEP}, {}))
+    """The solution for any history agrees with that for a jump within their errors."""
+    step, jump = (compute(block(oversampling=16, **change)).values for change in ({"protocol": STEP}, {}))
     for name in ("friction_coefficient_before", "friction_coefficient_after", "friction_coefficient"):
-        assert np.allclose(step[name], quick[name], rtol=4e-3), name
-    assert np.allclose(step["indentation_depth"], quick["indentation_depth"], rtol=1e-3)
+        assert np.allclose(step[name], jump[name], rtol=4e-3), name
+    assert np.allclose(step["indentation_depth"], jump["indentation_depth"], rtol=1e-3)
 
 
 def test_value_depends_on_the_case_alone() -> None:
@@ -61,7 +61,9 @@ def test_value_depends_on_the_case_alone() -> None:
 @pytest.mark.parametrize(
     "material", [None, {"standard_solid": {"static_modulus": 1e7, "glass_modulus": 3e7, "relaxation_time": 3e-4}}]
 )
-def test_every_course_ends_in_its_steady_state(protocol: dict[str, object], material: dict[str, object] | None) -> None:
+def test_every_history_ends_in_its_steady_state(
+    protocol: dict[str, object], material: dict[str, object] | None
+) -> None:
     kelvin = {} if material is None else {"shear_modulus": None, "relaxation_time": None, "material": material}
     found = compute(block(protocol=protocol, relaxation_times=(1.0, 60.0), **kelvin)).values
     assert np.allclose(found["friction_coefficient"][..., -1], found["friction_coefficient_after"], rtol=0.01)
@@ -69,7 +71,7 @@ def test_every_course_ends_in_its_steady_state(protocol: dict[str, object], mate
 
 @pytest.mark.parametrize(("time", "oversampling"), [(1e-3, 16), (0.7e-3, 6)])
 def test_a_time_at_a_change_of_velocity_has_the_value_after_it(time: float, oversampling: int) -> None:
-    """Also if it is the last requested time, and whatever the moments of the march round to."""
+    """This also holds for the last requested time, and if the time is not a multiple of the time step."""
     steps = {"shape": "steps", "times": [0.0, time], "velocities": [0.03, 0.3]}
     at = (0.2, time / 1e-3)
     small = {"points": 16, "oversampling": oversampling, "protocol": steps}
@@ -136,7 +138,7 @@ def test_extremes_are_values_or_a_status(change: dict[str, object]) -> None:
         ({"material": {"kelvin": {"shear_modulus": 1e6, "relaxation_time": 1e-3}}}, "or material"),
     ],
 )
-def test_impossible_courses_are_refused(change: dict[str, object], message: str) -> None:
+def test_impossible_histories_are_refused(change: dict[str, object], message: str) -> None:
     with pytest.raises(ValidationError, match=message):
         block(**change)
 
@@ -159,7 +161,7 @@ def written_line(tmp_path: Path, nodes: int) -> str:
 
 @pytest.mark.parametrize("protocol", [{"shape": "jump"}, STEP])
 def test_measured_line_is_the_generated_one(tmp_path: Path, protocol: dict[str, object]) -> None:
-    """A file of its own nodes; in the quick solution of a jump they are cells of the same kind."""
+    """The file has as many nodes as the grid of the generated line needs."""
     whole = block(protocol=protocol, oversampling=8)
     line = written_line(tmp_path, 400)
     read = compute(block(protocol=protocol, oversampling=2, surface={"profile": line}, length=None, rms_roughness=None))

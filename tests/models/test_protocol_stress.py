@@ -53,7 +53,7 @@ def powers(low: float, high: float) -> st.SearchStrategy[float]:
 
 
 def shares(most: float) -> st.SearchStrategy[float]:
-    """Return parts of what is there: none, or no less than a campaign lets through."""
+    """Draw fractions of a value: zero, or not smaller than a campaign allows."""
     return st.one_of(st.just(0.0), st.floats(1e-12, most))
 
 
@@ -68,7 +68,7 @@ SPEEDS = st.one_of(st.just(0.0), powers(-6, 0), powers(-3, 0).map(lambda v: -v))
     body=st.sampled_from(["kelvin", "standard_solid", "prony"]),
 )
 def test_steps_of_velocity_and_load(speeds: list[float], forces: list[float], start: str, body: str) -> None:
-    """Phases at rest and backwards, loads that jump by up to eight decades, from one point to full contact."""
+    """Phases at rest and of reversed sliding, and jumps of the load by up to eight decades."""
     steps = {"shape": "steps", "start": start, "times": [0.0, 5e-4, 1e-3], "velocities": speeds, "forces": forces}
     check(protocol=steps, **of(body))
 

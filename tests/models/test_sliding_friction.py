@@ -71,7 +71,7 @@ def test_a_smooth_indenter_is_the_limit_of_a_rough_one(shape):
     rough = MODEL.compute(indented(shape, velocity, rms_roughness=1e-13, oversampling=64))
     assert np.all(smooth.status == Status.DONE)
     for name in ("friction_coefficient", "indentation_depth", "contact_fraction"):
-        # the cubic cells of a line of 12800: exact for cone and parabola, fourth order for n = 3; edges within a cell
+        # cubic cells on 12800 nodes are exact for cone and parabola; the edges of the contact are known within a cell
         assert rough.values[name] == pytest.approx(
             smooth.values[name], rel=1e-4 if name == "contact_fraction" else 1e-6
         )
@@ -120,9 +120,9 @@ def test_finer_accuracy_takes_finer_grids_and_is_met():
         warned = np.array([[(j, r) in result.messages for r in (0, 1)] for j in range(16)])
         assert np.all((estimate <= accuracy) | warned)
         errors.append(np.abs(result.values["friction_coefficient"] / reference - 1))
-        # 32 cases of an estimate that holds in 95 %: 1.6 misses are expected, five have a chance of 2 %
+        # if the estimate holds in 95 % of 32 cases, 1.6 misses are expected; five have a probability of 2 %
         assert np.count_nonzero(errors[-1] > estimate) <= 4
-    # the accuracy bounds the largest error; half of the cases are in full contact and exact at any
+    # half of the cases are in full contact, where the solution is exact on any grid
     assert np.max(errors[1]) < np.max(errors[0])
 
 
@@ -137,7 +137,7 @@ def test_full_contact_is_exact_in_any_units():
 
 
 def test_friction_below_zero_lies_within_an_error_that_is_not():
-    """On two nodes a wave friction may be negative; its error was so, too."""
+    """With two nodes per wave, friction may be negative, but its error must not be."""
     wanted = ("friction_coefficient", "friction_coefficient_error")
     case = {"points": 50, "hurst": 0.0, "normal_force": 0.01, "velocity": 1.0}
     found = [

@@ -1,4 +1,4 @@
-"""Every kind of line is solved with every kind of solid, and every output has an error."""
+"""The model sliding_friction: every kind of line with every kind of solid, and the errors of the outputs."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -53,8 +53,8 @@ def solved(parameters, outputs=ALL, columns=None, accuracy=None):
 
 
 @pytest.mark.parametrize("body", BODIES)
-def test_every_line_meets_every_solid(tmp_path, body):
-    """Four ways to name the solid, two to name the line: within their errors, the same Kelvin body and line."""
+def test_every_line_with_every_solid(tmp_path, body):
+    """The same line and Kelvin body, given in different ways, give the same results within their errors."""
     lines = {"generated": GENERATED, "measured": measured(tmp_path / "line.csv")}
     found = {}
     for (line, numbers), (solid, material) in product(lines.items(), SOLIDS.items()):
@@ -107,14 +107,14 @@ def test_the_message_names_the_outputs_that_miss_the_accuracy(solid):
     assert result.status[0, 0] == Status.DONE
     for name in asked:
         relative = result.values[f"{name}_error"][0, 0] / result.values[name][0, 0]
-        assert f"{name} by {relative:.2g}" in message
+        assert f"{name} {relative:.2g}" in message
     assert "indentation_depth" not in message
     assert not solved(GENERATED | SOLIDS[solid], accuracy=0.05).messages
 
 
 @dataclass(frozen=True)
 class Wedge:
-    """A wedge with a flat of half its width at the tip: a shape of one's own."""
+    """A wedge with a flat tip, as an example of a shape that a user defines; `flat` is half the width of the tip."""
 
     steepness: float
     flat: float
@@ -129,13 +129,13 @@ class Wedge:
 
 
 @pytest.mark.parametrize("terms", [None, PronyTerms((4.0,), (0.01,))], ids=["kelvin", "terms"])
-def test_a_new_shape_is_height_and_slopes(terms):
-    """A flat of no width is the cone that the power laws have; a wide one carries the load at less depth."""
+def test_a_shape_needs_only_heights_and_slopes(terms):
+    """A wedge without a flat is a cone; with a wide flat, it carries the same load at a smaller depth."""
     line = roughness.amplitudes(50, 0.7) * 0.5 * np.exp(1j * roughness.phases(1, 0, 50))
     numbers = np.array([0.02]), np.array([1.0])
-    aim = Request(accuracy=1e-3)
+    request = Request(accuracy=1e-3)
     cone, wedge, flat = (
-        solve(RoughLine(Waves(line, 100), body), terms, *numbers, aim)[0]
+        solve(RoughLine(Waves(line, 100), body), terms, *numbers, request)[0]
         for body in (PowerLaw(40.0, 1.0), Wedge(40.0, 0.0), Wedge(40.0, 0.125))
     )
     for column in ("drag", "depth", "contact_fraction", "contact_slope"):

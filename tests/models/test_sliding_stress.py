@@ -1,4 +1,4 @@
-"""Sliding friction over fifteen decades of all parameters, and on very light contacts."""
+"""Sliding friction for parameters over fifteen decades, and for very light contacts."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def solved(parameters, columns=None, realisations=(0,), accuracy=None):
 
 
 def assert_answers_or_says_why(result):
-    """Every result is a state with bounds that any state obeys, or a status with a sentence and no numbers."""
+    """Check that every result is within physical bounds, or has a status with a message and no numbers."""
     for place in np.ndindex(result.status.shape):
         found = {name: result.values[name][place] for name in ALL}
         if result.status[place] != Status.DONE:
@@ -45,8 +45,8 @@ def assert_answers_or_says_why(result):
 
 
 @settings(max_examples=30, deadline=None)
-@example(0.0, -6.0, 3.0, 4.0, 6.0, BODIES[1], 1, "hermite", False)  # the load is lost in the rounding of the line
-@example(0.0, 0.0, 4.0, 7.0, 7.0, BODIES[0], "auto", "hermite", True)  # as friction is
+@example(0.0, -6.0, 3.0, 4.0, 6.0, BODIES[1], 1, "hermite", False)  # the load is lost to rounding errors of the line
+@example(0.0, 0.0, 4.0, 7.0, 7.0, BODIES[0], "auto", "hermite", True)  # friction is lost to rounding errors
 @given(
     hurst=st.floats(0, 1),
     force=fifteen_decades,
@@ -75,7 +75,7 @@ def test_fifteen_decades_of_everything(hurst, force, velocity, modulus, rms, bod
 
 @pytest.mark.parametrize("realisation", range(2))
 def test_the_error_covers_a_peak_between_two_nodes(realisation):
-    """A contact shorter than a cell: drag depends on the curvature of one cubic only, and two grids may agree on it."""
+    """If the contact is shorter than a cell, two grids may agree although both are wrong."""
     columns = {"velocity": np.geomspace(2e4, 1e8, 6), "normal_force": np.geomspace(1e4, 1e8, 6)}
     parameters = LINE | KELVIN | LOAD | {"length": 1.0, "rms_roughness": 1.0, "hurst": 0.3}
 

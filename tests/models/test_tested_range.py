@@ -52,7 +52,7 @@ def test_heavy_loads_on_a_spectrum(parameters, model, load, change, words):
     assert ("docs/validity.md" in note) == bool(words)
 
 
-def test_generated_lines_and_lines_as_they_are_make_no_claim_about_a_surface(parameters):
+def test_generated_lines_and_measured_profiles_have_no_tested_range(parameters):
     line = {"length": 5e-3, "points": 200, "hurst": 0.8, "rms_roughness": 2e-5}
     case = SlidingFriction.model_validate(line | {k: parameters[k] for k in list(parameters)[3:]} | {"normal_force": 9})
     assert not SLIDING.notes([case])

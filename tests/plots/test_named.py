@@ -182,5 +182,5 @@ def test_a_master_curve_has_the_units_of_the_other_figures(stores):
 
 
 def test_a_calibration_without_a_table_says_so(stores):
-    with pytest.raises(FitError, match="no table of measurements"):
+    with pytest.raises(FitError, match="expected a table of measurements"):
         available("velocity_jump")["calibration"].describe(stores(JUMP))

@@ -1,6 +1,7 @@
-"""The lubricated line contact: film, pressure and traction as functions of load, speed and material parameter.
+"""The lubricated line contact: film thickness, pressure and traction for a given load, speed and oil.
 
-`declaration` holds parameters and outputs and is fast to import; `solve` computes the arrays of a block.
+`declaration` defines the parameters and outputs, and is quick to import; `solve` computes the outputs of a block of
+cases.
 """
 
 from mdr_dask.models.ehl_line.declaration import MODEL, EhlLineParameters, groups

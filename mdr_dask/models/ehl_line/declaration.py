@@ -1,4 +1,4 @@
-"""Parameters and outputs of the lubricated line contact."""
+"""Parameters and outputs of the model `ehl_line`; quick to import."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from mdr_dask.models.base import Alternatives, Block, Coordinate, Model, Number,
 
 #: Contact modulus of steel on steel in Pa, with E = 210 GPa and nu = 0.3 for both bodies.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
-#: Relative error of the films if the campaign states no accuracy.
+#: Relative error of the film thickness that is allowed if the campaign states no accuracy.
 ACCURACY = 1e-3
 
-#: Each dimensionless number, the dimensional quantity that can replace it, and the further parameters that the
-#: dimensional quantity requires.
+#: Each dimensionless number, the quantity with a unit that can replace it, and the further parameters that are needed
+#: to compute the number from this quantity.
 _PAIRS = (
     ("load_parameter", "line_load", ("radius",)),
     ("speed_parameter", "mean_velocity", ("radius", "viscosity")),
@@ -42,13 +42,25 @@ class EhlLineParameters(Parameters):
     )
     settings: ClassVar[frozenset[str]] = frozenset({"profile_start", "profile_end", "profile_points"})
     load_parameter: float | None = quantity(
-        "1", "load parameter W = w/(E' R) of the line load w, E' = 2 E*", usual="2e-5", gt=0, default=None
+        "1",
+        "load parameter W = w/(E' R) of the line load w, with E' = 2 E*, twice the contact modulus",
+        usual="2e-5",
+        gt=0,
+        default=None,
     )
     speed_parameter: float | None = quantity(
-        "1", "speed parameter U = eta0 u/(E' R) (eta0: viscosity, u: velocity)", usual="1e-11", gt=0, default=None
+        "1",
+        "speed parameter U = eta0 u/(E' R), with the viscosity eta0 and the mean velocity u",
+        usual="1e-11",
+        gt=0,
+        default=None,
     )
     material_parameter: float | None = quantity(
-        "1", "material parameter G = alpha E' (alpha: pressure_viscosity)", usual="5000", ge=0, default=None
+        "1",
+        "material parameter G = alpha E', with the pressure-viscosity coefficient alpha",
+        usual="5000",
+        ge=0,
+        default=None,
     )
     line_load: float | None = quantity(
         "N/m", "line load w, the normal force per length of the contact", usual="100 N/mm", gt=0, default=None
@@ -68,16 +80,25 @@ class EhlLineParameters(Parameters):
     contact_modulus: float = quantity(
         "Pa", "contact modulus E*, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2", usual="115 GPa", gt=0, default=STEEL
     )
-    viscosity_law: Literal["barus", "roelands"] = Field("barus", description="law of the viscosity under pressure")
-    compressible: bool = Field(True, description="whether the density follows the law of Dowson and Higginson")
+    viscosity_law: Literal["barus", "roelands"] = Field(
+        "barus", description="law by which the viscosity grows with the pressure"
+    )
+    compressible: bool = Field(
+        True, description="whether the density grows with the pressure, by the law of Dowson and Higginson"
+    )
     inlet: float | None = quantity(
         "1",
-        "position where the oil film begins, in Hertzian half widths before the middle (negative); fully flooded if "
-        "not given",
+        "position x/a at which the oil film begins, in Hertzian half widths a; negative, because the middle of the "
+        "contact is at 0. Without it, the contact is fully flooded",
         lt=0,
         default=None,
     )
-    slide_roll_ratio: float = quantity("1", "slide-roll ratio (u1 - u2)/u; 0 is pure rolling", ge=0, default=0.0)
+    slide_roll_ratio: float = quantity(
+        "1",
+        "slide-roll ratio (u1 - u2)/u of the surface velocities u1 and u2 with the mean u; 0 is pure rolling",
+        ge=0,
+        default=0.0,
+    )
     shear_law: Literal["newtonian", "eyring"] = Field(
         "newtonian", description="law of the shear stress as a function of the shear rate"
     )
@@ -103,7 +124,7 @@ class EhlLineParameters(Parameters):
             if missing:
                 raise ValueError(f"{dimensional} needs {' and '.join(missing)}")
         if self.viscosity_law == "roelands" and self.viscosity is None:
-            raise ValueError("viscosity_law roelands needs viscosity, which it refers to a pole in Pa s")
+            raise ValueError("viscosity_law: roelands needs the parameter viscosity")
         if self.profile_end <= self.profile_start:
             end, start = distinguishable(self.profile_end, self.profile_start, digits=6)
             raise ValueError(f"expected profile_end above profile_start {start}, got {end}")
@@ -118,7 +139,7 @@ OUTPUTS = (
     Output(
         "film",
         "1",
-        "relative film thickness h/R; behind the film, the gap",
+        "film thickness h/R; behind the end of the film, the gap between the surfaces divided by R",
         ("position",),
         default=False,
         has_error=True,
@@ -126,30 +147,27 @@ OUTPUTS = (
     Output("pressure", "Pa", "pressure in the film", ("position",), default=False, has_error=True),
     Output("formula_central_film", "1", "relative central film thickness h_c/R by Pan and Hamrock", default=False),
     Output("formula_minimum_film", "1", "relative minimum film thickness h_min/R by Pan and Hamrock", default=False),
-    Output("moes_load", "1", "Moes' load parameter M = W (2U)^(-1/2)", default=False),
-    Output("moes_lubricant", "1", "Moes' lubricant parameter L = G (2U)^(1/4)", default=False),
     Output("minimum_position", "1", "position x/a of the minimum film thickness", default=False, has_error=True),
     Output("rupture_position", "1", "position x/a of the end of the film", default=False, has_error=True),
     Output("spike_position", "1", "position x/a of the pressure spike", default=False, has_error=True),
     Output(
         "spike_pressure",
         "Pa",
-        "largest pressure of the spike; it does not converge for Barus' law",
+        "largest pressure of the spike; with Barus' law it does not converge when the grid is refined",
         default=False,
         has_error=True,
     ),
-    Output("load_error", "1", "relative difference between the integral of the pressure and the load", default=False),
     Output(
         "traction_coefficient",
         "1",
-        "traction coefficient; the shear force in the middle of the film divided by the load",
+        "traction coefficient: shear force in the middle of the film divided by the load",
         default=False,
         has_error=True,
     ),
     Output(
         "rolling_coefficient",
         "1",
-        "rolling friction coefficient; the rolling resistance of each surface divided by the load",
+        "rolling friction coefficient: rolling resistance of each surface divided by the load",
         default=False,
         has_error=True,
     ),
@@ -157,7 +175,9 @@ OUTPUTS = (
 
 
 def groups(lookup: Callable[[str], Any]) -> tuple[Any, Any, Any]:
-    """Return W, U and G from the given parameter of each pair.
+    """Return the dimensionless parameters W (load), U (speed) and G (material).
+
+    Each is taken as given, or computed from the quantities with units.
 
     Parameters
     ----------
@@ -186,7 +206,7 @@ distinct = deferred("mdr_dask.models.ehl_line.solve", "distinct")
 def operations(block: Block[EhlLineParameters]) -> float:
     """Return the approximate number of operations of `compute`.
 
-    A solution needs about 6 million, but more if an accurate pressure spike requires the finest grid.
+    A solution needs about 6 million, and 1.5 billion on the finest grid, which an accurate pressure spike requires.
     """
     accuracy = block.accuracy or ACCURACY
     is_sharp = block.accuracy is not None and {"pressure", "spike_pressure", "spike_position"} & set(block.outputs)
@@ -195,12 +215,12 @@ def operations(block: Block[EhlLineParameters]) -> float:
 
 
 def memory(_: Block[EhlLineParameters]) -> float:
-    """Return the memory in bytes of a solution on the finest grid: about three matrices of 1281 x 1281 numbers."""
+    """Return the memory of a solution on the finest grid in bytes: about three matrices of 1281 x 1281 numbers."""
     return 3.0 * 8 * 1281**2
 
 
 def coordinates(parameters: EhlLineParameters) -> dict[str, Coordinate]:
-    """Return the coordinate of film and pressure."""
+    """Return the positions at which film and pressure are stored, as a coordinate."""
     return {
         "position": Coordinate(
             positions(parameters), "1", "position x/a in Hertzian half widths, positive in the direction of flow"
@@ -228,7 +248,11 @@ MODEL = Model(
             "speed parameter U = eta0 u/(E' R)",
         ),
         Number("material_parameter", "2 * contact_modulus * pressure_viscosity", "material parameter G = alpha E'"),
-        Number("moes_load", "load_parameter * (2 * speed_parameter) ** -0.5", "Moes' load parameter M"),
-        Number("moes_lubricant", "material_parameter * (2 * speed_parameter) ** 0.25", "Moes' lubricant parameter L"),
+        Number("moes_load", "load_parameter * (2 * speed_parameter) ** -0.5", "Moes' load parameter M = W (2U)^(-1/2)"),
+        Number(
+            "moes_lubricant",
+            "material_parameter * (2 * speed_parameter) ** 0.25",
+            "Moes' lubricant parameter L = G (2U)^(1/4)",
+        ),
     ),
 )

@@ -15,7 +15,6 @@ from mdr_dask.physics.lubrication.film_formulas import (
     PAN_HAMROCK_CENTRAL,
     PAN_HAMROCK_MINIMUM,
     Groups,
-    moes_parameters,
     square_of_half_width,
     thick_film,
 )
@@ -29,8 +28,7 @@ from mdr_dask.physics.lubrication.line_contact import (
 )
 from mdr_dask.physics.outcome import Outcome
 
-#: Outputs that are positions. Their unit is the half width of the contact, and their errors are relative to this half
-#: width.
+#: Outputs that are positions, in half widths of the contact. The accuracy of a campaign also refers to this half width.
 _POSITIONS = {"minimum_position", "rupture_position", "spike_position"}
 
 
@@ -58,7 +56,10 @@ def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
 
 
 def _readings(case: EhlLineParameters, W: float, contact: LineContact) -> dict[str, Reading]:
-    """Return, for each output, a function that evaluates it on a grid, in Hertz units."""
+    """Return, for each output, a function that evaluates it from the solution on one grid.
+
+    Positions are in half widths a, film thicknesses in a^2/R, and pressures in units of Hertz' maximum pressure.
+    """
     p0 = highest_pressure(case.contact_modulus, W)
     stress = case.eyring_stress / p0 if case.shear_law == "eyring" else None
     place = positions(case)
@@ -106,15 +107,12 @@ def _estimates(
 
 
 def compute(block: Block[EhlLineParameters]) -> Result:
-    """Solve every different case of a block once; all realisations of a case are equal."""
+    """Solve the cases of a block; equal cases are solved once, and all realisations of a case have the same result."""
     parameters = _groups(block)
-    given = dict(
-        zip(
-            ("formula_central_film", "formula_minimum_film", "moes_load", "moes_lubricant"),
-            (PAN_HAMROCK_CENTRAL(*parameters), PAN_HAMROCK_MINIMUM(*parameters), *moes_parameters(*parameters)),
-            strict=True,
-        )
-    )
+    given = {
+        "formula_central_film": PAN_HAMROCK_CENTRAL(*parameters),
+        "formula_minimum_film": PAN_HAMROCK_MINIMUM(*parameters),
+    }
     shape = (block.cases, len(block.realisations))
     lengths = {"position": block.parameters.profile_points}
     values = {
@@ -139,7 +137,7 @@ def compute(block: Block[EhlLineParameters]) -> Result:
             estimates = _estimates(case, W, solution, block.outputs)
             for name, estimate in estimates.items():
                 found |= {name: estimate.value, f"{name}_error": estimate.error}
-            found["load_error"] = solution.load_error
+
             film = float(solution.central_film.value) * square_of_half_width(W)
             missed = missed_accuracy(
                 {name: [estimate.value] for name, estimate in estimates.items()},

@@ -1,4 +1,4 @@
-"""Parameters and outputs of mixed lubrication, with units, bounds and meanings."""
+"""Parameters and outputs of the model `mixed_lubrication`; quick to import."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from mdr_dask.physics.lubrication.oil import OILS, Oil
 Positive = Annotated[float, Field(gt=0)]
 #: Contact modulus of steel on steel in Pa, with E = 210 GPa and nu = 0.3 for both bodies.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
-#: Number of the shortest waves that fit around a roller, if neither shortest_wavelength nor points are given.
+#: Circumference of a roller divided by the shortest wavelength, if neither shortest_wavelength nor points are given.
 WAVES = 100_000
 #: Positions of the profiles, in half widths of the contact.
 POSITIONS = np.linspace(-1.5, 1.5, 1501)
@@ -52,24 +52,37 @@ class MixedLubrication(Parameters):
     rotation_speed: float = quantity("rad/s", "mean rotation speed of the two rollers", usual="100 rpm", gt=0)
     temperature: float = quantity("K", "temperature of rollers and oil", usual="60 degC", gt=0)
     slide_roll_ratio: float = quantity(
-        "1", "slide-roll ratio (v1 - v2)/u with the mean velocity u; 0 is pure rolling", default=0.0, ge=-2, le=2
+        "1",
+        "slide-roll ratio (v1 - v2)/u of the surface velocities v1 and v2 with the mean u; 0 is pure rolling",
+        default=0.0,
+        ge=-2,
+        le=2,
     )
     rms_roughness: Positive | None = quantity(
-        "m", "rms height of each roller; required unless surfaces are given", usual="0.2 um", default=None
+        "m",
+        "rms height of each roller; required unless surface_1 and surface_2 are given",
+        usual="0.2 um",
+        default=None,
     )
     hurst: float | None = quantity("1", "Hurst exponent H of the roughness", default=0.7, ge=0, le=1)
     points: Annotated[int, Field(ge=64, le=MOST_POINTS)] | Literal["auto"] = quantity(
-        "1", "points of the rough line around each roller; auto takes as many as the accuracy requires", default="auto"
+        "1",
+        "number of points of the rough line around each roller; auto takes as many as the accuracy requires",
+        default="auto",
     )
     longest_wavelength: Positive | Literal["auto"] = quantity(
         "m",
-        "longest wavelength of the roughness; auto is the Hertzian contact width 2a under cutoff_force. With measured "
-        "profiles it is used only for the load on asperities",
+        "longest wavelength of the roughness; auto is the width 2a of the Hertzian contact under cutoff_force. With "
+        "measured profiles, this wavelength affects only the load on the asperities",
         usual="0.4 mm",
         default="auto",
     )
     cutoff_force: float = quantity(
-        "N", "normal force that sets longest_wavelength: auto", usual="1600 N", default=1600, gt=0
+        "N",
+        "normal force for longest_wavelength: auto; the contact width under this force is the longest wavelength",
+        usual="1600 N",
+        default=1600,
+        gt=0,
     )
     shortest_wavelength: Positive | Literal["auto"] = quantity(
         "m",
@@ -93,29 +106,34 @@ class MixedLubrication(Parameters):
         Positive | Literal["oil", "gold_mineral", "gold_polyalphaolefin", "gold_ester", "gold_polyglycol", "wooster"]
     ) = quantity(
         "1/Pa",
-        "pressure-viscosity coefficient alpha, or the name of the correlation that gives it; oil stands for the "
-        "correlation of the oil",
+        "pressure-viscosity coefficient alpha, or the name of a correlation by which it follows from the viscosity; "
+        "oil means the correlation that belongs to the parameter oil",
         usual="20 1/GPa",
         default="oil",
     )
     film_formula: Literal["pan_hamrock", "pan_hamrock_minimum", "dowson_higginson", "ehl"] = Field(
         default="pan_hamrock",
-        description="formula for the film thickness; ehl solves the contact as in the model ehl_line",
+        description="formula for the film thickness; with ehl, the contact is solved as in the model ehl_line",
     )
     film_thickness: Positive | None = quantity(
-        "m", "film thickness in place of the result of film_formula", usual="100 nm", default=None
+        "m", "film thickness, if it is given and not computed by film_formula", usual="100 nm", default=None
     )
     edge_rule: Literal["part", "clip", "whole", "inside"] = Field(
         default="part",
-        description="cluster of asperities at an edge of the contact: test and count its part inside (part), test all "
-        "of it and count its part inside (clip), test and count all of it (whole), or ignore it (inside)",
+        description="treatment of a cluster of asperities that an edge of the contact cuts. part: its part inside the "
+        "contact is tested for breakthrough and counted. clip: the whole cluster is tested, and its part inside is "
+        "counted. whole: the whole cluster is tested and counted. inside: the cluster is ignored",
     )
     roller_radius: float = quantity("m", "radius of each roller", usual="50 mm", default=0.05, gt=0)
     roller_width: float = quantity(
         "m", "width of the rollers, which is the length L' of the contact", usual="10 mm", default=0.01, gt=0
     )
     contact_modulus: float = quantity(
-        "Pa", "contact modulus E*, E/(2 (1 - nu^2)) for two equal materials", usual="115 GPa", default=STEEL, gt=0
+        "Pa",
+        "contact modulus E*; for two rollers of the same material, E* = E/(2 (1 - nu^2))",
+        usual="115 GPa",
+        default=STEEL,
+        gt=0,
     )
     resistivity: float = quantity("ohm m", "electrical resistivity of the rollers", default=2e-7, gt=0)
     boundary_friction: float = quantity(
@@ -123,7 +141,9 @@ class MixedLubrication(Parameters):
     )
     eyring_stress: float = quantity("Pa", "Eyring stress of the oil", usual="5 MPa", default=5e6, gt=0)
     viscosity_law: Literal["barus", "roelands"] = Field(
-        default="barus", description="law of the viscosity under pressure, for friction and for film_formula: ehl"
+        default="barus",
+        description="law by which the viscosity grows with the pressure; it is used for friction, and for the film if "
+        "film_formula is ehl",
     )
     trace_points: int = quantity(
         "1", "number of angles in one revolution at which contact_length_trace is stored", default=3600, ge=2, le=10**6
@@ -146,10 +166,15 @@ class MixedLubrication(Parameters):
         """Circumference of a roller in m."""
         return 2 * float(np.pi) * self.roller_radius
 
-    def source(self) -> Source:
-        """Return how the rough lines are obtained: generated, measured, or from spectra of surfaces.
+    @property
+    def radius(self) -> float:
+        """Reduced radius of curvature of the two equal rollers in m."""
+        return self.roller_radius / 2
 
-        Cases with equal sources can share lines.
+    def source(self) -> Source:
+        """Return the source of the rough lines: generated, measured, or from the spectra of measured surfaces.
+
+        Cases with equal sources share their lines.
         """
         one, two = self.surface_1, self.surface_2
         if one is not None and two is not None and one.profile is not None and two.profile is not None:
@@ -233,7 +258,7 @@ class MixedLubrication(Parameters):
 
     def dry_contact(self, force: float) -> HertzLine:
         """Return the Hertzian contact of the smooth rollers under a normal force in N."""
-        return hertz_line(force / self.roller_width, self.contact_modulus, self.roller_radius / 2)
+        return hertz_line(force / self.roller_width, self.contact_modulus, self.radius)
 
 
 OUTPUTS = (
@@ -253,8 +278,8 @@ OUTPUTS = (
     Output(
         "independent_squares",
         "1",
-        "number of independent squares; the width of the rollers divided by the longest wavelength, one line for each "
-        "square",
+        "number of independent squares across the rollers: their width divided by the longest wavelength. One rough "
+        "line represents one square",
     ),
     Output(
         "revolution_error",
@@ -272,7 +297,7 @@ OUTPUTS = (
     Output(
         "contact_resistance",
         "ohm",
-        "electrical contact resistance; the reciprocal of contact_conductance, infinite without contact",
+        "electrical contact resistance: the reciprocal of contact_conductance, infinite without contact",
         default=False,
         has_error=True,
     ),
@@ -294,7 +319,7 @@ DRAWN = {output.name for output in OUTPUTS if output.dims}
 
 
 def coordinates(parameters: MixedLubrication) -> dict[str, Coordinate]:
-    """Return the coordinates of the outputs: angles of a trace, and positions of profiles in half contact widths."""
+    """Return the coordinates of the outputs: rolling angles, and positions in half widths of the contact."""
     angles = 2 * np.pi * np.arange(parameters.trace_points) / parameters.trace_points
     return {
         "angle": Coordinate(angles, "rad", "rolling angle"),
@@ -310,7 +335,7 @@ OF_LINES = {
 
 
 def operations(block: Block[MixedLubrication]) -> float:
-    """Return the approximate number of operations of a block, from the points of the first two lines of every case."""
+    """Return the approximate number of operations of a block, from the points of the two coarsest lines of each case."""
     columns = (block.column(name) for name in ("points", "shortest_wavelength", "roller_radius"))
     points_of = np.empty(block.cases)
     for case, (points, shortest, radius) in enumerate(zip(*columns, strict=True)):
@@ -349,18 +374,12 @@ MODEL = Model(
         Number(
             "load_parameter",
             "normal_force / (roller_width * contact_modulus * roller_radius)",
-            "load parameter W = w/(E' R) of the pair, E' = 2 E* and R half the radius of a roller",
+            "load parameter W = w/(E' R), with the line load w, E' = 2 E*, and R, half the radius of a roller",
         ),
         Number(
             "rig_probability",
             "1 - (1 - breakthrough_probability) ** independent_squares",
-            "fraction of time in which the layer is broken somewhere in the width of the rollers (independent squares)",
-        ),
-        Number("film_over_layer", "film / layer_thickness", "film thickness divided by layer_thickness"),
-        Number(
-            "touching_share",
-            "contact_length / (2 * contact_half_width)",
-            "contact length divided by the Hertzian width",
+            "fraction of time in which the layer is broken somewhere across the rollers, for independent squares",
         ),
     ),
 )

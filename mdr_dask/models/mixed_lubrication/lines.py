@@ -1,4 +1,4 @@
-"""The two rough lines of a case: generated, generated with the spectra of measured surfaces, or measured."""
+"""The two rough lines of a case: self-affine, with the spectra of measured surfaces, or measured profiles."""
 
 from __future__ import annotations
 
@@ -13,13 +13,12 @@ from mdr_dask.models.parts.surface import Surface, lines_of
 
 #: Largest number of points of a line.
 MOST_POINTS = 10**7
-#: If the accuracy determines the number of points: points per shortest wave on the coarsest lines, and number of
-#: doublings.
+#: For points: auto, the number of points per shortest wave on the coarsest lines, and how often it may be doubled.
 LEAST_PER_WAVE, DOUBLINGS = 2.5, 3
 
 
 def points_for(modes: int) -> tuple[int, ...]:
-    """Return the increasing numbers of points on which lines with `modes` shortest waves are solved."""
+    """Return the numbers of points, increasing, on which lines are solved; `modes` is their number of waves."""
     from scipy.fft import next_fast_len
 
     least = min(next_fast_len(int(np.ceil(LEAST_PER_WAVE * modes)), real=True), MOST_POINTS)
@@ -33,9 +32,9 @@ class _Random:
     Parameters
     ----------
     points : tuple of int
-        Numbers of points of the lines, increasing. The lines have the same waves on every number of points.
+        Numbers of points on which the lines are solved, increasing. The waves are the same on every number of points.
     longest, modes : float, int
-        Number of longest and of shortest waves around a roller.
+        Circumference of a roller divided by the longest wavelength, and by the shortest wavelength.
     """
 
     points: tuple[int, ...]
@@ -66,8 +65,8 @@ class _Random:
     def lines(self, seed: int, realisation: int, points: int) -> FloatArray:
         """Return the least-squares splines of both lines, shape (2, points).
 
-        Both lines take their phases in turn from one random stream, from the longest wave to the shortest. Therefore
-        the longer waves stay the same if shorter waves are added.
+        The random phases are drawn in turn for both lines, from the longest wave to the shortest. Therefore the longer
+        waves stay the same if shorter waves are added.
         """
         from mdr_dask.physics.surfaces.roughness import phase_factors
         from mdr_dask.physics.surfaces.splines import closest
@@ -134,11 +133,11 @@ class OfSurfaces(_Random):
 
 @dataclass(frozen=True)
 class Measured:
-    """Two measured lines, each closed to a ring; every realisation rotates the rings by random offsets."""
+    """Two measured lines, each closed to a ring; in every realisation, the lines begin at random points."""
 
     file_1: ProfileFile
     file_2: ProfileFile
-    scaled: bool  # to unit rms height
+    scaled: bool  # whether the lines are scaled to the rms height 1
 
     @property
     def points(self) -> tuple[int, int]:
@@ -176,7 +175,7 @@ class Measured:
         return np.array([through_heights(np.roll(line, roll)[:: self.points[-1] // points]) for line, roll in rings])
 
     def _pair(self) -> tuple[FloatArray, FloatArray]:
-        """Return the lines without mean and tilt; the step where the ends of a line meet is then small."""
+        """Return the lines without mean and tilt, because the ends of a ring must meet without a large step."""
         from mdr_dask.physics.surfaces.measured import detrended, rms_height
 
         lines = [detrended(line_of(file).height[: self.points[-1]], "line") for file in (self.file_1, self.file_2)]

@@ -38,19 +38,20 @@ class OilData(Parameters):
     )
     viscosities: NamedFile | None = Field(
         default=None,
-        description="table with the columns temperature and kinematic viscosity (or dynamic viscosity), to which "
-        "Walther's law is fitted; in place of the two viscosities",
+        description="table with the columns temperature and kinematic viscosity (or dynamic viscosity), in place of "
+        "the two viscosities; Walther's law is fitted to it",
     )
     density: float = quantity("kg/m^3", "density of the oil at density_temperature", usual="870 kg/m^3", gt=0)
     density_temperature: float = quantity("K", "temperature at which the density was measured", default=288.15, gt=0)
     correlation: Literal["gold_mineral", "gold_polyalphaolefin", "gold_ester", "gold_polyglycol", "wooster"] = Field(
-        default="gold_mineral", description="correlation that gives the pressure-viscosity coefficient"
+        default="gold_mineral",
+        description="correlation by which the pressure-viscosity coefficient follows from the viscosity",
     )
     lowest_temperature: float | None = quantity(
-        "K", "lowest allowed temperature of the oil; by default that of the viscosities", default=None, gt=0
+        "K", "lowest allowed temperature; by default the lowest one with a known viscosity", default=None, gt=0
     )
     highest_temperature: float | None = quantity(
-        "K", "highest allowed temperature of the oil; by default that of the viscosities", default=None, gt=0
+        "K", "highest allowed temperature; by default the highest one with a known viscosity", default=None, gt=0
     )
 
     @model_validator(mode="after")
@@ -66,10 +67,7 @@ class OilData(Parameters):
 
     @property
     def two_viscosities(self) -> tuple[float, float, float, float]:
-        """Two temperatures in K, each followed by the kinematic viscosity in m^2/s.
-
-        The viscosities are those of the campaign, or follow from the fit to the table.
-        """
+        """Two temperatures in K, each followed by the kinematic viscosity in m^2/s, as given or from the table."""
         if self.viscosities is not None:
             found = _fitted(self.viscosities, self.density, self.density_temperature)
             low, high = float(found.temperature[0]), float(found.temperature[-1])
@@ -86,7 +84,7 @@ class OilData(Parameters):
         return Oil(*data, self.density, self.density_temperature, self.correlation, low, high, "campaign file")
 
     def notes(self) -> tuple[str, ...]:
-        """Return notes about the fit of the law to a table, and about extrapolation of the viscosity."""
+        """Return notes about the fit of Walther's law to the table, and about extrapolated viscosities."""
         notes = []
         if self.viscosities is not None:
             found = _fitted(self.viscosities, self.density, self.density_temperature)
@@ -95,7 +93,7 @@ class OilData(Parameters):
             first, last = (found.at(float(temperature[end])) * 1e6 for end in (0, -1))
             notes.append(
                 f"table {self.viscosities.name}: ASTM D341 through {off.size} kinematic viscosities, {first:.4g} to "
-                f"{last:.4g} mm^2/s; {off[worst]:+.2g} % off at {shown(float(temperature[worst]), 'K')}, less elsewhere"
+                f"{last:.4g} mm^2/s; largest deviation {off[worst]:+.2g} % at {shown(float(temperature[worst]), 'K')}"
             )
         one, _, two, _ = self.two_viscosities
         ends = ((self.lowest_temperature, min(one, two), "below"), (self.highest_temperature, max(one, two), "above"))
@@ -107,7 +105,10 @@ class OilData(Parameters):
 
 
 class _Fit(NamedTuple):
-    """The fit to a table: ascending temperatures in K, constants of the law, relative deviations of viscosities."""
+    """Walther's law fitted to a table.
+
+    The temperatures in K ascend; `departures` are the relative deviations of the measured viscosities from the law.
+    """
 
     temperature: FloatArray
     constants: tuple[float, float]
@@ -120,7 +121,7 @@ class _Fit(NamedTuple):
 
 @lru_cache(maxsize=16)
 def _fitted(file: DataFile, density: float, density_temperature: float) -> _Fit:
-    """Return the law fitted to a table of viscosities.
+    """Fit Walther's law to a table of viscosities.
 
     Raises
     ------

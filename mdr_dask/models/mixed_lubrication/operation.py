@@ -1,4 +1,4 @@
-"""The smooth contact of a case: Hertzian contact, oil, load shared between film and asperities, and friction."""
+"""The smooth rollers of a case: Hertzian contact, oil film, load shares of film and asperities, and friction."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mdr_dask.physics.lubrication.film_formulas import HertzLine
 from mdr_dask.physics.lubrication.load_sharing import Asperities, SharedLoad, share_load
 from mdr_dask.physics.outcome import Outcome
 
-#: Relative error of the film from the EHL solution if the campaign states no accuracy.
+#: Relative error of the film thickness that is allowed in an EHL solution if the campaign states no accuracy.
 ACCURACY = 1e-3
 
 
@@ -31,11 +31,12 @@ class Film(NamedTuple):
 
 @dataclass(frozen=True)
 class Operation:
-    """Contact, film and boundary layer of a case, converted to the units of its rough lines.
+    """Contact, film and boundary layer of a case.
 
-    `shared` holds the film in m, and `film_error` is the relative error of the film. `scale` is the unit, in m, of the
-    heights of the lines, and `strength` is the layer strength for lines in this unit. `width` is the width of the
-    contact in m.
+    `viscosity` is the dynamic viscosity in Pa s, and `alpha` the pressure-viscosity coefficient in 1/Pa. `shared` has
+    the film thickness in m and the load shares, and `film_error` is the relative error of the film thickness. `scale`
+    is the unit, in m, of the heights of the lines, and `strength` is the layer strength for lines in this unit. `width`
+    is the width of the contact in m.
     """
 
     case: MixedLubrication
@@ -57,7 +58,7 @@ class Operation:
 
     @property
     def level(self) -> float:
-        """Film thickness in the unit of the lines' heights."""
+        """Film thickness in the unit of the heights of the lines."""
         return self.film / self.scale
 
     @property
@@ -67,10 +68,7 @@ class Operation:
 
     @property
     def squares(self) -> float:
-        """Number of squares across the width of the rollers; the edge of a square is the longest wavelength.
-
-        One line represents one square.
-        """
+        """Number of squares across the width of the rollers; the side of a square is the longest wavelength."""
         return self.case.roller_width / self.case.longest()
 
     @property
@@ -113,13 +111,8 @@ def operation_of(case: MixedLubrication, accuracy: float | None = None) -> Opera
             breakthrough.layer_strength(case.layer_shear_strength, case.contact_modulus, case.layer_thickness)
         )
         / scale,
-        warning="; ".join(note for note in (warning, film_formulas.thick_film(shared.film / _radius(case))) if note),
+        warning="; ".join(note for note in (warning, film_formulas.thick_film(shared.film / case.radius)) if note),
     )
-
-
-def _radius(case: MixedLubrication) -> float:
-    """Return the reduced radius of two equal rollers in m."""
-    return case.roller_radius / 2
 
 
 def _mean_pressure(case: MixedLubrication) -> float:
@@ -130,7 +123,7 @@ def _mean_pressure(case: MixedLubrication) -> float:
 def _shared_load(
     case: MixedLubrication, asperities: Asperities, film_of: tuple[Callable[[float], Film], str], accuracy: float
 ) -> tuple[SharedLoad, float, str]:
-    """Return film and load shares, the relative error of the film, and a warning."""
+    """Return the film thickness with the load shares, the relative error of the film thickness, and a warning."""
     pressure = _mean_pressure(case)
 
     def asperity_share(film: float) -> float:
@@ -151,8 +144,8 @@ def _shared_load(
 def _film_of(
     case: MixedLubrication, viscosity: float, alpha: float, accuracy: float
 ) -> tuple[Callable[[float], Film], str]:
-    """Return a function from the load share of the film to the film, and a warning if the formula is out of range."""
-    E_star, radius = case.contact_modulus, _radius(case)
+    """Return a function that computes the film from its load share, and a warning if the formula is out of range."""
+    E_star, radius = case.contact_modulus, case.radius
     velocity = case.rotation_speed * case.roller_radius
     line_load = case.normal_force / case.roller_width
     groups = film_formulas.dimensionless_groups(line_load, viscosity, velocity, alpha, E_star, radius)
@@ -176,10 +169,7 @@ def _film_of(
 
 @lru_cache(maxsize=1024)
 def _solved(contact: line_contact.LineContact, accuracy: float) -> Film:
-    """Return the central film of the EHL solution in units of ``a^2/R``, and its relative error.
-
-    The result is cached for all realisations.
-    """
+    """Return the central film thickness of the EHL solution in units of ``a^2/R``, and its relative error."""
     solution = line_contact.solve_film(contact, accuracy)
     if solution.outcome == Outcome.FILM_COLLAPSED:
         return Film(0.0)  # the film is too thin for the grids; nearly all load will be on the asperities

@@ -24,16 +24,19 @@ WINDOWS = 4
 
 @dataclass(frozen=True)
 class Revolution:
-    """Intimate contact of the window during one revolution of the rollers.
+    """Intimate contact during one revolution of the rollers.
+
+    The window is the part of both lines that is in the Hertzian contact at one moment.
 
     Parameters
     ----------
     contact : int array, shape (windows,)
-        Length in intimate contact at equal time steps, in the unit of `breakthrough.contact_lengths`.
+        Length in intimate contact in each window; the windows follow at equal time steps.
     unit : float
-        Length in m of one count of contact.
+        Unit of `contact` in m.
     parts : int
-        Number of parts of the revolution. A part is at least two windows long, unless there is only one part.
+        Number of equal parts of the revolution, whose scatter gives the standard error. A part is at least two windows
+        long, unless there is only one part.
     """
 
     contact: NDArray[np.int32] | IntArray
@@ -42,7 +45,7 @@ class Revolution:
 
     @property
     def probability(self) -> float:
-        """Share of windows in intimate contact."""
+        """Fraction of the windows that have intimate contact."""
         return np.count_nonzero(self.contact) / self.contact.size
 
     @property
@@ -82,7 +85,7 @@ def revolve(operation: Operation, lines: FloatArray) -> Revolution:
 
 
 def _windows(operation: Operation, lines: FloatArray, travels: ArrayLike) -> IntArray:
-    """Return the lengths in contact of the windows after given travels; the travels are in points."""
+    """Return the lengths in intimate contact after given travels of the contact; a travel is in points of the line."""
     spacing = operation.length / lines.shape[1]
     pair = breakthrough.Pair(lines[0], lines[1], operation.level, spacing, operation.strength)
     starts = breakthrough.creep_positions(travels, lines.shape[1], operation.case.slide_roll_ratio)
@@ -139,6 +142,6 @@ def drawn(
             operation.scale * np.interp(nodes + start[0], np.arange(points), heights(line), period=points)
             for start, line in zip(starts, lines, strict=True)
         )
-        gap = operation.film + film_formulas.hertz_gap(x, half_width, case.roller_radius / 2)
+        gap = operation.film + film_formulas.hertz_gap(x, half_width, case.radius)
         found |= {"upper_profile": gap - upper, "lower_profile": lower}
     return found

@@ -1,8 +1,8 @@
-"""Compute the outputs of a block of rough rollers on an oil film."""
+"""Solve a block of cases: mixed lubrication of two rough rollers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any
@@ -20,7 +20,7 @@ from mdr_dask.physics.refine import Solution, refine
 
 #: Film ratio below which overlapping asperities merge into large clusters that do not break the layer.
 LEAST_FILM_RATIO = 0.5
-#: Outputs that follow from the length in contact, and all outputs that need the rough lines.
+#: Outputs that follow from the length in intimate contact, and all outputs that need the rough lines.
 _OF_LENGTH = {"contact_length", "contact_conductance", "contact_resistance", *DRAWN}
 _OF_LINES = {"breakthrough_probability", "revolution_error", *_OF_LENGTH}
 #: Outputs that can be zero, each with a magnitude. If an output is smaller than its magnitude, its error is relative to
@@ -33,29 +33,37 @@ _ORDER = 1
 
 
 def compute(block: Block[MixedLubrication]) -> Result:
-    """Return the values of a block; one realisation is one revolution of the rollers with random lines.
+    """Solve the cases of a block; one realisation is one revolution of the rollers with random lines.
 
     In each realisation, cases that differ only in load, speed, temperature, rms height or layer use the same lines.
     """
-    result = _empty(block)
+    sizes = {name: coordinate.values.size for name, coordinate in coordinates(block.parameters).items()}
+    shape = (block.cases, len(block.realisations))
+    arrays = {
+        name: np.full((*shape, *(sizes[dim] for dim in MODEL.output(name).dims)), np.nan) for name in block.outputs
+    }
+    result = Result(arrays, np.full(shape, Status.MISSING, dtype=np.int8))
     groups: dict[Source, list[tuple[int, Operation]]] = {}
     for index in range(block.cases):
         case = block.case(index)
-        problem = case.problem()
+        problem, status = case.problem(), Status.FAILED
+        if not problem:
+            try:
+                operation = operation_of(case, block.accuracy)
+            except NoFilmError as error:
+                problem, status = str(error), Status.NOT_CONVERGED
         if problem:
-            _refuse(result, index, Status.FAILED, problem)
-            continue
-        try:
-            operation = operation_of(case, block.accuracy)
-        except NoFilmError as error:
-            _refuse(result, index, Status.NOT_CONVERGED, str(error))
+            result.status[index] = status
+            result.messages.update({(index, position): problem for position in range(len(block.realisations))})
             continue
         groups.setdefault(operation.source, []).append((index, operation))
         fixed = fixed_values(operation)
         _store(result, block, index, slice(None), fixed)
-        _warn(result, block, index, operation)
+        if 0 in block.realisations:
+            for warning in _warnings(operation):
+                result.add_message(index, block.realisations.index(0), warning)
         for position in range(len(block.realisations)):
-            _note(result, index, position, _missed(block, fixed, _FLOORS))
+            _add_missed(result, block, index, position, fixed, _FLOORS)
         result.status[index] = Status.DONE
     if _OF_LINES & set(block.outputs):
         for source, members in groups.items():
@@ -64,46 +72,31 @@ def compute(block: Block[MixedLubrication]) -> Result:
     return replace(result, solves=sum(map(len, groups.values())) * len(block.realisations))
 
 
-def _empty(block: Block[MixedLubrication]) -> Result:
-    sizes = {name: coordinate.values.size for name, coordinate in coordinates(block.parameters).items()}
-    shape = (block.cases, len(block.realisations))
-    values = {
-        name: np.full((*shape, *(sizes[dim] for dim in MODEL.output(name).dims)), np.nan) for name in block.outputs
-    }
-    return Result(values, np.full(shape, Status.MISSING, dtype=np.int8))
-
-
-def _refuse(result: Result, index: int, status: Status, why: str) -> None:
-    """Set the status of a case for all realisations, and give the reason as message."""
-    result.status[index] = status
-    result.messages.update({(index, position): why for position in range(result.status.shape[1])})
-
-
 def _store(
     result: Result, block: Block[MixedLubrication], index: int, position: int | slice, found: Mapping[str, Any]
 ) -> None:
+    """Write those of the found values that are requested."""
     for name in found.keys() & set(block.outputs):
         result.values[name][index, position] = found[name]
 
 
-def _note(result: Result, index: int, position: int, note: str) -> None:
-    """Append a note to the message of one case in one realisation."""
-    if note:
-        before = result.messages.get((index, position))
-        result.messages[index, position] = f"{before}; {note}" if before else note
-
-
-def _missed(
-    block: Block[MixedLubrication], found: Mapping[str, float], floors: Mapping[str, float], advice: str = ""
-) -> str:
-    """Return a message about requested outputs that miss the accuracy of the campaign, or an empty string."""
+def _add_missed(
+    result: Result,
+    block: Block[MixedLubrication],
+    index: int,
+    position: int,
+    found: Mapping[str, float],
+    floors: Mapping[str, float],
+    advice: str = "",
+) -> None:
+    """Add a message if requested outputs miss the accuracy of the campaign."""
     if block.accuracy is None:
-        return ""
+        return
     known = [name for name in block.outputs if np.isfinite(found.get(name, np.nan))]
     values = {name: [found[name]] for name in known}
     errors = {name: [found.get(f"{name}_error", 0.0)] for name in known}
-    text = missed_accuracy(values, errors, block.accuracy, floors).get(0, "")
-    return f"{text}{advice}" if text else ""
+    for text in missed_accuracy(values, errors, block.accuracy, floors).values():
+        result.add_message(index, position, text + advice)
 
 
 def _realise(
@@ -113,7 +106,7 @@ def _realise(
     members: list[tuple[int, Operation]],
     position: int,
 ) -> None:
-    """Compute one realisation of all cases that share lines, each on the points that the accuracy needs."""
+    """Compute one realisation of all cases that share lines; each case gets as many points as the accuracy requires."""
     lines = lru_cache(maxsize=1)(partial(source.lines, block.seed, block.realisations[position]))
     found: list[Revolution] = [None] * len(members)  # type: ignore[list-item]
     arrays: list[dict[str, FloatArray]] = [{}] * len(members)
@@ -148,19 +141,16 @@ def _realise(
             * max(1.0, length / found_length if found_length else 1.0),
         }
         advice = "" if operation.case.points == "auto" else " (increase points)"
-        _note(result, index, position, _missed(block, numbers, floors_here, advice))
+        _add_missed(result, block, index, position, numbers, floors_here, advice)
         _store(result, block, index, position, numbers | arrays[k])
 
 
-def _warn(result: Result, block: Block[MixedLubrication], index: int, operation: Operation) -> None:
-    """Add a warning to realisation 0 if an assumption of the model is violated."""
-    if 0 not in block.realisations:
-        return
-    position = block.realisations.index(0)
-    _note(result, index, position, operation.warning)
+def _warnings(operation: Operation) -> Iterator[str]:
+    """Yield a warning for each assumption of the model that a case violates."""
+    if operation.warning:
+        yield operation.warning
     if operation.film / operation.rms < LEAST_FILM_RATIO:
-        text = (
+        yield (
             f"the film ratio is below {LEAST_FILM_RATIO}: asperities merge into large clusters that do not "
-            "break the layer, so the "
+            "break the layer, so the probability is too low"
         )
-        _note(result, index, position, f"{text}probability is too low")

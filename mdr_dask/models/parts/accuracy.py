@@ -1,8 +1,8 @@
-"""For all models: check whether results reach the accuracy of a campaign, and write a message if they do not.
+"""Find the results that miss the accuracy of a campaign, for all models.
 
-The relative error of an output is its error divided by its value. For a profile or a history, it is the largest error
-divided by the largest value. For an output that can be zero, the model gives a floor in the unit of the output. If the
-output is smaller than the floor, the error is divided by the floor.
+The accuracy limits the relative error of every output: the error divided by the value. For a profile or a history, it
+is the largest error divided by the largest value. For an output that can be zero, the model gives a floor in the unit
+of the output. If the output is smaller than its floor, the error is divided by the floor instead.
 """
 
 from __future__ import annotations
@@ -16,33 +16,6 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import distinguishable
 
 
-def relative_errors(
-    values: Mapping[str, ArrayLike], errors: Mapping[str, ArrayLike], floors: Mapping[str, ArrayLike] | None = None
-) -> dict[str, FloatArray]:
-    """Return the relative error of every output of every case, shape (cases,).
-
-    Parameters
-    ----------
-    values, errors : mapping of str to array, shape (cases, ...)
-        Results and their absolute errors, by the name of the output. Entries are ignored where the result or the error
-        is NaN.
-    floors : mapping of str to array, shape (cases,), or float
-        Floors by the name of the output. If the result is smaller than its floor, its error is relative to the floor.
-    """
-    found = {}
-    for name, value in values.items():
-        size, error = (np.abs(np.atleast_1d(np.asarray(each, dtype=np.float64))) for each in (value, errors[name]))
-        known = ~(np.isnan(size) | np.isnan(error))
-        largest_error, largest = (
-            np.where(known, each, 0.0).reshape(len(each), -1).max(axis=1, initial=0.0) for each in (error, size)
-        )
-        floor = np.asarray((floors or {}).get(name, 0.0), dtype=np.float64)
-        with np.errstate(all="ignore"):
-            share = largest_error / np.maximum(largest, floor)
-        found[name] = np.where(largest_error == 0, 0.0, share)
-    return found
-
-
 def missed_accuracy(
     values: Mapping[str, ArrayLike],
     errors: Mapping[str, ArrayLike],
@@ -54,23 +27,39 @@ def missed_accuracy(
 
     Parameters
     ----------
-    values, errors, floors
-        As in :func:`relative_errors`.
+    values, errors : mapping of str to array, shape (cases, ...)
+        Results and their absolute errors, by the name of the output. Elements are ignored where the result or the error
+        is NaN.
     accuracy : float
         Allowed relative error of every output.
+    floors : mapping of str to array, shape (cases,), or float
+        Floors by the name of the output; 0 for outputs that are not named.
     where : str
         Text that is added to the message, such as ``" on the finest grid"``.
     """
-    shares = relative_errors(values, errors, floors)
-    late = np.flatnonzero(np.any([~(share <= accuracy) for share in shares.values()], axis=0)) if shares else ()
-    return {int(k): missed({name: float(share[k]) for name, share in shares.items()}, accuracy, where) for k in late}
+    shares = {
+        name: _relative_errors(value, errors[name], (floors or {}).get(name, 0.0)) for name, value in values.items()
+    }
+    messages = {}
+    for k in np.flatnonzero(np.any([~(share <= accuracy) for share in shares.values()], axis=0)) if shares else ():
+        late = {name: share[k] for name, share in shares.items() if not share[k] <= accuracy}
+        texts = (
+            f"{name} {distinguishable(share, accuracy, digits=2)[0] if np.isfinite(share) else 'unknown'}"
+            for name, share in late.items()
+        )
+        messages[int(k)] = (
+            f"an accuracy of {accuracy:.12g} is missed{where}; estimated relative errors: {', '.join(texts)}"
+        )
+    return messages
 
 
-def missed(shares: Mapping[str, float], accuracy: float, where: str = "") -> str:
-    """Return a message about the outputs that miss an accuracy, or an empty string if all outputs reach it."""
-    named = [f"{name} by {_amount(share, accuracy)}" for name, share in shares.items() if share > accuracy]
-    return f"an accuracy of {accuracy:.12g} is missed{where}: {', '.join(named)} (estimated)" if named else ""
-
-
-def _amount(share: float, accuracy: float) -> str:
-    return distinguishable(share, accuracy, digits=2)[0] if np.isfinite(share) else "an unknown amount"
+def _relative_errors(values: ArrayLike, errors: ArrayLike, floor: ArrayLike) -> FloatArray:
+    """Return the relative error of an output of every case, shape (cases,); infinite if only the value is zero."""
+    size, error = (np.abs(np.atleast_1d(np.asarray(each, dtype=np.float64))) for each in (values, errors))
+    known = ~(np.isnan(size) | np.isnan(error))
+    largest_error, largest = (
+        np.where(known, each, 0.0).reshape(len(each), -1).max(axis=1, initial=0.0) for each in (error, size)
+    )
+    with np.errstate(all="ignore"):
+        share = largest_error / np.maximum(largest, np.asarray(floor, dtype=np.float64))
+    return np.where(largest_error == 0, 0.0, share)

@@ -1,4 +1,7 @@
-"""Parameters of indenters. In the model of fretting wear, sizes are optional, and there are also measured profiles."""
+"""Parameters of indenters.
+
+The model of fretting wear uses them, too. There, the sizes are optional, and an indenter may be a measured profile.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Plane(Parameters):
-    """A nominally flat body with a periodic rough line."""
+    """A body that is flat apart from its roughness."""
 
     shape: Literal["plane"] = "plane"
 
@@ -27,14 +30,14 @@ class _PowerLaw(Parameters):
     """A body of revolution whose height is a power of the distance from its axis."""
 
     def power_law(self) -> tuple[float, float]:
-        """Return coefficient and exponent of the body c r^n.
+        """Return coefficient c and exponent n of the body c r^n.
 
         The coefficient is NaN if the size of the body is not given, as in a dimensionless study of wear.
         """
         raise NotImplementedError
 
     def line(self) -> Shape:
-        """Return the equivalent one-dimensional profile by the MDR rule, in metres."""
+        """Return the profile, in m, that replaces the body in the method of dimensionality reduction."""
         from mdr_dask.physics.surfaces.shapes import PowerLaw
 
         return PowerLaw.of_body(*self.power_law())
@@ -88,7 +91,7 @@ class RoundedCone(Parameters):
     tip_radius: float = quantity("m", "radius of curvature R of the tip", gt=0)
 
     def line(self) -> Shape:
-        """Return the equivalent one-dimensional profile by the MDR rule, in metres."""
+        """Return the profile, in m, that replaces the body in the method of dimensionality reduction."""
         from mdr_dask.physics.surfaces.shapes import RoundedCone as Line
 
         steepness = math.tan(self.angle)

@@ -12,7 +12,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from mdr_dask.errors import DataError
 from mdr_dask.headings import Column
 from mdr_dask.models.base import Parameters, quantity
-from mdr_dask.models.data_file import NamedFile
+from mdr_dask.models.data_file import NamedFile, check_in_campaign
 from mdr_dask.tables import read_table
 
 if TYPE_CHECKING:
@@ -31,7 +31,9 @@ class _History(Parameters):
     """Base of all histories except the jump."""
 
     start: Literal["steady", "rest"] = Field(
-        default="steady", description="state before t = 0 under `normal_force`: steady sliding at `velocity`, or rest"
+        default="steady",
+        description="state before t = 0, under the parameter `normal_force`: steady sliding at the parameter "
+        "`velocity`, or rest",
     )
 
 
@@ -40,32 +42,43 @@ class Steps(_History):
 
     shape: Literal["steps"]
     times: Numbers = quantity(
-        "s", "times at which velocity and normal force change, the first not before 0", min_length=1
+        "s", "increasing times at which velocity and normal force change; none is negative", min_length=1
     )
     velocities: Numbers = quantity("m/s", "velocity after each of the times", min_length=1)
     forces: Numbers | None = quantity(
-        "N", "normal force after each of the times; by default `normal_force`", default=None
+        "N", "normal force after each of the times; by default always the parameter `normal_force`", default=None
     )
 
     @model_validator(mode="after")
     def _rows(self) -> Steps:
-        _check_rows(self.times, self.velocities, self.forces)
+        times, forces = self.times, self.forces
+        if len(self.velocities) != len(times) or (forces is not None and len(forces) != len(times)):
+            raise ValueError(f"expected a velocity and a force for each of {len(times)} times")
+        if times[0] < 0 or any(b <= a for a, b in pairwise(times)):
+            raise ValueError(f"expected increasing times that are not negative, got {times!r}")
+        if forces is not None and min(forces) <= 0:
+            raise ValueError(f"expected positive forces, got {forces!r}")
         return self
 
 
 class Ramp(_History):
-    """Velocity and normal force that change linearly from t = 0 during a given time, and are constant afterwards."""
+    """Velocity and normal force that change linearly, beginning at t = 0, and are constant after the ramp."""
 
     shape: Literal["ramp"]
     duration: float = quantity("s", "duration of the ramp", usual="4 ms", gt=0)
-    velocity: float | None = quantity("m/s", "velocity at the end of the ramp; by default `velocity`", default=None)
+    velocity: float | None = quantity(
+        "m/s", "velocity at the end of the ramp; by default the parameter `velocity` of the body", default=None
+    )
     force: float | None = quantity(
-        "N", "normal force at the end of the ramp; by default `normal_force`", default=None, gt=0
+        "N",
+        "normal force at the end of the ramp; by default the parameter `normal_force` of the body",
+        default=None,
+        gt=0,
     )
 
 
 class Oscillation(_History):
-    """A velocity that oscillates about `velocity`; the normal force may oscillate about `normal_force`."""
+    """An oscillation of the velocity about the parameter `velocity`, and of the force about `normal_force`."""
 
     shape: Literal["oscillation"]
     amplitude: float = quantity("m/s", "amplitude of the oscillating velocity", usual="20 mm/s", ge=0)
@@ -83,31 +96,25 @@ class TableFile(_History):
 
     @model_validator(mode="after")
     def _holds_a_history(self, info: ValidationInfo) -> TableFile:
-        """Raise an error for an invalid table when the campaign is read, before any case is computed."""
-        if info.context is not None:
-            try:
-                _table_rows(self.file, 1.0)
-            except DataError as problem:
-                raise ValueError(str(problem)) from None
+        check_in_campaign(info, lambda: _table_rows(self.file, 1.0))
         return self
 
 
 Protocol = Annotated[Jump | Steps | Ramp | Oscillation | TableFile, Field(discriminator="shape")]
 
 
-def _check_rows(times: tuple[float, ...], velocities: tuple[float, ...], forces: tuple[float, ...] | None) -> None:
-    if len(velocities) != len(times) or (forces is not None and len(forces) != len(times)):
-        raise ValueError(f"expected a velocity and a force for each of {len(times)} times")
-    if times[0] < 0 or any(b <= a for a, b in pairwise(times)):
-        raise ValueError(f"expected increasing times that are not negative, got {times!r}")
-    if forces is not None and min(forces) <= 0:
-        raise ValueError(f"expected positive forces, got {forces!r}")
-
-
 def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> tuple[tuple[float, float], list[Piece]]:
     """Return velocity and normal force before t = 0, and the pieces of the history after t = 0.
 
-    The last piece continues for ever.
+    Within a piece, velocity and force are linear in time, and a sine may be added to both. The last piece has no end.
+
+    Parameters
+    ----------
+    protocol : Protocol
+    velocity, force : float
+        The parameters `velocity` and `normal_force` of the body, in m/s and N.
+    change : float
+        Relative change of the velocity at a jump.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Parameter sets that a user can give as a mere file name."""
+"""Parameter sets that a user can write as a file name only."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from mdr_dask.models.base import Parameters
 
 
 class NamedByFile(Parameters):
-    """A parameter set with a field `file` or `files`; a mere file name means this file with default options."""
+    """A parameter set with a field `file` or `files`. A file name alone means this file with the default options."""
 
     model_config = ConfigDict(json_schema_extra={"bare_name": True})
 

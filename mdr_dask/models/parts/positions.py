@@ -1,4 +1,4 @@
-"""Recognition of positions and row numbers in tables of heights, and the regular grid of these positions."""
+"""Find positions and row numbers in tables of heights, and the regular grid on which the positions lie."""
 
 from __future__ import annotations
 
@@ -12,19 +12,23 @@ from mdr_dask.errors import DataError
 from mdr_dask.units import shown
 
 OFF_GRID = 0.5
-"""Largest deviation of a position from its grid point, in steps of the grid."""
+"""Largest distance of a position from its grid point, in steps of the grid."""
 OUTER = 3
 """Largest number of rows or columns on each side of a table that may hold positions or row numbers."""
 BREAK = 3.0
-"""Bend between a line of positions and the lines beside it, over the largest bend between lines of heights."""
+"""A row or column holds positions if it differs from its neighbours by more than this times the largest difference
+between rows or columns of heights (see `_leading`)."""
 FAR_ALONE = 10.0
 """A number that occurs once is not a height if its distance from all other heights exceeds this times their range."""
 FEW_LEVELS = 10
-"""A profile with at most this many different heights counts as designed, not measured."""
+"""Heights with at most this many different values belong to a designed surface, such as a grating."""
 
 
 class Outer(NamedTuple):
-    """Heights without the lines of positions, steps of the positions along x and y, and remarks on omitted lines."""
+    """A table of heights from which rows and columns of positions were removed.
+
+    `steps` are the steps of the positions along x and y, None if unknown. `remarks` name the removed rows and columns.
+    """
 
     rows: FloatArray
     steps: tuple[float | None, float | None]
@@ -34,7 +38,7 @@ class Outer(NamedTuple):
 def rising(lines: FloatArray) -> NDArray[np.bool_]:
     """Return which lines only rise or only fall.
 
-    Lines of positions and lines of row numbers have this property; lines of rough heights do not.
+    Lines of positions and of row numbers do so; lines of rough heights do not.
     """
     steps = np.diff(lines, axis=1)
     known = np.isfinite(steps)
@@ -67,8 +71,8 @@ def without_positions(rows: FloatArray) -> Outer:
 def _leading(lines: FloatArray) -> int:
     """Return the number of lines at the beginning that hold positions or row numbers.
 
-    Lines of positions only rise or only fall. On a tilted or curved surface, lines of heights may also only rise or
-    only fall. But a line of positions differs from the adjacent lines much more than a line of heights does.
+    Lines of positions only rise or only fall. Lines of heights may also do so on a tilted or curved surface, but a line
+    of positions differs from the adjacent lines much more than a line of heights does.
     """
     inner = lines[:, OUTER:-OUTER]
     rises = rising(inner)
@@ -86,7 +90,13 @@ def is_numbered(line: FloatArray) -> bool:
 
 
 def _common_step(lines: list[FloatArray], name: str) -> float | None:
-    """Return the common step of all lines of positions; None if the lines hold only the numbers of points."""
+    """Return the step that all lines of positions have in common; None if all lines hold the numbers of their points.
+
+    Raises
+    ------
+    DataError
+        If the steps of two lines differ.
+    """
     steps = [regular(line)[1] for line in lines if not is_numbered(line)]
     if any(abs(step - steps[0]) > 0.01 * steps[0] for step in steps):
         apart = " and ".join(f"{step:.4g}" for step in steps)
@@ -95,9 +105,9 @@ def _common_step(lines: list[FloatArray], name: str) -> float | None:
 
 
 def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
-    """Return the index, starting from 0, of each position on a regular grid, and the step of the grid.
+    """Return the index of each position on a regular grid, counted from 0, and the step of the grid.
 
-    Positions with the same index may differ slightly, and indices may be missing.
+    Positions may deviate a little from the grid, and grid points may be missing.
 
     Raises
     ------
@@ -120,7 +130,9 @@ def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
 
 
 def scattered(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, tuple[float, float]]:
-    """Return rows of heights, NaN if a point is missing, and the steps along x and y, from points in any order.
+    """Arrange points, which are given in any order, in rows of heights; return the rows and the steps along x and y.
+
+    A height is NaN where a point is missing.
 
     Raises
     ------
@@ -137,12 +149,12 @@ def scattered(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, 
 
 
 def without_codes(height: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
-    """Replace numbers that cannot be heights, such as the code 9999 for missing points, by NaN. Heights are in m.
+    """Replace numbers that cannot be heights by NaN, such as the code 9999 for missing points; also return remarks.
 
-    A number is replaced if it is the largest or the smallest of all, and if its distance from the other heights exceeds
-    their range. If the number occurs only once, the distance must exceed `FAR_ALONE` times this range, because a single
-    deep groove is possible. No number is replaced if the other heights have at most `FEW_LEVELS` different values, as
-    on a grating.
+    The largest and the smallest of all numbers, in m, are replaced if their distance from the other heights exceeds the
+    range of these heights. For a number that occurs only once, the distance must exceed `FAR_ALONE` times this range,
+    because a single deep groove is possible. Nothing is replaced if the other heights have at most `FEW_LEVELS`
+    different values, as on a grating.
     """
     height = np.where(np.isfinite(height), height, np.nan)
     found: list[str] = []

@@ -1,4 +1,7 @@
-"""The four kinds of roughness of a line: self-affine, with the spectrum of a measured surface, measured, or none."""
+"""The four kinds of rough lines: self-affine, with the spectrum of a measured surface, a measured profile, and smooth.
+
+All heights are in units of the rms height, and all lengths in units of the length of the line.
+"""
 
 from __future__ import annotations
 
@@ -16,12 +19,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Generated:
-    """Self-affine roughness in units of its length and rms height; only the phases depend on the realisation."""
+    """Self-affine roughness. The realisations have the same amplitudes, and different random phases."""
 
     hurst: float
     points: int
-    rolloff: float  # length of the line divided by the roll-off wavelength; 0 for no roll-off
-    longest: float
+    rolloff: float  # length of the line divided by the roll-off wavelength; 0 without a roll-off
+    longest: float  # length of the line divided by the longest wavelength; 0 if all waves are present
     is_random = True
 
     def waves(self, seed: int, realisation: int) -> Waves:
@@ -57,10 +60,10 @@ def _slope(line: Generated) -> float:
 
 @dataclass(frozen=True)
 class OfSurface:
-    """Lines with the spectrum of a measured surface, in units of their length and rms height.
+    """Lines with the spectrum of a measured surface and random phases.
 
-    If the surface has n files, realisation r uses the file with the index r modulo n. Therefore the scatter between
-    realisations includes the scatter between files, and the mean over realisations is also a mean over files.
+    If the surface has several files, the realisations use the files in turn. Therefore the scatter between realisations
+    includes the scatter between files, and the mean over realisations is also a mean over files.
     """
 
     surface: Surface
@@ -69,7 +72,7 @@ class OfSurface:
     is_random = True
 
     def height(self) -> float:
-        """Return the unit of height in m, which is the rms height of the lines of all files together."""
+        """Return the unit of height in m: the rms height of the lines of all files together."""
         return _height(self)
 
     def waves(self, seed: int, realisation: int) -> Waves:
@@ -97,14 +100,14 @@ def _height(line: OfSurface) -> float:
 
 @dataclass(frozen=True)
 class Measured:
-    """The line of a file, in units of its length and rms height; it is the same in every realisation."""
+    """The measured profile of a file; it is the same in every realisation."""
 
     profile: ProfileFile
     is_random = False
 
     @property
     def points(self) -> int:
-        """Number of Nyquist points, which is the number of samples of the line."""
+        """Number of samples of the profile."""
         return int(line_of(self.profile).height.size)
 
     def height(self) -> float:
@@ -130,7 +133,7 @@ def _waves(line: Measured) -> Waves:
 
 @dataclass(frozen=True)
 class Smooth:
-    """No roughness; `points` is the number of Nyquist points, on which grids depend."""
+    """A line without roughness; `points` is the number of points from which a solver makes its grids."""
 
     points: int
     is_random = False

@@ -16,7 +16,7 @@ from mdr_dask.models.parts.measured_line import line_of
 from mdr_dask.models.parts.surface import Surface, spectra_of, without_exponent
 from mdr_dask.units import shown
 
-#: Parameters of a generated line that are replaced by the file of a measured surface.
+#: Parameters of generated roughness. A measured surface replaces them.
 GENERATED = ("hurst", "rms_roughness", "rolloff_wavelength", "longest_wavelength")
 #: Dimensionless numbers of a Kelvin body on a generated line.
 NUMBERS = (
@@ -35,9 +35,9 @@ NUMBERS = (
 
 
 class SlidingBody(Parameters):
-    """A viscoelastic body that slides over a rough line, which is generated or measured.
+    """A viscoelastic body that slides over a rough line.
 
-    The rough line is flat, or has the shape of an indenter.
+    The roughness is generated or measured. The line is flat apart from its roughness, or has the shape of an indenter.
     """
 
     renamed: ClassVar[Mapping[str, str]] = {
@@ -52,7 +52,11 @@ class SlidingBody(Parameters):
         "m", "length L of the rough line, after which the roughness repeats", usual="10 mm", default=None, gt=0
     )
     points: int = quantity(
-        "1", "points of the rough line; its shortest wavelength is 2 length / points", default=5000, ge=16, le=10**6
+        "1",
+        "number of points of the rough line; the shortest wavelength of its roughness is 2 length / points",
+        default=5000,
+        ge=16,
+        le=10**6,
     )
     hurst: float | None = quantity("1", "Hurst exponent H of the self-affine roughness", default=0.7, ge=0, le=1)
     rms_roughness: float | None = quantity("m", "rms height h of the roughness", usual="0.5 um", default=None, ge=0)
@@ -67,7 +71,11 @@ class SlidingBody(Parameters):
         "Pa", "static shear modulus G of an incompressible Kelvin body", usual="10 MPa", default=None, gt=0
     )
     relaxation_time: float | None = quantity(
-        "s", "relaxation time tau = eta / G of the Kelvin body (viscosity eta)", usual="1 ms", default=None, gt=0
+        "s",
+        "relaxation time tau = eta / G of the Kelvin body, with its viscosity eta",
+        usual="1 ms",
+        default=None,
+        gt=0,
     )
     material: Material | None = Field(
         default=None, description="a general linear viscoelastic material in place of a Kelvin body"
@@ -92,14 +100,14 @@ class SlidingBody(Parameters):
     def _problem_of_line(self) -> str:
         """Return a message about missing or contradictory parameters of the line, or an empty string."""
         if self.surface is None:
-            return "" if self.hurst is not None else "expected hurst, which rms_roughness needs, got none"
+            return "" if self.hurst is not None else "expected hurst, because generated roughness needs it, got none"
         both = [name for name in GENERATED if getattr(self, name) is not None]
         if both:
             return f"surface replaces {', '.join(both)}: leave out one or the other"
         if self.surface.profile is not None and self.length is not None:
             return "the length of surface: {profile: ...} comes from its file: leave out length"
         if self.surface.profile is None and self.length is None:
-            return "expected length, the length of the rough line that represents the surface"
+            return "expected length, the length of the rough line that represents the surface, got none"
         return ""
 
     def largest_force(self) -> float:
@@ -120,7 +128,10 @@ class SlidingBody(Parameters):
 
 
 def frequency_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
-    """Return notes that compare the frequencies q v of a study with the range of data of each material."""
+    """Return a note for each material, which compares the frequencies of a study with those of the material's data.
+
+    A wave of the roughness with wave number q excites the angular frequency q v, at the sliding velocity v.
+    """
     velocities = [one.velocity for one in sets]
     waves = [one.wavelengths() for one in sets]
     low = 2 * math.pi * min(velocities) / max(longest for _, longest in waves)
@@ -137,7 +148,7 @@ def frequency_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
 
 
 def _compared(asked: tuple[float, float], known: tuple[float, float]) -> str:
-    """Return a text that says how far the frequencies of a study are outside the range of the data."""
+    """Return how far the frequencies of a study lie outside the range of the data, as text."""
     (low, high), (first, last) = np.log10(asked), np.log10(known)
     beyond = {"below": max(first - low, 0.0), "above": max(high - last, 0.0)}
     if high <= first or low >= last:

@@ -1,4 +1,4 @@
-"""Conversion of sliding bodies to dimensionless numbers: loads, velocities, lines and solids without units."""
+"""Convert the sliding bodies of a block to dimensionless loads, velocities, lines and solids."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from mdr_dask.models.parts.material import solid_of
 from mdr_dask.models.parts.measured_line import line_of
 from mdr_dask.models.parts.rough_line import Generated, Measured, OfSurface, Roughness, Smooth
 from mdr_dask.models.parts.sliding_body import SlidingBody
-from mdr_dask.models.parts.surface import Surface
 from mdr_dask.physics.outcome import Outcome
 
 if TYPE_CHECKING:
@@ -40,9 +39,10 @@ LEAST = 1e-100  # a product of three numbers between LEAST and 1 / LEAST does no
 
 @dataclass(frozen=True)
 class Setting:
-    """The roughness, the shape and the Prony terms that some cases share, in dimensionless form.
+    """The roughness, shape and solid that some cases share, in dimensionless form.
 
-    The shape is None for a plane. The Prony terms are None for a Kelvin solid.
+    `body` is the shape of the indenter, None for a plane. `terms` are the Prony terms of the solid, None for a Kelvin
+    solid.
     """
 
     roughness: Roughness
@@ -52,7 +52,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class SlidingProblems:
-    """The cases of a block as dimensionless numbers. The dimensionless solution depends only on these numbers.
+    """The cases of a block as dimensionless numbers. Cases with equal numbers have the same dimensionless solution.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class SlidingProblems:
     faults: dict[int, str]
 
     def groups(self, *columns: NDArray[Any]) -> Iterator[tuple[Setting, IntArray]]:
-        """Yield groups of solvable cases that share a setting and the values of some columns."""
+        """Group the cases that can be solved by their setting and the values of some columns; yield the groups."""
         is_sound = self.which >= 0
         is_sound[list(self.faults)] = False
         sound = np.flatnonzero(is_sound)
@@ -155,7 +155,7 @@ def sliding_problems(block: Block[Any]) -> SlidingProblems:
 
 
 def _without_units(body: Shape | None, length: float, height: float) -> Shape | None:
-    """Return the line of an indenter in units of length and height, as canonical numbers."""
+    """Return the profile of an indenter in units of length and height; its numbers are rounded by `canonical`."""
     if body is None:
         return None
     body = body.scaled(float(length), float(height))
@@ -224,7 +224,10 @@ def _lines(
             continue
         members = np.flatnonzero(which == k)
         try:
-            line = _measured(surface, points, float(length[j]))
+            if surface.profile is None:
+                line: OfSurface | Measured = OfSurface(surface, points, float(length[j]))
+            else:
+                line = Measured(surface.profile)
             length[members] = line_of(line.profile).length if isinstance(line, Measured) else length[j]
             height[members] = line.height()
             lines.append(line)
@@ -234,20 +237,16 @@ def _lines(
     return lines, which, length, height
 
 
-def _measured(surface: Surface, points: int, length: float) -> OfSurface | Measured:
-    """Return the roughness of a measured surface, in units of length and height."""
-    return OfSurface(surface, points, length) if surface.profile is None else Measured(surface.profile)
-
-
 def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArray, FloatArray, list[Any], IntArray]:
-    """Return the solids of a block; viscosity and moduli of Prony terms are divided by the static modulus.
+    """Return the solids of a block.
 
     Returns
     -------
     static, viscosity : array, shape (cases,)
-        Static modulus in Pa; and viscosity of the dashpot in s, because it is divided by the static modulus.
+        Static modulus in Pa; and viscosity of the dashpot divided by the static modulus, in s.
     terms : list
-        Moduli and relaxation times in s of the Prony terms of every different solid; None for a Kelvin solid.
+        For every different solid, the moduli of its Prony terms divided by the static modulus, and their relaxation
+        times in s; None for a Kelvin solid.
     which : int array, shape (cases,)
         Index of the solid of every case.
     """

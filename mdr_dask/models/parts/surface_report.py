@@ -41,9 +41,11 @@ UNITS = {
 }
 """Columns of a report and their units. A value is NaN if a file does not determine the quantity.
 
-Sq and Sa are the rms height and the mean absolute height of the levelled map. Pq is the rms height of the levelled
-profile. These three are computed without a window. Gradient, slopes and anisotropy are computed from the windowed
-heights.
+* Sq and Sa: rms height and mean absolute height of the levelled map. Pq: rms height of the levelled profile. These
+three are computed without a window; gradient, slopes and anisotropy are computed from the windowed heights.
+* hurst, rolloff and cutoff: Hurst exponent, longest and shortest wavelength of the fitted power law, each with the ends
+of its interval.
+* resolution: shortest wavelength that is not only noise. length: longest wavelength of a map, length of a profile.
 """
 
 
@@ -57,11 +59,12 @@ class FileReport(NamedTuple):
     row : dict of str to number or str
         Values of the columns of `UNITS`.
     found : Found
-        The spectrum C2D, the wavelength below which there is only noise, and remarks.
+        The two-dimensional power spectrum C2D, the wavelength below which there is only noise, and remarks.
     bins : Cut
         C2D in logarithmic bins with relative errors.
     cuts : dict of str to (array, array)
-        Wave numbers and spectrum C_cut in m^3 of straight profiles, for each direction; empty for a table.
+        Wave numbers and one-dimensional power spectrum, in m^3, of straight profiles in each direction; empty for a
+        table.
     law : SelfAffine or None
         The fitted power law; None if no power law fits.
     """
@@ -131,10 +134,10 @@ def _of_scan(
 
 
 def mean_spectrum(spectra: tuple[Spectrum, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the wave numbers of the first spectrum, the mean C2D of all spectra, and the relative error of the mean.
+    """Return the wave numbers of the first spectrum, the mean of all spectra, and its relative standard error.
 
-    The error is the standard error; it is NaN for a single spectrum. At each wave number, the mean includes only the
-    spectra that have this wave number in their range.
+    At each wave number, the mean includes only the spectra that have this wave number in their range. The error is NaN
+    for a single spectrum.
     """
     q = spectra[0].wavenumber
     each = np.array([spectrum.at(q) for spectrum in spectra])

@@ -1,4 +1,4 @@
-"""Messages about results on measured surfaces outside the range that was tested (docs/validity.md)."""
+"""Messages about results on measured surfaces outside the range in which the method was tested (docs/validity.md)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PAGE = "docs/validity.md"
 
 
 def load_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
-    """Return a note if loads of a study exceed the range in which the friction on a rough surface was tested."""
+    """Return a note if loads of a study exceed `LARGEST_LOAD`."""
     from mdr_dask.models.parts.material import solid_of
 
     loads = []

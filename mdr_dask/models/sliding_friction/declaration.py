@@ -18,14 +18,14 @@ class SlidingFriction(SlidingBody):
     settings: ClassVar[frozenset[str]] = frozenset({"oversampling"})
     oversampling: Annotated[int, Field(ge=1, le=256)] | Literal["auto"] = quantity(
         "1",
-        "number of grid points for each of the `points`; 1 is the grid of the original papers, auto refines the grid "
-        "until the accuracy is met",
+        "grid points per point of the rough line (`points`). 1 gives the grid of the original papers; with auto, the "
+        "grid is refined until the accuracy is reached",
         default="auto",
     )
     scheme: Literal["hermite", "backward_euler"] = Field(
         default="hermite",
-        description="integration along the line, for a Kelvin body only: exact between grid points that are joined by "
-        "cubic polynomials (hermite), or by the time steps of the original papers (backward_euler)",
+        description="integration of the deformation along the line. hermite: exact for cubic polynomials between the "
+        "grid points. backward_euler: the time steps of the original papers, for a Kelvin body only",
     )
 
 
@@ -35,7 +35,7 @@ OUTPUTS = (
     Output("contact_fraction", "1", "fraction of the line that is in contact", has_error=True, comment=NO_AREA),
     Output("contact_slope", "1", "rms slope of the line inside the contact", has_error=True),
     Output("rms_slope", "1", "rms slope of the whole line"),
-    Output("material_error", "1", "rms relative error of the fitted Prony series, 0 without a fit", (), False),
+    Output("material_error", "1", "rms relative error of the fitted Prony series; 0 if none was fitted", (), False),
 )
 
 SOLVE = "mdr_dask.models.sliding_friction.solve"

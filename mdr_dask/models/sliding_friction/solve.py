@@ -1,9 +1,9 @@
-"""Steady friction of a block of cases; cases with equal dimensionless numbers are solved once per realisation."""
+"""Solve a block of cases: steady friction."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,24 +20,25 @@ from mdr_dask.physics.sliding.problem import Request, solve
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 ACCURACY = 0.01  # relative accuracy if the campaign does not give an accuracy
-USUAL_ON_PLANES, USUAL = 2, 16  # nodes per Nyquist point on the finest grid that is usually needed
-BYTES_A_NODE = 150  # peak memory per node in bytes, for a line and one case on it; measured: 20 to 130 bytes
-OPERATIONS_A_NODE = 10  # operations of a sweep for each node
+# grid points per point of the line, on the finest grid that is usually needed: for a plane Kelvin body, and otherwise
+USUAL_ON_PLANES, USUAL = 2, 16
+BYTES_A_NODE = 150  # peak memory per grid point in bytes, for a line and one case on it; measured: 20 to 130 bytes
+OPERATIONS_A_NODE = 10  # operations for each grid point in one sweep along the line
 
-#: Outputs that have errors, and the corresponding columns of a steady state.
+#: Outputs that have errors, each with the corresponding column of `Steady`.
 OUTPUTS = dict(
     zip(("friction_coefficient", "indentation_depth", "contact_fraction", "contact_slope"), COLUMNS, strict=True)
 )
 
 
 def compute(block: Block[SlidingFriction]) -> Result:
-    """Solve the cases of a block; equal cases are solved once."""
+    """Solve the cases of a block. Cases with equal dimensionless numbers are solved once per realisation."""
     shape = (block.cases, len(block.realisations))
     values = {name: np.full(shape, np.nan) for name in block.outputs}
     result = Result(values, np.full(shape, Status.FAILED, np.int8))
     problems = sliding_problems(block)
     solves = 0
-    groups = [_Group.of(block, problems, *group) for group in _groups(block, problems)]
+    groups = [_Group(block, problems, *group) for group in _groups(block, problems)]
     for r, realisation in enumerate(block.realisations):  # all lines of a realisation have the same random phases
         for group in groups:
             solves += group.solve(result, r, realisation)
@@ -58,35 +59,24 @@ def _groups(
         yield setting, block.case(int(members[0])), members
 
 
-@dataclass
 class _Group:
     """Cases with the same line, solid and grid; equal cases are solved once."""
 
-    block: Block[SlidingFriction]
-    problems: SlidingProblems
-    setting: Setting
-    request: Request
-    members: IntArray
-    deborah: FloatArray
-    loads: FloatArray
-    which: IntArray  # index into `deborah` and `loads` for every member
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         block: Block[SlidingFriction],
         problems: SlidingProblems,
         setting: Setting,
         case: SlidingFriction,
         members: IntArray,
-    ) -> _Group:
-        """Return a group of cases; equal cases among the members are listed once."""
-        deborah, loads, which = problems.different(members)
+    ) -> None:
+        self.block, self.setting, self.members = block, setting, members
+        self.height, self.length = problems.height[members], problems.length[members]
+        self.deborah, self.loads, self.which = problems.different(members)
         with_errors = any(f"{output}_error" in block.outputs for output in OUTPUTS)
         contact = not {"contact_fraction", "contact_slope"}.isdisjoint(block.outputs)
         accuracy = ACCURACY if block.accuracy is None else block.accuracy
-        request = Request(accuracy, case.oversampling, case.scheme, with_errors, contact)
-        return cls(block, problems, setting, request, members, deborah, loads, which)
+        self.request = Request(accuracy, case.oversampling, case.scheme, with_errors, contact)
 
     def solve(self, result: Result, r: int, realisation: int) -> int:
         """Write the results of the realisation with index r in the block; return the number of solved cases."""
@@ -103,7 +93,7 @@ class _Group:
         values, absolute = self._outputs(steady.columns), self._outputs(errors)
         result.status[self.members, r] = STATUS[steady.status[self.which]]
         if "rms_slope" in result.values:
-            slope = roughness.slope(realisation) * self._height / self._length
+            slope = roughness.slope(realisation) * self.height / self.length
             result.values["rms_slope"][self.members, r] = np.where(np.isnan(values["contact_slope"]), np.nan, slope)
         for output in OUTPUTS:
             for name, found in ((output, values[output]), (f"{output}_error", absolute[output])):
@@ -121,19 +111,11 @@ class _Group:
         first = {int(j): result.messages[j, 0] for j in self.members if (j, 0) in result.messages}
         result.messages.update({(j, r): message for j, message in first.items()})
 
-    @property
-    def _height(self) -> FloatArray:
-        return self.problems.height[self.members]
-
-    @property
-    def _length(self) -> FloatArray:
-        return self.problems.length[self.members]
-
     def _outputs(self, columns: FloatArray) -> dict[str, FloatArray]:
         """Return the outputs of the members, or their errors, in SI units."""
         drag, depth, fraction, contact_slope = columns
-        slope = self._height / self._length
-        in_units = (drag / self.loads)[self.which] * slope, depth[self.which] * self._height, fraction[self.which]
+        slope = self.height / self.length
+        in_units = (drag / self.loads)[self.which] * slope, depth[self.which] * self.height, fraction[self.which]
         return dict(zip(OUTPUTS, (*in_units, contact_slope[self.which] * slope), strict=True))
 
     def _messages(
@@ -146,7 +128,7 @@ class _Group:
         if self.request.oversampling == "auto":
             asked = [name for name in OUTPUTS if name in self.block.outputs]
             found, stated = ({name: each[name] for name in asked} for each in (values, errors))
-            floors = {"indentation_depth": self._height}
+            floors = {"indentation_depth": self.height}
             yield from missed_accuracy(found, stated, self.request.accuracy, floors, " on the finest grid").items()
         yield from beyond_tested(self.setting, self.loads[self.which], values["contact_fraction"]).items()
 
@@ -165,7 +147,7 @@ def _lines(block: Block[SlidingFriction], setting: Setting) -> int:
 
 
 def operations(block: Block[SlidingFriction]) -> float:
-    """Return the approximate number of operations of a block, from the number of nodes in all sweeps."""
+    """Return the approximate number of operations of a block, from the grid points of all sweeps."""
     problems, nodes = sliding_problems(block), 0.0
     for setting, case, members in _groups(block, problems):
         solves = problems.different(members)[0].size

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from mdr_dask.models.base import Coordinate, Model, Number, Output, deferred, quantity
+from mdr_dask.models.base import Coordinate, Model, Output, deferred, quantity
 from mdr_dask.models.parts.loading_history import Jump, Protocol, pieces
 from mdr_dask.models.parts.material import solid_of
 from mdr_dask.models.parts.sliding_body import NUMBERS, SlidingBody, frequency_notes
@@ -27,7 +27,12 @@ class VelocityJump(SlidingBody):
     rms_roughness: float | None = quantity("m", "rms height h of the roughness", usual="2 um", default=None, gt=0)
     velocity: float = quantity("m/s", "sliding velocity v_1 before the jump", usual="50 mm/s", gt=0)
     oversampling: int = quantity(
-        "1", "number of grid points for each of the `points`, after the jump", default=4, ge=2, le=256, multiple_of=2
+        "1",
+        "grid points per point of the rough line (`points`), for the time after the jump",
+        default=4,
+        ge=2,
+        le=256,
+        multiple_of=2,
     )
     steps_per_decade: int = quantity(
         "1", "time steps in each decade of time; use 8 or more for large jumps", default=8, ge=4, le=400
@@ -36,11 +41,13 @@ class VelocityJump(SlidingBody):
         "1", "relative change of the velocity at the jump, (v_2 - v_1) / v_1", default=0.2, gt=-1
     )
     protocol: Protocol = Field(
-        default=Jump(), description="history of velocity and normal force from t_0 = 0 on; by default one jump"
+        default=Jump(),
+        description="history of velocity and normal force, beginning at the time 0; by default, the velocity jumps "
+        "once, by velocity_change",
     )
     relaxation_times: tuple[float, ...] = quantity(
         "1",
-        "times after the jump at which results are stored, divided by the longest relaxation time: (t - t_0) / tau",
+        "times after the jump at which results are stored, divided by the longest relaxation time tau of the material",
         default=TIMES,
         strict=False,
         min_length=2,
@@ -103,11 +110,11 @@ OUTPUTS = (
 
 
 def coordinates(parameters: VelocityJump) -> dict[str, Coordinate]:
-    """Return the times at which friction is stored."""
+    """Return the times at which results are stored, as a coordinate."""
     times = np.array(parameters.relaxation_times)
     return {
         "relaxation_times": Coordinate(
-            times, "1", "time after the jump divided by the relaxation time, (t - t_0) / tau"
+            times, "1", "time after the jump divided by the longest relaxation time, (t - t_0) / tau"
         )
     }
 
@@ -125,13 +132,6 @@ MODEL = Model(
     whole=("velocity", "normal_force", "velocity_change", "shear_modulus", "relaxation_time", "rms_roughness"),
     coordinates=coordinates,
     distinct=deferred(SOLVE, "distinct"),
-    numbers=(
-        *NUMBERS,
-        Number(
-            "relative_jump",
-            "friction_coefficient_jump / friction_coefficient_before",
-            "immediate change of the coefficient of friction divided by its value before the jump",
-        ),
-    ),
+    numbers=(*NUMBERS,),
     notes=lambda sets: (*frequency_notes(sets), *load_notes(sets)),
 )

@@ -1,4 +1,8 @@
-"""Solve a block of cases: jumps of a plane Kelvin body by a march of the depth in time, other cases by `elements`."""
+"""Solve a block of cases: friction after a jump of the velocity, or under a loading history.
+
+Jumps of a plane Kelvin body are solved by a march of the depth in time. In all other cases, the motion of every element
+of the viscoelastic foundation is computed.
+"""
 
 from __future__ import annotations
 
@@ -32,14 +36,13 @@ from mdr_dask.physics.refine import Solution, refine
 from mdr_dask.physics.surfaces.cubic_line import without_kinks
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.waves import Waves
-from mdr_dask.physics.transients.accuracy import Jumps, solve_jumps
+from mdr_dask.physics.transients.accuracy import solve_jumps
 from mdr_dask.physics.transients.elements.foundation import foundation
 from mdr_dask.physics.transients.elements.loading_history import Trace, trace
 from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
 ACCURACY = 0.01  # relative accuracy of steady friction and of the jump, if the campaign does not give an accuracy
-# operations: for a jump, multiplied by the number of nodes and the steps per decade; for a history, multiplied by the
-# square of the number of nodes
+# operations: of a jump, per node and step per decade; and of a history, per square of the number of nodes
 OPERATIONS_MARCHED, OPERATIONS_FOLLOWED = 20, 35
 FLAT = 1e-12  # a line is flat if its rms height is at most this fraction of its largest absolute height
 HISTORY_ORDER = 2  # order of convergence of the results of a history in cell size and time step
@@ -168,9 +171,10 @@ class _Group:
         yield from beyond_tested(self.setting, self.largest_loads, found.contact).items()
 
     def _floor(self, found: _Found, name: str) -> FloatArray:
-        """Return the floor for the relative error of an output: 0 or the largest friction of the case.
+        """Return, for every case, the smallest value to which the error of an output may be relative.
 
-        The largest friction is used if the output is zero within its error, for example the friction of a body at rest.
+        If friction is zero within its error, as for a body at rest, its error is relative to the largest friction of
+        the case. Otherwise an error is relative to the output itself, and 0 is returned.
         """
         cases = found.outcome.size
         if name == "indentation_depth":
@@ -193,16 +197,18 @@ class _Marched(_Group):
         times, wavenumber = np.array(self.block.parameters.relaxation_times), np.pi * waves.points
         transient = MarchRequest(times, wavenumber, self.steps, self.block.accuracy or 0.0) if is_wanted else None
         with_errors = any(f"{name}_error" in self.block.outputs for name in WITH_ERROR)
-        jumps = solve_jumps(
-            RoughLine(waves),
-            loads,
-            deborah,
-            self.block.accuracy or (ACCURACY if with_errors else None),
-            self.oversampling,
-            transient,
-            any(f"{name}_error" in self.block.outputs for name in TRANSIENT),
-        )
-        return self._of(jumps, loads, which), loads.size
+        of_transient = any(f"{name}_error" in self.block.outputs for name in TRANSIENT)
+        accuracy = self.block.accuracy or (ACCURACY if with_errors else None)
+        jumps = solve_jumps(RoughLine(waves), loads, deborah, accuracy, self.oversampling, transient, of_transient)
+        outputs = {
+            "friction_coefficient_before": (jumps.levels.before / loads, jumps.errors.before / loads),
+            "friction_coefficient_jump": (jumps.levels.jump / loads, jumps.errors.jump / loads),
+            "friction_coefficient_after": (jumps.levels.after / loads, jumps.errors.after / loads),
+            "friction_coefficient": ((jumps.trace.T / loads).T, (jumps.trace_error.T / loads).T),
+            "indentation_depth": (jumps.depth, jumps.depth_error),
+        }
+        values, errors = ({name: pair[k][which] for name, pair in outputs.items()} for k in (0, 1))
+        return _Found(values, errors, jumps.contact[which], jumps.outcome[which]), loads.size
 
     @cached_property
     def different(self) -> tuple[FloatArray, FloatArray, IntArray]:
@@ -216,26 +222,12 @@ class _Marched(_Group):
         first, which = combinations(before, after, loads)
         return loads[first], np.column_stack([before, after])[first], which
 
-    @staticmethod
-    def _of(jumps: Jumps, loads: FloatArray, which: IntArray) -> _Found:
-        """Return the outputs of the members."""
-        named = {
-            "friction_coefficient_before": (jumps.levels.before / loads, jumps.errors.before / loads),
-            "friction_coefficient_jump": (jumps.levels.jump / loads, jumps.errors.jump / loads),
-            "friction_coefficient_after": (jumps.levels.after / loads, jumps.errors.after / loads),
-            "friction_coefficient": ((jumps.trace.T / loads).T, (jumps.trace_error.T / loads).T),
-            "indentation_depth": (jumps.depth, jumps.depth_error),
-        }
-        values = {name: value[which] for name, (value, _) in named.items()}
-        errors = {name: error[which] for name, (_, error) in named.items()}
-        return _Found(values, errors, jumps.contact[which], jumps.outcome[which])
-
 
 class _Followed(_Group):
     """One case that is computed from the motion of all elements: any history, solid and indenter."""
 
     def found(self, waves: Waves) -> tuple[_Found, int]:
-        """Solve the case on a quarter, half and all of the nodes; time steps are proportional to the cell size."""
+        """Solve the case with a quarter, half and all of the nodes. The time step is proportional to their spacing."""
         nodes = waves.points * self.oversampling
         grids = [nodes // every for every in (4, 2, 1) if nodes % every == 0 and nodes // every >= waves.points]
 
@@ -295,7 +287,7 @@ def distinct(block: Block[VelocityJump]) -> int:
 
 
 def operations(block: Block[VelocityJump]) -> float:
-    """Return the approximate number of operations of a block, from the numbers of nodes and moments."""
+    """Return the approximate number of operations of a block, from the numbers of nodes."""
     total = 1e6
     for group in _groups(block, sliding_problems(block)):
         nodes = group.setting.roughness.points * group.oversampling
