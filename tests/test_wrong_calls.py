@@ -1,16 +1,13 @@
 """Wrong options, wrong files, full disks, damaged stores: one error with exit code 2, and nothing is written."""
 
 import json
-import re
 import shutil
 from pathlib import Path
 
 import pytest
 from test_cli import CAMPAIGN
 
-import mdr_dask
 from mdr_dask.cli import main
-from mdr_dask.errors import MdrDaskError
 
 #: Command line, and the parts that the error must name: file and place, value, remedy. STORE is a filled store, FOREIGN
 #: a Zarr group of somebody else. Targets below new/ show that a refused command creates nothing.
@@ -122,11 +119,6 @@ COMMANDS = [
     "run small.yaml --store FILE",
     "run small.yaml --store FILE --part 1/2",
 ]
-CALLS = {
-    "open": lambda file: mdr_dask.open(file),
-    "fit": lambda file: mdr_dask.fit(file, "zone_one"),
-    "run": lambda file: mdr_dask.run("small.yaml", store=file),
-}
 FILES = {
     "small.yaml": "small.yaml: a file, expected the folder of a store",
     "small.yaml/x": "small.yaml/x: small.yaml is a file, expected the folder of a store",
@@ -146,15 +138,6 @@ def test_every_command_says_that_a_file_is_no_store(folder, monkeypatch, capsys,
     assert errors.startswith(FILES[file])
     assert errors.count("\n") == 1
     assert ("'mdr-dask run small.yaml' runs a campaign" in errors) == (file != "notes.txt")
-    assert contents(folder) == before
-
-
-@pytest.mark.parametrize("name", CALLS)
-def test_every_function_says_that_a_file_is_no_store(folder, monkeypatch, name):
-    monkeypatch.chdir(folder)
-    before = contents(folder)
-    with pytest.raises(MdrDaskError, match=re.escape(FILES["notes.txt"])):
-        CALLS[name]("notes.txt")
     assert contents(folder) == before
 
 
