@@ -291,13 +291,12 @@ class _Grid:
 
     `length` is the number of cells of each line. `filled`, `number` and `word` have the shape of `cells` and mark the
     cells that are not empty, that are numbers, and that are words. A word is neither a number nor a mark of a missing
-    number, such as ``n/a``. `comments` contains the lines that begin with a comment sign.
+    number, such as ``n/a``.
     """
 
     source: str
     cells: Cells
     lines: tuple[Line, ...]
-    comments: tuple[Line, ...]
     length: NDArray[np.int64]
     filled: BoolArray
     number: BoolArray
@@ -315,21 +314,29 @@ def _further(count: int) -> str:
 
 
 def _grid(source: str, every: Sequence[Line]) -> _Grid:
-    """Split lines into cells."""
-    comments = tuple(line for line in every if line.text.lstrip()[0] in COMMENT)
+    """Split lines into cells.
+
+    Comments are left out, except a comment just above the first line that may contain the names of the columns.
+    """
     texts = [line for line in every if line.text.lstrip()[0] not in COMMENT]
     if not texts:
         raise TableError(source, [Problem(1, 1, NO_ROWS)])
     separator = _separator([line.text for line in texts])
-    rows = [_split(line.text, separator) for line in texts]
+    lines = [line._replace(separator=separator) for line in texts]
+    rows = [_split(line.text, separator) for line in lines]
+    for comment in every[: every.index(texts[0])][-1:]:
+        for each in SEPARATORS:
+            names = _split(comment.text.lstrip(COMMENT + " "), each)
+            if len(names) == len(rows[0]) > 1 and not any(map(_NUMBER.fullmatch, names)):
+                rows, lines = [names, *rows], [comment._replace(separator=each), *lines]
+                break
     width = 1 + max((place for row in rows for place, cell in enumerate(row) if cell), default=0)
     cells = np.array([[*row[:width], *[""] * (width - len(row))] for row in rows], dtype=object)
     number = np.array([[bool(_NUMBER.fullmatch(cell)) for cell in row] for row in cells])
     word = ~number
     word[word] = [not _MISSING.fullmatch(cell) for cell in cells[word]]
     length = np.array([min(len(row), width) for row in rows])
-    lines = tuple(line._replace(separator=separator) for line in texts)
-    return _Grid(source, cells, lines, comments, length, cells != "", number, word)
+    return _Grid(source, cells, tuple(lines), length, cells != "", number, word)
 
 
 class _Head(NamedTuple):
@@ -450,27 +457,13 @@ def _names_and_units(grid: _Grid, head: _Head) -> tuple[tuple[str, ...], tuple[s
     """Return the names and the units of the columns.
 
     A unit is taken from the line of units or, if this line has none, from the name of the column.
-
-    If there is no line of names, the last comment above the numbers may contain the names.
     """
     if head.names is None:
-        names = _names_in_comment(grid, head)
-        parts = [split_unit(name) for name in names] or [("", "")] * head.numeric.size
-        return tuple(name for name, _ in parts if names), tuple(in_degrees(unit) for _, unit in parts)
+        return (), ("",) * head.numeric.size
     parts = [split_unit(name) for name in grid.cells[head.names][: grid.length[head.names]]]
     below = [""] * len(parts) if head.units is None else [cell.strip("[](){}<> ") for cell in grid.cells[head.units]]
     units = (in_degrees(one or own) for one, (_, own) in zip(below, parts, strict=False))
     return tuple(name for name, _ in parts), tuple(units)
-
-
-def _names_in_comment(grid: _Grid, head: _Head) -> list[str]:
-    """Return the names in the last comment above the numbers; empty unless there is one name for each column."""
-    above = [line.text for line in grid.comments if line.number < grid.lines[head.begin].number and not line.sheet]
-    for separator in SEPARATORS if above else ():
-        names = _split(above[-1].lstrip(COMMENT + " "), separator)
-        if len(names) == head.numeric.size and not any(map(_NUMBER.fullmatch, names)):
-            return names
-    return []
 
 
 def _require_even(grid: _Grid, rows: Sequence[int], width: int, head: _Head) -> None:

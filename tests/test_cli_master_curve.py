@@ -67,8 +67,8 @@ def test_impossible_options_are_refused_before_anything_is_written(tmp_path, mon
 
 def test_factors_and_merged_curve_are_written_and_kept_results_are_recognised(tmp_path, capsys):
     factors, curve, kept = tmp_path / "new" / "factors.csv", tmp_path / "curve.csv", tmp_path / "kept.json"
-    assert main(["master-curve", str(TABLE), "-o", str(factors)]) == 0
     assert main(["master-curve", str(TABLE), "-o", str(kept)]) == 0
+    assert main(["master-curve", str(kept), "-o", str(factors)]) == 0
     other = kept.rename(tmp_path / "kept.dat")
     assert main(["master-curve", str(other), "--reference", "60", "--show", "curve", "-o", str(curve)]) == 0
     assert factors.read_text().splitlines()[0].startswith("T [degC],shift_factor,shift_factor_error")

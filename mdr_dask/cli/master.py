@@ -37,25 +37,30 @@ KEPT = (".json", ".csv")
 @click.argument("source")
 @series_option
 @select_option
-@click.option("--over", help="What curves are drawn against: a column such as normal_force or time.")
+@click.option("--over", help="Abscissa of the curves: a column such as normal_force or time.")
 @click.option(
     "--of",
     "ordinates",
     multiple=True,
-    help="Their values: a column such as friction_coefficient or modulus; twice for storage and loss modulus together.",
+    help="Ordinate: a column such as friction_coefficient or modulus; twice for storage and loss modulus together.",
 )
-@click.option("--by", help="What curves differ in: a column such as velocity or temperature.")
+@click.option("--by", help="Quantity in which the curves differ: a column such as velocity or temperature.")
 @click.option(
     "--vertical",
     type=click.Choice(["none", "modulus", "compliance", "free"]),
-    help="Factors along the ordinate: b_T and offsets of a few per cent of a modulus or compliance (the default of "
-    "those), unknown ones, or none.",
+    help="Factors along the ordinate: b_T and an offset of some per cent (the default for a modulus or compliance), "
+    "unknown factors (free), or none.",
 )
 @click.option(
-    "--reference", type=float, help="Where the factors are zero, in the units of --by; also between the groups."
+    "--reference",
+    type=float,
+    help="Value of --by at which the factors are zero, in its unit; it may lie between the groups.",
 )
 @click.option(
-    "--keep", "-o", type=click.Path(path_type=Path), help="Keep all in FILE.json, a later SOURCE; FILE.csv: the table."
+    "--keep",
+    "-o",
+    type=click.Path(path_type=Path),
+    help="Write the result to FILE.json, which may be a later SOURCE, or the table to FILE.csv.",
 )
 @figure_options("--plot")
 @click.option("--show", "part", type=click.Choice(PARTS), default=PARTS[0], show_default=True, help="What to print.")

@@ -107,8 +107,8 @@ def with_verdict(curve: xr.Dataset, verdicts: dict[str, str]) -> xr.Dataset:
     """
     open_steps = curve.attrs.get("undetermined", "")
     collapse = f"not tested: shift factors are {open_steps.partition(':')[0]}" if open_steps else _collapse(curve)
-    told = {"the curves collapse": collapse, **verdicts}
-    words = [sentence.partition(":")[0] for sentence in told.values()]
+    answers = {"the curves collapse": collapse, **verdicts}
+    words = [sentence.partition(":")[0] for sentence in answers.values()]
     described = words[1:] or ["yes"]
     if words[0] == "no" or all(word == "no" for word in described):
         word = "no"
@@ -116,7 +116,7 @@ def with_verdict(curve: xr.Dataset, verdicts: dict[str, str]) -> xr.Dataset:
         word = "not tested"
     else:
         word = "yes" if words[0] == "yes" and "yes" in described else "approximately"
-    sentence = f"{word}: " + "; ".join(f"{name}: {reason}" for name, reason in told.items())
+    sentence = f"{word}: " + "; ".join(f"{name}: {reason}" for name, reason in answers.items())
     return curve.assign(law_holds=xr.Variable((), sentence, LAW_HOLDS))
 
 

@@ -156,19 +156,18 @@ def _of_two_groups(
     attrs = {"second": by[1], "second_reference": found.second.reference}
     attrs |= {"chi_squared": found.chi_squared, "probability": found.probability}
     dataset = _dataset(found.first, over, ordinates, by[0], units).assign_attrs(attrs)
-    for name, along in (("point_shift", "horizontal"), ("point_rise", "vertical")):
-        parts = [getattr(part, along)[part.member] for part in (found.first, found.second)]
-        dataset[name] = ("point", parts[0] + parts[1], {"units": "1"})
+    shift = found.first.horizontal[found.first.member] + found.second.horizontal[found.second.member]
+    dataset["point_shift"] = ("point", shift, {"units": "1"})
     dataset["point_second"] = ("point", found.second.groups[found.second.member], {"units": units.get(by[1], "")})
     extra = _dataset(found.second, over, ordinates, by[1], units)
     for part in ("", "_error", "_low", "_high"):
         dataset[f"second_factor{part}"] = extra[f"shift_factor{part}"]
     verdicts: dict[str, str] = {}
     for one, name in zip((found.first, found.second), by, strict=True):
-        laws, said = laws_of(
+        laws, sentences = laws_of(
             one, over, units.get(name, ""), one.reference, is_temperature=is_temperature(name, units.get(name, ""))
         )
-        dataset, verdicts = dataset.assign(constants_of(laws)), verdicts | said
+        dataset, verdicts = dataset.assign(constants_of(laws)), verdicts | sentences
     return with_verdict(dataset, verdicts)
 
 
@@ -176,8 +175,8 @@ def _inside(groups: FloatArray, reference: float) -> float:
     """Return the reference, or the nearest group if the reference lies just outside, as measured set points scatter."""
     margin = 0.1 * np.ptp(groups) / max(groups.size - 1, 1)
     if not groups.min() - margin <= reference <= groups.max() + margin:
-        told, low, high = distinguishable(reference, groups.min(), groups.max(), digits=6)
-        raise DataError(f"the reference must lie between {low} and {high}, got {told}")
+        got, low, high = distinguishable(reference, groups.min(), groups.max(), digits=6)
+        raise DataError(f"expected a reference between {low} and {high}, got {got}")
     return float(np.clip(reference, groups.min(), groups.max()))
 
 
@@ -287,8 +286,7 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
     for name in [name for name in curve.data_vars if name not in dataset or name == "law_holds"]:
         dataset[name] = curve[name]
     if "point_shift" in curve:
-        for name, factor in (("point_shift", "shift_factor"), ("point_rise", "vertical_factor")):
-            dataset[name] = curve[name] + float(dataset[factor][0] - curve[factor][0])
+        dataset["point_shift"] = curve["point_shift"] + float(dataset["shift_factor"][0] - curve["shift_factor"][0])
     return dataset.assign_attrs(kept)
 
 

@@ -87,7 +87,7 @@ def _curves(curve: xr.Dataset) -> tuple[Panel, Panel]:
         points = curve.isel(point=np.flatnonzero(curve["point_group"].values == value))
         x = points["point_abscissa"].values
         shift = points.get("point_shift", curve["shift_factor"][k]).values
-        rise = points.get("point_rise", curve["vertical_factor"][k]).values
+        rise = curve["vertical_factor"][k].values
         second = points["point_second"].values if "point_second" in points else np.zeros(x.size)
         for channel, marker in channels.items():
             y = points[f"point_{channel}"].values

@@ -157,4 +157,4 @@ def test_a_spectrum_goes_on_by_its_power_law_where_that_is_asked_for(tmp_path):
     (found,) = spectra_of(surface(tmp_path, **given, extrapolate=True))
     assert found.rms_gradient() == pytest.approx(whole.rms_gradient(), rel=1e-3)
     assert shorter.rms_gradient() < 0.8 * found.rms_gradient()
-    assert "expected shortest_wavelength of at least 3.125e-05 m, where the spectrum ends" in refused(tmp_path, **given)
+    assert "expected shortest_wavelength of at least 31.25 um, where the spectrum ends" in refused(tmp_path, **given)

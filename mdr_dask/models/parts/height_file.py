@@ -150,7 +150,7 @@ def dimensions(file: DataFile) -> int:
         return 2
     if (channel := _channel(file)) is not None:
         return int(channel.dim)
-    lines = file.read_text().splitlines()
+    lines = file.read_text().replace('"', "").splitlines()
     if _grid_file(file, lines) is not None:
         return 2
     try:
@@ -222,6 +222,8 @@ def _channel(file: DataFile) -> Any:
     This module reads text files in which SurfaceTopography finds no unit.
     """
     file.read_bytes()  # to raise an error if the file has changed
+    import warnings
+
     is_text = file.name.lower().endswith(TEXT)
     try:
         import SurfaceTopography
@@ -230,7 +232,9 @@ def _channel(file: DataFile) -> Any:
             return None
         raise DataError(f"{file.name}: this format needs SurfaceTopography: pip install 'mdr_dask[formats]'") from None
     try:
-        channel = SurfaceTopography.open_topography(file.path).default_channel
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # those of readers that try whether the file has their format
+            channel = SurfaceTopography.open_topography(file.path).default_channel
     except Exception as problem:  # the readers raise errors of many types
         if is_text:
             return None
@@ -297,13 +301,13 @@ def _grid_file(file: DataFile, lines: list[str]) -> _Grid | None:
         if kind == "Surfer":
             numbers = np.array(" ".join(lines[1:]).split(), dtype=np.float64)
             nx, ny = (int(n) for n in numbers[:2])
-            steps = (numbers[3] - numbers[2]) / (nx - 1), (numbers[5] - numbers[4]) / (ny - 1)
-            return _Grid(numbers[8:].reshape(ny, nx), (float(steps[0]), float(steps[1])))
+            steps = float(numbers[3] - numbers[2]) / (nx - 1), float(numbers[5] - numbers[4]) / (ny - 1)
+            return _Grid(numbers[8:].reshape(ny, nx), steps)
         head = {line.split()[0].lower(): line.split()[-1] for line in lines[:6] if line.strip()[:1].isalpha()}
         rows = np.array(" ".join(lines[len(head) :]).split(), dtype=np.float64)
         rows[rows == float(head.get("nodata_value", "nan"))] = np.nan
-        step = float(head["cellsize"])
-        return _Grid(rows.reshape(int(head["nrows"]), int(head["ncols"]))[::-1], (step, step))
+        steps = float(head.get("dx") or head["cellsize"]), float(head.get("dy") or head["cellsize"])
+        return _Grid(rows.reshape(int(head["nrows"]), int(head["ncols"]))[::-1], steps)
     except (KeyError, ValueError, ZeroDivisionError):
         raise DataError(
             f"{file.name}: expected a grid of {kind} with a complete heading, and as many heights as stated in it"
@@ -314,7 +318,7 @@ def _grid_of_text(file: DataFile) -> _Grid:
     """Return the heights of a text file, with the units and spacings stated in it."""
     import numpy as np
 
-    lines = file.read_text().splitlines()
+    lines = file.read_text().replace('"', "").splitlines()
     if (grid := _grid_file(file, lines)) is not None:
         return grid
     cells, first = _block(file, lines)
@@ -417,7 +421,7 @@ def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
     except (ValueError, pd.errors.ParserError) as problem:
         raise DataError(f"{file.name}: expected the same number of heights in every row: {problem}") from None
     if odd is not None:
-        where = f"line {lines.index(rows[odd]) + 1} has {width[odd]}, others {common}"
+        where = f"line {lines.index(rows[odd]) + 1} has {width[odd]}, others {common} (write nan for a missing point)"
         raise DataError(f"{file.name}: expected the same number of heights in every row: {where}")
     return table.apply(pd.to_numeric, errors="coerce"), first
 
@@ -460,14 +464,15 @@ def _scattered(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame
             f"{file.name}: expected a map, or columns x, y and z, got {cells.shape[1]} columns: name the columns "
             "in a header line above the numbers, such as x [mm], y [mm], z [um]"
         )
-    x, y, z = (cells[place].to_numpy(dtype="float64") for place, _ in columns)
+    x, y, z = (cells.iloc[:, place].to_numpy(dtype="float64") for place, _ in columns)
     units = [unit for _, unit in columns]
     if units[0] and units[1]:
         y = y * (_metre(file, units[1], "x_unit") / _metre(file, units[0], "x_unit"))
     try:
         rows, steps = positions.scattered(x, y, z)
     except DataError as problem:
-        raise DataError(f"{file.name}: {problem}: without names, the order of the columns must be x, y, z") from None
+        hint = "" if any(units) else ": without names, the order of the columns must be x, y, z"
+        raise DataError(f"{file.name}: {problem}{hint}") from None
     return _Grid(rows, steps, stated._replace(position=units[0] or stated.position, height=units[2] or stated.height))
 
 

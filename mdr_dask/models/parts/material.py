@@ -122,7 +122,7 @@ class Material(Parameters):
 
     def notes(self) -> tuple[str, ...]:
         """Return notes on the error of a fitted Prony series, and on unusual temperatures and moduli."""
-        return (*fit_notes(self), *_scaled(self), *_outside(self), *_unusual(self))
+        return (*fit_notes(self), *_table_notes(self))
 
 
 @lru_cache(maxsize=256)
@@ -242,47 +242,28 @@ def fit_notes(material: Material | None) -> tuple[str, ...]:
     )
 
 
-def _scaled(material: Material) -> tuple[str, ...]:
-    """Return a note if the moduli of a table are scaled to the material's temperature."""
-    table = material.dma_table
-    if table is None or material.temperature is None or table.vertical == "none":
-        return ()
-    own = _curve(table, material.law).temperature
-    if own is None:
-        return ()
-    return (
-        f"table {table.file.name}: at other temperatures than {shown(own, 'K')}, moduli are divided by "
-        "b_T = rho0 T0 / (rho T) (`vertical: none` turns this off)",
-    )
-
-
-def _outside(material: Material) -> tuple[str, ...]:
-    """Return a note if the temperature is outside the measured range."""
+def _table_notes(material: Material) -> tuple[str, ...]:
+    """Return notes on moduli of a table: their scaling with temperature, and unusual temperatures and moduli."""
     table, temperature = material.dma_table, material.temperature
-    measured = None if table is None else _curve(table, material.law).measured
-    if table is None or temperature is None or measured is None:
-        return ()
-    low, high = measured
-    if low - SAME_TEMPERATURE <= temperature <= high + SAME_TEMPERATURE:
-        return ()
-    ends = shown(low, "K") if high - low < SAME_TEMPERATURE else f"{shown(low, 'K')} to {shown(high, 'K')}"
-    return (
-        f"table {table.file.name}: measured at {ends}; {shown(temperature, 'K')} lies outside, and is reached "
-        "by shift factors only",
-    )
-
-
-def _unusual(material: Material) -> tuple[str, ...]:
-    """Return a note if the moduli are outside the range of solids, because the unit may be wrong."""
-    table = material.dma_table
     if table is None:
         return ()
-    storage = _curve(table, material.law).storage
-    low, high = float(storage.min()), float(storage.max())
-    if high >= SOFTEST and low <= STIFFEST:
-        return ()
-    ends = f"{shown(low, 'Pa')} to {shown(high, 'Pa')}"
-    return (f"table {table.file.name}: shear moduli of {ends} are not those of a solid (is the unit right?)",)
+    curve, notes = _curve(table, material.law), []
+    if temperature is not None and curve.temperature is not None and table.vertical != "none":
+        notes.append(
+            f"at other temperatures than {shown(curve.temperature, 'K')}, moduli are divided by "
+            "b_T = rho0 T0 / (rho T) (`vertical: none` turns this off)"
+        )
+    low, high = curve.measured or (0.0, np.inf)
+    if temperature is not None and not low - SAME_TEMPERATURE <= temperature <= high + SAME_TEMPERATURE:
+        ends = shown(low, "K") if high - low < SAME_TEMPERATURE else f"{shown(low, 'K')} to {shown(high, 'K')}"
+        notes.append(
+            f"measured at {ends}; {shown(temperature, 'K')} lies outside, and is reached by shift factors only"
+        )
+    least, most = float(curve.storage.min()), float(curve.storage.max())
+    if most < SOFTEST or least > STIFFEST:
+        ends = f"{shown(least, 'Pa')} to {shown(most, 'Pa')}"
+        notes.append(f"shear moduli of {ends} are not those of a solid (is the unit right?)")
+    return tuple(f"table {table.file.name}: {note}" for note in notes)
 
 
 def _errors(fit: SeriesFit) -> dict[str, float]:

@@ -120,7 +120,8 @@ def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
     middles = np.array([line.mean() for line in lines])
     if middles.size < 2 or len(known) != len(positions):
         raise DataError("expected positions on a regular grid")
-    place = np.rint((middles - middles[0]) / np.median(np.diff(middles)))
+    apart = np.diff(middles)
+    place = np.append(0.0, np.cumsum(np.rint(apart / np.median(apart))))  # rounded positions do not add up
     step, origin = np.polyfit(place, middles, 1)
     nearest = np.rint((positions - origin) / step)
     own = np.repeat(place, [line.size for line in lines])

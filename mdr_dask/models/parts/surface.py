@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import DataError, distinguishable
+from mdr_dask.errors import DataError
 from mdr_dask.models.base import Alternatives, Parameters, quantity
 from mdr_dask.models.data_file import DataFile, check_in_campaign
 from mdr_dask.models.parts.measured_line import ProfileFile
 from mdr_dask.models.parts.surface_files import Files, Found, MapFiles, ScanFiles, SpectrumTables, anisotropic
-from mdr_dask.units import shown
+from mdr_dask.units import shown, shown_apart
 
 if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.spectrum import Spectrum
@@ -148,9 +148,9 @@ def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
 
 
 def _beyond(name: str, wavelength: float, which: str, end: float) -> str:
-    given, limit = distinguishable(wavelength, end, digits=4)
+    given, limit = shown_apart("m", wavelength, end)
     return (
-        f"expected {name} of at {which} {limit} m, where the spectrum ends, got {given} m "
+        f"expected {name} of at {which} {limit}, where the spectrum ends, got {given} "
         "(`extrapolate: true` continues it by a power law)"
     )
 
@@ -170,13 +170,10 @@ def lines_of(surface: Surface, length: float, modes: int) -> tuple[FloatArray, .
     for file, spectrum, line in zip(surface.measured.files, spectra_of(surface), lines, strict=False):
         if not np.any(line):
             longest, shortest = spectrum.wavelengths
-            (last, least), (first, most) = (
-                distinguishable(length, shortest, digits=4),
-                distinguishable(length / modes, longest, digits=4),
-            )
+            (last, least), (first, most) = shown_apart("m", length, shortest), shown_apart("m", length / modes, longest)
             raise DataError(
-                f"{file.name}: expected a line with waves of {least} to {most} m, "
-                f"got {first} to {last} m: change length or points"
+                f"{file.name}: expected a line with waves of {least} to {most}, got {first} to {last}: "
+                "change length or points"
             )
         line.flags.writeable = False
     return lines

@@ -38,8 +38,6 @@ COLUMNS = (
     Column("relative error", "1", needed=False, least=0),
 )
 
-Window = Literal["hann", "none"]
-
 
 class Found(NamedTuple):
     """The spectrum of a file.
@@ -82,19 +80,24 @@ class SpectrumTables(Files):
         return tuple(_tabulated(file) for file in self.files)
 
 
-class ScanFiles(Files):
-    """Scans of an isotropic surface along straight lines, as a stylus records them."""
+class HeightFiles(Files):
+    """Heights along lines or on areas of a surface."""
 
     spacing: float | None = quantity(
-        "m", "distance between neighbouring points, for a file of heights without positions", default=None, gt=0
+        "m", "distance between neighbouring points along x, for files of heights without positions", default=None, gt=0
     )
     unit: str = Field(default="", description="unit of the heights, if the file does not state it")
     x_unit: str = Field(default="", description="unit of the positions, if the file does not state it")
+    window: Literal["hann", "none"] = Field(
+        default="hann", description="window for the Fourier transform; none only for periodic heights"
+    )
+
+
+class ScanFiles(HeightFiles):
+    """Scans of an isotropic surface along straight lines, as a stylus records them."""
+
     detrend: Literal["none", "mean", "line", "parabola"] = Field(
         default="line", description="polynomial that is subtracted from the heights"
-    )
-    window: Window = Field(
-        default="hann", description="window for the Fourier transform of each scan; none only for a periodic scan"
     )
 
     def found(self) -> tuple[Found, ...]:
@@ -102,22 +105,14 @@ class ScanFiles(Files):
         return tuple(scanned(self, file) for file in self.files)
 
 
-class MapFiles(Files):
+class MapFiles(HeightFiles):
     """Areal maps of a surface."""
 
-    spacing: float | None = quantity(
-        "m", "distance between neighbouring points of a row, for text and npy files", default=None, gt=0
-    )
     spacing_y: float | None = quantity(
         "m", "distance between neighbouring rows, if it differs from `spacing`", default=None, gt=0
     )
-    unit: str = Field(default="", description="unit of the heights, if the file does not state it")
-    x_unit: str = Field(default="", description="unit of the positions, if the file does not state it")
     detrend: Literal["none", "mean", "plane", "parabola"] = Field(
         default="plane", description="polynomial that is subtracted from the heights"
-    )
-    window: Window = Field(
-        default="hann", description="window for the Fourier transform of the map; none only for a periodic map"
     )
     outliers: Literal["keep", "fill"] = Field(
         default="keep", description="whether heights far from those of their neighbours are kept or replaced"

@@ -205,7 +205,7 @@ def _sorted(
         order = np.argsort(x, kind="stable")
         arrays.append((x[order], y[:, order]))
     if all(np.ptp(y) == 0 for _, y in arrays):
-        raise DataError("every curve is constant: nothing tells how far to shift them")
+        raise DataError("expected curves that vary, got constant ones, for which shifts cannot be determined")
     return np.sort(values), arrays
 
 
@@ -310,8 +310,8 @@ def rereference(
     """
     groups, size = result.groups, result.groups.size
     if not groups[0] <= reference <= groups[-1]:
-        told, low, high = distinguishable(reference, groups[0], groups[-1], digits=6)
-        raise DataError(f"the reference must lie between {low} and {high}, got {told}")
+        got, low, high = distinguishable(reference, groups[0], groups[-1], digits=6)
+        raise DataError(f"expected a reference between {low} and {high}, got {got}")
     place, places = (np.log(reference), np.log(groups)) if logarithmic else (reference, groups)
     share = np.array([np.interp(place, places, unit) for unit in np.eye(size)])
     known = np.zeros(size) if law is None or reference in groups else law - at_reference

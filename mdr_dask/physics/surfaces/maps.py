@@ -20,7 +20,7 @@ LEAST_POINTS = 16  # smallest number of points along each axis
 MOST_MISSING = 0.05  # largest fraction of missing points that are filled
 FAR = 19.0  # deviation of an outlier, in robust standard deviations; no point of a generated surface reaches it
 BAND = 128  # number of rows processed together, so that they fit into the processor's cache
-TELLING = 1e-3  # rings that contribute less than this fraction of the largest contribution may consist of rounding
+SIGNIFICANT = 1e-3  # rings that contribute less than this fraction of the largest contribution may consist of rounding
 MOST_SCATTER = 0.02  # an octave is used if scatter causes at most this mean square of its angular harmonics
 FLAT = 1e-12  # a map is flat if the range of heights, divided by the largest height, is below this value
 ROUNDING = 1e-20  # rounding error of the transform, as a fraction of the largest ring
@@ -61,8 +61,8 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
         beside = np.clip(row + down - 1, 0, away.shape[0] - 1), np.clip(column + right - 1, 0, away.shape[1] - 1)
         largest = np.fmax(largest, away[beside])
     # a neighbour of an outlier is itself an outlier only if it deviates at least half as much
-    telling = away[row, column] > 0.5 * largest
-    found[row[telling] + 1, column[telling] + 1] = True
+    deviates = away[row, column] > 0.5 * largest
+    found[row[deviates] + 1, column[deviates] + 1] = True
     return found
 
 
@@ -237,7 +237,7 @@ class MapSpectrum:
         The anisotropy is the larger of the second and the fourth angular harmonic of the power. Each harmonic is an rms
         over the octaves of the wave number that contain enough waves.
         """
-        there = np.flatnonzero(telling(self.wavenumber, self.density))
+        there = np.flatnonzero(significant(self.wavenumber, self.density))
         octave = np.floor(np.log2(self.wavenumber[there] / self.wavenumber[there[0]] + 1e-9)).astype(int)
         _, octave = np.unique(octave, return_inverse=True)  # omits octaves without a ring
         power = self.density[there] * self.wavenumber[there]
@@ -323,10 +323,10 @@ def _rings(
     )
 
 
-def telling(wavenumber: FloatArray, density: FloatArray) -> NDArray[np.bool_]:
+def significant(wavenumber: FloatArray, density: FloatArray) -> NDArray[np.bool_]:
     """Return the rings that contribute more to the mean square of height or gradient than rounding in a file may."""
     height, gradient = density * wavenumber, density * wavenumber**3
-    return np.asarray((height > TELLING * height.max()) | (gradient > TELLING * gradient.max()))
+    return np.asarray((height > SIGNIFICANT * height.max()) | (gradient > SIGNIFICANT * gradient.max()))
 
 
 def _cut(power: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
@@ -338,8 +338,7 @@ def _cut(power: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
 def _axis(power: FloatArray, ring: NDArray[np.int32], total: FloatArray, count: FloatArray) -> float:
     """Return the median over the rings of the power of waves along an axis, divided by the mean power of their ring."""
     number = np.arange(1.0, total.size + 1)
-    alive = number[telling(number, total / number)]
-    inner = (ring >= 4) & np.isin(ring, alive)
+    inner = (ring >= 4) & np.isin(ring, number[significant(number, total / number)])
     k = ring[inner] - 1
     ratio = power[inner] / (total[k] / count[k])
     return float(np.median(ratio) / np.log(2)) if k.size else 1.0
