@@ -87,12 +87,7 @@ class TableError(DataError):
 
     def __init__(self, source: str, problems: Sequence[Problem]) -> None:
         super().__init__(source, tuple(problems))
-
-    @property
-    def problems(self) -> tuple[Problem, ...]:
-        """All problems, in the order of the table."""
-        found: tuple[Problem, ...] = self.args[1]
-        return found
+        self.problems = tuple(problems)
 
     def __str__(self) -> str:
         source = self.args[0]

@@ -46,8 +46,8 @@ class Measured:
         The measured values, in SI.
     errors : array, shape (points,), or None
         Standard errors of the values; None if the table does not contain them.
-    error_name : str
-        Name of the column of the errors; empty if there is none.
+    error_column : str
+        A text that names the column of the errors.
     conditions : dict of str to array, shape (points,)
         The values of the parameters at each measured point, in SI, by the names of their coordinates in the store.
     lines : tuple of Line
@@ -62,7 +62,7 @@ class Measured:
     errors: FloatArray | None
     conditions: Mapping[str, FloatArray]
     lines: tuple[Line, ...]
-    error_name: str = ""
+    error_column: str = ""
     remark: str = ""
 
 
@@ -112,8 +112,8 @@ def read_measured(
     if values.size < 2:
         raise DataError(f"{source}: expected at least two measured points, got {values.size}")
     lines = tuple(line for line, is_known in zip(read.lines, known, strict=True) if is_known)
-    name = read.headings.get(ERROR, "") + (", relative to the values" if is_relative else "")
-    return Measured(source, output, values, errors, rows, lines, name, remark)
+    of_errors = f"column {read.headings.get(ERROR, '')!r}{' (in % of the values)' if is_relative else ''}"
+    return Measured(source, output, values, errors, rows, lines, of_errors, remark)
 
 
 def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...], str, bool]:
@@ -189,7 +189,7 @@ def notes(campaign: Campaign) -> tuple[str, ...]:
 def _sentences(found: Measured, model: str, series: Series, units: Mapping[str, str], unit: str) -> Iterator[str]:
     errors = "errors estimated by the fit"
     if found.errors is not None:
-        errors = f"column {found.error_name!r} taken as one standard error"
+        errors = f"{found.error_column} taken as one standard error"
     reach = (shown(float(end), unit) for end in (found.values.min(), found.values.max()))
     yield f"{found.values.size} rows of {found.output}, {' to '.join(dict.fromkeys(reach))}, {errors}"
     ranges = {

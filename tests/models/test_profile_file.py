@@ -25,10 +25,8 @@ def test_a_bare_name_is_a_profile(tmp_path):
     np.testing.assert_allclose(line.height, HEIGHT, atol=1e-15)
 
 
-@pytest.mark.parametrize("separator", [",", ";", "\t", " "])
-def test_header_units_comments_and_mark_are_tolerated(tmp_path, separator):
-    header = f"\ufeff# scanned\nx{separator}z\nmm{separator}um\n"
-    line = line_of(write(tmp_path / "line.txt", header, separator))
+def test_header_units_comments_and_mark_are_tolerated(tmp_path):
+    line = line_of(write(tmp_path / "line.txt", "\ufeff# scanned\nx;z\nmm;um\n", ";"))
     assert line.length == pytest.approx(0.016)
     assert line.height.max() == pytest.approx(1e-6)
 
@@ -41,19 +39,11 @@ def test_unit_can_be_given(tmp_path):
         line_of(ProfileFile.model_validate({"file": str(tmp_path / "line.csv"), "unit": "ich", "x_unit": "um"}))
 
 
-def test_a_line_without_units_is_not_taken_to_be_in_metres(tmp_path):
-    write(tmp_path / "line.csv", header="x,z\n")
-    with pytest.raises(DataError, match=r"line.csv:1:1: column x: expected its unit, such as 'x \[mm\]'"):
-        line_of(ProfileFile.model_validate(str(tmp_path / "line.csv")))
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("# nothing\n", "expected a line of names and at least one line of values"),
-        ("x,z\n", "expected a line of names and at least one line of values"),
         ("x [m]\n1\n2\n", "expected a column z"),
-        ("x [m],z [m]\n1,2\n3,?\n", r"line.csv:3:3: column z: expected a number, got '\?'"),
+        ("x,z\n1,2\n", r"line.csv:1:1: column x: expected its unit, such as 'x \[mm\]'"),
         ("x [m],z [m]\n1,2\n3,4\n", "8 or more pairs"),
         ("x [m],z [s]\n1,2\n3,4\n", "expected a length"),
     ],
@@ -99,16 +89,3 @@ def test_files_of_instruments_are_read_by_surface_topography(tmp_path):
     (tmp_path / "noise.nc").write_bytes(b"nothing" * 10)
     with pytest.raises(DataError, match=r"noise.nc: SurfaceTopography cannot read it"):
         line_of(ProfileFile.model_validate(str(tmp_path / "noise.nc")))
-
-
-@pytest.mark.parametrize(
-    ("names", "separator", "mark"),
-    [("x [um];z [nm]", ";", ","), ("x (um)\tz (nm)", "\t", ","), ("x,z\num,nm", ",", ".")],
-    ids=["semicolons", "tabs", "row of units"],
-)
-def test_decimal_commas_and_units_behind_names_are_understood(tmp_path, names, separator, mark):
-    rows = "\n".join(f"{2 * i}.0{separator}{z:.6f}".replace(".", mark) for i, z in enumerate(HEIGHT))
-    (tmp_path / "line.csv").write_text(f"% instrument 7\n{names}\n{rows}\n")
-    line = line_of(ProfileFile.model_validate(str(tmp_path / "line.csv")))
-    assert line.length == pytest.approx(32e-6)
-    np.testing.assert_allclose(line.height, 1e-9 * HEIGHT, atol=1e-15)
