@@ -120,14 +120,13 @@ class TableProfile:
     ----------
     curve, image_curve : PPoly
         f0(r) and g0(x), in units of d0 and a0.
-    length, height_unit : float
-        a0 and d0 in the original units of the body.
+    length : float
+        a0 in the original unit of the body.
     """
 
     curve: PPoly
     image_curve: PPoly
     length: float
-    height_unit: float
 
     @property
     def largest_radius(self) -> float:
@@ -238,7 +237,7 @@ def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfi
             "extend the table or reduce the depth"
         )
     a0 = bisect(lambda x: float(image_curve(x)) - depth, 0.0, float(r[-1]))
-    return TableProfile(_scaled(interpolant, a0, depth), _scaled(image_curve, a0, depth), a0, depth)
+    return TableProfile(_scaled(interpolant, a0, depth), _scaled(image_curve, a0, depth), a0)
 
 
 #: For a body in closed form: largest radius divided by a0, and half the number of knots in each smooth piece.
@@ -272,7 +271,7 @@ def from_body(body: Any, depth: float) -> TableProfile:
     knots = np.append(np.concatenate(parts), ends[-1])
     line, slope, _ = body.at(knots)
     height, image = (CubicHermiteSpline(knots, *values) for values in (body.body(knots), (-line, -slope)))
-    return TableProfile(_scaled(height, a0, depth), _scaled(image, a0, depth), a0, depth)
+    return TableProfile(_scaled(height, a0, depth), _scaled(image, a0, depth), a0)
 
 
 def check_table(radius: FloatArray, height: FloatArray) -> None:

@@ -30,15 +30,12 @@ from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.refine import Solution
 from mdr_dask.physics.sliding.cases import Cases
-from mdr_dask.physics.surfaces.cubic_line import highest_point
+from mdr_dask.physics.surfaces.cubic_line import STEEPEST_RISE, highest_point
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 BLOCK = 32  # cells
 WING = 4  # the nodes of a finer grid in a cell are interpolated from this number of nodes on each side of the cell
 BEFORE, AFTER = WING + 1, WING + 2  # numbers of nodes added from the previous and the next period, for `refine`
-# a cubic cell rises above its ends by at most this factor times the sum of the upward slope at its start and the
-# downward slope at its end
-ABOVE = 4 / 27
 SUMMIT = 64  # number of fine nodes in the cell of the highest point; the highest of these nodes is used as the summit
 
 NO_ENDS: FloatArray = np.empty((2, 0))
@@ -143,7 +140,7 @@ def _write_blocks(h: FloatArray, s: FloatArray, mean: FloatArray, square: FloatA
     for j in range(blocks.shape[0]):
         peak, lowest, steepest, heights, squares = -np.inf, np.inf, np.inf, 0.0, 0.0
         for i in range(j * BLOCK, (j + 1) * BLOCK):
-            above = max(h[i], h[i + 1]) + ABOVE * (max(s[i], 0.0) + max(-s[i + 1], 0.0))
+            above = max(h[i], h[i + 1]) + STEEPEST_RISE * (max(s[i], 0.0) + max(-s[i + 1], 0.0))
             peak, lowest = max(peak, above), min(lowest, min(h[i], h[i + 1]))
             steepest = min(steepest, min(s[i], s[i + 1]))
             heights += mean[i]
