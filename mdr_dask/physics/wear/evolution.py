@@ -77,6 +77,9 @@ class Problem(Protocol):
     def holds(self, unknowns: FloatArray) -> bool:
         """Return whether the unknowns describe a possible contact."""
 
+    def admits(self, unknowns: FloatArray, tolerance: float) -> bool:
+        """Return whether a solution is a possible contact within a tolerance; the equations have other solutions."""
+
     def start(self) -> Moment:
         """Return the virgin contact."""
 
@@ -219,7 +222,7 @@ def _try_step(problem: Problem, newton: _Newton, history: Sequence[Moment], time
     unknowns = newton.solve(guess, theta, known)
     if unknowns is None:
         unknowns = newton.solve(past[0].unknowns, theta, known)
-    if unknowns is None:
+    if unknowns is None or not problem.admits(unknowns, newton.enough):
         return None, np.inf
     gap = np.max(np.abs(problem.worn(unknowns) - problem.worn(guess)))
     return problem.moment(time, unknowns, theta, known(unknowns), past), float(gap) * _ERROR_SHARE[order - 1]

@@ -17,7 +17,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.half_integrals import Panels, graded_panels, interpolate
 from mdr_dask.physics.mdr.revolution import Profile, bisect
 from mdr_dask.physics.mdr.transforms import gauss
-from mdr_dask.physics.wear.evolution import NotConvergedError, at, integral_along, march
+from mdr_dask.physics.wear.evolution import at, integral_along, march
 from mdr_dask.physics.wear.rules import limit, limit_radius
 from mdr_dask.physics.wear.slip import GrossSlip, PartialSlip, SlipMoment, partial_slip, rising
 from mdr_dask.physics.wear.worn import (
@@ -31,10 +31,11 @@ from mdr_dask.physics.wear.worn import (
     worn_image,
 )
 
-COARSEST = 1e-2
-"""Largest accuracy used for panels and steps; if a larger accuracy is requested, this value is used instead."""
+COARSEST = 2e-3
+"""Largest accuracy used for panels and steps; if a larger accuracy is requested, this value is used instead, because
+coarser panels do not resolve the image of a steep body."""
 COARSEST_OF_MOVING = 3e-4
-"""The same for a moving border. With a larger value, the steps are too long to follow the border: more steps fail, and
+"""The same under constant force. With a larger value, the steps are too long to follow the border: more steps fail, and
 the solution takes longer."""
 ENDED = 1e4
 """Value of N / sqrt(a^2 - c^2) from which on the limiting profile is returned; a is a bound of the contact radius. The
@@ -43,8 +44,9 @@ rounding error."""
 JUMP = 0.1
 """The border stops when y = 1 - (d - g) / eta in the panel next to the border exceeds this value, because the image
 jumps there."""
-LOWEST = 1e-2
-"""A step that gives y below minus this value is rejected, and the border stops at the moment before this step."""
+FLAT = 1e-2
+"""Change of the depth divided by eta, as a fraction of the error of a step, during which the path of the border is not
+computed. A steep body is so flat at the border that the border moves far during the first moments of wear."""
 ROUGHER = 4.0
 """Ratio of the step tolerance of each rougher solution to that of the previous solution."""
 EDGE = 0.2
@@ -88,7 +90,7 @@ class Resolution(NamedTuple):
         digits = -np.log10(self.accuracy)
         # with fewer halvings, the error of the panels at the moving edge would make the steps very short
         levels = max(round(2.7 * digits - 3.3), 2)
-        order = 5 if digits < 3.2 else 6  # steep bodies need many nodes per panel
+        order = max(int(digits) + 1, 4)
         left, right = (max(halvings - self.rougher, 0) for halvings in (levels + near, levels))
         return graded_panels(left, right, order - min(self.rougher, 1))
 
@@ -158,57 +160,20 @@ def exact(
     >>> print(f"{few.wear_volume:.3f} {many.wear_volume:.3f}")
     0.131 0.759
     """
-    wanted, coarsest = sorted({float(amount) for amount in amounts}), COARSEST
+    wanted = sorted({float(amount) for amount in amounts})
     if stick_radius == 0.0:
         solve: Solver = partial(_slid, profile, wanted, constant_force)
     else:
         check_stick_radius(stick_radius)
-        # near full stick the border hardly moves: the results at constant depth and at constant force agree
-        border_moves = constant_force and 0.5 * (1.0 - stick_radius) > accuracy**2
-        coarsest = COARSEST_OF_MOVING if border_moves else coarsest
-        solve = partial(_fretted, profile, stick_radius, wanted, border_moves)
-    found, *rougher = _converged(solve, min(accuracy, coarsest), errors)
+        solve = partial(_fretted, profile, stick_radius, wanted, constant_force)
+    coarsest = COARSEST_OF_MOVING if constant_force and stick_radius > 0.0 else COARSEST
+    resolution = Resolution(min(accuracy, coarsest))
+    found, *rougher = [solve(resolution._replace(rougher=rougher)) for rougher in range(3 if errors else 1)]
     contacts = {
         amount: one if one.relative_error > 0.0 else replace(one, rougher=tuple(other[amount] for other in rougher))
         for amount, one in found.items()
     }
     return [contacts[float(amount)] for amount in amounts]
-
-
-def _converged(solve: Solver, accuracy: float, errors: bool) -> list[dict[float, Worn]]:
-    """Return the solutions of `_solutions`. If they fail, repeat them at up to two finer accuracies."""
-    for finer in (accuracy, 0.25 * accuracy):
-        try:
-            return _solutions(solve, Resolution(finer), errors)
-        except NotConvergedError:
-            continue
-    return _solutions(solve, Resolution(0.0625 * accuracy), errors)
-
-
-def _solutions(solve: Solver, resolution: Resolution, errors: bool) -> list[dict[float, Worn]]:
-    """Return the solutions at a resolution and, if `errors`, at two rougher resolutions.
-
-    If one of the rougher solutions fails, it is left out; if both fail, NotConvergedError is raised.
-    """
-    found, reasons = [_solved(solve, resolution)], []
-    for rougher in (1, 2) if errors else ():
-        try:
-            found.append(_solved(solve, resolution._replace(rougher=rougher)))
-        except NotConvergedError as reason:
-            reasons.append(reason)
-    if len(reasons) > 1:
-        raise NotConvergedError(f"the error of the worn contact is not known: {reasons[0]}")
-    return found
-
-
-def _solved(solve: Solver, resolution: Resolution) -> dict[float, Worn]:
-    """Return the solution at a resolution. If the evolution fails, repeat it at up to two finer resolutions."""
-    for accuracy in (resolution.accuracy, 0.5 * resolution.accuracy):
-        try:
-            return solve(resolution._replace(accuracy=accuracy))
-        except NotConvergedError:
-            continue
-    return solve(resolution._replace(accuracy=0.25 * resolution.accuracy))
 
 
 class _Leg(NamedTuple):
@@ -242,9 +207,10 @@ class _Common(NamedTuple):
 
 
 def _fretted(
-    profile: Profile, c: float, wanted: Sequence[float], constant_force: bool, resolution: Resolution
+    profile: Profile, stick_radius: float, wanted: Sequence[float], constant_force: bool, resolution: Resolution
 ) -> dict[float, Worn]:
     """Return the contacts after all wanted numbers of cycles, from one solution."""
+    c = max(_moved(profile, stick_radius, FLAT * resolution.step), stick_radius) if constant_force else stick_radius
     reach = profile.largest_radius
     if np.isinf(reach):
         reach = farthest_contact(profile, c) if constant_force else 1.05 * limit_radius(profile, c)
@@ -257,18 +223,14 @@ def _fretted(
     problem = partial_slip(profile, c, panels, reach)
     first = resolution.first * float(np.sqrt(problem.body.width))
 
-    def is_rejected(moment: SlipMoment) -> bool:
-        return bool(np.min(moment.unknowns[: problem.size - 1]) < -LOWEST)
-
     def stops(moment: SlipMoment) -> bool:
         _refuse_beyond(problem.edge(moment.unknowns) <= profile.largest_radius, profile, c)
-        return problem.border is None and (moment.unknowns[panels.mesh.order - 1] > JUMP or is_rejected(moment))
+        return problem.border is None and bool(moment.unknowns[panels.mesh.order - 1] > JUMP)
 
     legs, start, energy = [], None, 0.0
     if constant_force:
         problem, start = problem.under_force()
         moments = march(problem, np.inf if late else early[-1], resolution.step, first, start, stops)
-        moments = moments[:-1] if is_rejected(moments[-1]) else moments
         legs.append(_Leg(problem, moments, resolution.step))
         energy = legs[0].at(moments[-1].time)[1].energy
         problem, start = problem.stop(moments[-1])
@@ -279,9 +241,20 @@ def _fretted(
     for time in early:
         leg = legs[0] if time <= legs[0].end else legs[-1]
         contacts[time] = _contact(leg, time)
+        rise = (contacts[time].depth - 1.0) / problem.eta
+        if constant_force and rise < FLAT * resolution.step:
+            border = max(_moved(profile, stick_radius, rise), stick_radius)
+            least_errors = {**contacts[time].least_errors, "stick_border": border - stick_radius}
+            contacts[time] = replace(contacts[time], stick_border=border, least_errors=least_errors)
     if late:
         contacts |= dict.fromkeys(late, _end(problem, start) if start else limit(profile, c))
     return contacts
+
+
+def _moved(profile: Profile, c: float, rise: float) -> float:
+    """Return the stick border b of a body without wear whose depth has increased: g0(b) = g0(c) + rise * eta."""
+    level = float(profile.image(np.array(c)))
+    return profile.inside(level + rise * (1.0 - level))
 
 
 def farthest_contact(profile: Profile, stick_radius: float) -> float:
@@ -329,7 +302,8 @@ class _Frozen(NamedTuple):
 
 def _frozen(problem: PartialSlip, path: FloatArray) -> _Frozen:
     places, depths = rising(path)
-    return _Frozen(np.sqrt(problem.body.square + problem.body.width * places), 1.0 + problem.eta * depths)
+    radii, first = np.unique(np.sqrt(problem.body.square + problem.body.width * places), return_index=True)
+    return _Frozen(radii, 1.0 + problem.eta * depths[first])
 
 
 def _end(problem: PartialSlip, moment: SlipMoment) -> Worn:

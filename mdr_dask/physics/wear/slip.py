@@ -29,7 +29,7 @@ from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.mdr.half_integrals import Mesh, Panels, interpolate, interpolate_weighted, value_at
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import gauss
-from mdr_dask.physics.wear.evolution import ROUNDING, Moment, settled
+from mdr_dask.physics.wear.evolution import Moment, settled
 
 #: Weight of the border relative to the depth in the error of a step. It is large, because f rises like a square root
 #: beyond the border.
@@ -83,7 +83,11 @@ class Past(NamedTuple):
         One entry for each moment: its weight, border and width.
     worn : array, shape (m, n)
         Worn depth divided by eta at the nodes. If the border does not move, `frozen` is subtracted, and the difference
-        is divided by sqrt(z), where z is the position on the panels.
+        is divided by sqrt(z), where z is the position on the panels. If `is_growth`, the array holds ln(s / s0)
+        instead: at constant depth, s increases exponentially from the virgin slip s0, which is very small next to the
+        border of a steep body.
+    is_growth : bool
+        Whether the depth is constant.
     frozen : float
         The worn depth divided by eta at a border that does not move; NaN while the border moves.
     moved : array, shape (n + order,)
@@ -99,6 +103,7 @@ class Past(NamedTuple):
     borders: FloatArray
     widths: FloatArray
     worn: FloatArray
+    is_growth: bool
     frozen: float
     moved: FloatArray
     path: FloatArray
@@ -181,6 +186,11 @@ class PartialSlip:
         place = self.place(unknowns)
         return place.width > 0.0 and self.body.width * place.border > -0.5 * self.body.square
 
+    def admits(self, unknowns: FloatArray, tolerance: float) -> bool:
+        """Return whether y >= 0 beyond a moving border, or s >= 0 beyond a border that does not move."""
+        positive = unknowns[: self.size - 1] if self.border is None else self.slip(unknowns)
+        return bool(np.min(positive) >= -tolerance)
+
     def radius(self, place: float) -> float:
         """Return the radius that belongs to a value of q."""
         return math.sqrt(self.body.square + self.body.width * place)
@@ -217,11 +227,16 @@ class PartialSlip:
         """
         places = [self.place(moment.unknowns) for moment in past]
         worn = np.array([moment.accumulated for moment in past])
+        if self.load is None:
+            worn = np.array([self._growth(moment) for moment in past])
+        elif self.border is not None:
+            worn = (worn - self.frozen) / np.sqrt(self.panels.nodes)
         earlier = Past(
             shares,
             np.array([place.border for place in places]),
             np.array([place.width for place in places]),
-            worn if self.border is None else (worn - self.frozen) / np.sqrt(self.panels.nodes),
+            worn,
+            self.load is None,
             self.frozen,
             past[0].moved,
             past[0].path,
@@ -234,6 +249,12 @@ class PartialSlip:
             return result
 
         return known
+
+    def _growth(self, moment: SlipMoment) -> FloatArray:
+        """Return ln(s / s0) at the nodes for a border at its first position."""
+        virgin = np.empty(self.size)
+        _virgin_slip(self.body, self.place(moment.unknowns).width * self.panels.nodes, virgin)
+        return np.asarray(np.log1p(np.maximum(moment.accumulated, 0.0) / virgin))
 
     def path_to(self, before: SlipMoment, place: Place) -> FloatArray:
         """Return the path up to the moment that follows `before`."""
@@ -296,9 +317,6 @@ class PartialSlip:
         slip, rate = self.panels.inner @ (y * factor), self.panels.outer @ y
         rate[-1] = 0.0
         rows = np.empty(unknowns.size)
-        if self.border is not None and np.min(slip) < -ROUNDING:
-            rows[:] = np.nan  # the equations have another solution, in which s is negative
-            return rows
         rows[:size] = slip * (1.0 - theta / root * rate) - known[:size]
         if self.load is not None:
             rows[size] = known[-1] + 0.5 * root * (self.panels.weights @ ((1.0 - y) * factor)) - self.load
@@ -394,16 +412,20 @@ def _fill_known(mesh: Mesh, body: VirginBody, past: Past, place: Place, result: 
     border, depth = path[0, -1], path[1, -1]
     for i in range(nodes):
         q = place.border + place.width * mesh.nodes[i]
-        worn = 0.0
+        virgin, worn = _slip_at(body, q), 0.0
         for k in range(past.shares.size if i < nodes - 1 else 0):  # the worn depth at the edge is zero
             z = (q - past.borders[k]) / past.widths[k]
             if z < 1.0:
                 value = value_at(mesh, past.worn[k], z)
-                worn += past.shares[k] * (past.frozen + math.sqrt(z) * value if is_still else value)
+                if past.is_growth:
+                    value = virgin * math.expm1(value)
+                elif is_still:
+                    value = past.frozen + math.sqrt(z) * value
+                worn += past.shares[k] * value
         z = (q - past.borders[0]) / past.widths[0]
         rise = value_at(mesh, past.moved, z) if z < mesh.edges[-1] else _rise(body, path, q)
-        rise += _piece(body, _root(q, border), _root(q, place.border), place.depth - depth, q)
-        result[i] = _slip_at(body, q) - rise + worn
+        rise += _piece(body, border, place.border, place.depth - depth, q)
+        result[i] = virgin - rise + worn
         result[nodes + i] = worn
     first, last = math.sqrt(body.square + body.width * border), math.sqrt(body.square + body.width * place.border)
     step = body.width * (place.border - border) / (first + last)
@@ -434,40 +456,34 @@ def _plateau_rise(body: VirginBody, path: FloatArray, places: FloatArray, result
 
 @jit
 def _rise(body: VirginBody, path: FloatArray, q: float) -> float:
-    """Return the rise of the plateau at q, (2/pi) int arccos(b / r) dd, while the border b was below r."""
-    total, first = 0.0, _root(q, path[0, 0])
+    """Return the rise of the plateau at q along the path, (2/pi) int arccos(b / r) dd for borders b below r."""
+    total = 0.0
     for k in range(1, path.shape[1]):
-        end = _root(q, path[0, k])
-        change = path[1, k] - path[1, k - 1]
-        if path[0, k] > q:
-            change *= (q - path[0, k - 1]) / (path[0, k] - path[0, k - 1])
-        total += _piece(body, first, end, change, q)
-        if path[0, k] > q:
-            break
-        first = end
+        total += _piece(body, path[0, k - 1], path[0, k], path[1, k] - path[1, k - 1], q)
     return total
 
 
 @jit_inline
-def _root(q: float, border: float) -> float:
-    return math.sqrt(max(q - border, 0.0))
-
-
-@jit_inline
 def _piece(body: VirginBody, first: float, last: float, change: float, q: float) -> float:
-    """Return (2/pi) int arccos(b / r) dd over a straight piece of the path, along which the depth changes by `change`.
+    """Return the rise of the plateau at q on a straight piece of the path, along which the depth changes by `change`.
 
-    The integration variable is sqrt(r^2 - b^2), because the integrand is a smooth function of this variable. `first`
-    and `last` are the values of the variable at the ends of the piece.
+    The border moves from `first` to `last`. The integration variable is sqrt(r^2 - b^2), because the integrand is a
+    smooth function of this variable.
     """
+    low, high = min(first, last), max(first, last)
+    if low >= q:
+        return 0.0
+    if high > q:
+        change *= (q - low) / (high - low)
     scale = math.sqrt(body.width / (body.square + body.width * q))
-    whole = first + last
-    spread = (first - last) / whole if whole > 0.0 else 0.0
+    begin, end = math.sqrt(max(q - first, 0.0)), math.sqrt(max(q - last, 0.0))
+    whole = begin + end
+    spread = (begin - end) / whole
     if abs(spread) < SHORT:
         return 2.0 / math.pi * change * math.asin(min(0.5 * scale * whole, 1.0)) * (1.0 + spread * spread / 3.0)
     mean, weights = 0.0, 0.0
     for node in range(_ABSCISSA.size):
-        root = first + (last - first) * _ABSCISSA[node]
+        root = begin + (end - begin) * _ABSCISSA[node]
         mean += _WEIGHT[node] * root * math.asin(min(scale * root, 1.0))
         weights += _WEIGHT[node] * root
     return 2.0 / math.pi * change * mean / weights
@@ -493,6 +509,10 @@ class GrossSlip:
     def holds(self, unknowns: FloatArray) -> bool:
         """Return whether the unknowns describe a possible contact."""
         return bool(unknowns[self.panels.nodes.size - 1] > 0.0)
+
+    def admits(self, unknowns: FloatArray, tolerance: float) -> bool:
+        """Return True: no other solutions of the equations are known."""
+        return True
 
     def start(self) -> Moment:
         """Return the virgin contact."""
