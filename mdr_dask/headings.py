@@ -39,7 +39,7 @@ wear volume, worn volume, verschleißvolumen
 """.splitlines()
 )  # fmt: skip
 #: Words in front of or behind the name of a quantity that do not change its meaning.
-IGNORED = {"mean", "average", "avg", "mittel", "sample", "test", "step", "measured"}
+IGNORED = {"mean", "average", "avg", "mittel", "sample", "test", "step", "measured", "linear"}
 #: Units that may be joined to a name, as in ``freq_hz``, by their spelling in lower case.
 JOINED = {unit.casefold(): unit for unit in ("Pa", "kPa", "MPa", "GPa", "mPa", "Hz", "K", "N")} | {"f": "degF"}
 JOINED |= {"c": "degC"}

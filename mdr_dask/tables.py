@@ -31,7 +31,7 @@ from mdr_dask.units import example_unit, in_degrees, is_unit, scaled
 
 COMMENT = "#%"
 BLANKS = r"\s+"
-SEPARATORS = ("\t", ";", ",", BLANKS)
+SEPARATORS = ("\t", ";", "|", ",", BLANKS)
 #: Start of the line that precedes each sheet of a workbook; the name of the sheet follows.
 SHEET = "# sheet of a workbook: "
 #: Two columns of one quantity agree if their relative difference is at most this. Instruments print three digits.
@@ -226,11 +226,11 @@ def _separator(lines: Sequence[str]) -> str:
         return count > 1 and 2 * count >= len(filled)
 
     several = {
-        mark: sum(has_numbers(line, mark) for line in lines) * (2 if mark in "\t;" else 1) for mark in SEPARATORS
+        mark: sum(has_numbers(line, mark) for line in lines) * (2 if mark in "\t;|" else 1) for mark in SEPARATORS
     }
     best = max(SEPARATORS, key=lambda mark: several[mark])
     if not several[best]:
-        best = max(SEPARATORS[:3], key=lambda mark: sum(mark in line for line in lines))
+        best = max(SEPARATORS[:-1], key=lambda mark: sum(mark in line for line in lines))
         return best if any(best in line for line in lines) else ","
     if best == "," and all(_NUMBER.fullmatch(line.strip()) for line in lines[1:]) and "," not in lines[0]:
         return ";"  # one column of numbers with decimal commas
@@ -651,6 +651,11 @@ def _values(
         if not _NUMBER.fullmatch(text):
             hint = " (remove the separators of thousands)" if _THOUSANDS.fullmatch(text) else ""
             hint = " (write errors in a column of their own)" if re.search("±|[+][/-]", text) else hint
+            hint = (
+                " (write units in the line of names)"
+                if re.fullmatch(r"[+-]?[\d.,]+ ?[^\W\d]\S*|.*\d ?%", text)
+                else hint
+            )
             wrong.append((row, f"expected a number, got {text[:60]!r}{hint}"))
             continue
         exact = repr(10.0 ** float(text)) if is_logarithm and abs(float(text)) < 300 else text

@@ -239,6 +239,11 @@ READ = {
         (Column("rotation speed", "rad/s"), Column("friction coefficient", "1")),
         {"rotation speed": 10.472},
     ),
+    "vertical lines": (
+        "| v [mm/s] | Linear load [N] | mu |\n|---|---|---|\n| 1 | 5 | 0.5 |\n| 2 | 5 | 0.6 |\n",
+        FRICTION,
+        {"velocity": 1e-3, "normal force": 5.0},
+    ),
     "temperatures above pairs of tabs": (
         "20 °C\t\t40 °C\t\nf (Hz)\tG' (kPa)\tf (Hz)\tG' (kPa)\n0.1\t5\t0.1\t2\n1\t6\t1\t3\n",
         DMA,
@@ -277,6 +282,7 @@ REFUSED = {
         FRICTION,
         "write errors in a column of their own",
     ),
+    "unit in each cell": ("v [mm/s];mu\n1 mm/s;0,5\n", FRICTION, "write units in the line of names"),
     "one column for each temperature": (
         "f [Hz];20 °C;40 °C\n1;5;4\n2;6;5\n",
         DMA,

@@ -21,7 +21,7 @@ from mdr_dask.units import shown
 ERROR = "standard_error"
 #: Names of errors in a heading, such as ``std``. They stand before or after the name of an output, or alone.
 _ERROR = re.compile(
-    r"(?<!\w)(?:(?:std|standard)? ?(?:dev|deviation|err|error|abw|abweichung|fehler)|uncertainty|std|sd|se)(?!\w)"
+    r"(?<!\w)(?:(?:std?|standard)? ?(?:dev|deviation|err|error|abw|abweichung|fehler)|uncertainty|std|sd|sem?)(?!\w)"
     r"|[σ±]|\+ ?/?"
 )
 #: Largest size of a table of measured points, in characters. The table is stored with the study.

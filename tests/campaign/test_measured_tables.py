@@ -17,7 +17,19 @@ def read(text):
 
 @pytest.mark.parametrize(
     "heading",
-    ["std", "Std.abw.", "std dev", "sd", "\u00b1", "+-", "error of mu", "mu std", "friction_coefficient_error"],
+    [
+        "std",
+        "Std.abw.",
+        "std dev",
+        "COF stdev",
+        "SEM",
+        "sd",
+        "\u00b1",
+        "+-",
+        "error of mu",
+        "mu std",
+        "friction_coefficient_error",
+    ],
 )
 def test_columns_named_as_errors_are_errors_of_the_output_before_them(heading):
     found = read(f"velocity [m/s];mu;n;{heading}\n1;0,3;5;0,01\n2;0,4;5;0,02\n")
