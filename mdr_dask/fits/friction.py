@@ -181,17 +181,8 @@ def _plateau(data: xr.Dataset) -> Variables:
 def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], count: int, reached: str) -> Variables:
     """Test mu = sqrt 2 times the rms slope, with the slope in contact (eq. 3.15) and with the slope of the line.
 
-    Parameters
-    ----------
-    data : Dataset
-    height : array, shape (rows,)
-        Stack of the largest friction divided by the rms slope of the line.
-    flat : int array
-        Indices of the cases on the plateau.
-    count : int
-        Number of realisations.
-    reached : str
-        Sentence on whether friction reaches its maximum.
+    `height` is the stack of the plateau, `flat` are the indices of the cases on the plateau, and `reached` is the
+    sentence on whether friction reaches its maximum.
     """
     meaning = "largest mu divided by the rms slope in contact"
     if "contact_slope" in data:
@@ -221,16 +212,8 @@ def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str]:
 def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: str) -> str:
     """Return a sentence on whether friction reaches a maximum or a constant value within the range of velocities.
 
-    Parameters
-    ----------
-    x : array, shape (velocities,)
-        Logarithms of velocity.
-    found : Top
-        The largest friction.
-    ends : (float, float)
-        Ends of the interval of d ln(friction) / d ln(velocity) at the largest friction.
-    place : str
-        Format to write the velocity of the maximum.
+    `x` are the logarithms of the velocities, `ends` is the interval of the slope `found.rise`, and `place` is a format
+    to write the velocity of the maximum.
     """
     at, rise = float(found.place[0]), float(found.rise[0])
     change = f"d ln mu / d ln v = {rise:.2g}"

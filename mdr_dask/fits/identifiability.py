@@ -91,14 +91,8 @@ class Product(NamedTuple):
 def products(found: Posterior, values: FloatArray, free: Sequence[int]) -> list[Product]:
     """Return the products of undetermined unknowns that the data determine.
 
-    Parameters
-    ----------
-    found : Posterior
-        Posterior density of all unknowns.
-    values : array, shape (cells, unknowns)
-        The unknowns in SI units at the centre of each cell.
-    free : sequence of int
-        Indices of the unknowns that the data do not determine.
+    `values` are the unknowns in SI units at the centre of each cell, shape (cells, unknowns), and `free` are the
+    indices of the undetermined unknowns.
     """
     if len(free) < 2 or np.any(values[:, free] <= 0):
         return []

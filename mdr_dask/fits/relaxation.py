@@ -170,16 +170,9 @@ def _passing_number(case: xr.Dataset) -> float:
 
 
 def _outputs(case: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the friction of a case as a function of time.
+    """Return the times t' of a case, beginning with 0; its values, shape (realisations, values); and their grid errors.
 
-    Returns
-    -------
-    time : array, shape (m,)
-        t', beginning with 0.
-    values : array, shape (realisations, 2 + m)
-        mu_1, d_mu_0, mu_2, and mu at all times except the first.
-    error : array, shape (2 + m,)
-        Discretisation errors of the means of these values.
+    The values are mu_1, d_mu_0, mu_2, and mu at all times except the first. The errors are those of the means.
     """
     tables = [table_of(case, 1.0, output=name) for name in (*LEVELS, TRACE)]
     values = np.concatenate([table.values for table in tables]).T
@@ -295,18 +288,8 @@ def _side_by_side(found: list[Relaxation | None]) -> FloatArray:
 def _power(x: FloatArray, rates: FloatArray, error: FloatArray, stated: float, count: int) -> Variables:
     """Fit the rates to a power of v_1 tau q_max, either below or above v_1 tau q_max = 1.
 
-    Parameters
-    ----------
-    x : array, shape (cases,)
-        ln(v_1 tau q_max).
-    rates : array, shape (rows, cases)
-        Stack of the rates.
-    error : array, shape (cases,)
-        Standard errors of the logarithms of the rates.
-    stated : float
-        Power by eq. 4.12.
-    count : int
-        Number of realisations.
+    `x` is ln(v_1 tau q_max), `rates` is the stack of the rates, `error` are the standard errors of their logarithms,
+    and `stated` is the power by eq. 4.12.
     """
     power, factor, error_of_fit = np.full(1 + bootstrap.RESAMPLES, np.nan), np.nan, np.nan
     of_fitted = of_stated = f"not tested: {x.size} rates are known to a factor of 1.6, three are needed"

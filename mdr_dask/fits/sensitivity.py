@@ -191,12 +191,7 @@ def _neighbours(values: FloatArray) -> FloatArray:
 def _with_interval(values: FloatArray, indices: Callable[[FloatArray], FloatArray]) -> FloatArray:
     """Return indices and the ends of their intervals by a jackknife, shape (3, indices).
 
-    Parameters
-    ----------
-    values : array, shape (realisations, points, ...)
-        Outputs.
-    indices : callable
-        Computes the indices from such an array.
+    `indices` computes the indices from outputs of shape (realisations, points, ...).
     """
     middle, lines = indices(values), len(values)
     group = np.random.Generator(np.random.Philox(0)).permutation(values.shape[1]) % GROUPS

@@ -43,21 +43,21 @@ class EhlLineParameters(Parameters):
     settings: ClassVar[frozenset[str]] = frozenset({"profile_start", "profile_end", "profile_points"})
     load_parameter: float | None = quantity(
         "1",
-        "load parameter W = w/(E' R) of the line load w, with E' = 2 E*, twice the contact modulus",
+        "load parameter W = w/(E' R), with the line load w, the radius R and E' = 2 E*, twice the contact modulus",
         usual="2e-5",
         gt=0,
         default=None,
     )
     speed_parameter: float | None = quantity(
         "1",
-        "speed parameter U = eta0 u/(E' R), with the viscosity eta0 and the mean velocity u",
+        "speed parameter U = eta0 u/(E' R), with the viscosity eta0, the mean velocity u, the radius R and E' = 2 E*",
         usual="1e-11",
         gt=0,
         default=None,
     )
     material_parameter: float | None = quantity(
         "1",
-        "material parameter G = alpha E', with the pressure-viscosity coefficient alpha",
+        "material parameter G = alpha E', with the pressure-viscosity coefficient alpha and E' = 2 E*",
         usual="5000",
         ge=0,
         default=None,
@@ -106,10 +106,10 @@ class EhlLineParameters(Parameters):
         "Pa", "Eyring stress of the oil, for shear_law: eyring", usual="5 MPa", gt=0, default=5e6
     )
     profile_start: float = quantity(
-        "1", "first position at which film and pressure are stored, in Hertzian half widths", default=-4.0
+        "1", "first position x/a at which film and pressure are stored, in Hertzian half widths a", default=-4.0
     )
     profile_end: float = quantity(
-        "1", "last position at which film and pressure are stored, in Hertzian half widths", default=2.0
+        "1", "last position x/a at which film and pressure are stored, in Hertzian half widths a", default=2.0
     )
     profile_points: int = quantity("1", "number of positions at which film and pressure are stored", ge=2, default=241)
 

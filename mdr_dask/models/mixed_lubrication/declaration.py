@@ -116,7 +116,7 @@ class MixedLubrication(Parameters):
         description="formula for the film thickness; with ehl, the contact is solved as in the model ehl_line",
     )
     film_thickness: Positive | None = quantity(
-        "m", "film thickness, if it is given and not computed by film_formula", usual="100 nm", default=None
+        "m", "given film thickness; film_formula is then not used", usual="100 nm", default=None
     )
     edge_rule: Literal["part", "clip", "whole", "inside"] = Field(
         default="part",
@@ -307,10 +307,10 @@ OUTPUTS = (
     Output("contact_half_width", "m", "half width a of the Hertzian contact", default=False),
     Output("contact_length_trace", "m", "length in intimate contact against rolling angle", ("angle",), default=False),
     Output(
-        "upper_profile", "m", "profile of roller 1 at the angle with the longest contact", ("position",), default=False
+        "upper_profile", "m", "profile of roller 1 at the angle of largest contact_length", ("position",), default=False
     ),
     Output(
-        "lower_profile", "m", "profile of roller 2 at the angle with the longest contact", ("position",), default=False
+        "lower_profile", "m", "profile of roller 2 at the angle of largest contact_length", ("position",), default=False
     ),
 )
 

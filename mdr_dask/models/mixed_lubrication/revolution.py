@@ -63,14 +63,7 @@ class Revolution:
 
 
 def revolve(operation: Operation, lines: FloatArray) -> Revolution:
-    """Return one revolution of the rollers.
-
-    Parameters
-    ----------
-    operation : Operation
-    lines : array, shape (2, points)
-        Splines of both lines.
-    """
+    """Find the intimate contact during one revolution; `lines` are the splines of both lines, shape (2, points)."""
     case, points = operation.case, lines.shape[1]
     spacing, creep = operation.length / points, case.slide_roll_ratio
     width = operation.width / spacing
@@ -95,14 +88,8 @@ def _windows(operation: Operation, lines: FloatArray, travels: ArrayLike) -> Int
 def values(operation: Operation, revolution: Revolution, errors: FloatArray) -> dict[str, float]:
     """Return the scalar outputs of a realisation and their errors.
 
-    Conductance and resistance are those of the whole roller width, across which the squares conduct in parallel.
-
-    Parameters
-    ----------
-    operation : Operation
-    revolution : Revolution
-    errors : array, shape (2,)
-        Error of the probability, and error of the length in m.
+    `errors` are the errors of the probability and of the length in m. Conductance and resistance are those of the whole
+    width of the rollers, across which the squares conduct in parallel.
     """
     specific, length = operation.case.resistivity / operation.squares, revolution.length
     of_probability, off = errors.tolist()

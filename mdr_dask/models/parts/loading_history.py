@@ -107,14 +107,8 @@ def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> 
     """Return velocity and normal force before t = 0, and the pieces of the history after t = 0.
 
     Within a piece, velocity and force are linear in time, and a sine may be added to both. The last piece has no end.
-
-    Parameters
-    ----------
-    protocol : Protocol
-    velocity, force : float
-        The parameters `velocity` and `normal_force` of the body, in m/s and N.
-    change : float
-        Relative change of the velocity at a jump.
+    `velocity` and `force` are the parameters of the body, and `change` is the relative change of the velocity at a
+    jump.
 
     Raises
     ------
