@@ -108,7 +108,11 @@ def run_block(work: Work) -> Outcome:
         status = result.status.reshape(shape)
     else:
         is_new = bool((work.wanted | work.spared).all())
-        values, status = _nothing(model, work) if is_new else store.read_block(work.place, work.block.outputs)
+        if is_new:
+            shape = work.wanted.shape
+            values, status = _unknown(model, work.block, shape), np.full(shape, Status.MISSING, dtype=np.int8)
+        else:
+            values, status = store.read_block(work.place, work.block.outputs)
         status[work.spared] = Status.NOT_NEEDED
         result = _compute_part(model, is_own, work.block, work.wanted.reshape(work.block.cases, -1), values, status)
     middle = time.perf_counter()
@@ -174,7 +178,8 @@ def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
                 f"{platform.node()} cannot compute {model.name}: {type(error).__name__}: {error}"
             ) from None
         if is_single:
-            return _failed(model, block, reason(error) + (where(error) if is_own else ""))
+            message, failed = reason(error) + (where(error) if is_own else ""), np.full((1, 1), Status.FAILED, np.int8)
+            return Result(_unknown(model, block, (1, 1)), failed, {(0, 0): message})
     parts = [
         _compute(model, block.part(case, number), is_own)
         for case in range(block.cases)
@@ -230,17 +235,6 @@ def _unknown(model: Model[Any], block: Block[Any], shape: tuple[int, ...]) -> di
     extra = model.coordinates(block.parameters)
     sizes = {name: tuple(extra[dim].values.size for dim in model.output(name).dims) for name in block.outputs}
     return {name: np.full((*shape, *size), np.nan) for name, size in sizes.items()}
-
-
-def _nothing(model: Model[Any], work: Work) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int8]]:
-    """Return outputs of NaN, and a ledger in which all results are missing."""
-    shape = work.wanted.shape
-    return _unknown(model, work.block, shape), np.full(shape, Status.MISSING, dtype=np.int8)
-
-
-def _failed(model: Model[Any], block: Block[Any], message: str) -> Result:
-    values = _unknown(model, block, (1, 1))
-    return Result(values, np.array([[Status.FAILED]], dtype=np.int8), {(0, 0): message})
 
 
 def _join(block: Block[Any], parts: list[Result]) -> Result:

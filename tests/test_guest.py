@@ -32,7 +32,8 @@ def example(tmp_path, monkeypatch):
 
     def command(*arguments, line=""):
         Path("wear_rate.py").write_text(MODULE.replace(PLACE, f"{line}\n{PLACE}"))
-        Path("pin.yaml").write_text(CAMPAIGN.replace("realisations: 20", "realisations: 4"))
+        text = CAMPAIGN.replace("realisations: 20", "realisations: 4")
+        Path("pin.yaml").write_text(f"{text}store: {{blocks: {{realisation: 4}}}}\n")
         environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
         words = [sys.executable, "-m", "mdr_dask", *arguments]
         return subprocess.run(words, env=environment, capture_output=True, text=True, check=False)

@@ -72,16 +72,13 @@ def write_block(
 
     with guarded(place.url, f"encoding block {place.index}"):
         sync(encode())
-    keys = {name: _chunk(place, arrays[name], name) for name in given}
+    further = {name: arrays[name].ndim - len(place.index) for name in given}
+    keys = {name: chunk_name(place.series, name, place.index, dims) for name, dims in further.items()}
     chunks = {name: (key, encoded.pop(key).to_bytes()) for name, key in keys.items()}
     line = with_digest({**record, "chunks": {name: digest(content) for name, (_, content) in chunks.items()}})
     ledger = dict([chunks.pop("status")])
     with while_locked(place.url, place.lock):
         write_stages(place.url, [{name_of(place.series, place.index, attempt): line}, dict(chunks.values()), ledger])
-
-
-def _chunk(place: Place, array: Any, name: str) -> str:
-    return chunk_name(place.series, name, place.index, array.ndim - len(place.index))
 
 
 def is_written(place: Place, record: Mapping[str, Any]) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 from collections import Counter
-from collections.abc import Mapping, Set
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache, reduce
 from typing import Annotated, Any
@@ -110,23 +110,15 @@ def _group_attributes(url: str, name: str) -> dict[str, Any] | None:
 
 def _study_differences(url: str, campaign: Campaign) -> list[str]:
     root = attributes(url)
-    now = {
-        "model": campaign.model,
-        "seed": campaign.seed,
-        "accuracy": campaign.accuracy,
-    }
-    found = [_difference(key.replace("_", " "), root[key], value) for key, value in now.items() if root[key] != value]
+    now = {"model": campaign.model, "seed": campaign.seed, "accuracy": campaign.accuracy}
+    found = [_difference(key, root[key], value) for key, value in now.items() if root[key] != value]
     names, names_now = series_names(url), [series.name for series in campaign.series]
     if "" in names_now and not {"", ROOT} & set(names):
         found.append(f"series: {' '.join(names)} in the store, none in the campaign: name this one as well")
-    arrays = _arrays_at_root(url)
+    members = (document(url) or {})["consolidated_metadata"]["metadata"]
+    arrays = {name for name, member in members.items() if member["node_type"] == "array"}
     found += [f"series {name}: an array of the store has that name" for name in names_now if name in arrays]
     return found
-
-
-def _arrays_at_root(url: str) -> set[str]:
-    members = (document(url) or {})["consolidated_metadata"]["metadata"]
-    return {name for name, member in members.items() if member["node_type"] == "array"}
 
 
 def _with_root(url: str, campaign: Campaign) -> Campaign:
@@ -162,16 +154,11 @@ def _series_differences(series: Series, held: Mapping[str, Any], outputs: tuple[
         found.append(f"outputs: the store lacks {', '.join(lacking)}, for which every case would be computed again")
     before = _leaves(json.loads(held["parameters"]), "")
     now = _leaves(series.parameters.model_dump(mode="json"), "")
-    fixed = [
-        path for path in sorted(before.keys() | now.keys()) if not _below_any(path, axes.keys() | held_axes.keys())
-    ]
+    varied = tuple(f"{axis}." for axis in axes.keys() | held_axes.keys())
+    fixed = [path for path in sorted(before.keys() | now.keys()) if not f"{path}.".startswith(varied)]
     return found + [
         _difference(path, before.get(path), now.get(path)) for path in fixed if before.get(path) != now.get(path)
     ]
-
-
-def _below_any(path: str, axes: Set[str]) -> bool:
-    return any(path == axis or path.startswith(axis + ".") for axis in axes)
 
 
 def _leaves(tree: Mapping[str, Any], prefix: str) -> dict[str, Any]:
@@ -205,7 +192,8 @@ def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, 
     axes = []
     for dim in dict.fromkeys(axis["dim"] for axis in held["axes"]):
         stored = [axis for axis in held["axes"] if axis["dim"] == dim]
-        now = [_axis(series, axis["path"]) for axis in stored]
+        by_path = {axis.path: axis for axis in series.axes}
+        now = [by_path[axis["path"]] for axis in stored]
         old = _entries([axis["values"] for axis in stored])
         wanted = _entries([plain_values(axis.values) for axis in now])
         new = [position for entry, position in wanted.items() if entry not in old]
@@ -213,10 +201,6 @@ def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, 
         places[dim] = np.array([old[entry] if entry in old else next(behind) for entry in wanted], dtype=np.int64)
         axes += [_longer(series, axis, before, new) for axis, before in zip(now, stored, strict=True)]
     return replace(series, axes=tuple(axes)), places
-
-
-def _axis(series: Series, path: str) -> Axis:
-    return next(axis for axis in series.axes if axis.path == path)
 
 
 def _entries(columns: list[list[Any]]) -> dict[tuple[str, int], int]:

@@ -339,7 +339,7 @@ def _busy(url: str, who: str) -> StoreBusyError:
 
 def _holder(url: str, name: str = "") -> str:
     """Return a text for messages that names the process that holds a lock."""
-    names = [_read_claim(url, _claim(name, number)).get("who", "") for number in _numbers(url, name)]
+    names = [_read_claim(url, _claim(name, number)).get("who") for number in sorted(_numbers(url, name), reverse=True)]
     for runner in _runners(url, name) if local(url) is not None else ():
         with suppress(OSError):
             names.append(runner.read_text())
@@ -437,13 +437,13 @@ def _make_claim(url: str, name: str, owner: str) -> int:
     """Make the next claim and return its number; raise StoreBusyError if the owner of the last claim is active."""
     standing = _numbers(url, name)
     if standing and _is_alive(url, name, max(standing)):
-        raise _busy(url, _read_claim(url, _claim(name, max(standing))).get("who", "another process"))
+        raise _busy(url, _holder(url, name))
     number = max(standing, default=0) + 1
     content = json.dumps({"owner": owner, "who": _this_process(), "time": time.time()}).encode()
     if not create(url, _claim(name, number), content):
-        held = _read_claim(url, _claim(name, number))
-        if held.get("owner") != owner:  # the claim is this run's own if only the reply to the request was lost
-            raise _busy(url, held.get("who", "another process"))
+        # the claim is this run's own if only the reply to the request was lost
+        if _read_claim(url, _claim(name, number)).get("owner") != owner:
+            raise _busy(url, _holder(url, name))
     elif not name and (not conditional(url) or create(url, _claim(name, number), content)):
         log.warning(
             "%s: nothing prevents two simultaneous runs here (no conditional write): start one run at a time", url
