@@ -20,9 +20,8 @@ from mdr_dask.errors import CampaignError, ModelError, distinguishable
 from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, with_value
 from mdr_dask.models.numbers import numbers_of
 
-#: Number of operations in a second, for the times that are printed. Only their order of magnitude is meant.
-SPEED = 1e9
-#: Number of operations of a block: about a second of work, because scheduling and writing a block take milliseconds.
+#: Number of operations of a block. They take about a second, of which only the order of magnitude is meant; scheduling
+#: and writing a block take milliseconds.
 OPERATIONS = 1e9
 #: A small study has about this number of blocks, for several workers, but none of fewer than `LEAST` operations.
 FEW_BLOCKS, LEAST = 16, OPERATIONS / 10
@@ -231,8 +230,8 @@ class Estimate:
 
     @property
     def seconds(self) -> float | None:
-        """Order of magnitude of the time on one core in s: the operations divided by `SPEED`."""
-        return None if self.operations is None else self.operations / SPEED
+        """Order of magnitude of the time on one core in s."""
+        return None if self.operations is None else self.operations / OPERATIONS
 
     @property
     def rounds(self) -> float:

@@ -56,9 +56,9 @@ SILENCE = 60.0
 #: Time in s for which a process tries to acquire a lock that another process holds. The other process may hold the lock
 #: only for an instant, to check whether it is free.
 GLANCE = 0.5
-#: `KNOCK`: time in s between two attempts to acquire the gate. `PATIENCE`: time in s of waiting after which a message
-#: is logged.
-KNOCK, PATIENCE = 0.1, 4.0
+#: `POLL`: time in s between two attempts to acquire a lock. `PATIENCE`: time in s of waiting for the gate after which a
+#: message is logged, so that a user reads it within five seconds.
+POLL, PATIENCE = 0.05, 4.0
 #: Error numbers of a file system without locks, and error numbers of a read-only file system.
 NO_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP}
 READ_ONLY = {errno.EACCES, errno.EPERM, errno.EROFS}
@@ -160,7 +160,7 @@ def gate(url: str) -> Iterator[None]:
                 if time.monotonic() - start > PATIENCE and not is_reported:
                     log.warning("%s; waiting until it releases the store", error.args[0].partition(";")[0])
                     is_reported = True
-                time.sleep(KNOCK)
+                time.sleep(POLL)
         yield
 
 
@@ -273,7 +273,7 @@ def _locked(file: Path) -> int:
             if time.monotonic() > give_up:
                 os.close(descriptor)
                 raise
-            time.sleep(GLANCE / 10)
+            time.sleep(POLL)
         except OSError:
             os.close(descriptor)
             raise
@@ -387,7 +387,7 @@ def _retire(url: str, name: str) -> None:
                 except BlockingIOError:
                     if time.monotonic() > give_up:
                         raise _busy(url, f"a task of {_holder(url, name)}") from None
-                    time.sleep(GLANCE / 10)
+                    time.sleep(POLL)
             runner.unlink(missing_ok=True)
 
 
