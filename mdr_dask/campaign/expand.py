@@ -178,13 +178,9 @@ class _Expansion:
                 continue
             value = _get(checked, one.path)
             values.append(value)
-            key = (
-                float(f"{value:.{SAME_DIGITS}g}")
-                if isinstance(value, float)
-                else value
-                if isinstance(value, int | tuple)
-                else item.label
-            )
+            key = value if isinstance(value, int | tuple) else item.label
+            if isinstance(value, float):
+                key = float(f"{value:.{SAME_DIGITS}g}")
             if key in seen:
                 self._complain(item.origin, f"this value is given twice: {item.label}")
             seen.add(key)
