@@ -178,8 +178,9 @@ def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
                 f"{platform.node()} cannot compute {model.name}: {type(error).__name__}: {error}"
             ) from None
         if is_single:
-            message, failed = reason(error) + (where(error) if is_own else ""), np.full((1, 1), Status.FAILED, np.int8)
-            return Result(_unknown(model, block, (1, 1)), failed, {(0, 0): message})
+            message = reason(error) + (where(error) if is_own else "")
+            status = np.full((1, 1), Status.FAILED, dtype=np.int8)
+            return Result(_unknown(model, block, (1, 1)), status, {(0, 0): message})
     parts = [
         _compute(model, block.part(case, number), is_own)
         for case in range(block.cases)
