@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 #: Widths in inches. `ALONE`: a single panel on a screen. `BESIDE`: a panel next to another panel. `WIDE`, `NARROW`:
 #: usual and least width of a panel in a figure whose width was requested.
-ALONE, BESIDE, WIDE, NARROW = 6.4, 4.2, 2.2, 1.5
+ALONE, BESIDE, WIDE, NARROW = 6.4, 4.2, 3.0, 1.5
 #: `LEAST_HEIGHT`: least height of a panel in inches. `MOST_COLUMNS`: usual largest number of panels in a row.
 LEAST_HEIGHT, MOST_COLUMNS = 1.3, 3
 #: `SLENDER`: largest height of a figure over its width, unless its panels would be lower than `LEAST_HEIGHT`.
@@ -99,7 +99,7 @@ def render(description: Figure) -> Drawn:
     places = _axes(figure, description, rows, columns)
     for axes, panel in zip(places, panels, strict=True):
         _draw_panel(axes, panel)
-    _share_labels(places, panels)
+    _share_labels(figure, places, panels)
     _bars(figure, places, panels)
     _title(figure, description)
     traces = [trace for panel in panels for trace in panel.traces]
@@ -146,8 +146,11 @@ def _axes(figure: Drawn, description: Figure, rows: int, columns: int) -> list[A
     return found
 
 
-def _share_labels(places: list[Axes], panels: list[Panel]) -> None:
-    """Remove an axis label that the panel below (horizontal axes) or on the left (vertical axes) also has."""
+def _share_labels(figure: Drawn, places: list[Axes], panels: list[Panel]) -> None:
+    """Remove an axis label that the panel below (horizontal axes) or on the left (vertical axes) also has.
+
+    If all panels in several rows have the same vertical axis, its label is drawn once.
+    """
     at = {}
     for axes, panel in zip(places, panels, strict=True):
         place = axes.get_subplotspec()
@@ -159,6 +162,10 @@ def _share_labels(places: list[Axes], panels: list[Panel]) -> None:
             axes.set_xlabel("")
         if left and left[1].y == panel.y:
             axes.set_ylabel("")
+    if len({row for row, _ in at}) > 1 and all(panel.y == panels[0].y for panel in panels):
+        for axes in places:
+            axes.set_ylabel("")
+        figure.supylabel(panels[0].y.label, fontsize=mpl.rcParams["axes.labelsize"])
 
 
 def _draw_panel(axes: Axes, panel: Panel) -> None:

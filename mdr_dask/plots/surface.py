@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from mdr_dask.models.parts.surface_report import FileReport
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
-#: Label of the spectrum of the line that replaces a surface.
+#: `CUTS`: colours and lines of straight cuts in both directions. `METHOD`: label of the spectrum of the line that
+#: replaces a surface.
+CUTS = ("#a0a0a0", "-"), ("#505050", ":")
 METHOD = r"line of the method, $\pi q\,C^{2D}$"
 
 
@@ -35,14 +37,14 @@ def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...])
     for k, (report, used) in enumerate(zip(reports, spectra, strict=True)):
         file, colour = xr.Dataset(coords={"file": Path(report.file.name).name}), colours.colour(k)
         areal.traces += _areal(report, used, colour, file)
-        for (direction, (wave, cut)), dash in zip(report.cuts.items(), ("-", ":"), strict=False):
+        for (direction, (wave, cut)), (grey, dash) in zip(report.cuts.items(), CUTS, strict=False):
             there, name = cut > 1e-20 * cut.max(), f"straight cut along {direction}"
-            line.traces.append(Trace("law", columns(file, x=wave[there], y=cut[there]), name, name, "#909090", dash))
+            line.traces.append(Trace("law", columns(file, x=wave[there], y=cut[there]), name, name, grey, dash))
         wave = np.geomspace(used.wavenumber[0], used.wavenumber[-1], 400)
         method = columns(file, x=wave, y=np.pi * wave * used.at(wave))
         line.traces.append(Trace("law", method, METHOD, METHOD, colour, "-"))
-        areal.keys.append(Key(f"{file['file'].item()}: measured, in bins", colour, "", "o"))
-    areal.keys += [Key("used by a campaign", colours.colour(0), "-")]
+        name = f"{file['file'].item()}: measured (points) and used by a campaign (line)"
+        areal.keys.append(Key(name, colour, "-", "o"))
     for report in reports[:1]:
         if report.law is not None:
             hurst = report.law.hurst
