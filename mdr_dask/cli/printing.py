@@ -209,21 +209,12 @@ def table(dataset: xr.Dataset) -> tuple[list[Row], dict[str, str]]:
 
     Variables that lack a dimension are repeated along it; scalar coordinates are left out.
     """
-    dims = [str(dim) for dim in dataset.sizes]
-    names = [str(name) for name in dataset.data_vars]
-    along = [str(name) for name, coord in dataset.coords.items() if coord.ndim == 1 and name not in dims]
-    frame = dataset.drop_vars([name for name, c in dataset.coords.items() if c.ndim == 0])
-    columns = {name: frame[name] for name in (*dims, *along, *names)}
-    shape = dataset.sizes
-    flat = {n: _spread(c, dims, shape) for n, c in columns.items()}
-    rows = [dict(zip(flat, values, strict=True)) for values in zip(*flat.values(), strict=True)]
-    return rows, {name: str(column.attrs.get("units", "1")) for name, column in columns.items()}
-
-
-def _spread(column: xr.DataArray, dims: list[Any], shape: Any) -> list[Any]:
-    missing = {dim: shape[dim] for dim in dims if dim not in column.dims}
-    values: list[Any] = column.expand_dims(missing).transpose(*dims).to_numpy().ravel().tolist()
-    return values
+    data = dataset.drop_vars([name for name, coord in dataset.coords.items() if coord.ndim == 0])
+    dims = [str(dim) for dim in data.sizes]
+    names = [*dims, *(str(name) for name in data.variables if name not in dims)]
+    frame = (data if dims else data.expand_dims("row")).to_dataframe(dim_order=dims or None).reset_index()
+    rows = [dict(zip(names, row, strict=True)) for row in frame[names].itertuples(index=False)]
+    return rows, {name: str(data[name].attrs.get("units", "1")) for name in names}
 
 
 def with_intervals(rows: list[Row], units: dict[str, str]) -> tuple[list[Row], dict[str, str]]:
