@@ -35,7 +35,7 @@ def pytest_collection_modifyitems(items):
     pytest-xdist gives the first half of the tests to the first of two workers. It compiles most kernels, and the other
     worker finds them in the cache. Kernels that take longest to compile, and that the other half needs, come first.
     """
-    first = ("physics/superposition", "physics/transients", "physics", "models", "fits")
+    first = ("physics/superposition", "physics/sliding", "physics/transients", "physics", "models", "fits")
     rooms = {TESTS / room: rank for rank, room in enumerate(first)}
 
     def order(item):

@@ -184,7 +184,7 @@ def test_rounds_go_on_for_the_cases_that_need_them(toy, url):
 def test_rounds_have_the_same_bytes_however_often_they_stop_and_whoever_works(toy, tmp_path, blocks):
     """The number of realisations of a round follows from the rounds before alone."""
     axes = toy.axis("position", [1.0, 2.0]), toy.axis("noise", [0.01, 0.05, 0.2])
-    tolerance = {"height": Tolerance(relative=0.01)}
+    tolerance = {"height": Tolerance(relative=0.02)}
     campaign = replace(toy.campaign(*axes, realisations=Replication(10, 400, tolerance)), blocks=blocks)
     whole, broken, parts = (str(tmp_path / name) for name in ("a.zarr", "b.zarr", "c.zarr"))
     run(campaign, whole)

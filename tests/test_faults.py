@@ -88,6 +88,10 @@ SCENES = {
 }
 
 
+#: Scenes of the default run.
+QUICK = {"growth of axes and realisations", "retry"}
+
+
 def look(url: Path | str) -> list[dict[str, int]]:
     """Open a store as a stranger would, group by group, and read all of it; what is shown has one shape."""
     if not Path(url, "zarr.json").exists():
@@ -108,7 +112,7 @@ def look(url: Path | str) -> list[dict[str, int]]:
 
 
 @pytest.mark.parametrize("lasting", [False, True], ids=["one write fails", "the last write before a kill"])
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", [pytest.param(s, marks=[pytest.mark.slow] * (s not in QUICK)) for s in SCENES])
 def test_after_any_failed_write_a_plain_run_ends_with_the_same_bytes(toy, tmp_path, disk, scene, lasting):
     *before, last = SCENES[scene](toy)
     options = {"retry_failed": scene == "retry"}
