@@ -178,7 +178,7 @@ class _Expansion:
                 continue
             value = _get(checked, one.path)
             values.append(value)
-            key = value if isinstance(value, int | tuple) else item.label
+            key: Any = value if isinstance(value, int | tuple) else item.label
             if isinstance(value, float):
                 key = float(f"{value:.{SAME_DIGITS}g}")
             if key in seen:
