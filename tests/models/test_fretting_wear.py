@@ -107,6 +107,7 @@ def test_gross_slip_is_a_message_and_nothing_else_fails():
     result = run(FrettingWear(**STEEL), {"amplitude": np.array([1e-6, 1e-4])})
     assert result.status.ravel().tolist() == [Status.DONE, Status.FAILED]
     assert "gross slip" in result.messages[1, 0]
+    assert all(name in result.messages[1, 0] for name in ("normal_force", "path", "history"))
     assert np.isnan(result.values["wear_volume"][1, 0])
     assert np.isfinite(result.values["wear_volume"][0, 0])
 
@@ -131,6 +132,26 @@ def test_constant_force():
     mixed = run(FrettingWear(stick_radius=0.5, cycles=0.3), columns)
     assert mixed.status[:, 0].tolist() == [Status.FAILED, Status.DONE]
     assert "constant depth only" in mixed.messages[0, 0]
+
+
+@pytest.mark.parametrize(
+    ("settings", "outputs", "said"),
+    [
+        ({"extent": 1.2}, ("worn_profile",), "raise extent"),
+        ({"extent": 1.2}, ("wear_volume", "pressure"), "raise extent"),
+        ({"extent": 1.2}, ("wear_volume",), ""),
+        ({"extent": 1.3}, ("worn_profile",), ""),
+        ({"extent": 1.2, "wear_rule": "limit"}, ("worn_image",), "raise extent"),
+        ({"history": (LoadStep(cycles=8.0),), "cells": 60, "extent": 1.2}, ("block_worn_profile",), "raise extent"),
+    ],
+)
+def test_profiles_that_end_inside_the_scar_are_named(settings, outputs, said):
+    """The radius of the scar is 1.24 after 8 cycles, and 1.25 in the end."""
+    cycles = {} if "history" in settings else {"cycles": 8.0}
+    result = run(FrettingWear(stick_radius=0.455, **cycles, **settings), outputs=outputs)
+    assert result.status[0, 0] == Status.DONE
+    assert said in result.messages.get((0, 0), "")
+    assert bool(said) == bool(result.messages)
 
 
 def test_a_history_may_slip_everywhere():

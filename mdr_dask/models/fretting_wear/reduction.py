@@ -201,7 +201,8 @@ def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: di
         messages.setdefault(
             (int(case), int(realisation)),
             f"the amplitude is in gross slip: it must stay below mu E* d0 / G*, got {times} times that; "
-            "lower the amplitude or raise friction or load",
+            "lower amplitude, raise friction, depth or normal_force, or give path (sliding in one direction) "
+            "or history (blocks of load) instead of cycles",
         )
 
 

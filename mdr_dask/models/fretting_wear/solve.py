@@ -230,7 +230,8 @@ def _solve_each(
                 status[position], messages[position] = kind, str(problem)
             continue
         solves += _solves_of(task, wanted)
-        for positions, (records, text) in zip(wanted.values(), contacts, strict=True):
+        for positions, (records, missed) in zip(wanted.values(), contacts, strict=True):
+            text = "; ".join(part for part in (missed, _cut_off(records, block, task.extent)) if part)
             for name, array in values.items():
                 answer = _answer(records, name, places)
                 for position in positions:
@@ -250,6 +251,17 @@ def _answer(records: Sequence[Worn], name: str, places: FloatArray) -> float | F
         for one in (records if name.startswith("block_") else records[-1:])
     ]
     return np.array(answers) if name.startswith("block_") else answers[0]
+
+
+def _cut_off(records: Sequence[Worn], block: Block[FrettingWear], extent: float) -> str:
+    """Return a message if a requested profile ends inside the wear scar, or an empty string."""
+    widest = max(one.contact_radius for one in records)
+    if widest <= extent or not any({"radius", "position"} & {*MODEL.output(name).dims} for name in block.outputs):
+        return ""
+    name = "extent" if block.parameters.last_radius is None else "last_radius"
+    return (
+        f"the profiles end at {extent:.4g} a0, inside the wear scar, which has the radius {widest:.4g} a0; raise {name}"
+    )
 
 
 def _missed(records: Sequence[Worn], block: Block[FrettingWear], places: FloatArray) -> str:
