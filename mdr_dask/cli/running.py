@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("campaign", type=CAMPAIGN)
 @click.option("--store", "url", help="Path or URL of the store, instead of the one that the file names.")
-@click.option("--dry-run", is_flag=True, help="Say what would be done, and do nothing.")
+@click.option("--dry-run", is_flag=True, help="Print what would be computed, and compute nothing.")
 @click.option("--threads", type=click.IntRange(min=1), help="Threads of this process (default: one per core).")
 @click.option("--workers", type=click.IntRange(min=1), help="Processes of this machine, instead of threads.")
 @click.option("--scheduler", metavar="ADDRESS", help="Use the running Dask scheduler at ADDRESS.")
@@ -33,15 +33,20 @@ if TYPE_CHECKING:
     metavar="SECONDS",
     default=600,
     show_default=True,
-    help="Wait for workers so long.",
+    help="Time to wait for workers before giving up.",
 )
 @click.option("--part", metavar="K/N", help="Run the K-th of N disjoint sets of blocks.")
 @click.option(
-    "--case-timeout", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS", help="A longer case has failed."
+    "--case-timeout",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="SECONDS",
+    help="Record a case that takes longer as failed.",
 )
 @click.option("--retry-failed", is_flag=True, help="Compute the cases again that failed or did not converge.")
-@click.option("--log", type=click.Path(dir_okay=False, path_type=Path), help="Append events to FILE, JSON lines.")
-@click.option("--quiet", is_flag=True, help="No progress on stderr.")
+@click.option(
+    "--log", type=click.Path(dir_okay=False, path_type=Path), help="Append the events of the run to FILE as JSON lines."
+)
+@click.option("--quiet", is_flag=True, help="Print no progress.")
 @click.option("--json", "form", flag_value="json", help="Print the outcome as one JSON document.")
 def run(campaign: Path, dry_run: bool, log: Path | None, quiet: bool, form: str | None, **options: Any) -> int:
     """Run a campaign into its store: everything, or what is missing.

@@ -191,9 +191,9 @@ def _facts(held: Mapping[str, Any], counted: list[Json], records: list[Json]) ->
     states = {state: sum(row[state] for row in counted) for state in list(counted[0])[2:]} if counted else {}
     settled = total - states.get("missing", 0)
     spent = sum(float(record["compute_seconds"]) for record in records)
-    said = ", ".join(f"{number} {state.replace('_', ' ')}" for state, number in states.items() if number)
+    listed = ", ".join(f"{number} {state.replace('_', ' ')}" for state, number in states.items() if number)
     facts = {
-        "results": f"{settled} of {total} ({settled / max(total, 1):.0%}): {said}",
+        "results": f"{settled} of {total} ({settled / max(total, 1):.0%}): {listed}",
         "store created": str(held["created"]),
         "time in the model": seconds(spent),
         "computed by": f"mdr_dask {held['versions']['mdr_dask']}, model version {held['model_version']}",

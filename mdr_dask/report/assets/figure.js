@@ -28,7 +28,7 @@
     return typeof low === "number" && typeof high === "number" ? ` [${report.number(low)}, ${report.number(high)}]` : "";
   };
 
-  report.said = (trace, spec, k) => {
+  report.pointText = (trace, spec, k) => {
     const panel = spec.panels[trace.panel];
     const lines = [`<b>${trace.curve || report.escaped(trace.what)}</b>`];
     const names = { x: panel.x.label || "x", y: panel.y.label || "y", value: spec.scales[trace.scale]?.label || "value" };
@@ -69,7 +69,7 @@
       const colour = report.legible(trace.colour, palette);
       const joined = Boolean(trace.line) && kept.length + (trace.gaps?.length || 0) > 1;
       const found = [];
-      const texts = kept.map((k) => report.said(trace, spec, k));
+      const texts = kept.map((k) => report.pointText(trace, spec, k));
       const one = { type: "scatter", mode: joined ? (trace.marker ? "lines+markers" : "lines") : "markers", ...withGaps(trace, kept, texts), hoverinfo: "text",
         line: { color: colour, dash: LINES[trace.line] || "solid", width: 1.7 }, marker: { color: colour, symbol: MARKERS[trace.marker] || "circle", size: 6 } };
       const bars = state.errors && lengths(trace, "y", kept);
@@ -89,7 +89,7 @@
       const scale = spec.scales[trace.scale] || trace.shades;
       const number = (value) => (scale.log ? Math.log10(value) : value);
       const bars = state.errors && trace.y_low && lengths(trace, "y", kept);
-      return [{ type: "scatter", mode: "markers", x: kept.map((k) => trace.x[k]), y: kept.map((k) => trace.y[k]), text: kept.map((k) => report.said(trace, spec, k)),
+      return [{ type: "scatter", mode: "markers", x: kept.map((k) => trace.x[k]), y: kept.map((k) => trace.y[k]), text: kept.map((k) => report.pointText(trace, spec, k)),
         hoverinfo: "text", ...(bars ? { error_y: { ...bars, color: palette.line } } : {}),
         marker: { size: 7, color: kept.map((k) => number(trace.value[k])), ...coloured(scale, palette, trace.scale !== undefined), line: { width: 0.5, color: palette.line } } }];
     },
@@ -101,14 +101,14 @@
       for (const k of kept) {
         const [row, column] = [rows.indexOf(trace.y[k]), columns.indexOf(trace.x[k])];
         z[row][column] = scale.log ? Math.log10(trace.value[k]) : trace.value[k];
-        text[row][column] = report.said(trace, spec, k);
+        text[row][column] = report.pointText(trace, spec, k);
       }
       const { colorscale, cmin, cmax, colorbar, showscale } = coloured(scale, palette, trace.scale !== undefined);
       return [{ type: "heatmap", x: trace.x_edges, y: trace.y_edges, z, text, hoverinfo: "text", colorscale, zmin: cmin, zmax: cmax, colorbar, showscale, hoverongaps: false }];
     },
     absent(trace, spec, state, palette, kept) {
       return [{ type: "scatter", mode: "markers", x: kept.map((k) => trace.x[k]), y: kept.map(() => 0.02), yaxis: "y2", hoverinfo: "text",
-        text: kept.map((k) => report.said(trace, spec, k)),
+        text: kept.map((k) => report.pointText(trace, spec, k)),
         marker: { color: report.legible(trace.colour, palette), symbol: MARKERS[trace.marker] || "x", size: 8 } }];
     },
   };

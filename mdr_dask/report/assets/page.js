@@ -27,7 +27,7 @@
       const focus = this.host.contains(document.activeElement) ? document.activeElement.dataset.field : null;
       const plots = this.plots?.length === spec.panels.length ? this.plots : null;
       this.plots = plots || spec.panels.map(() => element("div", { class: "panel", role: "img" }));
-      this.plots.forEach((plot, k) => plot.setAttribute("aria-label", this.told(k)));
+      this.plots.forEach((plot, k) => plot.setAttribute("aria-label", this.description(k)));
       const notes = [...spec.fixed, ...(spec.left_out ? [`not drawn: ${spec.left_out}`] : [])];
       this.host.setAttribute("aria-label", spec.spoken);
       this.host.replaceChildren(
@@ -44,7 +44,7 @@
       return [...new Set(this.spec.traces.flatMap((trace) => (name in trace.of ? trace.of[name] : [])))];
     }
 
-    told(k) {
+    description(k) {
       const panel = this.spec.panels[k];
       const traces = this.spec.traces.filter((trace) => trace.panel === k);
       const count = traces.reduce((sum, trace) => sum + trace.x.length, 0);
