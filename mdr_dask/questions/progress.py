@@ -99,7 +99,7 @@ def warnings(found: Sequence[dict[str, Any]]) -> dict[str, int]:
 
 #: A number or a range of numbers with a SI unit for which users often prefer another unit.
 _QUANTITY = re.compile(
-    r"(?<![\w.])(-?[\d.]+(?:e[-+]?\d+)?)((?:,? (?:to|and|or) -?[\d.]+(?:e[-+]?\d+)?)?) (K|rad/s|m/s|m|N|Pa|s)\b(?!\^)"
+    r"(?<![\w.])(-?[\d.]+(?:e[-+]?\d+)?)((?:,? (?:to|and|or) -?[\d.]+(?:e[-+]?\d+)?)?) (K|rad/s|m/s|m|N|Pa)\b(?!\^)"
 )
 
 
