@@ -285,12 +285,13 @@ def plot(study: Study, figure: str, select: Words = (), **view: Any) -> Figure:
     study : Dataset, DataTree, str or Path
         A study, or the path of its store.
     figure : str
-        Name of a figure, or of an output to draw along the axes in `view`.
+        Name of a figure or of an output.
     select : sequence of str
         Parts of the study, as for the option ``--select``.
     **view
-        Options for an output. ``over`` is one axis for curves, two axes for a map, or empty for main effects. For
-        ``by``, ``panels`` and ``log`` see :class:`mdr_dask.plots.view.View`.
+        Options for an output. ``over`` is one axis for curves, two axes for a map, or empty for main effects. By
+        default, it is the axis with the most values. For ``by``, ``panels`` and ``log`` see
+        :class:`mdr_dask.plots.view.View`.
 
     Returns
     -------
@@ -304,17 +305,23 @@ def plot(study: Study, figure: str, select: Words = (), **view: Any) -> Figure:
     """
     groups = _groups(study)
     model = _model(groups)
-    if not view and any(figure in data.data_vars for data in groups.values()):
-        raise DataError(f"{figure} is an output: name an axis to draw it against, such as over='velocity'")
-    found = _of_output(figure, **view) if view else _named(plots.available(model), figure, f"figure of {model}")
+    known = plots.available(model)
+    if view or (figure not in known and any(figure in data.data_vars for data in groups.values())):
+        found = _of_output(groups, figure, **view)
+    else:
+        found = _named(known, figure, f"figure of {model}")
     drawn: Figure = found.figure(selection.select_all(groups, _several(select)))
     return drawn
 
 
-def _of_output(output: str, over: str | Sequence[str], **view: Any) -> Plot:
-    from mdr_dask.plots.view import View, figure_of
+def _of_output(
+    groups: Mapping[str, xr.Dataset], output: str, over: str | Sequence[str] | None = None, **view: Any
+) -> Plot:
+    from mdr_dask.plots.view import View, figure_of, main_axis
 
-    return figure_of(View(output, _several(over), **view))
+    without = [view.get(name, "") for name in ("by", "panels")]
+    along = main_axis(groups, output, without) if over is None else _several(over)
+    return figure_of(View(output, along, **view))
 
 
 def master_curve(

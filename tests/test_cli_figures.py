@@ -145,6 +145,11 @@ def test_a_figure_of_an_output_has_its_data_and_their_origin_beside_it(filled, c
     slow = slow[slow["what"] == "data"]
     assert len(slow) == int((mean < 1e-4).sum()) > 0
     figure = mdr_dask.plot(filled, "friction_coefficient", over="velocity", by="normal_force")
+    assert (
+        mdr_dask.plot(filled, "friction_coefficient")
+        .table()
+        .equals(mdr_dask.plot(filled, "friction_coefficient", over="velocity").table())
+    )
     shown = figure.table()
     np.testing.assert_array_equal(shown.loc[shown["what"] == "data", "y"], data["y"])
 

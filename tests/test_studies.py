@@ -196,7 +196,6 @@ UNFIT = [
     (lambda study: mdr_dask.aggregate(xr.Dataset()), "expected a study as returned by run or open_study"),
     (lambda study: mdr_dask.plot(study.isel(realisation=0), "velocity"), "isel(realisation=[0]) keeps one"),
     (lambda study: mdr_dask.fit(study.mean("realisation"), "plateau"), "with its status and realisations"),
-    (lambda study: mdr_dask.plot(study, "friction_coefficient"), "is an output: name an axis to draw it against"),
 ]
 
 
