@@ -102,15 +102,15 @@ def _constants(law: shift_laws.ShiftLaw) -> dict[str, xr.Variable]:
 def with_verdict(curve: xr.Dataset, verdicts: dict[str, str]) -> xr.Dataset:
     """Add ``law_holds`` to a master curve: whether its curves collapse, and which law its shift factors follow.
 
-    If the curves do not determine all shift factors, the collapse is not tested. For example, two plateaus of the same
-    height coincide for any shift.
+    If the curves do not determine all shift factors, neither the collapse nor a law is tested. For example, two
+    plateaus of the same height coincide for any shift.
     """
     open_steps = curve.attrs.get("undetermined", "")
     collapse = f"not tested: shift factors are {open_steps.partition(':')[0]}" if open_steps else _collapse(curve)
     answers = {"the curves collapse": collapse, **verdicts}
     words = [sentence.partition(":")[0] for sentence in answers.values()]
     described = words[1:] or ["yes"]
-    if words[0] == "no" or all(word == "no" for word in described):
+    if not open_steps and (words[0] == "no" or all(word == "no" for word in described)):
         word = "no"
     elif words[0] not in HOLDS or HOLDS.isdisjoint(described):
         word = "not tested"

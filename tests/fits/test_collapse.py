@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 
-from mdr_dask.fits.collapse import laws_of
+from mdr_dask.fits.collapse import laws_of, with_verdict
 from mdr_dask.fits.master_curve import master_curve
 
 TEMPERATURES = np.arange(0.0, 61.0, 10.0)  # degrees Celsius
@@ -53,6 +54,11 @@ def test_a_law_that_holds_is_rarely_contradicted():
     """Each of two tests rejects what holds with a chance of 5 %. Scatter of 2 % is too large to confirm the law."""
     sentences = [master_curve(modulus(seed, 0.02))["law_holds"].item() for seed in range(8)]
     assert sum(sentence.startswith("no: ") for sentence in sentences) <= 1, sentences
+
+
+def test_shift_factors_that_are_not_determined_contradict_no_law():
+    curve = xr.Dataset(attrs={"undetermined": "not determined between 0 and 30"})
+    assert with_verdict(curve, {"wlf": "no: departs by 90 % rms"})["law_holds"].item().startswith("not tested: ")
 
 
 def test_too_few_curves_leave_a_law_untested():
