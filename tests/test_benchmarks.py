@@ -18,7 +18,7 @@ from benchmarks.solvers import SOLVERS, sliding
 from benchmarks.surfaces import persson, road, validity
 
 #: Random cases of each family; more where a case takes milliseconds.
-CASES = {"wear": 2, "breakthrough of one revolution": 1, "transforms": 20, "levels of a jump": 20}
+CASES = {"wear": 2, "velocity jump": 2, "breakthrough of one revolution": 1, "transforms": 20, "levels of a jump": 20}
 
 
 def test_all_kinds_exist():
