@@ -1,6 +1,7 @@
 """The line used by the solvers: cubic cells between equidistant nodes. A periodic line starts at its highest point.
 
-Lengths are in cells, and slopes are rises per cell. Heights may have any unit and are positive towards the elastomer.
+The unit of length is the length of a cell; a slope is the rise over one cell. Heights may have any unit and are
+positive towards the elastomer.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ UNRESOLVED = 0.5  # a line is not resolved if the mean squared slopes at nodes a
 
 
 class CubicLine(NamedTuple):
-    """A line of n cubic cells between n + 1 equidistant nodes, in the order in which an elastomer element passes them.
+    """A line of n cubic cells between n + 1 equidistant nodes.
+
+    The nodes are numbered in the order in which an elastomer element passes them.
 
     Parameters
     ----------
@@ -86,7 +89,7 @@ def indented_line(height: FloatArray, slope: FloatArray | None, body: shapes.Sha
 
 
 def without_kinks(line: CubicLine) -> CubicLine:
-    """Return the line with the mean of the two slopes at every inner node; this rounds a kink over two cells."""
+    """Replace the two slopes at every inner node by their mean; a kink is rounded over the two adjacent cells."""
     slope = 0.5 * (line.leave[:-1] + line.enter[1:])
     return line._replace(enter=np.append(line.enter[0], slope), leave=np.append(slope, line.leave[-1]))
 
@@ -99,8 +102,8 @@ class Cells(NamedTuple):
     Parameters
     ----------
     height : array, shape (n + 2,)
-        Heights at the nodes minus the height of the highest point; they are never positive. In this form, the small
-        distances from the highest point, which matter under light loads, have no rounding error.
+        Heights at the nodes minus the height of the highest point; they are never positive. Under light loads only
+        small distances from the highest point matter. In this form they have no rounding error.
     enter, leave : array, shape (n + 1,)
         Slopes at the start and the end of each cell.
     peak : array, shape (n + 1,)
@@ -242,9 +245,10 @@ def _turned(
 
 
 def _is_resolved(slope: FloatArray, stretch: FloatArray) -> bool:
-    """Return whether the nodes resolve the line, with more than two nodes per shortest wave.
+    """Return whether the line has more than two nodes per shortest wave.
 
-    If they do, the sum of the squared slope over the nodes is close to its integral over the cells.
+    In that case the sum of the squared slopes at the nodes is close to the integral of the squared slope over the
+    cells.
     """
     by_nodes, by_cells = np.dot(slope, slope), np.sum(stretch)
     return bool(abs(by_nodes - by_cells) < UNRESOLVED * by_cells)
@@ -255,7 +259,7 @@ def _resum(slope: FloatArray, stretch: FloatArray) -> None:
     """Compute the integrals of the squared slope over cells by the Euler-Maclaurin formula.
 
     The first cell keeps the integral of its polynomial, because a period begins and ends inside this cell. The
-    difference between this integral and that of the formula is distributed over the other cells, so that the total
+    formula gives another value for this cell; the difference is distributed over the other cells, so that the total
     remains exact.
     """
     n, kept = slope.size - 1, stretch[0]

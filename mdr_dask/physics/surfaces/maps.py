@@ -18,13 +18,13 @@ Order = Literal["none", "mean", "plane", "parabola"]
 
 LEAST_POINTS = 16  # smallest number of points along each axis
 MOST_MISSING = 0.05  # largest fraction of missing points that are filled
-FAR = 19.0  # deviation of an outlier, in robust standard deviations; no point of a generated surface reaches it
+FAR = 19.0  # smallest deviation of an outlier, in robust standard deviations; points of generated surfaces deviate less
 BAND = 128  # number of rows processed together, so that they fit into the processor's cache
-SIGNIFICANT = 1e-3  # rings that contribute less than this fraction of the largest contribution may consist of rounding
-MOST_SCATTER = 0.02  # an octave is used if scatter causes at most this mean square of its angular harmonics
+SIGNIFICANT = 1e-3  # rings below this fraction of the largest contribution may be due to rounded heights
+MOST_SCATTER = 0.02  # largest mean square of the angular harmonics of an octave due to scatter; others are unused
 FLAT = 1e-12  # a map is flat if the range of heights, divided by the largest height, is below this value
-ROUNDING = 1e-20  # rounding error of the transform, as a fraction of the largest ring
-HANN_MODES = 0.3  # number of independent waves divided by the number of waves of the transform, for Hann's window
+ROUNDING = 1e-20  # rounding error of the Fourier transform, as a fraction of the power in the strongest ring
+HANN_MODES = 0.3  # fraction of the waves of the Fourier transform that are independent with Hann's window
 
 
 class SurfaceMap(NamedTuple):
@@ -67,7 +67,7 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
 
 
 def _off_neighbours(height: FloatArray) -> FloatArray:
-    """Return the distance of each inner point from the mean of its two neighbours, along x or y, whichever is smaller.
+    """Return how far each inner point is from the mean of its two neighbours along x, or along y if that is less.
 
     The smaller distance is used because a point on a crest is close to its neighbours along the crest, but far from its
     neighbours across the crest.
@@ -180,8 +180,8 @@ class MapSpectrum:
     count : array, shape (rings,)
         Number of waves in each ring; a wave vector and its negative count as two waves.
     independent : float
-        Number of statistically independent waves divided by the number of waves of the transform. It is below 1 if a
-        window was applied.
+        Fraction of the waves of the Fourier transform that are statistically independent: 1 without a window, less with
+        a window.
     rms_height : float
         rms height of the windowed map, m.
     slopes : tuple of float
@@ -191,8 +191,9 @@ class MapSpectrum:
     cuts : tuple of (array, array)
         Wave numbers and C_cut, m^3, of straight profiles along x and along y.
     axes : tuple of float
-        For the x axis and the y axis: median over the rings of the power of the waves along this axis, divided by the
-        mean power of their ring; 1 for an isotropic surface.
+        One number for the x axis and one for the y axis. In every ring, the power of the wave along this axis is
+        divided by the mean power of the ring. The number is the median of these ratios over the rings, divided by
+        ln(2); it is 1 for an isotropic surface.
     """
 
     wavenumber: FloatArray
@@ -207,7 +208,7 @@ class MapSpectrum:
 
     @property
     def rms_gradient(self) -> float:
-        """Return the rms of the gradient, which contains both slopes."""
+        """Return the rms of the gradient, from the slopes along x and along y."""
         return float(np.sqrt(self.slopes[0] + self.slopes[1]))
 
     def spectrum(self) -> Spectrum:
@@ -235,7 +236,7 @@ class MapSpectrum:
         """Return the anisotropy, corrected for scatter: 0 for an isotropic surface, 1 if all waves have one direction.
 
         The anisotropy is the larger of the second and the fourth angular harmonic of the power. Each harmonic is an rms
-        over the octaves of the wave number that contain enough waves.
+        over octaves of the wave number; octaves with few waves and therefore much scatter are left out.
         """
         there = np.flatnonzero(significant(self.wavenumber, self.density))
         octave = np.floor(np.log2(self.wavenumber[there] / self.wavenumber[there[0]] + 1e-9)).astype(int)
@@ -324,7 +325,11 @@ def _rings(
 
 
 def significant(wavenumber: FloatArray, density: FloatArray) -> NDArray[np.bool_]:
-    """Return the rings that contribute more to the mean square of height or gradient than rounding in a file may."""
+    """Return the rings whose power cannot be due to the rounding of heights in a file.
+
+    These rings contribute more than the fraction `SIGNIFICANT` of the largest contribution to the mean square of the
+    height or of the gradient.
+    """
     height, gradient = density * wavenumber, density * wavenumber**3
     return np.asarray((height > SIGNIFICANT * height.max()) | (gradient > SIGNIFICANT * gradient.max()))
 
@@ -336,7 +341,7 @@ def _cut(power: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
 
 
 def _axis(power: FloatArray, ring: NDArray[np.int32], total: FloatArray, count: FloatArray) -> float:
-    """Return the median over the rings of the power of waves along an axis, divided by the mean power of their ring."""
+    """Return the number in `MapSpectrum.axes` for one axis."""
     number = np.arange(1.0, total.size + 1)
     inner = (ring >= 4) & np.isin(ring, number[significant(number, total / number)])
     k = ring[inner] - 1

@@ -138,5 +138,5 @@ def rms_height(height: FloatArray) -> float:
 
 
 def rms_slope(height: FloatArray, length: float) -> float:
-    """Return the rms slope of a periodic line, from all its waves; the shortest wave is two points long."""
+    """Return the rms slope of a periodic line, from all waves down to a wavelength of two spacings of the points."""
     return waves_of(height).rms_slope() / length

@@ -35,7 +35,7 @@ def amplitudes(modes: int, hurst: float, rolloff: float = 0.0, longest: float = 
     Raises
     ------
     ValueError
-        If `longest` leaves no harmonic.
+        If there is no roughness at any of the harmonics, because of `longest`.
 
     Examples
     --------
@@ -68,8 +68,8 @@ def phases(seed: int, realisation: int, modes: int) -> FloatArray:
     """Return the phases of a realisation in [0, 2 pi), shape (modes,).
 
     The phases depend only on the seed and the index of the realisation. A short spectrum has the same phases as the
-    first waves of a long one. Lines that differ in Hurst exponent, rms height or cut-off therefore have common random
-    numbers (thesis Fig. 2.6).
+    first waves of a long one. Lines that differ in Hurst exponent, rms height or cut-off therefore have the same phases
+    (thesis Fig. 2.6).
     """
     phase: FloatArray = 2 * np.pi * _generator(seed, realisation).random(modes)
     return phase
@@ -81,11 +81,12 @@ def _generator(seed: int, realisation: int) -> np.random.Generator:
 
 def phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     """Return exp(i phi_k) for the phases of a realisation, shape (modes,); cached."""
-    # the number of modes is rounded up to a power of two, so that similar lines share the cache
+    # the number of modes is rounded up to a power of two, so that lines with similar numbers share an entry of the
+    # cache
     return _phase_factors(seed, realisation, 1 << max(modes - 1, 0).bit_length())[:modes]
 
 
-@lru_cache(maxsize=8)  # modes are powers of two: eight sizes up to 128 times the smallest
+@lru_cache(maxsize=8)  # `modes` is a power of two: eight entries suffice for a range of 1 to 128
 def _phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     factors: ComplexArray = np.exp(1j * phases(seed, realisation, modes))
     factors.flags.writeable = False

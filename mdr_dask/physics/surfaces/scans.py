@@ -21,8 +21,8 @@ from mdr_dask.physics.surfaces.spectrum import Spectrum, quadrature
 
 BINS = 10  # number of bins per decade of the wave number
 BEND = 3.0  # prior standard deviation of the change of d log C2D / d log q from one bin to the next
-NOISE_SLOPE = -0.5  # the end of a cut is noise if d log C_cut / d log q is above this value; roughness has -1 or less
-NOISE_TAIL = 0.5  # decades at the end of the cut that are tested for noise
+NOISE_SLOPE = -0.5  # the end of a cut is noise if d log C_cut / d log q is above this; for roughness it is at most -1
+NOISE_TAIL = 0.5  # the last part of the cut, of this many decades, is tested for noise
 STEEPEST = 30.0  # the spectrum ends where -d log C / d log q exceeds this value
 
 
@@ -67,13 +67,13 @@ def cut_of_lines(lines: Sequence[MeasuredLine], hann: bool = True) -> Cut:
     points, length = lines[0].height.size, lines[0].length
     if any(line.height.size != points or not math.isclose(line.length, length, rel_tol=1e-3) for line in lines):
         raise DataError(
-            "expected scans of one length and number of points: name each other one as a surface of its own"
+            "expected scans of equal length with equal numbers of points: describe other scans as separate surfaces"
         )
     height = np.array([line.height - line.height.mean() for line in lines])
     window = hann_window(points) if hann else np.ones(points)
     power = length / (2 * np.pi) * np.mean(np.abs(np.fft.rfft(height * window) / points) ** 2, axis=0)[1:]
     waves = np.arange(1, power.size + 1)
-    last = (points - 1) // 2  # without the wave of two points, whose phase is unknown
+    last = (points - 1) // 2  # without the wave of two spacings, whose phase is unknown
     independent = len(lines) / (1.94 if hann else 1.0)  # 1.94: Hann's window correlates the power of adjacent waves
     return averaged(2 * np.pi / length * waves[:last], power[:last], independent)
 
@@ -105,7 +105,7 @@ def hann_window(points: int) -> FloatArray:
 
 
 def _until_the_end(cut: Cut) -> slice:
-    """Return the slice of the bins before the first fall steeper than `STEEPEST`, where the spectrum ends."""
+    """Return the slice of the bins up to the first fall steeper than `STEEPEST`; the spectrum is taken to end there."""
     with np.errstate(divide="ignore"):
         logs = np.log(cut.density)
     falls = np.flatnonzero(np.diff(logs) < -STEEPEST * np.diff(np.log(cut.wavenumber)))
@@ -115,10 +115,10 @@ def _until_the_end(cut: Cut) -> slice:
 def of_cut(cut: Cut) -> Spectrum:
     """Return the isotropic spectrum of a surface with the given cut (inverse Abel transform).
 
-    The computed C2D is a power law between the wave numbers of the cut, and therefore positive. Its logarithms are a
-    least-squares fit to the cut, weighted with the errors of the cut. The change of the slope d log C2D / d log q from
-    bin to bin has a normal prior with the standard deviation `BEND`. The explicit inverse
-    -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk would amplify noise.
+    The computed C2D is a power law between the wave numbers of the cut, and therefore positive. A least-squares fit
+    finds the logarithms of C2D at these wave numbers; it is weighted with the errors of the cut. The change of the
+    slope d log C2D / d log q from bin to bin has a normal prior with the standard deviation `BEND`. The explicit
+    inverse -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk would amplify noise.
 
     Raises
     ------
@@ -128,7 +128,7 @@ def of_cut(cut: Cut) -> Spectrum:
     q, density, error = (np.asarray(column, dtype=np.float64)[_until_the_end(cut)] for column in cut)
     if q.size < 3:
         raise DataError(f"expected a spectrum of three wave numbers or more, got {q.size}")
-    # waves beyond the last wave number of the cut contribute to the cut: the spectrum is assumed to end one step beyond
+    # Waves beyond the last wave number of the cut contribute to the cut. C2D is assumed to end one step beyond it.
     edge = q[-1] ** 2 / q[-2]
     knots = np.append(q, edge)
     place, weight = quadrature(q, knots)

@@ -11,7 +11,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.surfaces.scans import Cut
 
 LEAST_ERROR = 0.05  # smallest assumed relative error of a bin, because real spectra deviate from power laws
-LEAST_BINS = 5  # smallest number of bins for the power law
+LEAST_BINS = 5  # smallest number of bins to which a power law is fitted
 LOWEST, HIGHEST = -0.1, 1.2  # range of Hurst exponents
 CHI_SQUARED = 3.84  # 95 % quantile of chi squared for one parameter
 # limits of the slope d log C2D / d log q of roughness; the slope is -4 for H = 1 and -2 for H = 0
@@ -37,7 +37,7 @@ class SelfAffine(NamedTuple):
 
 
 def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> float:
-    """Return the wave number beyond which the spectrum is flat, like noise, or infinity if there is no flat tail.
+    """Return the wave number beyond which the spectrum is noise, or infinity if the spectrum has no flat tail.
 
     Parameters
     ----------
@@ -85,7 +85,8 @@ def fit_self_affine(bins: Cut) -> SelfAffine | None:
     -------
     SelfAffine or None
         Schwarz's information criterion decides whether there are cut-offs, and at which bins. The confidence intervals
-        follow from the likelihood. They are widened if the spectrum departs from the law by more than its errors.
+        follow from the likelihood. They are widened if the spectrum deviates from the fitted law by more than the
+        errors of the spectrum.
     """
     wavenumber, density, error = bins
     if wavenumber.size < LEAST_BINS:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 
-ROUNDING = 1e-9  # relative distance up to which a wave number counts as an end of the spectrum
+ROUNDING = 1e-9  # wave numbers within this relative distance of a limit are merged with the limit
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 STEP = 0.1  # longest interval of the quadrature, in log q
 
@@ -50,7 +50,7 @@ class Spectrum:
             if not np.all(np.isfinite(numbers) & (numbers > 0)):
                 raise DataError(f"expected {what} of a spectrum above 0")
         if not np.all(np.diff(q) > 0):
-            raise DataError("expected wave numbers of a spectrum that ascend, each of them once")
+            raise DataError("expected strictly ascending wave numbers of a spectrum")
 
     @cached_property
     def _logs(self) -> tuple[FloatArray, FloatArray]:
@@ -101,7 +101,7 @@ class Spectrum:
         high = min(2 * np.pi / shortest if shortest else math.inf, float(self.wavenumber[-1]))
         if not low < high:
             ends = " to ".join(f"{2 * np.pi / q:.4g} m" for q in self.wavenumber[[0, -1]])
-            raise DataError(f"expected cut-offs that leave some of the spectrum, which has wavelengths of {ends}")
+            raise DataError(f"expected cut-offs within the wavelengths of the spectrum, {ends}")
         inner = (self.wavenumber > low * (1 + ROUNDING)) & (self.wavenumber < high * (1 - ROUNDING))
         q = np.concatenate([[low], self.wavenumber[inner], [high]])
         return Spectrum(q, self.at(q))
@@ -139,7 +139,7 @@ class Spectrum:
         return math.sqrt(2 * np.pi * self._moment(1))
 
     def rms_gradient(self) -> float:
-        """Return the rms of the gradient, which contains both slopes (thesis 2.23)."""
+        """Return the rms of the gradient, from the slopes along x and along y (thesis 2.23)."""
         return math.sqrt(2 * np.pi * self._moment(3))
 
     def _moment(self, order: int) -> float:

@@ -73,7 +73,7 @@ def _through(modes: int, nodes: int) -> FloatArray:
 
 
 def _phases(modes: int, nodes: int) -> FloatArray:
-    """Return the phase increment of each wave between nodes."""
+    """Return the phase increment of each wave from one node to the next."""
     return 2 * np.pi * np.arange(1, modes + 1) / nodes
 
 
@@ -103,7 +103,7 @@ def integral(of: Piece, t: float) -> float:
 
 @jit
 def shares(t: float) -> Piece:
-    """Return the weights of the four coefficients of a piece in the integral of the piece from 0 to t."""
+    """Return four weights: the integral of a piece from 0 to t is the weighted sum of its four coefficients."""
     square = t * t
     second, third = t * (4 - 2 * square + 0.75 * t * square) / 6, t * (1 + 1.5 * t + square - 0.75 * t * square) / 6
     return (1 - (1 - t) ** 4) / 24, second, third, square * square / 24

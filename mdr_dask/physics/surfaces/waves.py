@@ -37,7 +37,7 @@ class Waves:
     def from_place(self, place: float) -> Waves:
         """Return the line that starts at the position `place`, a fraction 0..1 of the length.
 
-        A grid with only two nodes per shortest wave would lose a part of this wave after the shift.
+        After the shift, a grid with only two nodes per shortest wave cannot represent this wave completely.
         """
         wave = np.arange(1, self.coefficients.size + 1)
         return Waves(self.coefficients * np.exp(2j * np.pi * wave * place), self.points)
@@ -70,8 +70,8 @@ def series(coefficients: NDArray[np.complex128], nodes: int) -> FloatArray:
 def waves_of(height: FloatArray) -> Waves:
     """Return the waves of the periodic line through equidistant samples, without the mean.
 
-    For an even number of samples, the shortest wave is two samples long. Only its cosine can be computed from the
-    samples; its sine is zero at all of them and is set to 0.
+    For an even number of samples, the shortest wave is two samples long. The sine part of this wave is zero at all
+    samples. It cannot be computed from the samples and is set to 0.
     """
     coefficients = np.fft.rfft(height)[1:] / height.size
     if height.size % 2 == 0:
