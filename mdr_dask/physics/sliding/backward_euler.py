@@ -29,10 +29,10 @@ COARSEST = 64  # largest number of nodes of the grid on which the search for the
 # The search ends if the product of the last two relative steps of the depth is at most CONVERGED. This product is about
 # the error of the extrapolation over the last step.
 CONVERGED = 1e-9
-EXACT_STEP = 1e-13  # relative step of the depth that is about as small as rounding errors; the search ends here as well
+EXACT_STEP = 1e-13  # the search also ends after a relative step of the depth that is as small as rounding errors
 COARSE = 1e-3  # replaces CONVERGED on all grids except the finest
 
-BLOCK = 256  # nodes
+BLOCK = 256  # number of nodes in a block
 LANES = 8  # number of cases in one vector instruction
 
 # Indices of the results of a sweep for every case
@@ -42,8 +42,8 @@ SUMS = 3
 # the block, and the sums of height, rise, height times rise, and rise squared
 PEAK, LOWEST, STEEPEST, BEFORE, HEIGHTS, RISES, WORK, SQUARES = range(8)
 # Indices of the state of a case in a sweep: displacement u (U), the derivative of u with respect to the depth (FADE),
-# the decay of u over a block (THROUGH), the sum of this decay over the nodes of a block (MEMORY), and three sums over
-# the nodes of a block: of u (LOAD), of FADE (RATE) and of the drag (LOSS)
+# the factor by which a free u decays over a block (THROUGH), the sum of the decay factors at the nodes of a block
+# (MEMORY), and three sums over the nodes of a block: of u (LOAD), of FADE (RATE) and of the drag (LOSS)
 U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS = range(7)
 ROWS = 7
 
@@ -88,8 +88,8 @@ class Lanes(NamedTuple):
     queue : array, shape (cases,)
         Cases in which contact begins or ends in the current block.
     sums : array, shape (SUMS, cases)
-        Results of the sweep: the sum of u, the derivative of this sum with respect to the depth, and F_x / (4 G) times
-        1 - lambda.
+        Results of the sweep: the sum of u, the derivative of this sum with respect to the depth, and the drag
+        (1 - lambda) F_x / (4 G).
     """
 
     state: FloatArray
@@ -107,10 +107,10 @@ def lanes_for(cases: int) -> Lanes:
 
 @jit
 def _step(h: float, t: float, decay: float, depth: float, u: float, fade: float) -> tuple[float, float, float]:
-    """Return u at the next node, du/d(depth) there, and the contribution to the drag times 1 - lambda.
+    """Return u and du/d(depth) at the next node, and the contribution of this node to (1 - lambda) F_x / (4 G).
 
-    The height of the next node is h; it is higher by t than the node before, where u and du/d(depth) are `u` and
-    `fade`.
+    The next node has the height `h` and is higher than the node before by `t`. At the node before, the displacement is
+    `u`, and its derivative with respect to the depth is `fade`.
     """
     free = decay * u
     w = h + depth
@@ -161,7 +161,7 @@ def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) ->
 
 @jit
 def _walk(height: FloatArray, rise: FloatArray, decay: FloatArray, depth: FloatArray, workspace: FloatArray) -> None:
-    """Move the element of each case from node to node, and add to the `LOAD`, `RATE` and `LOSS` of the case."""
+    """Move the element of each case from node to node, and update the sums `LOAD`, `RATE` and `LOSS` of the case."""
     whole = height.size // 4 * 4
     for i in range(0, whole, 4):
         h0, h1, h2, h3 = height[i], height[i + 1], height[i + 2], height[i + 3]
@@ -294,7 +294,7 @@ def contact(
 ) -> None:
     """Write for every case the number of nodes in contact (`touched`) and the rms rise at these nodes (`slope`).
 
-    The other parameters are as in :func:`steady_by_steps`.
+    `depths` is a result of :func:`steady_by_steps`, which describes the other parameters.
     """
     for k in range(depths.size):
         decay, count, square = deborah[k] / (1 + deborah[k]), 0, 0.0

@@ -49,10 +49,10 @@ def steady_full_contact(line: RoughLine, terms: Sequence[tuple[float, float]], c
     if terms:
         relaxing = sum((stiffness * (1 - 1 / (1 + wave * time)) for stiffness, time in terms), np.zeros(wave.size))
         pressure = pressure + series(waves * relaxing, nodes)
-    # sums over nodes are equal to sums over the spectrum; height and slope are orthogonal
+    # sums over the nodes equal sums over the spectrum; the product of height and slope has the mean 0
     lost, stretch = pressure @ slope / nodes if terms else 0.0, slope @ slope / nodes
     bound = np.cos(np.pi * waves.size / nodes)
-    worst = [np.abs(pressure).argmax(), np.abs(slope).argmax()]  # testing these two nodes already excludes most cases
+    worst = [np.abs(pressure).argmax(), np.abs(slope).argmax()]  # a test at two nodes excludes most cases
     with np.errstate(over="ignore", invalid="ignore"):
         drag = lost + deborah * stretch
         pull = np.abs(pressure[worst] + np.multiply.outer(deborah, slope[worst])).max(axis=1)

@@ -19,9 +19,9 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, summit
 
-BLOCK = 16  # cells that are skipped together if all of them are in contact or all of them are free
+BLOCK = 16  # number of cells in a block; a block that is entirely in contact or entirely free is skipped at once
 TINY = 1e-290  # displacements below this are set to 0
-CLOSE = 1e-8  # cells: Newton's method stops after a step shorter than this; the next step would be a rounding error
+CLOSE = 1e-8  # Newton's method stops after a step shorter than this, in cells; the next step would be a rounding error
 ITERATIONS = 80
 
 # Indices of the results of a sweep
@@ -30,7 +30,7 @@ SUMS = 7
 
 
 class Blocks(NamedTuple):
-    """For every block of `BLOCK` cells: largest height, and integrals of the height and of the slope squared."""
+    """For every block of cells: the largest height, and the integrals of the height and of the squared slope."""
 
     peak: FloatArray
     mean: FloatArray
@@ -39,7 +39,7 @@ class Blocks(NamedTuple):
 
 @jit_inline
 def _four(column: FloatArray, i: int) -> float:
-    """Return the sum of a column over the cells i and i + 1, and over the two cells half a block later."""
+    """Return the sum of four entries of a column: of cells i and i + 1, and of the two cells half a block later."""
     half = BLOCK // 2
     here, after = column[np.uintp(i)] + column[np.uintp(i + half)], column[np.uintp(i + 1)]
     return float(here + (after + column[np.uintp(i + 1 + half)]))
@@ -324,7 +324,8 @@ def sweep_cells(
     i, x, contact, patches = 0, start, cells.periodic, 0
     if contact and begins.size > 0:
         begins[0] = start
-    # u: displacement where contact ended; free: displacement at the start of this cell; left: place where contact ended
+    # u: displacement at the end of the last contact; left: place of this end; free: displacement at the start of the
+    # cell
     u = free = left = 0.0
     # the period ends at the highest point, inside a last cell that repeats the start of the first cell
     last = n if cells.periodic and start > 0 else n - 1

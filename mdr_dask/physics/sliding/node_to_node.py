@@ -33,16 +33,16 @@ from mdr_dask.physics.sliding.cases import Cases
 from mdr_dask.physics.surfaces.cubic_line import STEEPEST_RISE, highest_point
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
-BLOCK = 32  # cells
+BLOCK = 32  # number of cells in a block
 WING = 4  # the nodes of a finer grid in a cell are interpolated from this number of nodes on each side of the cell
-BEFORE, AFTER = WING + 1, WING + 2  # numbers of nodes added from the previous and the next period, for `refine`
+BEFORE, AFTER = WING + 1, WING + 2  # numbers of nodes of the previous and the next period that `refine` needs
 SUMMIT = 64  # number of fine nodes in the cell of the highest point; the highest of these nodes is used as the summit
 
 NO_ENDS: FloatArray = np.empty((2, 0))
 # Indices of the bounds and sums of a block of cells
 PEAK, LOWEST, STEEPEST, HEIGHTS, SQUARES = range(5)
 # Rows of a tile (a part of a line on a finer grid): height and slope at each node, beginning with the node before the
-# tile; then for each cell the integrals of height and of slope squared, and the largest height
+# tile; then for each cell the integrals of the height and of the squared slope, and the largest height
 HEIGHT, SLOPE, MEAN, SQUARE, TOP = range(5)
 IN_A_TILE = 5
 
@@ -58,8 +58,8 @@ class Nodes(NamedTuple):
     ends : array, shape (2, BEFORE + n + AFTER) or (2, 0)
         The corrections of the trapezium rule from `ends_of`, with the same additional nodes.
     blocks : array, shape (n // BLOCK, 5)
-        For every block: upper bound of the height, lowest node, smallest slope, integrals of height and of slope
-        squared.
+        For every block: upper bound of the height, lowest node, smallest slope, integrals of the height and of the
+        squared slope.
     top : float
         Height of the first node.
     rise : float
@@ -83,7 +83,7 @@ def _end_factors(n: int) -> NDArray[np.complex128]:
 
 
 def ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
-    """Return corrections of the trapezium rule for the integrals of height and slope squared, shape (2, n).
+    """Return corrections of the trapezium rule for the integrals of the height and of the squared slope, shape (2, n).
 
     The integral from node i to node j is the trapezium sum, plus the correction at node i, minus the correction at node
     j. This is exact. Slopes are rises per cell. Corrections from local derivatives would miss the shortest waves, which
@@ -159,7 +159,9 @@ def _integrals(
     mean: FloatArray,
     square: FloatArray,
 ) -> None:
-    """Write the integrals of height and slope squared over cells; `square` must have one more element than cells.
+    """Write the integrals of the height and of the squared slope over cells.
+
+    `square` has one element more than there are cells.
 
     The other arrays begin one node before the first cell. The trapezium rule is corrected with `of_height` and
     `of_square`, which come from `ends_of`. If they are empty, the corrections follow from the Euler-Maclaurin formula,
@@ -189,7 +191,7 @@ def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
         a, b = 3 * rise - 2 * s0 - s1, s0 + s1 - 2 * rise
         inside = a * a - 3 * s0 * b
         root = math.sqrt(inside) if inside > 0 else 0.0
-        above, below = (s0, root - a) if a <= 0 else (a + root, -3 * b)  # formula for the root without cancellation
+        above, below = (s0, root - a) if a <= 0 else (a + root, -3 * b)  # the root as a quotient without cancellation
         x = above / below if below > 0 else 0.0
         x = x if (x > 0) & (x < 1) else 0.0
         top, ends = h0 + x * (s0 + x * (a + x * b)), max(h0, h1)
@@ -209,8 +211,8 @@ def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatAr
         Interpolation weights from :func:`weights`. The refinement is the number of cells of the tile in each cell of
         the line.
     tile : array, shape (IN_A_TILE, cells refinement + 3), output
-        Heights and slopes, from the node before the tile to the node after the tile; integrals of height and of slope
-        squared over each cell; largest height in each cell.
+        Heights and slopes, from the node before the tile to the node after the tile; integrals of the height and of the
+        squared slope over each cell; largest height in each cell.
     """
     refinement, h, s = weights.shape[1], tile[HEIGHT], tile[SLOPE]
     # exact corrections are available only at the nodes of the line
@@ -279,9 +281,9 @@ RESOLVED = 10  # a grid resolves the contact if at least this number of cells is
 
 ITERATIONS = 25
 COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most COARSENING * COARSEST nodes
-LAST_STEP = 0.03  # largest relative last step of the depth; the results are extrapolated linearly over this step
+LAST_STEP = 0.03  # largest last step of the search, relative to the depth; the results are extrapolated over it
 SECANT_ERROR = 0.1  # assumed error of this extrapolation, as a fraction of the extrapolated change
-FIRST_STEP, FIRST_ERROR = 0.1, 0.03  # replace LAST_STEP and the allowed error on grids that only provide a guess
+FIRST_STEP, FIRST_ERROR = 0.1, 0.03  # values of LAST_STEP and the allowed error on grids that only provide a guess
 ROUNDING = 1e-12  # relative step of the depth that is as small as rounding errors
 ORDER = 3.0  # order of convergence: four inside cells, lower where contact begins or ends; measured: 3.3
 ARITHMETIC = 5e-5  # relative error of the integrals over cells that are partly in contact, on any grid
@@ -393,16 +395,16 @@ def _contact_in_cell(
 ) -> tuple[bool, float, float, float, float]:
     """Return whether a free element comes into contact in a cell, and four values about the end of this contact.
 
-    The displacement of the free element is u at the start of the cell, and would be `kept` at its end. The values are:
-    the place where the contact ends, w at this place, the fraction of w that remains at the end of the cell, and the
-    gap that would be between element and line at this place without contact.
+    The displacement of the free element is u at the start of the cell; without contact it would be `kept` at the end of
+    the cell. The four values are: the place where the contact ends; w at this place; the fraction of w that remains at
+    the end of the cell; and the gap between element and line that would exist at the place if there were no contact.
     """
     force, gap = cell.w1 + r * cell.s1, kept - cell.w1
     if force > 0:
         return gap <= 0, 1.0, cell.w1, 1.0, gap
     begins, falls = 0.0, cell.w0 + r * cell.s0
     if falls <= 0 and cell.s0 > 0 and cell.s1 < 0:
-        # approximate place of the highest point of the cell
+        # approximate place of the highest point of the line in the cell
         begins = cell.s0 / (cell.s0 - cell.s1)
         falls = _at(cell, begins)
     if falls <= 0:
@@ -591,14 +593,14 @@ def _search(
     cases : Cases
         v tau / L, and F_N / (4 G L) in the unit of height.
     last_step, error : float
-        Largest relative last step of the depth, and largest relative error of the drag due to the extrapolation over
-        this step.
+        Largest last step of the search, relative to the depth, and largest relative error of the drag due to the
+        extrapolation over this step.
     depths : array, shape (cases,)
         Penetration of the summit: first guesses, replaced by the solutions.
     rates : array, shape (cases, SECANTS), input and output
         Derivatives of the logarithms of the results with respect to the depth; NaN where unknown.
     results : array, shape (cases, SECANTS), output
-        Drag, contact fraction and contact slope. They are not changed for cases whose depth is not found.
+        Drag, contact fraction and contact slope. If the depth of a case is not found, its results are not changed.
     """
     (deborah, loads), rise = cases, line.rise
     refinement = weights.shape[1]
@@ -708,8 +710,9 @@ class NodeToNode:
         """Return the results on a grid.
 
         Two grids may both miss a small patch of contact. Such a patch is hardly longer than a cell, because a longer
-        one contains nodes. It therefore adds up to one cell to the length in contact. It reduces the rms slope of the
-        contact by at most half this relative amount, because the slope is small near the summit of an asperity.
+        one contains nodes. It therefore increases the length in contact by at most one cell. The slope is small near
+        the summit of an asperity, so that the patch reduces the rms slope of the contact. The relative reduction is at
+        most half the relative increase of the length.
         """
         drag, fraction, slope = results.T
         with np.errstate(invalid="ignore", divide="ignore"):

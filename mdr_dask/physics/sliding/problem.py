@@ -34,7 +34,7 @@ The floor of the depth is the unit of height, which is the rms height.
 """
 NODE_LEVELS = tuple(
     2**k for k in range(12)
-)  # nodes per Nyquist point; values above 2 only where contact begins or ends
+)  # nodes per Nyquist point; more than 2 are used only where contact begins or ends
 CELL_LEVELS = tuple(2**k for k in range(1, 7))
 GENERAL_LEVELS = tuple(2**k for k in range(1, 9))
 ORDER_OF_CELLS = 2.0  # order of convergence of sweeps over cubic cells if contacts are shorter than a cell
@@ -152,7 +152,7 @@ def _swept(line: RoughLine, cases: Cases, request: Request, levels: tuple[int, .
         depths[some] = found.depth
         return Solution(found.columns, found.status)
 
-    # with one node per Nyquist point, cubic cells do not converge at their order
+    # cubic cells reach their order of convergence only with two or more nodes per Nyquist point
     order = ORDER_OF_CELLS if request.scheme == "hermite" and levels[0] > 1 else ORDER_OF_STEPS
     return refine(solve, cases.loads.size, levels, accuracy, order, floors=FLOORS)
 
@@ -223,8 +223,8 @@ def _general(line: RoughLine, terms: PronyTerms, cases: Cases, request: Request)
         solve(1, np.arange(left.size))
         levels, accuracy = (GENERAL_LEVELS, request.accuracy) if is_auto else (GENERAL_LEVELS[:2], np.inf)
         _write(results, left, refine(solve, left.size, levels, accuracy, viscoelastic.ORDER, floors=FLOORS))
-    # the relative error of stresses equals the tolerance of the depth; in very fast or very slow sliding the drag is a
-    # small difference of large stresses
+    # The relative error of the stresses equals the tolerance of the depth. In very fast or very slow sliding the drag
+    # is a small difference of large stresses, so that its relative error is larger.
     rounding = viscoelastic.TOLERANCE * loads[left] * columns[3, left]
     errors[0, left] += np.where(np.isnan(rounding), 0.0, rounding)
     return Steady.of(columns, status), errors

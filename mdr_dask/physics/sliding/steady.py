@@ -99,15 +99,15 @@ class _Swept(NamedTuple):
 def _solve(
     line: _Swept, deborah: float, load: float, trail: FloatArray, sums: FloatArray, places: Places
 ) -> tuple[float, bool]:
-    """Return the largest lattice depth at which not more than the load is carried, and whether it was found.
+    """Return the largest lattice depth at which the carried load does not exceed `load`, and whether it was found.
 
     The sums at this depth are written to `sums`.
 
-    The carried load is a convex, increasing function of the depth. The depth at which a tangent of this function
-    reaches the given load is therefore an upper bound of the solution. Another upper bound is the depth at which full
-    contact carries the load. The search ends at a lattice depth below the solution if the tangent at this depth reaches
-    the load before the next lattice depth. Only one lattice depth meets this condition, so that the result does not
-    depend on the guess in `trail`.
+    The carried load is a convex, increasing function of the depth. Therefore the depth at which a tangent of this
+    function reaches `load` is an upper bound of the solution. Another upper bound is the depth at which full contact
+    carries the load. The search ends at a lattice depth below the solution if the tangent at this depth reaches `load`
+    before the next lattice depth. Only one lattice depth meets this condition, so that the result does not depend on
+    the guess in `trail`.
     """
     cells, blocks, barriers, mean = line
     low, high = 0.0, np.inf
@@ -120,7 +120,7 @@ def _solve(
         if not (carried > 0 and sums[STIFFNESS] > 0):
             return depth, False
         tangent = depth + (load - carried) / sums[STIFFNESS]
-        if tangent > low:  # not finite if the sums overflow
+        if tangent > low:  # the tangent is not finite if the sums overflow
             most = min(most, tangent)
         _follow(sums, depth, deborah, trail)
         if carried <= load:

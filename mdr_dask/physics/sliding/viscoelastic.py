@@ -23,8 +23,8 @@ from mdr_dask.physics.surfaces.cubic_line import CubicLine
 TOLERANCE = 1e-11  # largest last step of Newton's method, relative to the depth; it is larger than rounding errors
 LINEAR = 1e-10  # allowed relative residual of the linear equations of a step; much smaller than the error of the step
 SWEEPS = 80
-DEEPEST_STEP = 0.7  # largest relative decrease of the depth in a step under an indenter; the depth stays positive
-SHORTEST = 1e-9  # cells: faster Prony terms (smaller tau v) are merged with the dashpot to one term: see `_travelling`
+DEEPEST_STEP = 0.7  # largest relative decrease of the depth in one step under an indenter: the depth stays positive
+SHORTEST = 1e-9  # cells; the dashpot and all Prony terms with a shorter tau v become one term: see `_travelling`
 BALANCE = 1e-3  # largest relative error of the carried load in a converged solution
 ORDER = 2.0  # order of convergence without extrapolation; extrapolation raises it unless few cells are in contact
 
@@ -151,7 +151,7 @@ class ViscoelasticCase:
         result = values.copy()
         if self._before is not None:
             change = values - self._before
-            extrapolated = np.abs(change) <= np.abs(values)  # larger changes might reverse a sign
+            extrapolated = np.abs(change) <= np.abs(values)  # a larger change might reverse the sign
             result[extrapolated] += change[extrapolated] / 3
             result[FRACTION] = min(max(result[FRACTION], 0.0), 1.0)
         self._before = values
@@ -184,7 +184,8 @@ def _travelling(solid: LinearSolid, cell: float) -> Travelling:
     """Return a solid with lengths in cells and stresses divided by the static modulus.
 
     One Prony term with a very short relaxation time replaces the dashpot and all terms that relax within a very small
-    fraction of a cell. Its viscosity is the sum of the viscosities that it replaces.
+    fraction of a cell. The viscosity of this term is the sum of the viscosities of the dashpot and of the replaced
+    terms.
     """
     static = solid.static_modulus
     fast = solid.times < SHORTEST * cell
@@ -273,7 +274,7 @@ def follow(
 def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: float) -> None:  # pragma: no cover
     """Change the strain suddenly so that the stress becomes 0, as at the start of free recovery.
 
-    All numbers are changes due to `direction` in `follow`. The strains of the dashpots stay the same.
+    The strains of the dashpots stay the same. All quantities are the changes that `follow` propagates.
     """
     if stretch.size == 0:
         return
@@ -304,15 +305,15 @@ def newton_step(
 ) -> None:  # pragma: no cover
     """Solve the linear system of a Newton step on a periodic line by the method of generalised conjugate residuals.
 
-    After division of its rows by `scale`, the matrix of derivatives is the identity plus an operator that is smooth as
-    a function of the relaxation time. The singular values of such an operator decrease fast, so that four to seven
-    products of the matrix and a vector are enough for any number of terms.
+    The rows of the matrix of derivatives are divided by `scale`. It is then the identity plus an operator that is
+    smooth as a function of the relaxation time. The singular values of such an operator decrease fast, so that four to
+    seven products of the matrix and a vector are enough for any number of terms.
 
     Parameters
     ----------
     residual, scale : array, shape (n,)
-        Required changes of the integrals of e_m and u (n = terms + 1), and the magnitude of the derivatives of these
-        integrals. The residual is overwritten.
+        Required changes of the integrals of e_m and u, and the magnitudes of the derivatives of these integrals; n is
+        terms + 1. The residual is overwritten.
     swept : Swept
         Contacts and free recoveries.
     workspace : array, shape (3, n - 1)
@@ -331,7 +332,7 @@ def newton_step(
         direction[:] = residual
         follow(direction, swept, True, product, workspace)
         product /= scale
-        for _ in range(2):  # twice because of rounding errors
+        for _ in range(2):  # orthogonalise twice, because of rounding errors
             for i in range(j):
                 share = _dot(product, products[i]) / norms[i]
                 for k in range(n):
@@ -391,8 +392,9 @@ def solve_sliding(
     """Find the depth for a load and, for a periodic line, the stretches that repeat after one period.
 
     In the steady state the integral of the stress is equal to the integral of u, so that the load prescribes the
-    integral of u. The strain is a convex, increasing function of the unknowns (in contact it is the larger of two
-    convex, increasing functions). After its first step Newton's method therefore approaches the solution from above.
+    integral of u. The displacement is everywhere a convex, increasing function of the unknowns, because it is the
+    larger of two such functions: the penetration and the displacement of a free element. After its first step Newton's
+    method therefore approaches the solution from above.
 
     Parameters
     ----------
@@ -429,7 +431,7 @@ def solve_sliding(
     steepest = 0.0
     for i in range(nodes - 1):
         steepest = max(steepest, abs(profile[i + 1] - profile[i]))
-    rounding = 1e-15 * nodes * steepest  # error of a height due to the rounding of a place
+    rounding = 1e-15 * nodes * steepest  # error of a height due to the rounding error of a position
     for sweeps in range(1, SWEEPS + 1):
         for i in range(nodes):
             penetration[i] = unknown[terms] + profile[i]
@@ -444,10 +446,12 @@ def solve_sliding(
             scale[terms] = totals[3]
             newton_step(residual, scale, swept, workspace, step)
         else:
-            # all stretches change by the change of the depth, because the strains of the dashpots do not change
+            # if the depth changes, all stretches change by the same amount, because the strains of the dashpots stay
+            # the same
             residual[:] = 1.0
             follow(residual, swept, False, product, workspace)
-            # the load is the integral of the stress here: if the end of the line is in contact, u behind it is unknown
+            # the load is the integral of the stress here; u behind the line is unknown if the end of the line is in
+            # contact
             step[terms] = max((strain_area - totals[1]) / product[terms], -DEEPEST_STEP * unknown[terms])
         largest = 0.0
         for j in range(size):

@@ -30,8 +30,9 @@ class Travelling(NamedTuple):
     times : array, shape (terms,)
         Decay lengths of the recovery modes, in cells.
     stretch_of, amplitude_of : array, shape (terms, terms)
-        Row k of `stretch_of` contains the stretches in recovery mode k. Row m of `amplitude_of` contains the
-        contributions of the stretch of Prony term m to the modes.
+        Row k of `stretch_of` contains the stretches of all Prony terms if only recovery mode k is present, with the
+        strain 1. Row m of `amplitude_of` contains the strains of all recovery modes if only Prony term m is stretched,
+        by 1.
     """
 
     moduli: FloatArray
@@ -43,7 +44,7 @@ class Travelling(NamedTuple):
 
 @jit
 def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> None:  # pragma: no cover
-    """Write the product of a matrix, given by its columns, and a vector."""
+    """Write the product of a matrix and a vector; ``columns[k]`` is column k of the matrix."""
     product[:] = 0.0
     for k in range(vector.size):
         factor = vector[k]
@@ -55,7 +56,7 @@ def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> No
 def step_factors(
     length: float, deborah: FloatArray, decay: FloatArray, gain: FloatArray, area: FloatArray
 ) -> None:  # pragma: no cover
-    """Write the factors decay, gain and area of a straight piece of the line for every Prony term.
+    """For every Prony term, write the factors decay, gain and area of a straight piece of the line.
 
     Over a piece of the given length and a constant slope, the stretch e changes to decay * e + gain * slope, and its
     integral is gain * e + area * slope.
@@ -92,7 +93,7 @@ def separation_point(
 ) -> float:  # pragma: no cover
     """Return the place in (0, end] where the stress falls to zero, by Newton's method inside a bracket."""
     low, high = 0.0, end
-    point = min(0.5 * end, deborah[0]) if deborah.size else 0.5 * end  # the stress changes fastest within deborah[0]
+    point = min(0.5 * end, deborah[0]) if deborah.size else 0.5 * end  # deborah[0] is the shortest decay length
     for _ in range(200):
         pressure, rate = _pressure_inside(point, start, slope, stretch, moduli, deborah)
         if pressure > 0:
@@ -283,8 +284,8 @@ def _contact(
     -------
     place, strain, pressure, left
         The place where the contact or the line ends; strain and remaining stress at this place; whether the contact
-        ends there. The stretches are written to ``workspace[0]``, and the end of the next cell in which contact can
-        begin to ``workspace[2, 0]``.
+        ends there. The stretches are written to ``workspace[0]``. The number of the node at the end of the next cell in
+        which contact can begin is written to ``workspace[2, 0]``.
     """
     terms, last = moduli.size, penetration.size - 1
     e, following = workspace[0], workspace[9]
