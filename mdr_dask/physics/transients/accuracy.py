@@ -157,7 +157,7 @@ def _left_out(jump: Jump, limits: SteadyLimits, request: MarchRequest) -> FloatA
 def _change(
     fine: Path, limits: SteadyLimits, coarse: Path | None, others: SteadyLimits, times: FloatArray
 ) -> FloatArray:
-    """Return the largest differences of drag and of depth between two paths at and after every given time.
+    """For every given time, return the largest differences of drag and of depth between two paths from this time on.
 
     The paths are the same march on two grids. The steady state on the same grid is subtracted from each path. The paths
     are compared at the given times and at all time steps of the fine path. If there is no path on the coarse grid, the

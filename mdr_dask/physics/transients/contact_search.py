@@ -2,8 +2,8 @@
 
 The search visits the cells of the line one by one. It starts at the highest point and follows the direction in which
 the elements move. It records where contact last ended and where free elements may have separated (`FreeRecovery`). The
-force on an element in contact is lift + h + D h', where D is the Deborah number v tau in cells, and the lift is the sum
-of the depth and the rate of the depth. In each cell that is examined:
+force on an element in contact is lift + h + D h'. Here h is the height of the line, D is the Deborah number v tau in
+cells, and the lift is the sum of the depth and the rate of the depth. In each cell that is examined:
 
 * Inside a patch, contact ends where the force falls through zero, or where free elements arrive with a displacement
   larger than the depth plus the height of the line (contact is then lost although the contact force is positive).
@@ -12,10 +12,10 @@ of the depth and the rate of the depth. In each cell that is examined:
 A patch is added to the sums when its end is found. Most cells can be skipped because of three bounds. The bounds are
 rigorous, so that no contact is missed.
 
-* A cell in contact is skipped if two conditions are met. First, the force was positive everywhere in the cell while
-  those elements passed it that are now further along the line. Second, the displacement u of free elements cannot
-  exceed w = depth + h in the cell. Along the line u' = (drift - u) / D, so that u stays below w wherever w + D h'
-  exceeds the largest drift (see `free_recovery`).
+* A cell in contact is skipped if two conditions are met. First, the elements that are now further along the line were
+  under a positive force while they passed the cell. Second, the displacement u of free elements cannot exceed
+  w = depth + h in the cell. Along the line u' = (drift - u) / D, so that u stays below w wherever w + D h' exceeds the
+  largest drift (see `free_recovery`).
 * A free cell is skipped if depth + h is smaller everywhere in the cell than a lower bound of the displacement of the
   free elements. The bound is computed along the line from the last known displacement and the least drift.
 * A free cell is also skipped if its gap is wider than any gap that can have opened since the elements separated,
@@ -74,7 +74,7 @@ SEPARATIONS = 1024  # largest number of places of separation at one instant
 PERIODS = 3  # largest number of periods of the line for which the search is repeated
 VISITS = 6  # largest number of changes of contact in a cell: a cubic force changes sign at most three times
 ROUNDING = 1e-9  # margin for rounding errors, relative to a displacement
-CLOSE = 1e-9  # cells: accuracy of the place where contact is lost to free elements
+CLOSE = 1e-9  # accuracy, in cells, of the place where free elements end a contact
 FULL = -1  # returned instead of the number of patches if the arrays are too small or a patch extends beyond its run
 DEPTH_CHANGES = 4.0  # assumed largest derivative of a displacement with respect to the last depth
 
@@ -162,7 +162,7 @@ class Motion(NamedTuple):
     Parameters
     ----------
     rise : float
-        Largest mean rate at which the lift has risen from an earlier moment until now.
+        Largest mean rate at which the lift has risen between any earlier moment and now.
     fall : float
         Largest rate at which the lift has fallen between two successive moments.
     deepest, highest : float
@@ -220,7 +220,7 @@ class Cell(NamedTuple):
 
 @jit_uncounted
 def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
-    """Find the contact patches at an instant, at the last depth and rate of its history, and add up their forces.
+    """Find the contact patches at an instant, for the last depth and rate of the history, and add up their forces.
 
     Parameters
     ----------
@@ -249,7 +249,7 @@ def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
     if motion.passes_top:
         work.skip.state[TIME] = np.nan  # bounds found in a repeated search are invalid at the next instant
         for _ in range(min(int(now.deborah * now.time / now.track.cells) + 1, PERIODS)):
-            for k in range(recovery.count[0]):  # the places of separation belong to the previous period now
+            for k in range(recovery.count[0]):  # from now on, the places found so far belong to the previous period
                 recovery.earliest[k] -= now.track.cells
                 recovery.place[k] -= now.track.cells
                 recovery.farthest[k] -= now.track.cells
@@ -309,8 +309,8 @@ def _add_approach(now: Instant, bounds: PathBounds, state: FloatArray) -> None:
 def _search_period(search: Search, runs: IntArray) -> int:
     """Search one period of the line; return the number of patches, or `FULL`.
 
-    Places of separation that the workspace already contains belong to the previous period. If it contains no place, the
-    highest point is assumed to be in contact.
+    Places of separation that the workspace already contains belong to the previous period. If the workspace contains no
+    such place, the highest point is assumed to be in contact.
     """
     now, work, scan, sums = search.now, search.work, search.work.scan, search.work.sums
     track, origin, lift = now.track, now.track.origin, search.lift
@@ -441,7 +441,7 @@ def _examine(search: Search, i: int, contact: bool, found: int) -> tuple[bool, i
             scan[FIRM_UNTIL] = 0.0
         elif x >= stop:
             break
-        else:  # from here on, the force on elements in contact would be tensile
+        else:  # from here on, the force on an element in contact would be negative
             scan[FREE_FROM], ended = x, True
     return contact, found
 
@@ -564,7 +564,7 @@ def _add_edge(search: Search, place: float, steep: float, by_depth: float, openi
 
     The force at this edge is not zero. The gap is the height of the line above the free elements: `steep` is the slope
     of the gap towards the inside of the patch, `by_depth` the derivative of the gap with respect to the depth, and
-    `opening` the rate of the gap.
+    `opening` the rate at which the gap changes.
     """
     sums = search.work.sums
     h, slope, _ = height_at(search.now.track, place)

@@ -27,10 +27,10 @@ from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted, last_until
 from mdr_dask.physics.transients.patches import History, Patches, Track, height_at
 
 ITERATIONS = 60  # largest number of iterations of Newton's method with bisection
-NEAR = 0.02  # cells: largest last Newton step towards a place of separation; the error is about the cube of this step
-STRIDE = 2.0  # cells: longest step towards a place of separation
-MET = 1e-3  # cells: largest last step towards the place where contact begins; the error is about the cube of this step
-CREST = 1e-3  # cells: resolution of the place in a cell where the gap between line and free elements is smallest
+NEAR = 0.02  # largest last Newton step towards a place of separation, in cells; the error is about its cube
+STRIDE = 2.0  # longest step towards a place of separation, in cells
+MET = 1e-3  # largest last step towards the place where contact begins, in cells; the error is about its cube
+CREST = 1e-3  # accuracy, in cells, of the place where the gap between line and free elements is smallest
 FARTHEST = 200  # largest number of cells of a stretch in which the place of separation is searched for
 MARGIN = 64.0  # the window of a bound is chosen for twice a distance plus this number of cells
 WINDOW, WINDOWS = 8.0, 16  # cells travelled in the shortest window; number of windows, each twice as long as the last
@@ -118,8 +118,8 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
     most, least = max(-rate, -history.rate[0] * left, 0.0), min(-rate, -history.rate[0] * left, 0.0)
     if first.deborah > deborah:  # the drift of elements that have been free since before the jump is u (1 - D / D_1)
         most = max(most, min(depth, first.depth * left) * (1 - deborah / first.deborah))
-    # if the velocity rises, elements that were free at the jump arrive with larger displacements than the elements that
-    # passed earlier; this is taken into account until half a window after the jump
+    # If the velocity rises, elements that were free at the jump arrive with larger displacements than the elements that
+    # passed earlier. `opened` includes this increase until half a window after the jump.
     rise, gains = 0.0, first.depth * (deborah / first.deborah - 1)
     for k in range(WINDOWS):
         duration = WINDOW / deborah * 2.0**k
@@ -141,7 +141,7 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
 
 @jit_inline_uncounted
 def window(distance: float) -> int:
-    """Return the index of the shortest window in which the line travels more than a distance in cells.
+    """Return the index of the shortest window in which the line travels more than `distance`, in cells.
 
     If even the longest window is too short, return the index of the longest.
     """

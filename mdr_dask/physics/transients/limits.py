@@ -31,7 +31,7 @@ from mdr_dask.physics.transients.patches import (
 KEPT_CELLS, KEPT_SPEEDS = 2**21, 4
 WHOLE = 1 - 1e-12  # fraction of the line in contact that counts as full contact, within rounding
 NEWTON_STEPS = 60
-NEARLY = 1e-6  # relative error of the load before the last Newton step; the remaining error is about its square
+NEARLY = 1e-6  # largest relative error of the load before the last Newton step; the step squares this error
 
 
 class PreparedLine(NamedTuple):
@@ -84,13 +84,13 @@ class SteadyLimits(NamedTuple):
     before, at, after : float
         Drag in steady sliding at v_1, just after the jump, and in steady sliding at v_2.
     rate, tilt : float
-        Derivative of the depth with respect to t / tau just after the jump, and derivative of `at` with respect to this
-        rate.
+        `rate` is the derivative of the depth with respect to t / tau just after the jump. `tilt` is the derivative of
+        the drag just after the jump (`at`) with respect to `rate`.
     depth : array, shape (2,)
         Steady depth before and after the jump.
     first, slower : Patches or None
-        Contact before the jump, and contact in steady sliding at the lower of both velocities. Both are None if a
-        steady state was not found.
+        Contact before the jump, and contact in steady sliding at the lower of both velocities. `first` and `slower` are
+        None if a steady state was not found.
     contact : array, shape (2,)
         Fraction of the line in contact in steady sliding before and after the jump.
     outcome : Outcome
@@ -129,7 +129,7 @@ def steady_limits(
     deborah : array, shape (cases, 2)
         v_1 tau / L and v_2 tau / L.
     guesses : array, shape (cases, 2), optional
-        Depths at which the searches start, such as those on another grid; they do not affect the results.
+        Depths at which the searches start, such as the depths on another grid; they do not affect the results.
     """
     guess = None if guesses is None else guesses.ravel()
     steady = steady_on_cells(line.cells, line.blocks, deborah.ravel(), np.repeat(loads, 2), guess)
@@ -168,10 +168,9 @@ def _pressed(track: Track, end: FloatArray, depth: float) -> FloatArray:
 def _release(
     track: Track, first: Patches, barriers: Barriers, deborah: float, load: float
 ) -> tuple[float, float, float, int]:
-    """Return the drag just after a jump, the rate of the depth, the tilt, and the outcome.
+    """Return the numbers `at`, `rate` and `tilt` of `SteadyLimits`, and the outcome.
 
-    The rate of the depth is the one at which the load is carried. The tilt is the derivative of the drag with respect
-    to this rate.
+    Newton's method finds the rate of the depth at which the load is carried.
     """
     rate, sums = 0.0, np.empty(SUMS)
     for _ in range(NEWTON_STEPS):

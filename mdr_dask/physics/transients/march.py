@@ -60,7 +60,8 @@ class Stepping(NamedTuple):
 class Finish(NamedTuple):
     """Criterion for the end of a march: final depth and drag, and the allowed distances from these values.
 
-    `drag_distance` is a fraction of the largest distance of the drag during the march; `depth_distance` is a length.
+    `depth_distance` is a length. `drag_distance` is relative to the largest distance from the final drag during the
+    march.
     """
 
     depth: float
@@ -168,10 +169,11 @@ def _balance(
 
 @jit_uncounted
 def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
-    """Return the numbers a and b with which the rate of the depth d at moment `now` of a march is a d + b.
+    """Return two numbers a and b: at moment `now` of a march the rate of the depth is a d + b, where d is the depth.
 
-    They follow from backward differentiation with respect to log(1 + t / onset). As a function of this variable the
-    relaxation is smooth, and the steps are equal. The first step uses the known rate just after the jump instead.
+    The numbers follow from backward differentiation with respect to log(1 + t / onset). As a function of this variable
+    the relaxation is smooth, and the steps are equal. For the first step, they follow from the known rate just after
+    the jump.
     """
     time, place, depth = found.time, found.place, found.depth
     if now == 1:

@@ -110,7 +110,7 @@ def _part(c0: float, c1: float, c2: float, c3: float, y: float) -> tuple[float, 
 
 @jit_inline_uncounted
 def add_patch(track: Track, start: float, end: float, lift: float, deborah: float, sums: FloatArray) -> None:
-    """Add the exact load, drag, length and rise of a patch in contact to `sums`.
+    """Add the exact load, drag, length and rise (integral of the slope) of a patch in contact to `sums`.
 
     The force on an element is lift + h + deborah h'. The integrals over whole cells follow from the integrals in
     `Track`, the integrals over parts of cells from the cubics.

@@ -41,7 +41,7 @@ LONG, NOT_STEADY = 15.0, (0.02, 1e-3)
 MARGIN, WIDENINGS = 0.25, 3
 SHALLOW = 0.01  # least depth of a march, divided by the smaller steady depth
 MOMENTS = 3000  # largest number of moments of a march
-STEEPEST = 3.0  # largest ratio of a tangent to the flatter of the two adjacent secants; steeper cubics may overshoot
+STEEPEST = 3.0  # largest ratio of a slope to the smaller slope of the adjacent secants; steeper cubics may overshoot
 
 
 class MarchRequest(NamedTuple):
@@ -58,7 +58,7 @@ class MarchRequest(NamedTuple):
     accuracy : float
         Allowed error of the friction relative to the steady friction after the jump. A transient that is smaller than
         this error is not marched; with 0 every transient is marched. A march ends when drag and depth are close enough
-        to the steady values. For the drag, a tenth of this error is always close enough.
+        to the steady values. A tenth of this error is always close enough for the drag.
     """
 
     times: FloatArray
@@ -243,8 +243,8 @@ class _Relaxation(NamedTuple):
         """Estimate the size of the transient, with a safety factor of two.
 
         The difference between the drag just after the jump and the steady drag is not an upper bound, because the drag
-        may cross its steady value. Two terms are therefore added: the drag due to the rate of the depth just after the
-        jump, and the drag due to the change of depth.
+        may cross its steady value. Two terms are therefore added to this difference: the drag due to the rate of the
+        depth just after the jump, and the drag due to the change of depth.
         """
         _, sums = self.line.patches(self.ends[1], self.deborah[1])
         by_depth = abs(sums[DRAG_RATE] * (self.ends[1] - self.ends[0]))

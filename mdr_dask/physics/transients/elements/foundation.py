@@ -33,7 +33,7 @@ class Foundation(NamedTuple):
         Transformation from the modes to the state of an element, and back. The state consists of the strains a_m of
         the dashpots of the Prony terms. If the solid has a dashpot of its own, the displacement u precedes them.
     push : array, shape (modes,)
-        Rates at which a unit load makes the modes of the mean state of all elements grow.
+        Rates at which the modes grow under a unit load; these modes describe the mean state of all elements.
     """
 
     moduli: FloatArray
@@ -103,7 +103,7 @@ class Lapse(NamedTuple):
 
 @jit
 def lapse_of(solid: Foundation, time: float) -> Lapse:
-    """Return a duration with the decay of a solid during it."""
+    """Return the `Lapse` of a duration for a solid."""
     modes, terms = solid.rates.size, solid.times.size
     lapse = Lapse(
         time, np.empty(modes), np.empty(terms), np.empty(modes), np.empty(terms), np.empty(modes), np.empty((1, terms))
@@ -114,7 +114,7 @@ def lapse_of(solid: Foundation, time: float) -> Lapse:
 
 @jit
 def fading(solid: Foundation, step: float, decay: FloatArray, fades: FloatArray) -> None:
-    """Write the decay of modes and terms over a duration."""
+    """Write the factors by which the modes and the strains of the Prony terms decay during a duration."""
     for k in range(decay.size):
         decay[k] = np.exp(-solid.rates[k] * step)
     for m in range(fades.size):

@@ -1,7 +1,7 @@
 """Friction under any loading history, from the motion of every element; second-order accurate in the time step.
 
-Times are in the unit of the solid, travel is in lengths of the line, loads are F_N / (4 G_inf L) in the unit of height.
-A single velocity jump of a Kelvin solid on a periodic line is solved much faster by `velocity_jump`.
+Times are in the unit of the solid, travel is divided by the length of the line, loads are F_N / (4 G_inf L) in the unit
+of height. A single velocity jump of a Kelvin solid on a periodic line is solved much faster by `velocity_jump`.
 """
 
 from __future__ import annotations
@@ -233,7 +233,7 @@ class Piece:
     end: float
     velocity: tuple[float, float]
     force: tuple[float, float]
-    swing: tuple[float, float, float] = (0.0, 0.0, 0.0)  # amplitude of the velocity and of the load, angular frequency
+    swing: tuple[float, float, float] = (0.0, 0.0, 0.0)  # the sine: amplitudes of velocity and load, angular frequency
 
     def scaled(self, time: float, velocity: float, force: float) -> Piece:
         """Return the piece in units of the given time, velocity and force."""
@@ -288,7 +288,7 @@ class Piece:
         count = max(int(np.ceil((span - late) / most)), 1)
         rest = late + (span - late) * np.arange(1, count + 1) / count
         moments: FloatArray = self.start + np.concatenate([[0.0], grown, rest])
-        moments[-1] = end  # exactly, because the next piece begins here, and this time may be requested
+        moments[-1] = end  # without rounding errors: the next piece begins at this time, which may also be requested
         return moments
 
 

@@ -28,10 +28,10 @@ from mdr_dask.physics.transients.elements.foundation import (
 
 
 class Edges(NamedTuple):
-    """Edge of contact in the cell before each element, as it was when it was last located where the force vanishes.
+    """The last known edge of contact in the cell before each element, if the force is zero at this edge.
 
-    At one end of such a cell the element is in contact, at the other end it is not. `place` is the distance of the edge
-    from the element in contact, in cells, or -1 if there is no edge. `gap` is the gap of the other element then.
+    One of the two elements of such a cell is in contact. `place` is the distance of the edge from this element, in
+    cells, or -1 if there is no edge. `gap` is the gap of the other element at the moment at which the edge was found.
     """
 
     place: FloatArray
@@ -44,7 +44,8 @@ class Contact(NamedTuple):
     Parameters
     ----------
     gaps, slope : array
-        Distance between the line and the position that an element would have without contact, and slope of the line.
+        Height of the line above the position that an element would have without contact, and slope of the line. Without
+        a dashpot, `gaps` contains the same numbers as `pulls`.
     pulls : array
         Force of spring and Prony terms of an element that follows the line.
     force, power : array, output
@@ -129,14 +130,14 @@ def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) ->
 
 @jit_inline
 def _whole(values: FloatArray, j: int) -> float:
-    """Return the integral over the cell before node j of the cubic through the four nearest values."""
+    """Integrate the cubic through the four nearest values over the cell before node j."""
     n = values.size
     return float((13 * (values[j - 1] + values[j]) - values[j - 2] - values[(j + 1) % n]) / 24)
 
 
 @jit_inline
 def _limit(inner: float, outer: float, place: float, gap: float) -> float:
-    """Return the distance of the edge from the element in contact, in cells.
+    """Return the distance between the edge of contact and the element in contact, in cells.
 
     `inner` and `outer` are the gaps of the elements in contact and out of contact; `place` and `gap` are those of
     `Edges`.
@@ -204,7 +205,7 @@ def _forces(contact: Contact, first: int, keep: bool) -> tuple[float, float, flo
 
 @jit
 def _pressing_rate(contact: Contact, weight: float, deborah: float) -> float:
-    """Return the smallest rate of the depth at which the force of no element in contact is negative."""
+    """Return the smallest rate of the depth at which no element in contact has a negative force."""
     rate = -np.inf
     for j in range(contact.force.size):
         if contact.touching[j]:
@@ -388,7 +389,7 @@ def _separate(
     depth: float,
     deborah: tuple[float, float],
 ) -> None:
-    """Write which elements separate during a step to a given depth, and their displacements at the end of the step."""
+    """Write when elements separate during a step to `depth`, and their displacements at the end of the step."""
     parts, leaves, fall = workspace.parts, workspace.leaves, (depth - old_depth) / lapse.time
     for j in range(workspace.under.size):
         if state.touching[j]:
@@ -466,7 +467,7 @@ def forces_now(
     Return the depth, its rate, the drag and the fraction of the line in contact.
 
     Without a dashpot the depth is corrected until it carries the load. The depth that follows from the mean
-    displacement is less accurate, because this mean is a sum over the elements.
+    displacement is less accurate, because this mean is taken over the elements only.
     """
     gaps, pulls = workspace.gaps, workspace.pulls
     for j in range(workspace.under.size):
