@@ -22,7 +22,7 @@ Draw = Callable[["Progress | None", float], None]
 
 @contextmanager
 def reporter(quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """Yield the function that takes the progress of a run; the latest progress is shown at regular times."""
+    """Yield the function that receives the progress of a run; the latest progress is shown at regular times."""
     if quiet:
         yield lambda _: None
     elif "ipykernel" in sys.modules:

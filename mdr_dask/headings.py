@@ -134,8 +134,8 @@ def nearest(heading: str, names: Sequence[str]) -> str:
 def split_unit(heading: str) -> tuple[str, str]:
     """Return the name and the unit of a heading: ``f [Hz]``, ``f (Hz)``, ``f / Hz``, ``f, Hz`` or ``f in Hz``.
 
-    Text in square brackets is always taken as a unit. Any other text is taken as a unit only if it looks like one. In
-    other brackets it must also not be a symbol of the quantity, as in ``force (F)``.
+    Text in square brackets is always taken as a unit. Any other text is taken as a unit only if it looks like one. A
+    symbol of the quantity in other brackets is not taken as a unit, as in ``force (F)``.
     """
     found = _BRACKETED.fullmatch(heading.strip())
     if found:
@@ -161,7 +161,7 @@ def match(name: str, unit: str, columns: Sequence[Column]) -> tuple[Column | Non
             for column in columns:
                 if column.holds(" ".join(words[:count])) and _fits(joined, column):
                     return column, joined
-    written = _BRACKETED.fullmatch(name)  # an unknown unit in round brackets
+    written = _BRACKETED.fullmatch(name)  # the unit in the brackets may be unknown
     return match(written[1], written[3], columns) if written and not unit else (None, unit)
 
 

@@ -80,7 +80,7 @@ def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
 def _defaults(campaign: Campaign) -> list[str]:
     """Return the parameters that have an effect and that the campaign file leaves at their defaults, with the values.
 
-    The names of the series follow if other series give the parameter. Parameters that are zero or empty are left out.
+    If only some series use the default, their names follow in brackets. Defaults that are zero or empty are left out.
     """
     found: dict[str, list[str]] = {}
     for series in campaign.series:
@@ -209,6 +209,6 @@ def axes_rows(campaign: Campaign) -> list[dict[str, Any]]:
 
 
 def _counted(what: str, first: int, more: float) -> str:
-    """Return a text with the count of the first round, and with that of all rounds if there may be further ones."""
+    """Return a text with the count of the first round and, if there may be further rounds, of all rounds."""
     last = round(first * more)
     return f"{first if more == 1 else f'{first} to {last}'} {what}{'s' if last != 1 else ''}"

@@ -53,7 +53,7 @@ Cells = NDArray[np.object_]
 
 
 class Problem(NamedTuple):
-    """One problem: line and column of its cell, counted from 1, and a text. Line 0: no single cell is wrong."""
+    """One problem: line and column of its cell, counted from 1, and a text. On line 0, no single cell is wrong."""
 
     line: int
     column: int
@@ -126,7 +126,7 @@ class Sheet:
 
     @property
     def remark(self) -> str:
-        """A text that names the lines below the numbers, which are not read; empty if there are none."""
+        """A text that lists the lines that follow the numbers and are not read; empty if there are no such lines."""
         shown = dict.fromkeys(repr(text[:60]) for text in self.notes)
         return f"lines below the numbers, left out: {', '.join(shown)}" if shown else ""
 
@@ -195,7 +195,7 @@ def _workbook(content: bytes, source: str) -> str:
 def _lines(text: str) -> list[Line]:
     """Return the lines of a text that are not empty."""
     lines, sheet, before = [], "", 0
-    # a name between quotation marks may contain the end of a line
+    # a name in quotation marks may contain a line break
     text = re.sub(r'(?:^|(?<=[\n;,\t]))"[^"]*"(?=[;,\t\r\n])', lambda found: re.sub(r"\s+", " ", found[0]), text)
     for number, line in enumerate(text.lstrip("\ufeff").splitlines(), 1):
         if line.startswith(SHEET):
@@ -215,9 +215,9 @@ def _split(line: str, separator: str) -> list[str]:
 
 
 def _separator(lines: Sequence[str]) -> str:
-    """Return the separator with which most lines contain several numbers, or else the one that most lines contain.
+    """Return the separator that splits most lines into several numbers; if none does, the most frequent separator.
 
-    Commas and blanks count half, because commas also occur in numbers, and blanks between a number and its unit.
+    Lines split by commas or blanks count half, because commas also occur in numbers, and blanks before units.
     """
 
     def has_numbers(line: str, mark: str) -> bool:
@@ -233,7 +233,7 @@ def _separator(lines: Sequence[str]) -> str:
         best = max(SEPARATORS[:-1], key=lambda mark: sum(mark in line for line in lines))
         return best if any(best in line for line in lines) else ","
     if best == "," and all(_NUMBER.fullmatch(line.strip()) for line in lines[1:]) and "," not in lines[0]:
-        return ";"  # one column of numbers with decimal commas
+        return ";"  # the table is one column of numbers with decimal commas
     return best
 
 
@@ -241,9 +241,9 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
     """Find the names, the units and the lines of numbers of a table.
 
     Text above the names is skipped. Text below the last numbers is left out. A table may consist of several blocks of
-    numbers, each below the same line of names. If the text above every block contains a temperature, it becomes a
-    column, unless the table has such a column. Pairs of columns with a temperature above each pair (as digitised from a
-    figure) become three columns.
+    numbers, each below the same line of names. If a temperature is stated above every block, the temperatures become a
+    further column, unless the table has a column of temperatures. Pairs of columns with a temperature above each pair
+    (as digitised from a figure) become three columns.
 
     Parameters
     ----------
@@ -298,13 +298,13 @@ class _Grid:
     word: BoolArray
 
     def require(self, wrong: Sequence[int], column: int, what: str) -> None:
-        """Raise TableError with the first of the wrong lines, and the number of the others."""
+        """Raise TableError if there are wrong lines: the message shows the first of them and states how many follow."""
         if len(wrong):
             raise TableError(self.source, [self.lines[wrong[0]].problem(column, what + _further(len(wrong)))])
 
 
 def _further(count: int) -> str:
-    """Return a text with the number of lines in which a problem occurs, except the first one."""
+    """Return a text that states in how many further lines a problem occurs."""
     return f" (and in {count - 1} more line{'s' if count > 2 else ''})" if count > 1 else ""
 
 
@@ -354,8 +354,8 @@ def _head(grid: _Grid) -> _Head:
     """Find the names and units.
 
     They are lines of text above the numbers with as many cells as most lines of the table. The line above the last line
-    of units contains the names. Without such a line, the last line contains the names, and perhaps the one above it the
-    units.
+    of units contains the names. If no line of units follows the names, the last line contains the names; the line above
+    it may then contain the units.
     """
     data, numeric = _lines_of_numbers(grid)
     full = np.flatnonzero(data & (grid.length == numeric.size))
@@ -381,12 +381,12 @@ def _lines_of_numbers(grid: _Grid) -> tuple[BoolArray, BoolArray]:
 
     A column is numeric if it contains numbers in at least half of the lines of the commonest length. A line contains
     numbers if, in the numeric columns, at least half of its filled cells are numbers or marks of missing numbers. A
-    line that begins with a word is nevertheless text in two cases: if the word is in a numeric column (a setting above
-    the table, or a mean below it), or if the line fills less than half of the columns (at most half, if it has fewer
-    cells than most lines).
+    line that begins with a word is nevertheless text in two cases. First, the word is in a numeric column: the line is
+    a setting above the table, or a mean below it. Second, the line fills less than half of the columns, or just half of
+    them if it has fewer cells than most lines.
     """
     mostly = grid.number.any(axis=1) & (grid.number.sum(axis=1) >= grid.word.sum(axis=1))
-    mostly = mostly if mostly.any() else grid.number.any(axis=1)  # tables with more columns of words than of numbers
+    mostly = mostly if mostly.any() else grid.number.any(axis=1)  # the table has more words than numbers
     lengths = Counter(grid.length[mostly].tolist() or [0])
     width = max(lengths, key=lambda each: (lengths[each], each))
     numeric = np.zeros(width, dtype=bool)
@@ -415,7 +415,7 @@ def _head_of_words(grid: _Grid, is_name: Callable[[str], bool]) -> _Head:
 
 
 def _body(grid: _Grid, head: _Head) -> tuple[list[int], list[tuple[str, str] | None], tuple[str, ...]]:
-    """Return the positions of the lines of numbers, the temperature stated above each of them, and the text below all.
+    """Return the positions of the lines of numbers, the temperature stated above each line, and the text below them.
 
     The text between lines of numbers must repeat the line of names; other text raises TableError.
     """
@@ -464,7 +464,7 @@ def _names_and_units(grid: _Grid, head: _Head) -> tuple[tuple[str, ...], tuple[s
 def _require_even(grid: _Grid, rows: Sequence[int], width: int, head: _Head) -> None:
     """Raise TableError if a line lacks a number, or has more cells than there are names."""
     first = grid.lines[rows[0] if head.names is None else head.names]
-    blanks = width > head.numeric.size and first.separator == BLANKS  # names with blanks between blanks
+    blanks = width > head.numeric.size and first.separator == BLANKS  # names that contain blanks, separated by blanks
     wrong = [
         row
         for row in rows
@@ -519,7 +519,7 @@ def _from_pairs(grid: _Grid, sheet: Sheet, labels: int | None) -> Sheet:
 def _are_units(row: Sequence[str]) -> bool:
     """Return whether a line is a line of units.
 
-    It is if at least half of its words are units, or if all are in square brackets.
+    A line is a line of units if at least half of its words are units, or if all of them are in square brackets.
     """
     filled = [text for text in row if text not in ("", "-", "--", "1", "[1]", "[-]")]
     # a text such as "10 mm" is a value of a table with words, but "10^3 um^3" is a unit
@@ -630,7 +630,7 @@ def _unit(written: str, column: Column) -> str:
     stated = factors(unit, column.unit)
     if column.given_unit and not np.allclose(stated, factors(column.given_unit, column.unit), rtol=1e-6, atol=0):
         raise ValueError(
-            f"the file states {written}, got the unit {column.given_unit!r}: give only what the file omits"
+            f"the file states {written}, got the unit {column.given_unit!r}: give a unit only if the file states none"
         )
     return unit
 

@@ -264,7 +264,7 @@ def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
     """Return whether a number without a unit may have been meant in another unit than the SI unit.
 
     The number is doubtful if, taken in SI, it differs from the first usual value by more than 3 decades. It is also
-    doubtful if it is nearer to the first usual value when it is taken in the unit of one of the usual values.
+    doubtful if it is nearer to that value when it is taken in the unit of one of the usual values.
 
     Parameters
     ----------
@@ -292,7 +292,7 @@ def likely(value: float, unit: str, usual: Sequence[str]) -> str:
     found = {}
     for each in usual:
         meant = f"{value:g} {unit_behind(each)}"
-        with suppress(ValueError):  # the converted number is too large
+        with suppress(ValueError):  # the converted number may be too large
             found[meant] = _decades(to_si(meant, unit), unit, usual[0])
     nearest = min(found, key=lambda meant: found[meant], default="")
     return nearest if nearest and found[nearest] <= _FAR + 1e-9 else ""
