@@ -1,16 +1,17 @@
 """Grid refinement: solve on a grid and on the next finer one, and estimate the error from the difference.
 
 Sliding, velocity jumps and lubrication use `refine`. The number of cells doubles from one level to the next, so that
-the error of a solver of order p decreases by r = 2^p per level. Let c be the relative change of the results from the
-second last level to the last, and b the relative change from the third last level to the second last. The relative
+the error of a solver of order p is divided by r = 2^p at each level. Let c be the relative change of the results from
+the second last level to the last, and b the relative change from the third last level to the second last. The relative
 error on the last level is estimated as
 
     error = safety max( c / (r - 1),  b / (r (r - 1)) ) + e.
 
 The first term is Richardson's estimate, with the safety factor of the grid convergence index (Roache, J. Fluids Eng.
-116, 405, 1994). The second term is the same estimate with b / r, the change that is expected after the change b. It is
-needed because the results on two grids may agree by chance; it is available from the third level on. The last term e is
-an error that two grids may have in common, so that their difference does not show it (`Solution.unseen`).
+116, 405, 1994). The second term is the same estimate with b / r instead of c: this is the last change that is expected
+after the earlier change b. The second term is needed because the results on two grids may agree by chance. It is
+available from the third level on. The last term e is an error that two grids may have in common, so that their
+difference does not show it (`Solution.unseen`).
 """
 
 from __future__ import annotations
@@ -114,7 +115,7 @@ def refine(
     Returns
     -------
     Refined
-        If a case has no solution on the finest grids, the solution on the finest grid that has one is returned.
+        If a case fails on the finest grids, its solution on the finest grid without failure is returned.
 
     Notes
     -----
@@ -192,7 +193,7 @@ def _sizes(values: Sequence[FloatArray] | FloatArray, floors: FloatArray) -> Flo
 
 
 def _largest(sizes: FloatArray) -> FloatArray:
-    """Return the largest of the numbers of every case; the numbers are not negative."""
+    """Return, for each case, the largest of its numbers; the numbers are not negative."""
     return sizes if sizes.ndim == 1 else sizes.reshape(len(sizes), -1).max(axis=1, initial=0.0)
 
 

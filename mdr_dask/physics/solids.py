@@ -404,8 +404,8 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
     times : array, shape (modes,)
         lambda_k, ascending: lambda_k is between tau_k and tau_(k+1), and the largest lambda_k is above the largest tau.
     distance : array, shape (modes, modes)
-        Element (m, k) is tau_m - lambda_k. Each lambda_k is computed as its distance from the nearer tau_m, so that the
-        differences are precise even if the times cover many decades.
+        Element (m, k) is tau_m - lambda_k. For each lambda_k, the distance from the nearer of the two neighbouring
+        tau_m is computed, so that the differences are precise even if the times cover many decades.
     """
     terms = times.size
     zeros, distance = np.empty(terms), np.empty((terms, terms))
@@ -423,7 +423,10 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
 
 @jit
 def _distance_to_zero(pole: int, sign: float, gap: float, weight: FloatArray, times: FloatArray) -> float:
-    """Return the distance of a zero from the nearest tau, by Newton's method and bisection of its logarithm."""
+    """Return the distance of a zero from the nearest tau.
+
+    The logarithm of the distance is found by Newton's method and bisection.
+    """
     high = np.log(gap)
     low = high - 80.0
     place = 0.5 * (low + high)

@@ -52,10 +52,10 @@ def _counted(length: float) -> int:
 
 @jit
 def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> None:
-    """Add `number` to `count` positions of the trace, starting at `begin`.
+    """Add `number` to `count` entries of the trace, the first of which has the index `begin`.
 
-    The trace contains the length in contact for the window that begins at each node of the closed line. `jumps` holds
-    the differences between neighbouring positions of the trace.
+    Entry k of the trace is the length in contact in the window that begins at node k of the closed line. `jumps` holds
+    the differences between neighbouring entries.
     """
     points = jumps.size - 1
     while begin < 0:
@@ -72,9 +72,9 @@ def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> Non
 
 @jit
 def _add(jumps: NDArray[np.int32], at: int, number: int) -> None:
-    """Add `number` to the position `at` of the trace, like `_block`.
+    """Add `number` to one entry of the trace, like `_block`.
 
-    `at` may lie outside the trace by at most the length of the trace.
+    The index `at` of the entry may lie outside the trace by at most the length of the trace.
     """
     points = jumps.size - 1
     at = at + points if at < 0 else at - points if at >= points else at
@@ -84,7 +84,7 @@ def _add(jumps: NDArray[np.int32], at: int, number: int) -> None:
 
 @jit
 def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: float, jumps: NDArray[np.int32]) -> None:
-    """Add to the trace the windows that contain only the head or only the tail of a cluster.
+    """Add the contribution of a cluster to the windows that contain only its head or only its tail.
 
     If `judged`, a part is counted if this part breaks the layer by itself. Otherwise, it is counted if the whole
     cluster breaks the layer. A part longer than `reach` cannot break the layer, whatever its shape.
@@ -114,7 +114,7 @@ def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: fl
 
 @jit
 def _add_middles(clusters: Clusters, c: int, window: float, judged: bool, jumps: NDArray[np.int32]) -> None:
-    """Add to the trace the windows that lie within a cluster, so that both edges of the window cut the cluster."""
+    """Add the contribution of a cluster to the windows that lie within it, so that both edges of a window cut it."""
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
     start, end = clusters.start[c], clusters.end[c]
     always = clusters.total[c] > limit * (end - start) ** 3
@@ -314,13 +314,13 @@ def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray
 
 
 def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> tuple[IntArray, IntArray]:
-    """Return the first node of the window on each line after given travels of the contact.
+    """Return the first node of the window on each line, for given distances that the contact has travelled.
 
     Parameters
     ----------
     travel : array_like, shape (n,)
-        Distance that the contact has travelled, at the mean velocity of the surfaces, in spacings. For mean values,
-        steps of an eighth of the window are small enough.
+        Distance that the contact has travelled at the mean velocity of the surfaces, measured in spacings of the nodes.
+        For mean values, steps of an eighth of the window are small enough.
     points : int
         Number of points of each line.
     slide_roll_ratio : float

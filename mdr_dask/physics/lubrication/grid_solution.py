@@ -51,7 +51,7 @@ class GridSolution:
         return np.where(inside, np.maximum(_between(self.nodes, self.pressure, positions, _CUBIC), 0.0), 0.0)
 
     def pressure_carried(self, nodes: FloatArray, front: float) -> FloatArray:
-        """Return the pressure at the nodes of another grid, with its front moved to the position `front`.
+        """Interpolate the pressure at the nodes of another grid, and move its front to the position `front`.
 
         The front is the steep fall of the pressure behind the spike (see :attr:`front`). The nodes on either side of
         the new front get the pressures that this grid has at half a cell from its own front. On a finer grid, the
@@ -165,7 +165,7 @@ def expected(
 
 @jit
 def _between(nodes: FloatArray, values: FloatArray, positions: FloatArray, sides: int) -> FloatArray:
-    """Return the values, at the positions, of polynomials through the `sides` nodes on either side of each position."""
+    """Interpolate at each position by the polynomial through the `sides` nodes on either side of this position."""
     result = np.empty(positions.size)
     for k in range(positions.size):
         low, high = sides, nodes.size - sides  # bounds for the first node that is not before the position

@@ -105,7 +105,7 @@ def aligned(
 
 
 def _halved_by(share: float, cells: int) -> int:
-    """Return the number n near `cells` for which n times `share` is closest to the middle between two whole numbers."""
+    """Return the number n near `cells` for which n times `share` is closest to a whole number plus one half."""
     far = int(0.5 / max(1 - share, 4 / cells))  # the position in its cell repeats after 1 / (1 - share) cells
     near = cells + np.arange(-far, far + 1)
     return int(near[np.argmin(np.abs(near * share % 1 - 0.5))])
@@ -171,10 +171,10 @@ def second_derivative(nodes: FloatArray, values: FloatArray) -> FloatArray:
 def adapted_density(nodes: FloatArray, pressure: FloatArray, film: FloatArray, central_film: float) -> FloatArray:
     """Return the density of nodes that is suitable for a solution, shape (n,).
 
-    The density has two terms. The error of the flow is of second order; its term is the square root of the curvature of
-    the film divided by the film. The error of the deformation is an integral over an element; its term is the cube root
-    of the curvature of the pressure. A least density provides nodes in the contact and in the inlet. Smoothing makes
-    neighbouring cells similar.
+    Two terms of the density follow from the solution. The error of the flow is of second order; its term is the square
+    root of the curvature of the film divided by the film. The error of the deformation is an integral over an element;
+    its term is the cube root of the curvature of the pressure. A third term, the least density, provides nodes where
+    the other two are small: in the contact and in the inlet. Smoothing makes neighbouring cells similar.
     """
     length = max(1.0, float(np.sqrt(2 * central_film)))
     of_film = np.sqrt(np.abs(second_derivative(nodes, film)) / film)

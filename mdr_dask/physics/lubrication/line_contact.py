@@ -35,7 +35,8 @@ NODES = (40, 80, 160, 320, 640, 1280)
 #: error to the last change of these values.
 ORDER = 3.0
 FACTOR = SAFETY / (2.0**ORDER - 1)
-#: Number of nodes of the two grids that are solved to obtain the density of nodes.
+#: Before the grids of `NODES`, up to two grids with this number of nodes are solved. Their solutions only serve to find
+#: the density of nodes of all further grids.
 ADAPTED_NODES = 161
 
 
@@ -47,10 +48,10 @@ ATTEMPTS = ((1.5, 0.2, 121, Pace(0.12, 80)), (2.5, 0.4, 361, Pace(0.05, 200)))
 #: Step limits on further grids. The first limits are used with an extrapolated initial guess. If this fails, the
 #: solution on the previous grid is used as the initial guess, with the second limits.
 PACES = (Pace(0.12, 16), Pace(0.03, 250))
-#: Smallest stated error of a position, in cells of the grid.
+#: The stated error of a position is never smaller than this number of cells.
 PLACED = 0.1
-#: Distance, in cells of the coarser grid, within which the largest error of a profile is used, because the position of
-#: a steep front differs between the grids.
+#: The error of a profile at a position is the largest error within this distance, measured in cells of the coarser
+#: grid. This is necessary, because the position of a steep front differs between the grids.
 REACH = 2.0
 
 
@@ -234,7 +235,7 @@ class LineSolution:
         return Estimate(value, np.where(np.isnan(value), np.nan, largest))
 
     def position(self, reading: Reading) -> Estimate:
-        """Return a position in half widths; its error is at least a tenth of a cell."""
+        """Return a position in half widths; its stated error is never smaller than a tenth of a cell."""
         found, nodes = self.estimate(reading), self.finest.nodes
         after = np.clip(np.searchsorted(nodes, found.value), 1, nodes.size - 1)
         return found._replace(error=np.maximum(found.error, PLACED * (nodes[after] - nodes[after - 1])))

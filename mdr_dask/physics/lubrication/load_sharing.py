@@ -33,7 +33,10 @@ _APART = 9.0
 
 
 def mean_overlap(distance: float) -> float:
-    """Return the mean overlap ``<(z - d)+>`` of Gaussian heights z at a distance d of the means, all in rms heights."""
+    """Return the mean overlap ``<(z - d)+>`` of Gaussian heights z at a distance d of the means.
+
+    Overlap, heights and distance are in units of the rms height.
+    """
     return max(exp(-(distance**2) / 2) / sqrt(2 * pi) - distance * erfc(distance / sqrt(2)) / 2, 0.0)
 
 

@@ -52,9 +52,9 @@ class Mesh(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Panels:
-    """Nodes and matrices on [0, 1]; each matrix maps the values u at the nodes to a function of z at the nodes.
+    """Nodes on [0, 1], and matrices for functions that are given by their values u at the nodes.
 
-    The last node is at 1.
+    Multiplied by u, a matrix gives the expression that is stated below, with z at each node. The last node is at 1.
 
     Parameters
     ----------

@@ -107,7 +107,7 @@ def forward_transform(
     Parameters
     ----------
     slope : callable, array -> array
-        f'(r) for r >= 0. The jumps of f are not part of it.
+        f'(r) for r >= 0. The jumps of f are given in `jumps`.
     position : array_like, shape (m,)
         Positions x. They may be negative, because g is even.
     apex : float

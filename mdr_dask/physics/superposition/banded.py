@@ -61,7 +61,7 @@ class Linear(NamedTuple):
     variance, tilt : array, shape (rows, channels, points)
         Variance of `fitted`, and covariance of `fitted` and `slope`.
     rough : array, shape (rows, channels, splines - 2)
-        Mean square of the second differences of the coefficients.
+        Mean of the square of each second difference of the coefficients.
     offsets : array, shape (rows, offsets, offsets)
         Covariance of the offsets.
     """

@@ -67,15 +67,15 @@ class Superposition:
     curve_x : array, shape (curve points,)
         Abscissae of the merged curves.
     curve_y, curve_error : array, shape (channels, curve points)
-        The merged curves, which are the curves at the reference, and their standard errors.
+        The merged curves and their standard errors. The merged curves belong to the reference.
     curve_cross : array, shape (channels, curve points, 2 groups)
         Covariance of the curves and the factors.
     measured : tuple of float
         Range of log10 x of the points measured at the reference. Outside this range the curve depends on the shift
         factors.
     undetermined : tuple of (float, float)
-        First and last group of each sequence of neighbouring groups between which the curves do not determine the
-        shift, for example on a plateau or across a gap.
+        Ranges of groups whose curves do not determine the shifts between them, for example on a plateau or across a
+        gap. Each range is given by its first and its last group.
     """
 
     groups: FloatArray
@@ -126,7 +126,7 @@ def superpose(
     """Find the shifts for which the curves are parts of one smooth curve, and the uncertainty of these shifts.
 
     The shifts, the smooth curve, the scatter and the vertical offsets have a joint probability density (module
-    `posterior`). Draws are taken from this density. Results are means over the draws, and intervals include the
+    `posterior`). Draws are taken from this density. Results are means over the draws. Their intervals include the
     uncertainty of smoothness, scatter and offsets.
 
     Parameters
@@ -140,8 +140,8 @@ def superpose(
     vertical : {'none', 'modulus', 'compliance', 'free'}
         Factors along the ordinate. A modulus of a polymer is proportional to density times temperature. For 'modulus'
         and 'compliance' the factor b_T = rho0 T0 / (rho T), with the density rho from `EXPANSION`, is therefore
-        applied, and an offset common to all channels of a curve has the prior `OFFSET`. Factors that are 'free' differ
-        from curve to curve by unknown steps.
+        applied. In addition, each curve may have an unknown offset, common to its channels, with the prior `OFFSET`.
+        Factors that are 'free' differ from curve to curve by unknown steps.
     reference : float, optional
         Group whose factors are zero; by default the middle group. For a reference between groups see `rereference`.
     seed : int
@@ -261,14 +261,14 @@ def _merged(
 
 
 def _runs(groups: FloatArray, steps: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
-    """Return the first and the last group of each sequence of consecutive marked steps."""
+    """Return the groups before the first and after the last step of each sequence of consecutive marked steps."""
     edges = np.diff(np.concatenate([[0], steps.astype(int), [0]]))
     ends = zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
     return tuple((float(groups[first]), float(groups[last])) for first, last in ends)
 
 
 def _gaps(x: FloatArray, member: NDArray[np.intp], shifts: FloatArray) -> NDArray[np.bool_]:
-    """Return, for each row of shifts and each curve, whether the curve begins after a gap in the abscissa."""
+    """Return, for each row of shifts, which curves begin after a gap in the abscissa."""
     ends = np.array([[x[member == k].min(), x[member == k].max()] for k in range(shifts.shape[1])])
     low, high = ends[:, 0] + shifts, ends[:, 1] + shifts
     order = np.argsort(low, axis=1)
@@ -289,8 +289,9 @@ def rereference(
     """Return the same master curve for another reference, which is a group or a value between two groups.
 
     Between two groups, the horizontal factor is the factor of the law plus the linearly interpolated departure of the
-    measured factors from the law. The error of this interpolation, `dT^2 |h''| / 8` for two groups at a distance dT, is
-    added to the draws; h'' is the second derivative of the departures.
+    measured factors from the law. The error of this interpolation is `dT^2 |h''| / 8` for two groups at a distance dT,
+    where h'' is the second derivative of the departures. This error widens the distribution of the draws: each draw is
+    shifted by a normally distributed number with this standard deviation.
 
     Parameters
     ----------
@@ -349,8 +350,8 @@ def rereference(
 def interpolation_error(places: FloatArray, factors: FloatArray, place: float) -> float:
     """Return the error of a linear interpolation, ``d^2 |h''| / 8`` for neighbours a distance d apart.
 
-    The second derivative h'' is the larger of the second derivatives of the factors at the two neighbours. If `place`
-    is one of the `places`, the error is zero.
+    Here h'' is the second derivative of the factors at one of the two neighbours, where its absolute value is larger.
+    If `place` is one of the `places`, the error is zero.
     """
     if place in places:
         return 0.0

@@ -85,8 +85,8 @@ class Curves:
         Prior of the standard deviation of the vertical offsets: median in decades, and standard deviation of the
         logarithm. None for curves without vertical offsets.
     drifting : bool
-        Whether offsets change from curve to curve by independent steps. The mean of the steps may be `TREND` times as
-        large as the scatter of the steps. If False, the offsets are independent of each other.
+        Whether offsets change from curve to curve by independent steps. The prior standard deviation of the mean step
+        is `TREND` times that of the steps about their mean. If False, the offsets are independent of each other.
     """
 
     x: FloatArray
@@ -106,7 +106,7 @@ class Curves:
         )
 
     def begin(self, moved: FloatArray) -> FloatArray:
-        """Return where the spline of each row begins, shape (rows,). The spline is centred on the shifted points."""
+        """Return where the spline of each row begins, shape (rows,); the spline is centred on the shifted points."""
         return np.asarray((moved.min(axis=1) + moved.max(axis=1) - (self.splines - 3) / CELLS) / 2, dtype=np.float64)
 
     def spline(self, channel: int, unknowns: FloatArray, shifts: FloatArray, grid: FloatArray) -> FloatArray:
@@ -130,9 +130,9 @@ class Curves:
     def prior(self) -> tuple[FloatArray, FloatArray]:
         """Prior mean and precision of all parameters.
 
-        The parameters are: the shifts of all curves except the first, in widths of a curve; the logarithms of the bend
-        near each curve, channel by channel; the logarithm of the noise of each channel; and the logarithm of the
-        standard deviation of the offsets, if there are offsets.
+        The parameters are: the shifts of all curves except the first, in widths of a curve; for each channel, the
+        logarithms of the bend near each curve (see `BEND`); the logarithm of the noise of each channel; and the
+        logarithm of the standard deviation of the offsets, if there are offsets.
         """
         channels = self.y.shape[0]
         drift = np.diff(np.eye(self.count), axis=0) / BEND_DRIFT
@@ -156,7 +156,7 @@ _VALUES, _SLOPES = _pieces()
 
 @dataclass(frozen=True)
 class Solved:
-    """Density of rows of parameters, and the distribution of spline coefficients and offsets for these parameters.
+    """Density for each row of parameters, and the distribution of the spline coefficients and offsets for this row.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ class Solved:
 
 
 def solve(curves: Curves, rows: FloatArray) -> Solved:
-    """Return density, gradient, and spline coefficients for rows of parameters, shape (rows, parameters).
+    """Return density, gradient and spline coefficients for each row of parameters, shape (rows, parameters).
 
     The parameters are described at `Curves.prior`. The knots of the splines follow the shifted curves of each row; the
     gradient neglects this, because the density hardly depends on the position of the knots.

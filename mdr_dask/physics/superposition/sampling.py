@@ -163,7 +163,7 @@ def _chosen(taken: NDArray[np.bool_], new: Solved, old: Solved) -> Solved:
 
 
 def _hop(curves: Curves, place: FloatArray, generator: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Return rows in which one step between neighbours is drawn again from its prior, and the rise of the prior energy.
+    """Draw one step between neighbours again from its prior, and return the new rows and the rise of the prior energy.
 
     The prior of this step is conditional on the other steps. By such jumps a chain can pass between the many small
     maxima of the density along a plateau.

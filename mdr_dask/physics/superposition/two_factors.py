@@ -71,14 +71,16 @@ def superpose_twice(
     values = [np.asarray(a, dtype=np.float64).reshape(-1) for a in (first, second)]
     groups, places = zip(*(np.unique(a, return_inverse=True) for a in values), strict=True)
     if min(group.size for group in groups) < 2:
-        raise DataError("two shifts need two or more values of each group")
+        raise DataError("two shifts need two or more different values of each quantity")
     order = _serpentine(places[0], places[1])
     zeros = [_nearest(group, None if references is None else references[i]) for i, group in enumerate(groups)]
     ordered = [place[order] for place in places]
     design = np.hstack([np.eye(group.size)[place] for group, place in zip(groups, ordered, strict=True)])
     columns = np.delete(np.arange(design.shape[1]), [zeros[0], groups[0].size + zeros[1]])
     if np.linalg.matrix_rank((design - design[0])[1:, columns]) < columns.size:
-        raise DataError("the curves fall into parts that share neither group: measure one value of each with the other")
+        raise DataError(
+            "the curves fall into sets that share no value of either quantity: add a curve that connects the sets"
+        )
     free = superpose(np.arange(order.size), [curves[k] for k in order], "none", 0.0, seed)
     return _split(free, groups, ordered, zeros, design, columns)
 

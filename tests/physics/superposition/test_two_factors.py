@@ -55,7 +55,7 @@ def test_pairs_may_be_missing_and_references_chosen():
 def test_parts_that_share_no_group_are_refused():
     first, second, curves, *_ = family(3)
     kept = [0, 1, 7, 8]  # two velocities, each at temperatures of its own
-    with pytest.raises(DataError, match="fall into parts that share neither group"):
+    with pytest.raises(DataError, match="fall into sets that share no value"):
         superpose_twice(*([thing[k] for k in kept] for thing in (first, second, curves)))
-    with pytest.raises(DataError, match="two or more values of each group"):
+    with pytest.raises(DataError, match="two or more different values of each quantity"):
         superpose_twice(first[:5], second[:5], curves[:5])
