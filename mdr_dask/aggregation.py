@@ -205,7 +205,7 @@ def aggregate(dataset: xr.Dataset, statistics: Sequence[str] = NAMES) -> xr.Data
     -------
     Dataset
         A variable ``<output>_<statistic>`` for every output and statistic, with units and meaning in attrs. The
-        statistic ``grid_error`` exists only for outputs that have a companion with discretisation errors.
+        statistic ``grid_error`` exists only for outputs with known discretisation errors.
     """
     for name in statistics:
         if name not in NAMES:

@@ -70,9 +70,9 @@ def complete(values: FloatArray) -> FloatArray:
 
 
 def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
-    """Return values shifted up and down by their errors, one group of neighbours at a time, shape (2 groups, ...).
+    """Return values shifted up and down by their errors, shape (2 groups, ...); in each row only one group is shifted.
 
-    An infinite error shifts a value by the absolute value itself.
+    A value with an infinite error is shifted by its own absolute value.
     """
     size = np.where(np.isinf(errors), values, errors)
     flat = np.abs(np.where(np.isfinite(size), size, 0.0)).ravel()
@@ -92,7 +92,7 @@ def with_errors(stack: FloatArray, errors: FloatArray) -> FloatArray:
 def difference(one: FloatArray, other: FloatArray) -> FloatArray:
     """Return the stack of the difference of two stacks with the same resamples.
 
-    Its shifted rows are those for the errors of the first stack, then those for the errors of the second stack.
+    In the shifted rows, first the errors of the first stack shift the difference, then those of the second stack.
     """
     plain = 1 + RESAMPLES
     rows = [one[:plain] - other[:plain], one[plain:] - other[0], one[0] - other[plain:]]
@@ -108,7 +108,7 @@ def logarithms(stack: FloatArray) -> FloatArray:
 
 
 def _reach(shifts: FloatArray) -> FloatArray:
-    """Return the sum over all groups of the largest upward shift of each group.
+    """Return the largest upward shift of each group, summed over all groups.
 
     Each group has two shifts, one for each sign of the errors. A shift that is negative or NaN counts as 0.
     """

@@ -20,10 +20,11 @@ from mdr_dask.errors import CampaignError, ModelError, distinguishable
 from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, with_value
 from mdr_dask.models.numbers import numbers_of
 
-#: Number of operations of a block. They take about a second, of which only the order of magnitude is meant; scheduling
-#: and writing a block take milliseconds.
+#: Number of operations of a block. They take of the order of a second, whereas scheduling and writing a block take
+#: milliseconds.
 OPERATIONS = 1e9
-#: A small study has about this number of blocks, for several workers, but none of fewer than `LEAST` operations.
+#: A small study is cut into about this number of blocks, so that several workers can share it, but a block needs at
+#: least `LEAST` operations.
 FEW_BLOCKS, LEAST = 16, OPERATIONS / 10
 #: Blocks whose cases share work are always halved if they need more operations than this.
 MOST_SHARED = 30 * OPERATIONS
@@ -77,7 +78,7 @@ class Template:
         return tuple(math.ceil(size / self.chunks[dim]) for dim, size in self.sizes.items())
 
     def extra_shape(self, output: Output) -> tuple[int, ...]:
-        """Lengths of the dimensions of an output in addition to those of cases and realisations."""
+        """Lengths of the dimensions that an output has in addition to those of cases and realisations."""
         return tuple(self.extra[dim].values.size for dim in output.dims)
 
     @cached_property
@@ -142,7 +143,8 @@ class Template:
     def _operations(self, block: Block[Any]) -> float:
         """Return the number of operations of a block.
 
-        If the model does not count them, return a number with which a study has as many blocks as a block has results.
+        If the model does not count operations, the number is chosen so that a study has as many blocks as a block has
+        results.
         """
         count = models.load(self.campaign.model).operations
         if count is not None:
@@ -348,7 +350,7 @@ def _whole_dims(template: Template, model: Model[Any]) -> list[str]:
 
 
 def _is_cut(template: Template, chunks: Mapping[str, int], dim: str, most: float) -> bool:
-    """Return whether blocks should be halved along a dimension.
+    """Return whether blocks should be halved along a dimension along which cases share work.
 
     Blocks are halved if they need more than `most` operations. But if they need at most `MOST_SHARED`, they are halved
     only if the halves repeat little of the shared work (`REPEATED_WORK`).

@@ -1,9 +1,9 @@
 """Choose the values of an adaptive axis, stage after stage, until interpolation meets every tolerance.
 
 Outputs are interpolated by monotone cubics on the linear or logarithmic scale of the axis. Every new value lies halfway
-between two older values, so that neighbouring cases use the same values. To test an interval, the output in it is
-predicted without the newer one of its ends, from older values only. If the error of the prediction is within the
-tolerance, the interval is accepted. Otherwise the interval is halved.
+between two older values, so that neighbouring cases use the same values. An interval is tested by a prediction: the
+newer one of its two ends is ignored, and the output in the interval is predicted from older values only. If the error
+of the prediction is within the tolerance, the interval is accepted. Otherwise the interval is halved.
 """
 
 from __future__ import annotations
@@ -80,8 +80,8 @@ class Mesh:
     # Shape (values,): positions of the values of each adaptive axis, from 0 to 1 between the ends of the axis. The key
     # is the index of the axis among all axes of the series.
     shares: Mapping[int, FloatArray]
-    # Shape (values of the other axes that are not adaptive..., values): whether a value of an adaptive axis is needed,
-    # for each combination of values of the non-adaptive axes. The key is the index of the adaptive axis.
+    # Shape (lengths of the non-adaptive axes..., values): for each combination of values of the non-adaptive axes, the
+    # values of an adaptive axis that are needed. The key is the index of the adaptive axis.
     used: Mapping[int, BoolArray]
 
     @classmethod
@@ -164,10 +164,10 @@ class _Interval:
 def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]]:
     """Halve the intervals in which a test has not yet shown that interpolation meets the tolerance.
 
-    All needed cases of the mesh are computed, and `means` has each output for which an adaptive axis has a tolerance,
-    over the cases of the series. The returned mesh has more values; it is unchanged if no further value is needed or
-    allowed. Also return, for each adaptive axis, the number of combinations of non-adaptive values for which an
-    interval misses a tolerance or was not tested, but may not be halved.
+    All needed cases of the mesh must have results. `means` contains the means of each output for which an adaptive axis
+    has a tolerance. The returned mesh has more values; it is unchanged if no further value is needed or allowed. Also
+    return, for each adaptive axis, in how many combinations of non-adaptive values an interval remains that misses a
+    tolerance or was not tested, but may not be halved.
     """
     found, short = mesh, {}
     for number in mesh.used:
@@ -237,7 +237,7 @@ def _intervals(mesh: Mesh, number: int, means: Mapping[str, Mean]) -> Iterator[_
 
 
 def _lines(mean: Mean, number: int) -> Mean:
-    """Return the means as an array with one row for each line of cases along an axis."""
+    """Return the same means with one row for each line of cases along an axis."""
     groups = np.moveaxis(mean.groups, number + 1, -1)
     error = np.moveaxis(mean.error, number, -1)
     rows = math.prod(error.shape[:-1])
@@ -245,7 +245,7 @@ def _lines(mean: Mean, number: int) -> Mean:
 
 
 def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolerance) -> FloatArray:
-    """Return for each interval the interpolation error divided by the tolerance, the largest ratio of all lines.
+    """Return, for each interval, the largest ratio of interpolation error and tolerance of all lines.
 
     Failed cases are left out of their line. If every line has a failed case at an end of an interval, the ratio of this
     interval is minus infinity.
@@ -266,7 +266,7 @@ def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolera
 
 
 def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray, error: FloatArray) -> FloatArray:
-    """Return for each interval the error of a prediction from values that are older than its newer end.
+    """Return the interpolation error of each interval, from predictions that use older values only.
 
     A value of level n lies halfway between two values of lower levels. In the two intervals next to this value, the
     output is predicted from all values of lower levels, once by a monotone cubic and once by a cubic spline. Both
@@ -277,7 +277,8 @@ def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray
     the axis, 1 for its middle, 2 for the quarters, ... `groups`, shape (1 + groups, lines, values), are means as in
     `Mean.groups`, and `error`, shape (lines, values), their discretisation errors. The result, shape (lines, values -
     1), is the largest absolute difference between a prediction and the interpolation through all values, minus the part
-    that the scatter of the realisations and the discretisation errors can explain. It is negative if they explain more.
+    that the scatter of the realisations and the discretisation errors can explain. The result is negative if scatter
+    and errors can explain more than the difference.
     """
     from scipy.interpolate import CubicSpline, PchipInterpolator
     from scipy.special import ndtri

@@ -30,7 +30,7 @@ NEGLIGIBLE = 1e-3
 
 
 def next_round(replication: Replication, count: int, growth: NDArray[np.float64]) -> int:
-    """Return the number of realisations after the next round, given their number `count` so far.
+    """Return the number of realisations after the next round; `count` is their number so far.
 
     `growth` is the factor by which the number of realisations of each case must grow, at most 1 if the case has enough.
     """
@@ -50,15 +50,15 @@ def growth_needed(
     """Return the factor by which the number of results of each case must grow.
 
     `values` are the outputs that have a tolerance, shape (..., realisations), and `status` the ledger; only results
-    that are done are used. `until` is the largest allowed standard error of the mean of each output. `scatter` is the
-    standard error of an output in each single realisation, for outputs of which one realisation gives such an estimate.
+    that are done are used. `until` is the largest allowed standard error of the mean of each output. `scatter`
+    contains, for some outputs, the standard error that was estimated within each single realisation.
 
     The factor is at most 1 if the case has enough results for every tolerance, and 0 if the case has no successful
     result. A case has enough results for a tolerance if at least one of these conditions holds:
 
     * There are at least `FEWEST` results, and the standard error is within the tolerance.
     * The standard error is below the fraction `NEGLIGIBLE` of the tolerance.
-    * Both the standard error and the standard error from the estimates in `scatter` are within the tolerance.
+    * The standard error is within the tolerance, and so is the standard error that follows from `scatter`.
     """
     done = status == Status.DONE
     count = np.maximum(done.sum(axis=-1), 1)
@@ -76,7 +76,10 @@ def growth_needed(
 
 
 def known_scatter(model: Model[Any], until: Collection[str], outputs: Collection[str]) -> dict[str, str]:
-    """Return, for each output with a tolerance, the computed output that estimates its scatter from one realisation."""
+    """Return, for outputs with a tolerance, the outputs that estimate their scatter from one realisation.
+
+    An output without such an estimate, or whose estimate is not computed, is left out.
+    """
     scatter = {output: model.output(output).scatter for output in until}
     return {output: own for output, own in scatter.items() if own in outputs}
 

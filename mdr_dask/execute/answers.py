@@ -25,10 +25,12 @@ FEWEST = 10
 def cases_that_narrow(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, taken: Sequence[IntArray]
 ) -> list[BoolArray]:
-    """Return the cases that need more realisations: those on which a fitted constant with a too wide interval depends.
+    """Return the cases that need more realisations.
 
-    `places` are the positions of the cases of the stage in the store. `taken` is, for each group, the number of
-    realisations that are used of every case; further realisations in the store are ignored.
+    A case needs them if the interval of a fitted constant that depends on this case is too wide.
+
+    `places` are the positions of the cases of the stage in the store. `taken` contains, for each group, the number of
+    realisations of every case that are used. Further realisations in the store are ignored.
     """
     answers = stage.campaign.replication.answers
     if max(int(each.max()) for each in taken) < FEWEST:
@@ -77,7 +79,10 @@ def unanswered(url: str, stage: Stage, layout: Sequence[Template], taken: Sequen
 
 
 def _groups(url: str, stage: Stage, layout: Sequence[Template], taken: Sequence[IntArray]) -> dict[str, xr.Dataset]:
-    """Return the cases of a campaign by series. Realisations beyond the number in `taken` are NaN."""
+    """Return the cases of a campaign by series.
+
+    Failed realisations, and realisations beyond the number in `taken`, are NaN.
+    """
     opened, groups = store.datasets(url), {}
     for mesh, template, count in zip(stage.meshes, layout, taken, strict=True):
         name = template.series.name
@@ -98,6 +103,6 @@ def _coordinates(series: Series) -> dict[str, list[object]]:
 
 
 def _of_mesh(cases: xr.DataArray, mesh: Mesh) -> BoolArray:
-    """Return a mask of cases along the dimensions of a series, in the order of its axes and values."""
+    """Return a mask of cases with the dimensions of a series, in the order of its axes and of their values."""
     ordered = cases.sel({dim: own for dim, own in _coordinates(mesh.series).items() if dim in cases.indexes})
     return np.asarray(ordered.transpose(*mesh.series.sizes).to_numpy())

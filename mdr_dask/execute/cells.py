@@ -19,7 +19,7 @@ from mdr_dask.task import Work, versions
 
 @dataclass(frozen=True)
 class Cells:
-    """The results of a group that a round has to compute, and the results that it has to mark as not needed."""
+    """What a round has to do in one group: results to compute, and results to mark as not needed."""
 
     # The group.
     template: Template
@@ -36,7 +36,10 @@ class Cells:
         return int(np.count_nonzero(self.wanted) + np.count_nonzero(self.spared))
 
     def operations(self, index: BlockIndex) -> float:
-        """Return the operations of a block, in proportion to the number of results to compute in it."""
+        """Return the number of operations of the results to compute in a block.
+
+        It is the number for the whole block, multiplied by the fraction of its results to compute.
+        """
         part = float(np.mean(self.wanted[self.template.region(index)]))
         return part * self.template.operations(index) if part else 0.0
 
@@ -50,7 +53,7 @@ def find_cells(
     retry_failed: bool,
     own: NDArray[np.bool_] | None = None,
 ) -> Cells:
-    """Compare a round with the ledger.
+    """Compare a round with the ledger to find the results that are missing.
 
     `asked` marks the cases of the stage and `needed` the cases that need the realisations of the round. `realisations`
     contains the number of the first realisation of the round, and the number of the last one plus 1. `own` marks the
@@ -73,7 +76,7 @@ def find_cells(
 
 
 def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]]:
-    """Yield for each group an array with the number, from 1 to `count`, of the part that computes each result."""
+    """Yield, for each group, an array with the number of the part that computes each result, from 1 to `count`."""
     position = itertools.count()
     for template in layout:
         numbers = np.zeros(template.shape, dtype=np.int32)

@@ -110,7 +110,7 @@ def _require_guard() -> None:
 
 
 def _loggers(names: tuple[str, ...]) -> list[logging.Logger]:
-    """Return the named loggers and all loggers below them. Dask adds handlers also to the latter."""
+    """Return the named loggers and all loggers below them. Dask adds handlers to both."""
     below = [known for known in logging.root.manager.loggerDict for name in names if known.startswith(f"{name}.")]
     return [logging.getLogger(name) for name in (*names, *below)]
 

@@ -35,7 +35,7 @@ def of_block(name: str, work: Work, **facts: Any) -> Event:
 
 
 def ended(work: Work, outcome: Outcome) -> Event:
-    """Return the event of the end of a block. The block counts as failed if any of its results has failed."""
+    """Return an event about a block that has ended. The block counts as failed if any of its results has failed."""
     counts = {state.name.lower(): outcome.counts[state] for state in Status if outcome.counts[state]}
     failed = outcome.counts[Status.FAILED] + outcome.counts[Status.NOT_CONVERGED]
     seconds = outcome.compute_seconds + outcome.write_seconds

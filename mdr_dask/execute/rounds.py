@@ -31,7 +31,7 @@ from mdr_dask.store import Lock, Part
 from mdr_dask.task import Outcome, Work
 
 #: `LOOK`: time in s between two checks of the progress of other parts. `PAUSE`: time in s between two messages about
-#: it.
+#: this progress.
 LOOK, PAUSE = 1.0, 4.0
 
 
@@ -149,9 +149,9 @@ def outlook(campaign: Campaign, url: str) -> Progress:
     """Return how many results of a campaign are in its store and how many are missing. The store is not changed.
 
     If realisations are added in rounds, only the results of the first round are counted. If axes are adaptive, all
-    values that are known to be needed are counted. If both is the case, only the first values of these axes are
-    counted. Raise StoreError if the store was made from another campaign, and CampaignError if the campaign is too
-    large to be run.
+    values that are known to be needed are counted. If realisations are added in rounds and axes are adaptive, only the
+    first values of these axes are counted. Raise StoreError if the store was made from another campaign, and
+    CampaignError if the campaign is too large to be run.
     """
     stage: Stage | None = Stage.first(campaign)
     count = campaign.replication.at_least
@@ -233,7 +233,11 @@ def _run_rounds(
 
 
 def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], None], realisations: int) -> None:
-    """Run the rounds for fitted constants, with all values of the adaptive axes; mark missing results as not needed."""
+    """Finish a study whose adaptive axes need no more values.
+
+    If fitted constants have tolerances, add realisations until they are met. Then mark the results that are still
+    missing as not needed, because no tolerance requires them.
+    """
     layout, places = stored_layout(job.stage, job.url)
     if job.stage.campaign.replication.answers:
         job = replace(job, stage=replace(job.stage, new=tuple(mesh.cases for mesh in job.stage.meshes)))
@@ -259,7 +263,7 @@ def _without_answers(job: _Job) -> _Job:
 
 
 def _next(job: _Job, last: _Round | None) -> _Round:
-    """Return the next round. If any case needs it, lay out the store for it, while other parts wait."""
+    """Return the next round. If any case needs more realisations, extend the store for them, while other parts wait."""
     replication = job.stage.campaign.replication
     with store.gate(job.url):
         layout, places = stored_layout(job.stage, job.url)

@@ -55,9 +55,9 @@ def cases_of(stage: Stage, layout: Sequence[Template], places: Places, cases: Se
 def following(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, realisations: int
 ) -> tuple[Stage | None, Event]:
-    """Return the stage that follows a finished stage, or None if no values are needed, and an event with the choice.
+    """Return the stage that follows a finished stage, and an event about the choice of its values.
 
-    Of the results, only the first `realisations` realisations are used.
+    The stage is None if no further values are needed. Only the first `realisations` realisations of each case are used.
     """
     meshes, short = [], []
     facts: dict[str, int] = {}

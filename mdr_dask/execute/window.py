@@ -19,8 +19,8 @@ from mdr_dask.execute.children import Child, children, compute_apart
 from mdr_dask.execute.events import Event, Settle, Tell, of_block
 from mdr_dask.task import Outcome, Work, finished, one_blas_thread, run_block, write_off
 
-#: Time in s between two checks of the cluster. With this time and the next one, a user reads within five seconds that
-#: there is no worker.
+#: Time in s between two checks of the cluster. Because of this time and the next one, a user learns within five seconds
+#: that there is no worker.
 CHECK_PAUSE = 1.0
 #: Time in s between two messages that there is no worker.
 REPORT_PAUSE = 3.0
