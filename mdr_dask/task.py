@@ -162,8 +162,8 @@ LONGEST_MESSAGE = 1000
 def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
     """Call the model for a block.
 
-    If it raises an exception, call it for each result of the block separately, to find the failing results. If `is_own` is true, the user wrote the model. Then every exception counts as a failed case, and results are
-    checked.
+    If it raises an exception, call it for each result of the block separately, to find the failing results. If `is_own`
+    is true, the user wrote the model. Then every exception counts as a failed case, and results are checked.
     """
     is_single = block.cases == len(block.realisations) == 1
     try:
