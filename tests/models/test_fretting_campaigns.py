@@ -1,5 +1,6 @@
 """Fretting wear through the command line: units in the store, sharing of solutions, sliding, histories, bad input."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -7,20 +8,7 @@ import pytest
 import xarray as xr
 
 from mdr_dask.cli import main
-from mdr_dask.models.base import Block
-from mdr_dask.models.fretting_wear import MODEL, FrettingWear
-from mdr_dask.models.fretting_wear.declaration import Parabola
 
-SI = {
-    "indenter": Parabola(radius=0.01),
-    "contact_modulus": 115e9,
-    "effective_shear_modulus": 90e9,
-    "friction": 0.6,
-    "amplitude": 1e-6,
-    "normal_force": 50.0,
-    "hardness": 2e9,
-    "wear_coefficient": 1e-4,
-}
 STEEL = """\
   indenter: {shape: parabola, radius: 10 mm}
   contact_modulus: 115 GPa
@@ -89,11 +77,11 @@ def test_profiles_over_a_length_are_those_over_the_contact_radius(write):
         np.testing.assert_allclose(data[name], np.linspace(0.0, 2e-4, 9))
     for case, force in enumerate((50.0, 100.0)):
         a0 = (0.75 * force * 0.01 / 115e9) ** (1 / 3)
-        parameters = FrettingWear(**SI | {"normal_force": force}, points=9, extent=2e-4 / a0)
-        names = ("worn_profile", "worn_image")
-        alone = MODEL.compute(Block(parameters, {}, 1, (0,), 0, names))
-        for name in names:
-            np.testing.assert_allclose(data[name][case], alone.values[name][0, 0], rtol=1e-9)
+        shutil.rmtree("wear.zarr")
+        one = STEEL.replace("50 N", f"{force} N") + f"  points: 9\n  extent: {2e-4 / a0}\n"
+        alone = filled(write(one, outputs)).isel(realisation=0)
+        for name in ("worn_profile", "worn_image"):
+            np.testing.assert_allclose(data[name][case], alone[name].squeeze(), rtol=1e-9)
 
 
 def test_a_grid_over_friction_and_stiffness_is_solved_once_for_each_distinct_stick_radius(write, capsys):
