@@ -14,8 +14,8 @@ from mdr_dask.models.data_file import DataFile
 
 #: Digits of the values of a range: two fewer than a double has, so that rounding errors do not show.
 _DIGITS = 14
-#: Digits to which the values of an axis are compared: two fewer again, for values from different formulas. Values that
-#: agree are computed only once.
+#: Number of digits in which two values of an axis must agree to count as equal; equal values are computed only once.
+#: These are two fewer than `_DIGITS`, because the values may come from different formulas.
 SAME_DIGITS = 12
 #: Largest number of values that `Axis.some` returns, so that a check of an axis with a million values is fast.
 SOME = 64

@@ -18,8 +18,8 @@ from mdr_dask.campaign.problems import Path, Place, Problems, dotted
 from mdr_dask.errors import CampaignError
 
 _TAG = "tag:yaml.org,2002:"
-_DEEPEST = 50  # levels; no campaign has more than ten, and Python ends at about 1000
-_LARGEST = 200_000  # values of a file; aliases can make billions of a short text
+_DEEPEST = 50  # nesting levels; no campaign has more than ten, and Python can read about 1000
+_LARGEST = 200_000  # values of a file; by aliases, a short text can have billions of values
 _LONGEST = 300_000  # characters of a file; reading them takes about a second
 _TOO_DEEP = "too deeply nested, or an alias that contains itself"
 _MOST_DIGITS = 300  # digits of a number; a double has at most 309 before the point

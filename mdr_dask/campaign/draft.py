@@ -95,7 +95,7 @@ def _choices(info: FieldInfo) -> list[str]:
 
 
 def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str]:
-    """Return examples of a value as text: one for each structure that the value may have, or a single one."""
+    """Return example texts of a value, one for each structure that it may have, or one if it has no structure."""
     info = parameters.model_fields[name]
     kinds = list(fields.structures(info))
     if inner:
@@ -107,7 +107,7 @@ def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str
 
 
 def _structures(kind: type[BaseModel], inner: set[str]) -> list[str]:
-    """Return the texts of a structure on one line, one text for each of its alternatives."""
+    """Return a structure as text on one line, once for each of its alternatives."""
     group = next(iter(getattr(kind, "alternatives", ())), ())
     wanted = [{*fields.required(kind), *member} for member in group] or [_needed(kind)]
     open_keys = [key for key in kind.model_fields if key not in fields.fixed(kind)]

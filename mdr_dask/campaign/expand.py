@@ -22,7 +22,7 @@ from mdr_dask.campaign.written import questions
 from mdr_dask.models.base import Model, Parameters, with_value
 from mdr_dask.units import to_si
 
-#: Largest number of adaptive axes. With three, the number of cases would be that of a grid.
+#: Largest number of adaptive axes. With three adaptive axes, a study would need as many cases as a full grid.
 MOST_ADAPTIVE = 2
 
 
@@ -169,7 +169,7 @@ class _Expansion:
         values: list[Any] = []
         seen, are_valid = set(), None not in (base, last)
         for position, item in enumerate(one.items):
-            if item.inner and (not are_valid or independent):  # such a value is valid if both ends of the range are
+            if item.inner and (not are_valid or independent):  # valid if both ends of the range are valid
                 values.append(item.value)
                 continue
             checked = base if position == 0 else self._validate(known, [one], position, elsewhere)
@@ -270,7 +270,7 @@ class _Expansion:
     def _refined(
         self, axes: Sequence[Axis], variations: Sequence[Variation], model: Model[Any], outputs: Sequence[str]
     ) -> Iterator[Axis]:
-        """Yield the axes. An adaptive axis gets its refinement."""
+        """Yield all axes; the rule by which further values are chosen is added to each adaptive axis."""
         for axis, one in zip(axes, variations, strict=True):
             if one.written and one.spread:
                 found = refinement(self.document, one.written, one.spread, model, outputs)

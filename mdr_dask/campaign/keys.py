@@ -43,7 +43,7 @@ def _plain(value: Any) -> Any:
     if hasattr(value, "magnitude") and hasattr(value, "units"):
         return _quantity(_plain(value.magnitude), f"{value.units:~}")
     if isinstance(value, np.floating):
-        return tidy(float(str(value)), whole=False)  # the text of a float32, such as 0.1, is the number that was meant
+        return tidy(float(str(value)), whole=False)  # a float32 is printed as the number that was meant, such as 0.1
     if isinstance(value, np.generic):
         return value.item()
     array = value if isinstance(value, np.ndarray) else getattr(value, "values", None)

@@ -117,10 +117,11 @@ def read_measured(
 
 
 def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...], str, bool]:
-    """Return the headings of the errors of the output, the unit of errors without one, and whether errors are relative.
+    """Find the columns that contain errors of the output.
 
-    The output is the last of `columns`. Errors without a unit have the unit of the output. Errors in percent are
-    relative to the values, unless the values are in percent as well.
+    Return their headings, the unit of the errors if no heading states it, and whether the errors are relative. The
+    output is the last of `columns`. Errors without a unit have the unit of the output. Errors in percent are relative
+    to the values, unless the values are in percent as well.
 
     A heading without the name of a quantity, such as ``std``, means the error of the nearest known column before it.
     """
@@ -145,7 +146,7 @@ def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...],
 
 
 def _short_names(names: Sequence[str], structures: Iterable[str]) -> dict[str, list[str]]:
-    """Return for each nested parameter its name without the name of its structure, if this short name is unique."""
+    """Return, for nested parameters, the name without the name of the structure, if this short name is unique."""
     short = [(name, name.removeprefix(f"{one}_")) for one in structures for name in names if name.startswith(f"{one}_")]
     called = [*names, *(inner for _, inner in short)]
     return {name: [inner] for name, inner in short if called.count(inner) == 1}

@@ -17,8 +17,8 @@ from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.units import expected, likely, spelt
 
-#: Function that adds a problem. Its arguments are the path in the data, the message, and a truth value: whether the key
-#: at this path is wrong, and not the value.
+#: Function that adds a problem. Its arguments are the path in the data, the message, and a truth value: true if the key
+#: at this path is wrong, false if its value is wrong.
 Report = Callable[[Path, str, bool], None]
 
 _BOUNDS = {"greater_than": ("gt", "above"), "greater_than_equal": ("ge", "of at least")}
@@ -167,7 +167,7 @@ def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
 
 
 def _of_file(info: FieldInfo) -> list[str]:
-    """Return the keys in the structures of a field whose value is the name of a file."""
+    """Return, from the structures of a field, the keys whose values are names of files."""
     inner = [entry for one in fields.structures(info) for entry in one.model_fields.items()]
     named = (DataFile, NamedByFile)
     return [

@@ -72,13 +72,14 @@ def tabled(
     problems: Problems,
     remarks: list[str],
 ) -> tuple[Variation, ...] | None:
-    """Return the parameters with the values in the columns of a CSV file, one case in each line.
+    """Read the varied parameters from a CSV file: each column is a parameter, and each line is a case.
 
     Return None if there is a problem.
 
     `name` is the name of the file, relative to `directory`, and `origin` the position of this name in the campaign.
-    `data` are the values of the other parameters as read from the campaign file. `problems` receives misspelt columns,
-    units and missing cells; `remarks` receives a sentence about the columns that are not parameters.
+    `data` are the values of the other parameters as read from the campaign file. Problems of the table, such as
+    misspelt columns, wrong units and missing cells, are added to `problems`. A sentence that names the ignored columns
+    is added to `remarks`.
     """
     path = Path(directory, name)
     try:
@@ -113,9 +114,10 @@ def tabled(
 
 
 def _is_unused(heading: str, entries: Iterable[str], parameters: type[Parameters]) -> bool:
-    """Return whether a column is unused, because it is not a parameter.
+    """Return whether a column is ignored, which is the case if its heading does not name a parameter.
 
-    A column of numbers whose name is similar to that of a parameter counts as a misspelt parameter instead.
+    A column of numbers whose heading is similar to the name of a parameter is not ignored, but counts as a misspelt
+    parameter.
     """
     if heading.split(".")[0] in parameters.model_fields:
         return False

@@ -55,7 +55,8 @@ class Item(NamedTuple):
 class Variation:
     """A varied parameter: its path in the parameters, and its values or the interval from which they are drawn.
 
-    An adaptive axis has both values and an interval; `written` is its path in the document.
+    An adaptive axis has both values and an interval; for such an axis, `written` is the path of its entry in the
+    document.
     """
 
     path: tuple[str, ...]

@@ -42,8 +42,8 @@ def questions(
 ) -> Iterator[str]:
     """Yield a question for each parameter with a number without a unit that may not be meant in SI.
 
-    `data` are the values of the parameters as read from the file, and `paths` their paths in the document. `units` are
-    the units that differ from the declared units of parameters, as in a dimensionless campaign.
+    `data` are the values of the parameters as read from the file, and `paths` their paths in the document. `units`
+    contains the units of the parameters whose unit differs from the declared one, as in a dimensionless campaign.
     """
     asked: set[Path] = set()
     for name, given in data.items():
