@@ -120,7 +120,9 @@ def test_a_series_named_like_an_array_at_the_root_and_a_study_beside_series_are_
         run(series, url)
     assert digests(url) == before
     run(series, url + "2")
-    with pytest.raises(StoreError, match="series: height in the store, none in the campaign: name this one as well"):
+    with pytest.raises(
+        StoreError, match="series: height in the store, none in the campaign: give this one a named series"
+    ):
         run(plain, url + "2")
 
 

@@ -61,8 +61,8 @@ def write_block(
     digest of every chunk. So if a task is killed while it writes, its chunks can be identified.
 
     `attempt` is the number of times that the computation of the block was started, including this one. Each of the
-    `values` has the shape of the region, followed by the further dimensions of the output; there are none if only the
-    ledger changes. `status` is the ledger of the block, and `record` its record without digests.
+    `values` has the shape of the region, followed by the further dimensions of the output. `values` is empty if only
+    the ledger changes. `status` is the ledger of the block, and `record` its record without digests.
     """
     arrays, encoded = _in_memory(place.url, place.series, place.layout)
     given = {**values, "status": status}
@@ -127,9 +127,9 @@ def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
 
 @lru_cache(maxsize=64)
 def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict[str, Buffer]]:
-    """Return arrays in memory with the metadata of the stored arrays, and a dictionary.
+    """Return empty arrays in memory with the metadata of the stored arrays, and a dictionary.
 
-    The dictionary contains the encoded chunks of what is written to the arrays.
+    Whatever is written to the arrays appears in the dictionary as encoded chunks.
     """
     shown, encoded = _arrays(url, series, layout), dict[str, Buffer]()
     memory = zarr.storage.MemoryStore(encoded)

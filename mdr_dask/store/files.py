@@ -163,7 +163,7 @@ def write_bytes(url: str, name: str, content: bytes) -> None:
 
 
 def write_stages(url: str, stages: Iterable[Mapping[str, bytes]]) -> None:
-    """Write files in stages: each file is replaced in one step, after all files of the stages before it.
+    """Write files in stages: each file is replaced in one step, after all files of the earlier stages.
 
     On a disk, the contents of all files are first written and flushed under temporary names. Then the files of all
     stages except the last one get their final names, and their folders are flushed. Finally the files of the last stage
@@ -221,7 +221,7 @@ def give_name(leftover: Path, target: Path) -> None:
 
 
 def _make(folder: Path) -> list[Path]:
-    """Make a folder and its missing parents. Return the folders that have new entries, or may have new entries."""
+    """Make a folder and its missing parents. Return the folders that may have new entries."""
     if folder.is_dir():
         return []
     above = [*_make(folder.parent), folder.parent]

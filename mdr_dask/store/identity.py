@@ -114,7 +114,9 @@ def _study_differences(url: str, campaign: Campaign) -> list[str]:
     found = [_difference(key, root[key], value) for key, value in now.items() if root[key] != value]
     names, names_now = series_names(url), [series.name for series in campaign.series]
     if "" in names_now and not {"", ROOT} & set(names):
-        found.append(f"series: {' '.join(names)} in the store, none in the campaign: name this one as well")
+        found.append(
+            f"series: {' '.join(names)} in the store, none in the campaign: give this one a named series as well"
+        )
     members = (document(url) or {})["consolidated_metadata"]["metadata"]
     arrays = {name for name, member in members.items() if member["node_type"] == "array"}
     found += [f"series {name}: an array of the store has that name" for name in names_now if name in arrays]
@@ -204,7 +206,9 @@ def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, 
 
 
 def _entries(columns: list[list[Any]]) -> dict[tuple[str, int], int]:
-    """Return the position of every entry of a dimension; the keys are its values as text, and a counter of equal ones.
+    """Return the position of every entry of a dimension.
+
+    A key consists of the values of the entry as text, and a counter of the earlier entries with the same values.
 
     Values that agree to `SAME_DIGITS` are equal. The counter is needed because sampled whole numbers may repeat a case.
     """

@@ -441,7 +441,7 @@ def _make_claim(url: str, name: str, owner: str) -> int:
     number = max(standing, default=0) + 1
     content = json.dumps({"owner": owner, "who": _this_process(), "time": time.time()}).encode()
     if not create(url, _claim(name, number), content):
-        # the claim is this run's own if only the reply to the request was lost
+        # if only the reply to the request was lost, the claim belongs to this run
         if _read_claim(url, _claim(name, number)).get("owner") != owner:
             raise _busy(url, _holder(url, name))
     elif not name and (not conditional(url) or create(url, _claim(name, number), content)):

@@ -118,7 +118,7 @@ def kinds(url: str, series: Sequence[str]) -> dict[str, int]:
 
 
 def merge_records(url: str, series: str) -> None:
-    """Merge the records of single blocks into files of many.
+    """Merge the records of single blocks into files that hold many records each.
 
     The record of a block that is not in the ledger is not merged. If two processes merge at the same time, or if a
     process is killed while merging, some records are in two files. Readers use each record only once.

@@ -61,7 +61,7 @@ def group_document_of(root: bytes, series: str) -> Mapping[str, Any] | None:
 
 @lru_cache(maxsize=32)
 def _checked(content: bytes, group: str) -> tuple[dict[str, Any] | None, str | None]:
-    """Return the metadata of a study, or of one of its groups, and the first fault in these metadata, or None."""
+    """Return the metadata of a study or of one of its groups, and the first fault in them (None without a fault)."""
     found = parsed(content)
     if not isinstance(found, dict) or not isinstance(found.get("attributes", {}), dict):
         return found, " is damaged"
@@ -78,7 +78,7 @@ def _checked(content: bytes, group: str) -> tuple[dict[str, Any] | None, str | N
 
 
 def _group(root: Mapping[str, Any], group: str) -> tuple[dict[str, Any] | None, str | None]:
-    """Return the metadata of a group, taken from those of its study, and the first fault in them, or None."""
+    """Return the metadata of a group from those of its study, and the first fault in them (None without a fault)."""
     members = root["consolidated_metadata"]["metadata"]
     if members.get(group, {}).get("node_type") != "group":
         return None, None
@@ -89,7 +89,7 @@ def _group(root: Mapping[str, Any], group: str) -> tuple[dict[str, Any] | None, 
 
 
 def members_of(members: Mapping[str, Any], group: str) -> dict[str, Any]:
-    """Return the members of a group by their names in it, from all members of a study."""
+    """Return those members of a study that lie in a group, by their names inside the group."""
     return {name.removeprefix(f"{group}/"): each for name, each in members.items() if name.startswith(f"{group}/")}
 
 

@@ -85,7 +85,7 @@ def repair(url: str) -> tuple[Inspection, Inspection]:
 
     Damaged metadata are written again. Damaged coordinates and damaged blocks are removed, and the next run writes them
     again. Damaged records, and foreign files in the folders of chunks and records, are removed. Other foreign files are
-    kept. Errors are those of `verify`; a store that cannot be written is one, too.
+    kept. Raise the same errors as `verify`, and StoreError also if the store cannot be written.
     """
     refuse_file(url)
     with exclusive(url):
