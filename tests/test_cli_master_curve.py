@@ -74,10 +74,10 @@ def test_factors_and_merged_curve_are_written_and_kept_results_are_recognised(tm
     assert factors.read_text().splitlines()[0].startswith("T [degC],shift_factor,shift_factor_error")
     assert curve.read_text().splitlines()[0] == "curve,t [s],E_relax [MPa],curve_error"
     printed = capsys.readouterr()
-    assert "the law wlf misses the factors by" in printed.err
+    assert "the law wlf deviates from the factors by" in printed.err
     assert "shifted: E_relax; a modulus: b_T" in printed.err
     assert main(["master-curve", str(other), "--vertical", "free"]) == 2
-    assert "is a kept result, of which only --reference may change" in capsys.readouterr().err
+    assert "is a result of --keep, for which only --reference can be changed" in capsys.readouterr().err
 
 
 def test_a_file_that_holds_no_master_curve_is_named(tmp_path, capsys):

@@ -120,7 +120,7 @@ def main(arguments: list[str] | None = None) -> int:
         say("interrupted; finished results are kept; the same command computes the others", err=True)
         return INTERRUPTED
     except MdrDaskError as error:
-        logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # hides messages of cancelled Zarr tasks
+        logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # hides messages about cancelled tasks of Zarr
         say(str(error), err=True)
         return 2
     except OSError as error:
@@ -134,10 +134,10 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _open_streams() -> None:
-    """Replace missing standard streams, and print characters that their encoding lacks as ASCII escapes."""
+    """Replace missing standard streams; characters that the encoding of a stream lacks are printed as ASCII escapes."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
-        if stream is None:  # closed by a service manager or with >&-
+        if stream is None:  # a service manager or >&- has closed the stream
             setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
         elif isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")

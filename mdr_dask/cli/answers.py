@@ -67,7 +67,7 @@ def write_answer(answer: Table, path: Path) -> int:
 def check_target(path: Path) -> None:
     """Raise an error if a table cannot be written to a path.
 
-    This is so if the suffix is unknown, if there is the store of a study, and for Parquet without pyarrow.
+    The reason is an unknown suffix, the store of a study at this path, or Parquet without pyarrow.
     """
     from mdr_dask.store import is_study
 

@@ -134,7 +134,7 @@ def _require_quantities(units: Mapping[str, str], groups: Mapping[str, xr.Datase
 
 
 def _with_notes(figure: Plot, where: str, warnings: list[str]) -> Plot:
-    """Return a figure that names the condition of its cases, and shows the warnings of its results."""
+    """Return a figure with notes: the condition `where` for its cases, and the warnings about the results."""
 
     def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
         drawn = replace(figure.draw(groups), warnings=warnings)
@@ -205,7 +205,7 @@ def _requested(
     groups: Mapping[str, xr.Dataset],
     axes: Mapping[str, Any],
 ) -> dict[str, Plot]:
-    """Return the requested figures, by the names for their files."""
+    """Return the requested figures; the keys become the names of their files."""
     given = [option for option in OF_OUTPUTS if axes[option]]
     if everything:
         if names or given:
@@ -304,7 +304,7 @@ def _save(description: Figure, path: Path, origin: Mapping[str, str]) -> list[st
 
 
 def _tell_notes(notes: Mapping[str, Sequence[str]]) -> None:
-    """Print the notes about figures, each of them once, after the names of the figures that it is about."""
+    """Print each note once, after the names of the figures to which it applies."""
     for note in dict.fromkeys(chain.from_iterable(notes.values())):
         about = [name for name, own in notes.items() if note in own]
         tell(f"{'all figures' if len(about) == len(notes) > 1 else ', '.join(about)}: {note}")

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def telling(quiet: bool, log: Path | None, **about: Any) -> Iterator[Tell]:
     """Yield the function that writes the events of a run to its log, and their messages to stderr unless `quiet`.
 
-    The log is appended to the file `log`. With None, no log is written. `about` are the contents of its first line.
+    The events are appended to the file `log`. With None, no log is written. `about` is the content of the first line.
     """
     if log is None:
         yield _printer(quiet)

@@ -102,7 +102,7 @@ def master_curve(
         curve = superpose(_open(source, series, selections), over, ordinates or None, by, vertical, reference)
     elif vertical or over or ordinates or by or selections or series:
         raise click.UsageError(
-            f"{source} is a kept result, of which only --reference may change: give the table itself"
+            f"{source} is a result of --keep, for which only --reference can be changed: give the original table"
         )
     else:
         curve = kept if reference is None else rereferenced(kept, reference)
@@ -207,7 +207,7 @@ def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
     if "second" in curve.attrs:
         click.echo(
             f"shift = {by} part + {curve.attrs['second']} part, zero at {curve.attrs['second_reference']:.6g}; "
-            f"chi-squared of the sum {curve.attrs['chi_squared']:.3g} a degree of freedom, "
+            f"chi-squared of the sum {curve.attrs['chi_squared']:.3g} per degree of freedom, "
             f"probability {curve.attrs['probability']:.2g}",
             err=True,
         )
@@ -227,7 +227,8 @@ def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
     for law in LAWS:
         if f"{law}_residual" in curve:
             click.echo(
-                f"the law {law} misses the factors by {float(curve[f'{law}_residual']):.2g} decades (rms)", err=True
+                f"the law {law} deviates from the factors by {float(curve[f'{law}_residual']):.2g} decades (rms)",
+                err=True,
             )
     if "law_holds" in curve:
         click.echo(f"law_holds = {curve['law_holds'].item()}", err=True)
@@ -238,7 +239,7 @@ def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
 
 
 def _print_outliers(curve: xr.Dataset) -> None:
-    """Print the number of points that are farther from the curve than scatter explains, and the farthest of them."""
+    """Print the number of points whose distance from the curve scatter cannot explain, and the farthest point."""
     import numpy as np
 
     x, y = np.log10(curve["point_abscissa"].to_numpy()), np.log10(curve["point_ordinate"].to_numpy())

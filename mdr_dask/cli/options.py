@@ -148,7 +148,7 @@ _QUESTION = (
 
 
 def question_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options that show and aggregate have in common."""
+    """Add the options that the commands `show` and `aggregate` have in common."""
     for option in reversed(_QUESTION):
         command = option(command)
     return command

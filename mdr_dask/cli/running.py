@@ -112,7 +112,7 @@ def _print_plan(study: Campaign, url: str, form: str | None) -> None:
 
 
 def _counted(study: Campaign, to_do: int) -> str:
-    """Return a text that says which results are counted, if the run may add more; otherwise an empty text."""
+    """Return a text that states which results are counted; it is empty if the run adds no further results."""
     if study.replication.goes_on:
         return "first round"
     is_adaptive = any(axis.refinement is not None for series in study.series for axis in series.axes)

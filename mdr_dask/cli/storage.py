@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @click.option("--limit", type=click.IntRange(min=0), default=40, show_default=True, help="Most lines; 0 for all.")
 @click.option("--json", "form", flag_value="json", help="Print one JSON document.")
 def verify(store: str, repair: bool, limit: int, form: str | None) -> int:
-    """Read every file of a store and name what is damaged, missing or foreign; exit code 1 if anything is.
+    """Read every file of a store, and list damaged, missing and foreign files; exit code 1 if there are any.
 
     \b
     mdr-dask verify results/quickstart.zarr

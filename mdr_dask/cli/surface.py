@@ -114,7 +114,7 @@ def _read(files: tuple[str, ...], kind: str | None, options: dict[str, Any]) -> 
 
 
 def _as_options(message: str) -> str:
-    """Replace parameter names of a campaign in a message by the options of this command."""
+    """In a message, replace the names of parameters of a campaign by the options of this command."""
     message = re.sub(r"`(map|scan|spectrum)` instead of `\w+`", r"--as \1", message)
     names = "|".join(option.name or "" for option in surface.params)
     return re.sub(rf"`({names})(?:: (\w+))?`", lambda m: " ".join(filter(None, (_option(m[1]), m[2]))), message)
