@@ -20,7 +20,7 @@ from mdr_dask.plots.measured import HALF, conditions
 
 #: `SAMPLES`: number of posterior samples for the band of predictions. `BINS`: number of bins of a density.
 SAMPLES, BINS = 400, 60
-#: Weights of neighbouring bins with which a density is smoothed.
+#: A density is smoothed: each bin becomes the mean of its neighbours with these weights.
 SMOOTH = np.array([0.1, 0.2, 0.4, 0.2, 0.1])
 Points = NDArray[np.intp]
 
@@ -29,8 +29,8 @@ def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Return a figure of measured points with the band of predictions, residuals, and the density of each unknown.
 
     The bars are 95 % intervals of the errors of measurement; the band is the 95 % interval of the posterior. A density
-    is grey if the data do not determine the unknown. Further panels show products of undetermined unknowns that the
-    data determine.
+    is grey if the data do not determine the unknown. If the data determine only a product of unknowns, a further panel
+    shows this product.
     """
     found, series, data = _first(groups)
     varied = found.measured.conditions
@@ -51,7 +51,7 @@ def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
 
 
 def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.Dataset]:
-    """Return the calibration of the first series that can be compared with its table."""
+    """Return the calibration of the first series that can be compared with its table of measurements."""
     reasons = []
     for name, dataset in groups.items():
         try:
@@ -166,7 +166,7 @@ def _density(found: fit.Calibration, name: str, values: FloatArray, how: labels.
 
 
 def of_whole_cells(ends: FloatArray, across: FloatArray, place: FloatArray, width: float) -> FloatArray:
-    """Return edges of bins that contain equal numbers of cells; unequal numbers would look like peaks."""
+    """Return edges of bins with equal numbers of cells of the posterior; unequal numbers would look like peaks."""
     low, high = int(place.argmin()), int(place.argmax())
     cell = width * (across[high] - across[low]) / (place[high] - place[low])
     start = across[low] - cell / 2

@@ -38,7 +38,10 @@ def colour(number: int) -> str:
 
 
 def line_and_marker(number: int) -> tuple[str, str]:
-    """Return line and marker of a curve. They differ between curves if the style is grey, or if it defines them."""
+    """Return line and marker of a curve.
+
+    They differ between curves if the style is grey, or if the style defines lines and markers.
+    """
     from matplotlib.colors import to_rgb
 
     greys = all(len(set(to_rgb(each))) == 1 for each in _cycle("color") or COLOURS)

@@ -228,7 +228,7 @@ def _split(data: xr.Dataset, dims: list[str], joined: bool) -> tuple[list[Curve]
     curves = []
     for part, label, cell in zip(parts, named, cells, strict=True):
         k = cell[1] if second else 0
-        marker = "." if bar and joined else colours.MARKERS[k]  # small, because there are many curves
+        marker = "." if bar and joined else colours.MARKERS[k]  # a small marker, because there are many curves
         curves.append(Curve(part, label, shades[cell[0]], colours.LINES[k] if joined else "", marker))
     keys = []
     if bar is None:

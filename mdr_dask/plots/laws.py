@@ -26,7 +26,10 @@ LINE = {"shear_modulus", "relaxation_time", "rms_roughness", "length", "hurst", 
 
 
 class Law(NamedTuple):
-    """A law: its name in the legend, and a function that returns its values in SI from parameters and `NEEDED`."""
+    """A law: its name in the legend, and a function that computes its values in SI.
+
+    The arguments of the function are parameters and the outputs `NEEDED`.
+    """
 
     name: str
     value: Callable[[xr.Dataset], xr.DataArray]

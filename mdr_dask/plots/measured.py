@@ -16,7 +16,7 @@ from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Figure, Key, Mean, Panel, Trace, columns
 from mdr_dask.units import shown
 
-#: Largest relative difference up to which a measured condition counts as equal to the value of a curve or panel.
+#: A measured condition and the value of a curve or panel count as equal up to this relative difference.
 SAME = 1e-3
 #: Half width of a 95 % interval, in standard errors.
 HALF = 1.96
@@ -75,7 +75,7 @@ def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
 
 
 def _apart(measured: Measured, data: xr.Dataset) -> list[str]:
-    """Return a sentence if all measured points lie above all results of a study, or below all of them; else nothing."""
+    """Return a sentence if all measured points lie above all results of a study, or all lie below; else nothing."""
     study = data[measured.output].to_numpy()
     low, high = (
         find(study[np.isfinite(study)], initial=start) for find, start in ((np.min, np.inf), (np.max, -np.inf))

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 ALONE, BESIDE, WIDE, NARROW = 6.4, 4.2, 3.0, 1.5
 #: `LEAST_HEIGHT`: least height of a panel in inches. `MOST_COLUMNS`: usual largest number of panels in a row.
 LEAST_HEIGHT, MOST_COLUMNS = 1.3, 3
-#: `SLENDER`: largest height of a figure over its width, unless its panels would be lower than `LEAST_HEIGHT`.
+#: `SLENDER`: largest ratio of height to width of a figure, unless its panels would be lower than `LEAST_HEIGHT`.
 SLENDER = 2.0
 #: Largest share of the height that the legend may take; entries that do not fit are left out.
 LEGEND_SHARE = 0.35
@@ -81,7 +81,7 @@ class Drawn(MplFigure):
 
 
 def table_beside(path: str | Path) -> Path:
-    """Return the path for the table of a figure; raise DataError if a file that is no such table has this path."""
+    """Return the path for the table of a figure; raise DataError if another kind of file has this path."""
     beside = Path(path).with_suffix(".csv")
     if beside.exists() and not beside.read_bytes().startswith(b"# mdr_dask"):
         raise DataError(f"{beside} exists and was not written beside a figure; choose another name for the figure")
@@ -374,7 +374,7 @@ def _legend(figure: Drawn, keys: list[Key]) -> float:
 def _fit(figure: Drawn, places: list[Axes]) -> None:
     """Break labels into lines that are not longer than their axes, and thin out ticks that overlap.
 
-    Each change may move the axes, so this is repeated, four times at most.
+    Each change may move the axes, so both are repeated, four times at most.
     """
     for _ in range(4):
         figure.draw_without_rendering()

@@ -22,7 +22,10 @@ METHOD = r"line of the method, $\pi q\,C^{2D}$"
 
 
 def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...]) -> Figure:
-    """Return the figure: C2D of every file with a power law, and C1D of the line of a campaign and of straight cuts.
+    """Return the figure of a measured surface.
+
+    One panel shows C2D of every file with a power law. The other panel shows the spectra of the lines that represent
+    the surface in a campaign, and of straight cuts.
 
     Parameters
     ----------

@@ -89,9 +89,10 @@ class View:
 
 
 def main_axis(groups: Mapping[str, xr.Dataset], output: str, without: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the parameter with the most values, as `View.over` for an output.
+    """Return the parameters for `View.over` of an output: the parameter with the most values.
 
-    It is none of the parameters `without`. For a sampled study, the result is empty, so that main effects are drawn.
+    Parameters in `without` are not considered. If the output has a dimension of its own, such as time, the result is
+    this dimension. For a sampled study the result is empty, so that main effects are drawn.
     """
     found: dict[str, int] = {}
     for data in (data for data in groups.values() if output in data):
@@ -251,7 +252,8 @@ def _lines(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     panels = [_panel(part, each, view, output, x) for part, each in zip(parts, families, strict=True)]
     first = next(iter(found.values()))
     log = view.is_log("y", np.concatenate([_values(panel) for panel in panels]))
-    log &= view.log is not None or not labels.quantity(output, first[output]).offset  # by default not for degC
+    # by default, the axis of a temperature in degC is not logarithmic
+    log &= view.log is not None or not labels.quantity(output, first[output]).offset
     y = Axis(labels.label(output, first[output]), log, quantity=output)
     for panel in panels:
         panel.y = y
@@ -400,7 +402,7 @@ def _counted(data: xr.Dataset, output: str) -> xr.Dataset:
 
 
 def _absent(curve: curves.Curve, x: xr.DataArray, output: str, marked: dict[str, str]) -> list[Trace]:
-    """Return marks at the lower edge of a panel, with reasons, for cases in which some realisations have no value."""
+    """Return marks at the lower edge of a panel for cases without a value or with failed realisations."""
     data = curve.data
     if "status" not in data:
         return []
@@ -428,7 +430,7 @@ def _absent(curve: curves.Curve, x: xr.DataArray, output: str, marked: dict[str,
 def _map(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     """Draw an output against two parameters: a grid as cells, or the cases of a sampled study as points."""
     if view.by or (view.panels and len(found) > 1):
-        raise DataError("expected a map of one series, without --by: the colours are the values")
+        raise DataError("expected a map of one series, without --by, because colours show the values")
     parts, left_out = _by_value(found, view) if view.panels else _by_series(found)
     drawn = []
     for part in parts:
@@ -471,12 +473,12 @@ def _effects(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure
     """Draw the mean of an output against each parameter of a series, averaged over all other parameters."""
     if len(found) > 1 or view.by or view.panels:
         raise DataError(
-            f"expected one series, without --by and --panels, got {', '.join(found)}: effects fill a figure"
+            f"expected one series, without --by and --panels, got {', '.join(found)}: main effects need a whole figure"
         )
     ((_, data),) = found.items()
     names = varied(data, output)
     if not names:
-        raise DataError(f"{output} varies along nothing: it has no effects")
+        raise DataError(f"expected an output that varies with a parameter, got {output}")
     how = labels.quantity(output, data[output])
     cases = how.of(aggregation.mean(data[output]))
     y = Axis(labels.with_unit(how.symbol, how.unit), view.is_log("y", cases), quantity=output)

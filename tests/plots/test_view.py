@@ -178,7 +178,7 @@ def test_words_are_ticks_and_cases_without_value_are_marked(tmp_path, monkeypatc
         (View(MU, "rms_roughness"), "is fixed"),
         (View(MU, "velocity", by="velocity"), "requested twice"),
         (View(MU, ("velocity", "hurst"), by="normal_force"), "without --by"),
-        (View(MU, by="hurst"), "effects fill a figure"),
+        (View(MU, by="hurst"), "main effects need a whole figure"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused_with_the_reason(groups, view, message):
