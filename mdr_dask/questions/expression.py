@@ -63,7 +63,7 @@ class Value(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """Numpy's letter for the data type. A lazy array is not loaded to find it."""
+        """Numpy's letter for the data type. A lazy array is not loaded for this."""
         return str((self.array if hasattr(self.array, "dtype") else np.asarray(self.array)).dtype.kind)
 
 
@@ -104,8 +104,8 @@ def parse(text: str) -> Expression:
 def evaluate(expression: Expression, find: Find, known: Sequence[str] = ()) -> Value:
     """Return the value of an expression.
 
-    `find` returns the values of a name, or None if there is no such name. Their SI unit is in ``attrs["units"]``.
-    `known` are all names; the message about an unknown name suggests one of them.
+    `find` returns the values of a name, or None if there is no such name. The SI unit of the values is in
+    ``attrs["units"]``. `known` are all names; the message about an unknown name suggests one of them.
 
     Raises
     ------

@@ -50,8 +50,8 @@ def counts(url: str) -> list[dict[str, Any]]:
 def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the current messages of a series.
 
-    For each result, the message of the last attempt is used. It is left out if the state of the result has changed
-    since.
+    For each result, the message of the last attempt is used. If the state of the result has changed since this message,
+    the message is left out.
     """
     last: dict[tuple[int, ...], dict[str, Any]] = {}
     telling = [record for record in store.records(url, series) if record["messages"]]
@@ -66,8 +66,8 @@ def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]
 def grouped(found: Sequence[dict[str, Any]], studies: Mapping[str, xr.Dataset]) -> list[Group]:
     """Group messages that differ only in their numbers, in the order of their first appearance.
 
-    Several warnings of one result are grouped one by one. `studies` are the groups of the study by series; they
-    contain the units of the axes, in which the messages are written.
+    If one result has several warnings, they are separate messages. `studies` are the groups of the study by series.
+    Quantities in the messages are converted to the units of the campaign file, which the groups contain.
     """
     wanted = {name: _units(study) for name, study in studies.items()}
     groups: dict[tuple[str, str, str], list[tuple[str, Any]]] = {}
@@ -104,7 +104,11 @@ _QUANTITY = re.compile(
 
 
 def _units(study: xr.Dataset) -> dict[str, str]:
-    """Return the unit in which the campaign file of a study writes all quantities of a SI unit, by SI unit."""
+    """Return the units of the campaign file of a study by SI unit.
+
+    A SI unit is left out if the campaign file uses several units for it. Temperatures are in degC unless the file uses
+    another unit.
+    """
     found: dict[str, set[str]] = {"K": {"degC"}}
     written = as_written(study)
     for name, unit in written.items():
@@ -114,7 +118,7 @@ def _units(study: xr.Dataset) -> dict[str, str]:
 
 
 def _converted(text: str, units: Mapping[str, str]) -> str:
-    """Return a message whose quantities have the units of a campaign file."""
+    """Return a message with its quantities converted to the units of a campaign file."""
 
     def convert(found: re.Match[str]) -> str:
         first, rest, unit = found.groups()

@@ -62,7 +62,7 @@ def select_all(
 ) -> dict[str, xr.Dataset]:
     """Apply each selection to every series in which the selected parameter varies.
 
-    If it varies in no series, apply the selection to the first series.
+    If the parameter varies in no series, apply the selection to the first series.
     """
     chosen = dict(datasets)
     for text in selections:

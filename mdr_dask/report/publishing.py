@@ -20,7 +20,7 @@ from mdr_dask.report.page import page
 from mdr_dask.report.study import Study, read_study
 from mdr_dask.store import CHECKSUMS, PUBLISHED
 
-#: Endings of files that are compressed in the zip. Chunks are not, because they are compressed already.
+#: Endings of files that are compressed in the zip. Chunks are compressed already and stay as they are.
 TEXTS = (".json", ".jsonl", ".html", ".txt", ".yaml", ".csv", ".sha256")
 
 
@@ -75,7 +75,10 @@ def _put(packed: zipfile.ZipFile, name: str, content: bytes) -> None:
 
 
 def _campaign(url: str, study: Study) -> tuple[bytes, dict[str, bytes]]:
-    """Return the campaign and the files that it names; files from other folders get new names, also in the campaign."""
+    """Return the campaign and the files that it names.
+
+    Files from other folders get new names, and the campaign refers to them by these names.
+    """
     text, found = study.campaign, {}
     for file in _named_files(url):
         name = PurePosixPath(str(file["name"]).replace("\\", "/"))

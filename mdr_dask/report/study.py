@@ -331,7 +331,7 @@ def _cell(value: xr.DataArray) -> str:
 
 
 def _errors(name: str, data: xr.Dataset) -> Iterator[Table]:
-    """Yield a table of the errors of the means, divided into errors by scatter of the realisations and by the grid."""
+    """Yield a table of the errors of means: the error due to scatter of the realisations, and the grid error."""
     rows = []
     for output in main_outputs(data):
         if "realisation" not in data[output].dims or set(data[output].dims) > set(data["status"].dims):
