@@ -169,7 +169,7 @@ def settled(problem: Problem) -> Any:
 
 
 def at(problem: Problem, history: Sequence[Any], time: float, tolerance: float) -> tuple[int, Any]:
-    """Return the number of steps before a time, and the moment at this time, computed by one additional step.
+    """Return the number of steps before a time, and the moment at this time, computed by one additional step or a few.
 
     Parameters
     ----------
@@ -181,17 +181,24 @@ def at(problem: Problem, history: Sequence[Any], time: float, tolerance: float) 
     Raises
     ------
     NotConvergedError
-        If the step fails.
+        If the step fails even if it is divided.
     """
     before = int(np.searchsorted([moment.time for moment in history], time))
     if history[before].time == time:
         return before, history[before]
     if time < np.finfo(np.float64).tiny:  # the inverse of such a time overflows
         return 0, history[0]
-    moment, _ = _try_step(problem, _Newton(problem, tolerance), history[:before], time)
-    if moment is None:
-        raise NotConvergedError(f"the wear law has no solution at {time:.6g}")
-    return before, moment
+    newton, past, next_time = _Newton(problem, tolerance), list(history[:before]), time
+    while past[-1].time < time:
+        moment, _ = _try_step(problem, newton, past, next_time)
+        if moment is not None:
+            past.append(moment)
+            next_time = time
+        elif next_time - past[-1].time > SHORTEST * (time - past[-1].time):
+            next_time = past[-1].time + 0.25 * (next_time - past[-1].time)
+        else:
+            raise NotConvergedError(f"the wear law has no solution at {time:.6g}")
+    return before, past[-1]
 
 
 def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatArray:
