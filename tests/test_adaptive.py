@@ -112,7 +112,7 @@ def test_the_most_values_are_those_of_each_curve(study, url):
         tell=lambda event: sentences.append(event.sentence),
     )
     assert int(store.datasets(url + "2")[""].y.notnull().all("realisation").sum("x").max()) == 10
-    assert re.search("along x misses its tolerance in . of 9 cases: 10 values are allowed", " ".join(sentences))
+    assert re.search("along x misses its tolerance in . of 9 cases: at_most is 10 values", " ".join(sentences))
 
 
 def test_scatter_is_not_refined(study, url):

@@ -1,4 +1,4 @@
-"""The data classes of a campaign: checked, in SI units and frozen."""
+"""The data classes of a campaign. They cannot be changed; their values are checked and in SI units."""
 
 from __future__ import annotations
 

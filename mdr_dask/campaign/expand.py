@@ -169,7 +169,8 @@ class _Expansion:
         values: list[Any] = []
         seen, are_valid = set(), None not in (base, last)
         for position, item in enumerate(one.items):
-            if item.inner and (not are_valid or independent):  # valid if both ends of the range are valid
+            # a value between the ends of a range is valid if both ends are valid
+            if item.inner and (not are_valid or independent):
                 values.append(item.value)
                 continue
             checked = base if position == 0 else self._validate(known, [one], position, elsewhere)

@@ -70,8 +70,8 @@ def structures(info: FieldInfo) -> tuple[type[BaseModel], ...]:
 def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
     """Return the parameter set that a mapping describes, from its fixed keys such as ``shape: cone``.
 
-    If several sets fit, return the one that has most of the keys of the mapping. If several have the same number of
-    them, return the one whose fields resemble most of the keys; in this way, misspelt keys count too.
+    If several sets fit, return the one that has most of the keys of the mapping. If several sets have equally many of
+    these keys, return the one whose fields resemble most of the keys. In this way, misspelt keys count too.
     """
     if not isinstance(value, dict):
         return None

@@ -75,7 +75,7 @@ def unanswered(url: str, stage: Stage, layout: Sequence[Template], taken: Sequen
                 fixed = f"; {rest:.2g} of it comes from the law and the grid, and more realisations do not reduce it"
                 yield f"{where}{answer}: {text}{fixed if rest > 0 else ''}"
             if not bool(np.isfinite(half).all()):
-                yield f"{where}{answer}: no interval, the law does not hold or its end is not reached"
+                yield f"{where}{answer}: no finite interval: the law does not hold, or the data do not give both ends"
 
 
 def _groups(url: str, stage: Stage, layout: Sequence[Template], taken: Sequence[IntArray]) -> dict[str, xr.Dataset]:
@@ -86,7 +86,7 @@ def _groups(url: str, stage: Stage, layout: Sequence[Template], taken: Sequence[
     opened, groups = store.datasets(url), {}
     for mesh, template, count in zip(stage.meshes, layout, taken, strict=True):
         name = template.series.name
-        data = opened[name if name in opened else next(iter(opened))]  # the store has results without series
+        data = opened[name if name in opened else next(iter(opened))]  # results without series, at the root
         counts = xr.DataArray(count, dims=template.dims[:-1], coords=_coordinates(template.series))
         counts = counts.sel({dim: data[dim] for dim in counts.indexes})
         here = {dim: data[dim].isin(list(own)).to_numpy() for dim, own in _coordinates(mesh.series).items()}

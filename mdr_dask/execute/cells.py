@@ -36,9 +36,9 @@ class Cells:
         return int(np.count_nonzero(self.wanted) + np.count_nonzero(self.spared))
 
     def operations(self, index: BlockIndex) -> float:
-        """Return the number of operations of the results to compute in a block.
+        """Return the number of operations that a round needs in a block.
 
-        It is the number for the whole block, multiplied by the fraction of its results to compute.
+        It is the number for the whole block, multiplied by the fraction of its results that the round has to compute.
         """
         part = float(np.mean(self.wanted[self.template.region(index)]))
         return part * self.template.operations(index) if part else 0.0

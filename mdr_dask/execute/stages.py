@@ -77,7 +77,7 @@ def _short(series: str, mesh: Mesh, number: int, count: int) -> str:
     """Return a sentence that says why interpolation along an adaptive axis misses its tolerance in some cases."""
     axis, values = mesh.series.axes[number], mesh.used[number].sum(axis=-1)
     others, most = values.size, mesh.refinement(number).at_most
-    why = f"{most} values are allowed" if (values >= most).any() else "it jumps or bends within a 1000th of the axis"
+    why = f"at_most is {most} values" if (values >= most).any() else "it jumps or bends within a 1000th of the axis"
     where = f"{series}: " if series else ""
     return f"{where}interpolation along {axis.name} misses its tolerance in {count} of {others} cases: {why}"
 

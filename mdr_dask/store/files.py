@@ -347,8 +347,8 @@ def chunk_name(series: str, array: str, block: Iterable[int], further: int = 0) 
 def digest(content: bytes) -> str:
     """Return the digest of a file.
 
-    A CRC cannot be used to distinguish chunks. Each chunk ends with the CRC of the bytes before it, and the CRC of
-    bytes followed by their own CRC is always the same number.
+    It is not a CRC, because all chunks would have the same CRC: each chunk ends with the CRC of the bytes before it,
+    and the CRC of any bytes followed by their own CRC is a fixed number.
     """
     return hashlib.blake2b(content, digest_size=8).hexdigest()
 

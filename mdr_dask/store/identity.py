@@ -188,7 +188,8 @@ def _by_digest(value: Any) -> Any:
 def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, IntArray]]:
     """Append the new entries of a series to the stored entries.
 
-    Return the extended series and, for each of its dimensions, the positions of the entries of the given series.
+    Return the extended series. Also return, for each of its dimensions, the positions in it of the entries of the given
+    series.
     """
     places = {}
     axes = []

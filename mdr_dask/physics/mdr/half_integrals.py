@@ -175,9 +175,10 @@ def interpolate(mesh: Mesh, values: FloatArray, places: FloatArray) -> FloatArra
 
 
 def interpolate_weighted(mesh: Mesh, rows: FloatArray, shares: FloatArray, stretch: FloatArray) -> FloatArray:
-    """Return the sum over k of shares[k] p_k(stretch[k] z) at all nodes z.
+    """Return a weighted sum of piecewise polynomials with stretched arguments, at all nodes.
 
-    p_k is the piecewise polynomial through rows[k].
+    The sum at the node z is that of shares[k] p_k(stretch[k] z) over k, where p_k is the piecewise polynomial through
+    rows[k].
     """
     result = np.zeros(mesh.nodes.size)
     _weighted(mesh, rows, shares, stretch, result)

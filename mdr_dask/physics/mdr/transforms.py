@@ -1,9 +1,9 @@
 """The transforms of the method of dimensionality reduction for bodies of revolution, with an error estimate.
 
-The transforms convert the profile f(r) of a body into its image g(x), the line that represents the body, and back. An
-angle, or a hyperbolic angle, as the new variable removes the square-root singularity of every integral. The integrals
-are split at the kinks and jumps of the profile and computed by Gauss-Legendre rules. The number of nodes is doubled
-until two successive results agree.
+The transforms convert the profile f(r) of a body into its image g(x), the line that represents the body, and back.
+Every integral has a square-root singularity. It disappears if an angle, or a hyperbolic angle, is the variable of
+integration. The integrals are split at the kinks and jumps of the profile and computed by Gauss-Legendre rules. The
+number of nodes is doubled until two successive results agree.
 """
 
 from __future__ import annotations
