@@ -1,7 +1,7 @@
 """Find a model by its name; a model is imported only when a campaign names it.
 
-There are three kinds of models: those of this package (`NAMES`), those that other installed packages declare in the
-entry point group `GROUP`, and objects ``package.module:NAME`` of the user.
+Models come from three sources: this package (`NAMES`), other installed packages, which declare models in the entry
+point group `GROUP`, and modules of the user, written as ``package.module:NAME``.
 """
 
 from __future__ import annotations
@@ -68,9 +68,9 @@ def is_own(name: str) -> bool:
 
 
 def source_digest(name: str) -> str | None:
-    """Return a digest of the lines of the file with the function of a user's model, without comments.
+    """Return a digest of the source file of a user's model, without its blank lines and comments.
 
-    Return None for the models of this package, and if there is no such file.
+    Return None for the models of this package, and if the source file cannot be read.
     """
     if not is_own(name):
         return None

@@ -46,10 +46,11 @@ class Parameters(BaseModel):
 
     * `renamed`: names that parameters and outputs had in earlier versions, each with a text that says what to write
     now.
-    * `alternatives`: groups of alternatives, of which a user gives exactly one member each. A member is a tuple of
+    * `alternatives`: groups of alternatives; a user gives exactly one member of each group. A member is a tuple of
     parameters that are given together; in the path of a nested parameter, a dot separates the names.
     * `overrides`: parameters that replace another parameter, each with the name of the replaced parameter.
-    * `settings`: parameters that set the resolution of the solver or the points to store, not the physical problem.
+    * `settings`: parameters of the numerical solution, such as its resolution or the stored points. They do not change
+    the physical problem.
     * `requires`: parameters that have an effect only if another parameter has a certain value. Each is listed with the
     name and the value of that other parameter.
     """
@@ -393,8 +394,8 @@ class Model(Generic[P]):
         other cases of the block. The function does not raise an exception for a case that fails.
     operations : callable, Block -> float, optional
         Approximate number of floating-point operations of `compute` for a block, from which the sizes of blocks follow.
-        The function must be fast; it should use array operations over the cases. Without this function, a study has
-        about as many blocks as a block has results.
+        The function must be fast; it should use array operations over the cases. Without this function, a study with n
+        results is divided into about sqrt(n) blocks.
     whole : tuple of str
         Parameters whose axes are not divided among blocks, because cases along these axes share work. If a block
         becomes too large, the axis of the last parameter in this list is divided first.
@@ -408,8 +409,8 @@ class Model(Generic[P]):
     memory : callable, Block -> float
         Estimated peak memory of `compute` in bytes, without the memory of the outputs.
     notes : callable, sequence of Parameters -> tuple of str
-        Notes for ``check`` about a study. The argument contains parameter sets of the study that vary one axis at a
-        time. Notes about a nested parameter set come from the method `notes` of that set.
+        Notes for ``check`` about a study. The argument contains parameter sets of the study, in which one axis at a
+        time is varied. Notes about a nested parameter set come from the method `notes` of that set.
     numbers : tuple of Number
         Dimensionless numbers of the cases.
     """
@@ -439,9 +440,9 @@ class Model(Generic[P]):
         return {output.name: output for output in (*self.outputs, *self.companions.values())}[name]
 
     def with_companions(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Return the given names of outputs, and the names of the outputs that are their `scatter`.
+        """Return the given names of outputs, and the names of their standard errors (`Output.scatter`).
 
-        Each name is followed by the name of its companion if the output has one.
+        If an output has a companion, the name of the companion follows the name of the output.
         """
         companions = self.companions
         asked = {*names, *(self.output(name).scatter for name in names)}

@@ -14,7 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.tables import decoded, described
 
-#: Larger files, in bytes, get no note about their columns.
+#: Size in bytes from which a file gets no note about its columns.
 LARGEST_TABLE = 10**7
 
 

@@ -84,5 +84,5 @@ def test_every_angle_of_an_axis_is_pressed_by_itself():
 
 
 def test_a_rounded_cone_needs_a_depth():
-    with pytest.raises(ValueError, match="a rounded_cone needs a dimensional campaign with its depth"):
+    with pytest.raises(ValueError, match="a rounded_cone needs a dimensional campaign: give depth"):
         FrettingWear.model_validate({"stick_radius": 0.5, "indenter": SHARP})

@@ -206,7 +206,8 @@ distinct = deferred("mdr_dask.models.ehl_line.solve", "distinct")
 def operations(block: Block[EhlLineParameters]) -> float:
     """Return the approximate number of operations of `compute`.
 
-    A solution needs about 6 million, and 1.5 billion on the finest grid, which an accurate pressure spike requires.
+    A solution with the default accuracy needs about 6 million operations. An accurate pressure spike requires the
+    finest grid, which needs 1.5 billion operations.
     """
     accuracy = block.accuracy or ACCURACY
     is_sharp = block.accuracy is not None and {"pressure", "spike_pressure", "spike_position"} & set(block.outputs)

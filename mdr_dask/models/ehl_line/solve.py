@@ -28,7 +28,8 @@ from mdr_dask.physics.lubrication.line_contact import (
 )
 from mdr_dask.physics.outcome import Outcome
 
-#: Outputs that are positions, in half widths of the contact. The accuracy of a campaign also refers to this half width.
+#: Outputs that are positions, in half widths of the contact. Their errors are relative to one half width, or to the
+#: position itself if it is larger.
 _POSITIONS = {"minimum_position", "rupture_position", "spike_position"}
 
 

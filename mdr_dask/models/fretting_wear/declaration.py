@@ -187,13 +187,16 @@ class FrettingWear(Parameters):
             given.append(f"indenter.{size}")
         if self.stick_radius is not None and given:
             raise ValueError(
-                f"a dimensionless campaign has stick_radius only, got {', '.join(given)} as well; leave one kind out"
+                f"expected stick_radius or quantities with units, got stick_radius and {', '.join(given)}; leave "
+                "one kind out"
             )
         if not self.dimensionless:
             self._check_dimensional()
         if isinstance(self.indenter, Pressed) and self.depth is None:
             body = "a table of a profile" if isinstance(self.indenter, Table) else f"a {self.indenter.shape}"
-            raise ValueError(f"{body} needs a dimensional campaign with its depth")
+            raise ValueError(
+                f"{body} needs a dimensional campaign: give depth, instead of normal_force or stick_radius"
+            )
         return self
 
     @model_validator(mode="after")
@@ -203,20 +206,22 @@ class FrettingWear(Parameters):
         oscillating = ("stick_radius", "amplitude", "history", "amplitude_scatter", "friction_scatter")
         given = [name for name in oscillating if getattr(self, name)]
         if given:
-            raise ValueError(f"a path is sliding in one direction, got {', '.join(given)} of an oscillation as well")
+            raise ValueError(f"a path is sliding in one direction: leave out {', '.join(given)} (oscillation)")
         if self.wear_rule != "exact":
-            raise ValueError(f"sliding along a path has wear_rule exact only, got {self.wear_rule!r}")
+            raise ValueError(f"expected wear_rule exact for sliding along a path, got {self.wear_rule!r}")
         return self
 
     @model_validator(mode="after")
     def _history(self) -> FrettingWear:
         if self.history and self.wear_rule != "exact":
-            raise ValueError(f"a history has wear_rule exact only, got {self.wear_rule!r}")
+            raise ValueError(f"expected wear_rule exact for a history, got {self.wear_rule!r}")
         for other, name in self.inactive.items():
             if getattr(self, other) != type(self).model_fields[other].default:
                 raise ValueError(f"{name} replaces {other}: leave out one or the other")
         if self.dimensionless and self.last_radius is not None:
-            raise ValueError("last_radius is a length: write extent, over a0, in a dimensionless campaign")
+            raise ValueError(
+                "last_radius is a length: in a dimensionless campaign, give extent (last radius / a0) instead"
+            )
         return self
 
     @model_validator(mode="after")

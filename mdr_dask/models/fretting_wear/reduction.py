@@ -47,7 +47,10 @@ class Numbers:
 
 
 def indenters(block: Block[FrettingWear]) -> list[Indenter]:
-    """Return the indenter of every case; return a single indenter if the cases differ only in its numbers."""
+    """Return the indenter of every case, or only one.
+
+    One is returned if all indenters are equal, or are power laws of the same shape that differ only in their numbers.
+    """
     if isinstance(block.parameters.indenter, Pressed) and any(path.startswith("indenter") for path in block.columns):
         return [block.case(case).indenter for case in range(block.cases)]
     return list(block.columns["indenter"]) if "indenter" in block.columns else [block.parameters.indenter]
@@ -172,7 +175,7 @@ def _first_contact(
 
 
 def table_profile(indenter: Indenter, depth: float) -> TableProfile:
-    """Return the virgin contact, at a depth, of a body that is not a power law; cached by the content of its file."""
+    """Return the contact before wear of a body that is not a power law, at an indentation depth."""
     if not isinstance(indenter, Pressed):
         raise ValueError("power laws and other profiles cannot be mixed along one axis")
     return _pressed_table(indenter.file, depth) if isinstance(indenter, Table) else _pressed_body(indenter, depth)
@@ -207,7 +210,7 @@ def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: di
 
 
 def notes(sets: Sequence[FrettingWear]) -> tuple[str, ...]:
-    """Return reasons why cases of a study will fail, as far as they follow from parameters without random scatter."""
+    """Return a note if cases of a study will fail, judged by their parameters without random scatter."""
     texts: list[str] = []
     for parameters in sets:
         scatter = dict.fromkeys(("friction_scatter", "amplitude_scatter", "wear_coefficient_scatter"), 0.0)

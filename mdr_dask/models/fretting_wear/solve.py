@@ -31,8 +31,8 @@ from mdr_dask.physics.wear.worn import Worn, virgin_load
 
 #: Outputs that have a closed form; the closed forms are computed for many cases at once.
 _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border")
-#: Names of outputs with the corresponding attributes of `Worn`, which have another name. The output cannot be called
-#: `normal_force`, because a parameter already has this name.
+#: Outputs whose name differs from that of the attribute of `Worn`, each with the name of the attribute. The output
+#: cannot be called `normal_force`, because a parameter already has this name.
 _RENAMED = {"contact_force": "normal_force"}
 #: Requested error of the profile, divided by eta d0, when the evolution is solved. It is `_USUAL` if the campaign
 #: states no accuracy, and never below `_FINEST`.
@@ -47,9 +47,10 @@ Places = list[tuple[int, int]]
 
 @dataclass(frozen=True)
 class Task:
-    """Input of a solution that several cases share: all data except the number of cycles and xi.
+    """Input of a solution that several cases share.
 
-    `extent` is the last radius of the profiles, divided by a0.
+    It contains all data except the number of cycles N and the factor xi of the fast rule. `extent` is the last radius
+    of the profiles, divided by a0.
     """
 
     table: Pressed | None
@@ -108,7 +109,7 @@ def operations(block: Block[FrettingWear]) -> float:
 
 
 def _followed(hold: str, accuracy: float) -> float:
-    """Return the operations of one evolution and its errors, without those to evaluate it at each N."""
+    """Return the number of operations to solve one evolution with its errors, without its evaluation at each N."""
     if hold == "force":
         return 9e7 * float(max(COARSEST_OF_MOVING / accuracy, 1.0) ** 1.1)
     return 1.2e7 * float((_USUAL / accuracy) ** 0.6)
@@ -125,7 +126,7 @@ def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int],
 
 
 def _plain_name(name: str) -> tuple[str, bool]:
-    """Return the name in `Worn` of an output of a campaign, and whether the output is the error of another output."""
+    """Return the attribute of `Worn` that holds an output, and whether the output is the error of this attribute."""
     owners = {companion.name: owner for owner, companion in MODEL.companions.items()}
     plain = owners.get(name, name).removeprefix("block_")
     return _RENAMED.get(plain, plain), name in owners
@@ -158,8 +159,8 @@ def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
 def _is_plain(block: Block[FrettingWear]) -> bool:
     """Return whether closed forms are sufficient for a block.
 
-    They are sufficient if the body is a power law, the depth is constant without a history, the limit or the fast rule
-    is requested, and all outputs are single numbers.
+    They are sufficient if the body is a power law, the depth is constant without a history, the limiting profile or the
+    fast rule is requested, and all outputs are single numbers.
     """
     simple = set(block.columns.get("wear_rule", [block.parameters.wear_rule])) <= {"limit", "fast"}
     depth = set(block.columns.get("hold", [block.parameters.hold])) == {"depth"}
@@ -196,7 +197,7 @@ def _solve_plain(
 
 
 def _distinct(rows: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Return the different columns of an array, and for each column its index in this selection."""
+    """Return the different columns of an array, and for every column its index among the different ones."""
     if rows.shape[1] == 0:
         return rows, np.zeros(0, dtype=np.intp)
     order = np.lexsort(rows)
@@ -270,7 +271,7 @@ def _missed(records: Sequence[Worn], block: Block[FrettingWear], places: FloatAr
         return ""
 
     def finite(name: str) -> FloatArray:
-        """Return an output with a first axis for the case; infinite values, as at a sharp tip, become NaN."""
+        """Return an output as an array with one row, for the case; infinite values, as at a sharp tip, become NaN."""
         answer = np.asarray(_answer(records, name, places))
         return np.where(np.isfinite(answer), answer, np.nan)[None]
 
@@ -291,7 +292,7 @@ def _solves_of(task: Task, wanted: Collection[tuple[float, float]]) -> int:
 def _tasks(
     block: Block[FrettingWear], numbers: Numbers, status: NDArray[np.int8]
 ) -> dict[Task, dict[tuple[float, float], Places]]:
-    """Return, for each task and each pair (N, xi) of the task, the positions of the cases in the block."""
+    """Return the tasks, and for each pair (N, xi) of a task the results (case, realisation) that need it."""
     tasks: dict[Task, dict[tuple[float, float], Places]] = {}
     bodies = indenters(block)
     for case in range(block.cases):
@@ -331,7 +332,7 @@ def _task(parameters: FrettingWear, indenter: Indenter, numbers: Numbers, place:
 
 
 def _first_resolution(accuracy: float | None, hold: str) -> float:
-    """Return the error of the profile, divided by eta d0, for which a case is solved first."""
+    """Return the error that is allowed in the first solution: the error of the profile, divided by eta d0."""
     return _USUAL if accuracy is None else max(_FIRST[hold] * accuracy, _FINEST)
 
 

@@ -335,7 +335,7 @@ OF_LINES = {
 
 
 def operations(block: Block[MixedLubrication]) -> float:
-    """Return the approximate number of operations of a block, from the points of the two coarsest lines of a case."""
+    """Return the approximate number of operations of a block, for the two coarsest grids of every case."""
     columns = (block.column(name) for name in ("points", "shortest_wavelength", "roller_radius"))
     points_of = np.empty(block.cases)
     for case, (points, shortest, radius) in enumerate(zip(*columns, strict=True)):

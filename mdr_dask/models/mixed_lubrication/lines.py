@@ -13,12 +13,13 @@ from mdr_dask.models.parts.surface import Surface, lines_of
 
 #: Largest number of points of a line.
 MOST_POINTS = 10**7
-#: For points: auto, the number of points per shortest wave on the coarsest lines, and how often it may be doubled.
+#: For `points: auto`: number of points per shortest wavelength on the coarsest grid, and how often this number may be
+#: doubled.
 LEAST_PER_WAVE, DOUBLINGS = 2.5, 3
 
 
 def points_for(modes: int) -> tuple[int, ...]:
-    """Return the numbers of points, increasing, on which lines are solved; `modes` is their number of waves."""
+    """Return the number of points of each grid, from coarse to fine; `modes` is the number of waves of a line."""
     from scipy.fft import next_fast_len
 
     least = min(next_fast_len(int(np.ceil(LEAST_PER_WAVE * modes)), real=True), MOST_POINTS)
@@ -32,7 +33,7 @@ class _Random:
     Parameters
     ----------
     points : tuple of int
-        Numbers of points on which the lines are solved, increasing. The waves are the same on every number of points.
+        Number of points of each grid, from coarse to fine. The lines have the same waves on every grid.
     longest, modes : float, int
         Circumference of a roller divided by the longest wavelength, and by the shortest wavelength.
     """

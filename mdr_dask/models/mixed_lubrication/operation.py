@@ -19,7 +19,7 @@ ACCURACY = 1e-3
 
 
 class NoFilmError(Exception):
-    """The reason why a case has no film."""
+    """The film of a case cannot be computed; the message is the reason."""
 
 
 class Film(NamedTuple):
@@ -35,8 +35,8 @@ class Operation:
 
     `viscosity` is the dynamic viscosity in Pa s, and `alpha` the pressure-viscosity coefficient in 1/Pa. `shared` has
     the film thickness in m and the load shares, and `film_error` is the relative error of the film thickness. `scale`
-    is the unit, in m, of the heights of the lines, and `strength` is the layer strength for lines in this unit. `width`
-    is the width of the contact in m.
+    is the unit of the heights of the lines in m, and `strength` is the strength of the layer for heights in this unit.
+    `width` is the width of the contact in m.
     """
 
     case: MixedLubrication
@@ -144,7 +144,7 @@ def _shared_load(
 def _film_of(
     case: MixedLubrication, viscosity: float, alpha: float, accuracy: float
 ) -> tuple[Callable[[float], Film], str]:
-    """Return a function that computes the film from its load share, and a warning if the formula is out of range."""
+    """Return a function that computes the film from its load share, and a warning outside the range of the formula."""
     E_star, radius = case.contact_modulus, case.radius
     velocity = case.rotation_speed * case.roller_radius
     line_load = case.normal_force / case.roller_width
@@ -190,7 +190,7 @@ def fixed_values(operation: Operation) -> dict[str, float]:
     }
     errors = dict.fromkeys(values, 0.0)
     if error > 0:
-        # the error of the asperity load is its change if the film is thinner by the error of the film
+        # error of the asperity load: its change if the film thickness decreases by the error of the film
         asperities = Asperities(operation.rms, operation.case.longest(), operation.case.contact_modulus)
         loaded = asperities.pressure(film * (1 - error)) / _mean_pressure(operation.case)
         errors = {

@@ -17,8 +17,8 @@ from mdr_dask.physics.surfaces.splines import heights
 
 #: Number of parts of a revolution; the scatter between the parts gives the standard error.
 PARTS = 16
-#: Number of windows per window width on the coarsest lines, in rolling with creep. Two windows at a quarter of this
-#: distance have nearly the same contact.
+#: In rolling with creep, the distance between windows on the coarsest grid is the window width divided by this number.
+#: Two windows at this distance have nearly the same contact.
 WINDOWS = 4
 
 
@@ -70,7 +70,7 @@ def revolve(operation: Operation, lines: FloatArray) -> Revolution:
     if creep == 0:
         clusters = find_clusters(lines.sum(axis=0), operation.level, spacing, operation.strength)
         contact: NDArray[np.int32] | IntArray = breakthrough.contact_lengths(clusters, width, case.edge_rule)
-    else:  # finer lines have more windows, and the changes between grids thus include the error of the window positions
+    else:  # finer grids have more windows, so that changes between grids include the error of the window positions
         stride = max(1, int(operation.width / operation.length * operation.source.points[0] / WINDOWS))
         contact = _windows(operation, lines, np.arange(0, points, stride))
     parts = max(1, min(PARTS, int(operation.length / (2 * operation.width))))
@@ -78,7 +78,7 @@ def revolve(operation: Operation, lines: FloatArray) -> Revolution:
 
 
 def _windows(operation: Operation, lines: FloatArray, travels: ArrayLike) -> IntArray:
-    """Return the lengths in intimate contact after given travels of the contact; a travel is in points of the line."""
+    """Return the length in intimate contact for each distance that the contact has travelled, in spacings of points."""
     spacing = operation.length / lines.shape[1]
     pair = breakthrough.Pair(lines[0], lines[1], operation.level, spacing, operation.strength)
     starts = breakthrough.creep_positions(travels, lines.shape[1], operation.case.slide_roll_ratio)

@@ -26,9 +26,9 @@ _OF_LINES = {"breakthrough_probability", "revolution_error", *_OF_LENGTH}
 #: Outputs that can be zero, each with a magnitude. If an output is smaller than its magnitude, its error is relative to
 #: the magnitude. The magnitude for the contact length is given in widths of the contact.
 _FLOORS = {"asperity_load_share": 1.0, "breakthrough_probability": 0.1, "contact_length": 0.01}
-#: Lower bound of the order of convergence of probability and length in the spacing of the points. The splines converge
-#: faster, but a single cluster may break the layer on one grid and not on the next, and contact may begin between two
-#: windows.
+#: Order of convergence of probability and length with decreasing spacing of the points; it is a lower bound. The
+#: splines converge faster, but a single cluster may break the layer on one grid and not on the next, and contact may
+#: begin between two windows.
 _ORDER = 1
 
 
@@ -75,7 +75,7 @@ def compute(block: Block[MixedLubrication]) -> Result:
 def _store(
     result: Result, block: Block[MixedLubrication], index: int, position: int | slice, found: Mapping[str, Any]
 ) -> None:
-    """Write those of the found values that are requested."""
+    """Write the values that the campaign requests to the result."""
     for name in found.keys() & set(block.outputs):
         result.values[name][index, position] = found[name]
 

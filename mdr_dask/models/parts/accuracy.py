@@ -54,7 +54,7 @@ def missed_accuracy(
 
 
 def _relative_errors(values: ArrayLike, errors: ArrayLike, floor: ArrayLike) -> FloatArray:
-    """Return the relative error of an output of every case, shape (cases,); infinite if only the value is zero."""
+    """Return the relative error of an output of every case, shape (cases,); infinite for a value 0 with an error."""
     size, error = (np.abs(np.atleast_1d(np.asarray(each, dtype=np.float64))) for each in (values, errors))
     known = ~(np.isnan(size) | np.isnan(error))
     largest_error, largest = (

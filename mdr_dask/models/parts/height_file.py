@@ -163,8 +163,8 @@ def dimensions(file: DataFile) -> int:
 def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[float, float]]:
     """Return the unit of the heights in m and the spacings along x and y in m, as stated by the file or the user.
 
-    If positions have no unit, the spacing stated by the user is used, provided that it equals the step of the positions
-    in any decimal unit.
+    If positions have no unit, the spacing stated by the user is used. It must equal the step of the positions times a
+    power of ten.
     """
     height = _one_unit(file, "unit", grid.stated.height, units.height)
     position = _one_unit(file, "x_unit", grid.stated.position, units.position)
@@ -233,7 +233,7 @@ def _channel(file: DataFile) -> Any:
         raise DataError(f"{file.name}: this format needs SurfaceTopography: pip install 'mdr_dask[formats]'") from None
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # those of readers that try whether the file has their format
+            warnings.simplefilter("ignore")  # warnings of readers that only test whether they can read the file
             channel = SurfaceTopography.open_topography(file.path).default_channel
     except Exception as problem:  # the readers raise errors of many types
         if is_text:
@@ -362,7 +362,7 @@ def _stated(file: DataFile, head: list[str], first: str) -> Units:
         if number and names & {"spacing", "pitch", "pixel", "step", "dx", "dy", "distance"}:
             key = "spacing_y" if names & {"y", "dy"} and not names & {"x", "dx"} else "spacing"
             found.setdefault(key, {})[f"{words[-2]} {words[-1]}"] = line
-        elif not number and bool(along) != bool(upwards):  # a line that names both is the row of column names
+        elif not number and bool(along) != bool(upwards):  # a line with names of both kinds is the row of column names
             found.setdefault("position" if along else "height", {})[words[-1]] = line
         elif not number and "unit" in names:
             found.setdefault("height", {})[words[-1]] = line

@@ -144,7 +144,7 @@ def solid_of(material: Material) -> LinearSolid:
 
 
 def _shift(material: Material) -> float | None:
-    """Return the factor of the relaxation times between the temperature of the data and the material's temperature."""
+    """Return the ratio of relaxation times at the material's temperature to those of the data; None without a law."""
     law, temperature = material.law, material.temperature
     if law is None or temperature is None:
         return None

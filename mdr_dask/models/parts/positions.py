@@ -116,12 +116,13 @@ def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
     """
     known = np.sort(positions[np.isfinite(positions)])
     gaps = np.diff(known)
-    lines = np.split(known, np.flatnonzero(gaps > 0.25 * gaps.max(initial=0.0)) + 1)  # the largest gap may be 3 steps
+    # points lie on different grid lines if the gap between them is at least one step; the largest gap may be 3 steps
+    lines = np.split(known, np.flatnonzero(gaps > 0.25 * gaps.max(initial=0.0)) + 1)
     middles = np.array([line.mean() for line in lines])
     if middles.size < 2 or len(known) != len(positions):
         raise DataError("expected positions on a regular grid")
     apart = np.diff(middles)
-    place = np.append(0.0, np.cumsum(np.rint(apart / np.median(apart))))  # rounded positions do not add up
+    place = np.append(0.0, np.cumsum(np.rint(apart / np.median(apart))))  # so that rounding errors do not add up
     step, origin = np.polyfit(place, middles, 1)
     nearest = np.rint((positions - origin) / step)
     own = np.repeat(place, [line.size for line in lines])

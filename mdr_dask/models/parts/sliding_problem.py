@@ -81,7 +81,7 @@ class SlidingProblems:
     faults: dict[int, str]
 
     def groups(self, *columns: NDArray[Any]) -> Iterator[tuple[Setting, IntArray]]:
-        """Group the cases that can be solved by their setting and the values of some columns; yield the groups."""
+        """Yield groups of the cases that can be solved. The cases of a group have equal settings and equal columns."""
         is_sound = self.which >= 0
         is_sound[list(self.faults)] = False
         sound = np.flatnonzero(is_sound)
@@ -173,7 +173,7 @@ def _travelling(term: tuple[FloatArray, FloatArray] | None, velocity: float, len
 
 
 def refuse_immense(numbers: dict[str, FloatArray], faults: dict[int, str]) -> None:
-    """Add a message for every case with a dimensionless number that is too large or too small for the arithmetic."""
+    """Add a message for every case with a dimensionless number that may overflow or underflow."""
     for name, column in numbers.items():
         for j in np.flatnonzero(~((column > LEAST) & (column < 1 / LEAST))):
             number, least, most = distinguishable(column[j], LEAST, 1 / LEAST, digits=6)

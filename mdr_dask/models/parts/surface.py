@@ -157,12 +157,12 @@ def _beyond(name: str, wavelength: float, which: str, end: float) -> str:
 
 @lru_cache(maxsize=64)
 def lines_of(surface: Surface, length: float, modes: int) -> tuple[FloatArray, ...]:
-    """Return the amplitudes in m of the lines that replace a surface in the method, one line for each file.
+    """Return the amplitudes in m of the MDR lines that replace a surface, one line for each file.
 
     Raises
     ------
     DataError
-        If no wave of the spectrum fits the line.
+        If no wave of the line lies in the range of the spectrum.
     """
     import numpy as np
 
@@ -172,7 +172,7 @@ def lines_of(surface: Surface, length: float, modes: int) -> tuple[FloatArray, .
             longest, shortest = spectrum.wavelengths
             (last, least), (first, most) = shown_apart("m", length, shortest), shown_apart("m", length / modes, longest)
             raise DataError(
-                f"{file.name}: expected a line with waves of {least} to {most}, got {first} to {last}: "
+                f"{file.name}: expected wavelengths of the line in {least} to {most}, got {first} to {last}: "
                 "change length or points"
             )
         line.flags.writeable = False

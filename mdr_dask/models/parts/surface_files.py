@@ -23,8 +23,9 @@ if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
 CUT_ERROR = 0.05  # relative error of every point of a tabulated spectrum of straight profiles
-MOST_ANISOTROPY = 0.25  # a surface counts as isotropic up to this; its slopes in two directions differ by less than 1/5
-STRIPES = 10.0  # a map has stripes if waves along an axis have over this times the power on an isotropic surface
+# largest anisotropy of a surface that counts as isotropic; its slopes along x and y differ by about a quarter at most
+MOST_ANISOTROPY = 0.25
+STRIPES = 10.0  # a map has stripes if waves along an axis have more than this times the mean power of their ring
 FORM = 0.9  # if a parabola explains more than this fraction of the mean square, the heights contain a form
 MOST_OUTLIERS = 0.05  # largest fraction of outliers; if there are more, they count as parts of the surface
 

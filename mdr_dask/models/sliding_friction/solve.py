@@ -20,7 +20,7 @@ from mdr_dask.physics.sliding.problem import Request, solve
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 ACCURACY = 0.01  # relative accuracy if the campaign does not give an accuracy
-# grid points per point of the line, on the finest grid that is usually needed: for a plane Kelvin body, and otherwise
+# finest grid that is usually needed, in grid points per point of the line: for a plane Kelvin body, and otherwise
 USUAL_ON_PLANES, USUAL = 2, 16
 BYTES_A_NODE = 150  # peak memory per grid point in bytes, for a line and one case on it; measured: 20 to 130 bytes
 OPERATIONS_A_NODE = 10  # operations for each grid point in one sweep along the line
@@ -53,7 +53,10 @@ def compute(block: Block[SlidingFriction]) -> Result:
 def _groups(
     block: Block[SlidingFriction], problems: SlidingProblems
 ) -> Iterator[tuple[Setting, SlidingFriction, IntArray]]:
-    """Yield setting, parameters of one case, and indices of all cases with this setting, oversampling and scheme."""
+    """Yield groups of cases with equal setting, oversampling and scheme.
+
+    A group is its setting, the parameters of one of its cases, and the indices of all its cases.
+    """
     varied = [block.columns[name] for name in ("oversampling", "scheme") if name in block.columns]
     for setting, members in problems.groups(*varied):
         yield setting, block.case(int(members[0])), members
@@ -112,7 +115,7 @@ class _Group:
         result.messages.update({(j, r): message for j, message in first.items()})
 
     def _outputs(self, columns: FloatArray) -> dict[str, FloatArray]:
-        """Return the outputs of the members, or their errors, in SI units."""
+        """Return the outputs of the cases of the group, or their errors, in SI units."""
         drag, depth, fraction, contact_slope = columns
         slope = self.height / self.length
         in_units = (drag / self.loads)[self.which] * slope, depth[self.which] * self.height, fraction[self.which]
@@ -121,7 +124,7 @@ class _Group:
     def _messages(
         self, steady: Steady, values: dict[str, FloatArray], errors: dict[str, FloatArray]
     ) -> Iterator[tuple[int, str]]:
-        """Yield messages about failures, outputs that miss the accuracy, and members beyond the tested loads."""
+        """Yield messages about failures, outputs that miss the accuracy, and cases outside the tested range."""
         status = steady.status[self.which]
         for k in np.flatnonzero(status != Outcome.CONVERGED):
             yield int(k), Outcome(int(status[k])).sentence
@@ -153,7 +156,7 @@ def operations(block: Block[SlidingFriction]) -> float:
         solves = problems.different(members)[0].size
         visits = 1 if setting.terms is None else 4 * (4 + len(setting.terms.moduli))  # sweeps per case
         grid = 2 if case.oversampling == "auto" else case.oversampling
-        # a line needs as many operations as about ten sweeps; a sweep counts half, because most grids are coarser
+        # computing a line costs about ten sweeps; a sweep of a case counts half, because most grids are coarser
         nodes += _lines(block, setting) * setting.roughness.points * grid * (10 + 0.5 * solves * visits)
     return 1e5 + OPERATIONS_A_NODE * nodes
 

@@ -1,7 +1,7 @@
 """Solve a block of cases: friction after a jump of the velocity, or under a loading history.
 
-Jumps of a plane Kelvin body are solved by a march of the depth in time. In all other cases, the motion of every element
-of the viscoelastic foundation is computed.
+Jumps of a plane Kelvin body are solved by marching the indentation depth in time. In all other cases, the motion of
+every element of the viscoelastic foundation is computed.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ from mdr_dask.physics.transients.elements.loading_history import Trace, trace
 from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
 ACCURACY = 0.01  # relative accuracy of steady friction and of the jump, if the campaign does not give an accuracy
-# operations: of a jump, per node and step per decade; and of a history, per square of the number of nodes
+# operations of a jump, divided by (nodes times steps per decade), and of a history, divided by nodes squared
 OPERATIONS_MARCHED, OPERATIONS_FOLLOWED = 20, 35
 FLAT = 1e-12  # a line is flat if its rms height is at most this fraction of its largest absolute height
-HISTORY_ORDER = 2  # order of convergence of the results of a history in cell size and time step
+HISTORY_ORDER = 2  # order of convergence of a history as cell size and time step decrease together
 
 #: Names of the outputs for which errors are estimated.
 WITH_ERROR = (
@@ -171,10 +171,10 @@ class _Group:
         yield from beyond_tested(self.setting, self.largest_loads, found.contact).items()
 
     def _floor(self, found: _Found, name: str) -> FloatArray:
-        """Return, for every case, the smallest value to which the error of an output may be relative.
+        """Return the floor of an output for every case: errors of smaller values are relative to the floor.
 
-        If friction is zero within its error, as for a body at rest, its error is relative to the largest friction of
-        the case. Otherwise an error is relative to the output itself, and 0 is returned.
+        If friction is zero within its error, as for a body at rest, the floor is the largest friction of the case.
+        Otherwise the floor is 0, and the error is relative to the output itself.
         """
         cases = found.outcome.size
         if name == "indentation_depth":
@@ -212,9 +212,10 @@ class _Marched(_Group):
 
     @cached_property
     def different(self) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Loads and Deborah numbers of the different cases, and the index of the case of every member.
+        """Loads and Deborah numbers of the different cases, and for every case its index among them.
 
-        The cases are sorted by velocity. The barriers of the line are then computed only once for each Deborah number.
+        The different cases are sorted by velocity, because the solver shares work among neighbours with equal Deborah
+        numbers.
         """
         before = self.problems.deborah[self.members]
         change = np.asarray(self.block.column("velocity_change"), dtype=np.float64)[self.members]
@@ -254,7 +255,7 @@ class _Followed(_Group):
         return self.problems.loads[self.members] * (case.largest_force() / case.normal_force)
 
     def _trace(self, waves: Waves, every: int) -> Trace:
-        """Compute the case on a grid that contains one out of `every` nodes."""
+        """Compute the case on a coarser grid; the number of nodes is divided by `every`."""
         case = self.block.case(int(self.members[0]))
         height, length = (float(column[self.members[0]]) for column in (self.problems.height, self.problems.length))
         solid, unit = case.solid(), case.time_unit()
