@@ -17,8 +17,8 @@ from mdr_dask.fits.base import Fit
 STEP = 1e-3
 #: Largest number of groups into which the values along a dimension are divided. One group is shifted at a time.
 GROUPS = 32
-#: A group of cases needs no more realisations if a shift by one standard error changes the constant by less than this
-#: fraction of the half width of its interval.
+#: A group of cases needs no more realisations if shifting its results by one standard error changes the constant by
+#: less than this fraction of the half width of the constant's interval.
 NEGLIGIBLE = 0.01
 #: To extrapolate to zero scatter, the fit is repeated with the scatter changed by this fraction.
 LESS = 0.01
@@ -30,8 +30,8 @@ def require_known(campaign: Campaign) -> None:
     Raises
     ------
     CampaignError
-        If no fit of the model gives such a constant, or if outputs and constants are named together with an adaptive
-        axis. The message has one sentence for each wrong name.
+        If no fit of the model gives such a constant, or if a campaign with an adaptive axis names both outputs and
+        constants. The message has one sentence for each wrong name.
     """
     known = available(campaign.model) if campaign.replication.answers else {}
     is_adaptive = any(axis.refinement for one in campaign.series for axis in one.axes)
@@ -55,7 +55,7 @@ def require_known(campaign: Campaign) -> None:
 def half_widths(
     fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]
 ) -> dict[str, tuple[xr.DataArray, xr.DataArray]]:
-    """Return a constant and the half width of its 95 % interval, by series.
+    """Return, for each series, a constant and the half width of its 95 % interval.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def _allowed(value: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
 
 
 def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.DataArray]:
-    """Return the half width that an interval would have without scatter of the realisations, by series.
+    """Return, for each series, the half width that the interval would have without scatter of the realisations.
 
     This half width is due to grid errors and to the misfit of the law, and more realisations do not reduce it. The fit
     is repeated with the scatter multiplied by ``1 - LESS``, and the half width is extrapolated linearly to zero
@@ -138,10 +138,10 @@ def cases_behind(
 ) -> xr.DataArray:
     """Return the cases of a series that affect a constant whose interval is too wide.
 
-    The values along each dimension that the constant itself does not have are divided into groups of neighbours. The
-    results of one group at a time are shifted by a small fraction of their standard error, and the fit is repeated. If
-    the constant changes, it depends on this group. A case is chosen if the constant depends on its groups along all of
-    these dimensions. In this way, all cases that a fit compares get the same number of realisations.
+    Along each dimension over which the constant is fitted, neighbouring cases form groups. The results of one group at
+    a time are shifted by a small fraction of their standard error, and the fit is repeated. If the constant changes, it
+    depends on this group. A case is chosen if, along each of these dimensions, the constant depends on the group of the
+    case. In this way, all cases that a fit compares get the same number of realisations.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def cases_behind(
     Returns
     -------
     bool array
-        Whether each case is chosen, over the dimensions of the cases.
+        Whether each case is chosen.
     """
     data = groups[name]
     sizes = {str(dim): size for dim, size in data["status"].sizes.items() if dim != "realisation"}
@@ -192,7 +192,7 @@ def cases_behind(
 
 
 def _over(dims: list[str], flags: xr.DataArray) -> xr.DataArray:
-    """Return, over the dimensions `dims`, whether any flag is set along the other dimensions."""
+    """Return flags with the dimensions `dims` only: whether any flag is set along the other dimensions."""
     bare = flags.drop_vars(flags.coords)
     return bare.any([dim for dim in bare.dims if dim not in dims])
 

@@ -4,9 +4,8 @@ Every result has a variable ``law_holds``: a sentence that begins with *yes*, *a
 is about the law with the constants that the source of the law states. If constants are fitted, ``fitted_law_holds`` is
 the corresponding sentence about the law with the fitted constants.
 
-If the data depart from the fitted law by more than scatter and errors explain, these departures count as an error of
-every case, and the intervals of the constants become wider (see `fitted`). A constant that the data do not determine is
-NaN (see `undetermined`).
+If scatter and errors do not explain the departures of the data from the fitted law, the intervals of the constants
+become wider (see `fitted`). A constant that the data do not determine is NaN (see `undetermined`).
 """
 
 from __future__ import annotations
@@ -115,9 +114,9 @@ class Fitted:
 
     Attributes
     ----------
-    constants : array, shape (1 + RESAMPLES + 2 groups, p)
+    constants : array, shape (rows, p)
         Stack of the constants, for `mdr_dask.bootstrap.interval`; NaN for constants that the data do not determine.
-    residuals : array, shape (1 + RESAMPLES + 2 groups, cases)
+    residuals : array, shape (rows, cases)
         Stack of data minus law.
     count : int
         Number of realisations that were resampled.
@@ -148,7 +147,8 @@ def fitted(
 ) -> Fitted:
     """Fit a law to a stack of data.
 
-    If scatter and errors do not explain the residuals, the residuals count as an error of every case.
+    If scatter and errors do not explain the residuals, the law is also fitted to data that are shifted by the
+    residuals. This widens the intervals of the constants.
 
     Parameters
     ----------
@@ -157,13 +157,13 @@ def fitted(
         logarithm of a factor.
     left : callable
         Takes data and constants, and returns data minus law, shape (rows, cases).
-    data : array, shape (1 + RESAMPLES + 2 groups, cases)
+    data : array, shape (rows, cases)
         Stack of the data.
     count : int
         Number of realisations that were resampled.
     stated : array, shape (p,), optional
-        Constants that the source of the law states. If they are given, a constant is NaN also if data that follow the
-        law with the stated constants would not determine it.
+        Constants that the source of the law states. Whether the data determine a constant is tested at the fitted and,
+        if given, at the stated constants. A constant that fails one of these tests is NaN.
     """
     constants = fit(data)
     residuals = left(data, constants)
@@ -181,9 +181,9 @@ def fitted(
 def undetermined(effects: FloatArray) -> BoolArray:
     """Return which constants of a law the data do not determine.
 
-    One constant is changed by 1, and the other constants are fitted again. If this changes the law by less than
-    `WITHIN` in every case, the constant is undetermined: a law may hold although the data depart from it by as much, so
-    that the fitted value is arbitrary.
+    One constant is changed by 1, and the other constants are fitted again. The constant is undetermined if this changes
+    the law by less than `WITHIN` in every case. A law still holds with such departures, so the fitted value of the
+    constant would be arbitrary.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def verdict(
 
     Parameters
     ----------
-    residuals : array, shape (1 + RESAMPLES + 2 groups, cases)
+    residuals : array, shape (rows, cases)
         Stack of the relative departures of the data from the law.
     count : int
         Number of realisations that were resampled.

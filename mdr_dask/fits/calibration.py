@@ -30,7 +30,7 @@ from mdr_dask.tables import decoded
 
 #: Smallest error of measurement that is considered possible, divided by the rms residual of the best prediction.
 LEAST = 0.2
-#: Smaller residuals, relative to the measured values, may be due to rounding and are replaced by this one.
+#: Smallest rms residual, divided by the rms of the measured values; smaller residuals may be due to rounding.
 _ROUNDING = 1e-9
 
 
@@ -51,8 +51,9 @@ class Calibration:
     units : dict of str to str
         Units of the unknowns, the conditions and the output.
     contradicted : Residuals or None
-        None if the errors of measurement in the table explain the residuals. Otherwise the residuals; the posterior is
-        then computed with larger errors of measurement, which explain them, so that the intervals include the misfit.
+        None if the errors of measurement in the table explain the residuals. Otherwise these are the residuals, and the
+        posterior is computed with errors of measurement that are large enough to explain them. The intervals then
+        include the misfit.
     """
 
     measured: Measured

@@ -28,7 +28,7 @@ def each(
     fit: Callable[[xr.Dataset], Variables],
     *outputs: str,
 ) -> xr.Dataset:
-    """Fit a law to all cases along some dimensions, separately for every combination of values of the others.
+    """Fit a law to all cases along some dimensions, separately for each combination of values of the other ones.
 
     Parameters
     ----------
@@ -39,7 +39,8 @@ def each(
     fit : callable
         Returns the results of the fit for one combination of values of the other dimensions.
     *outputs : str
-        Outputs that the fit needs. The only dimensions of the first output are the axes of the study.
+        Outputs that the fit needs. The first output must have no dimensions other than the axes of the study and the
+        realisation.
 
     Raises
     ------
@@ -96,7 +97,7 @@ class Table(NamedTuple):
     columns: tuple[FloatArray, ...]
 
     def stack(self, used: Any = slice(None)) -> FloatArray:
-        """Return the stack of the means of the `used` cases, shape (1 + RESAMPLES + 2 groups, cases)."""
+        """Return the stack of the means of the `used` cases, shape (rows, cases)."""
         return bootstrap.with_errors(bootstrap.means(self.values[used].T), self.mean_error(used))
 
     def logarithms(self, used: Any = slice(None)) -> FloatArray:
@@ -184,7 +185,7 @@ def nonlinear(
         Takes constants, shape (rows, p), and returns the logarithms of the law, shape (rows or 1, cases).
     stated : array, shape (p,)
         Constants that the source of the law states: exponents, or logarithms of factors.
-    logs : array, shape (1 + RESAMPLES + 2 groups, cases)
+    logs : array, shape (rows, cases)
         Stack of the data.
     count : int
         Number of realisations that were resampled.
@@ -217,9 +218,10 @@ def rms(left: FloatArray) -> float:
 
 
 def _least_squares(model: Callable[[FloatArray], FloatArray], start: FloatArray, data: FloatArray) -> FloatArray:
-    """Fit every row of the data, shape (rows, cases), by Levenberg-Marquardt steps; return (rows, constants).
+    """Fit every row of the data, shape (rows, cases), by Levenberg-Marquardt steps.
 
-    Each call of the model evaluates all rows; this is a hundred times faster than one scipy fit for each row.
+    Return the constants, shape (rows, constants). Each call of the model evaluates all rows; this is a hundred times
+    faster than one scipy fit for each row.
     """
     size = np.eye(start.size)
     constants = np.tile(start, (data.shape[0], 1))

@@ -62,7 +62,10 @@ def laws_of(
 
 
 def sign_of(over: str) -> int:
-    """Return -1 for a time as abscissa, else (frequency) 1; a shift factor in decades is this sign times log10 a_T."""
+    """Return -1 if the abscissa is a time, otherwise (frequency) 1.
+
+    A shift factor in decades is log10 a_T times this sign.
+    """
     return -1 if over == "t" or over.lower().startswith("time") else 1
 
 

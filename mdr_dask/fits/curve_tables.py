@@ -63,7 +63,7 @@ def frame_of(table: xr.Dataset | pd.DataFrame) -> pd.DataFrame:
 
 
 def finite_rows(frame: pd.DataFrame, columns: list[str]) -> tuple[pd.DataFrame, str]:
-    """Return the rows with a finite number in every column, and a sentence about omitted rows (empty without any)."""
+    """Return the rows with a finite number in every column, and a sentence about omitted rows, if any."""
     missing = {name: ~np.isfinite(frame[name].to_numpy(dtype=np.float64)) for name in columns}
     anywhere = np.logical_or.reduce(list(missing.values()))
     if not anywhere.any():
@@ -115,7 +115,10 @@ FAMILIES = (
 def columns_to_use(
     frame: pd.DataFrame, abscissa: str | None, ordinate: str | Sequence[str] | None, group: str | None
 ) -> tuple[str, tuple[str, ...], str]:
-    """Return the columns of abscissa, ordinates and group; those not given follow from the first family that fits."""
+    """Return the columns of abscissa, ordinates and group.
+
+    Columns that are not given are taken from the first of the `FAMILIES` that fits the table.
+    """
     wished = None if ordinate is None else (ordinate,) if isinstance(ordinate, str) else tuple(ordinate)
     found = []
     for over, values, by in FAMILIES:

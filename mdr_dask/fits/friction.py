@@ -150,7 +150,7 @@ def _zone_one(data: xr.Dataset) -> Variables:
 
 
 def _plateau(data: xr.Dataset) -> Variables:
-    """Find the largest friction over all velocities; compare it with the rms slopes of the line and in the contact."""
+    """Find the largest friction over all velocities; compare it with the rms slope of the line, and in contact."""
     require(data, "shear_modulus", "relaxation_time")
     velocities, form = _velocities(data)
     table = table_of(data, spectral_slope(data), velocities)
@@ -203,7 +203,10 @@ def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], coun
 
 
 def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str]:
-    """Return the dimensionless velocities and a format to write one of them; v tau if the study has no rms height."""
+    """Return the dimensionless velocities, and a format for one of them.
+
+    If the study has no rms height, return v tau, in m.
+    """
     if "rms_roughness" in data:
         return loads_and_velocities(data)[1], "v tau slope / (sqrt 2 h) = {:.2g}"
     return data["velocity"] * data["relaxation_time"], "v tau = {:.2g} m"
@@ -212,8 +215,8 @@ def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str]:
 def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: str) -> str:
     """Return a sentence on whether friction reaches a maximum or a constant value within the range of velocities.
 
-    `x` are the logarithms of the velocities, `ends` is the interval of the slope `found.rise`, and `place` is a format
-    to write the velocity of the maximum.
+    `x` are the logarithms of the velocities, `ends` is the interval of the slope `found.rise`, and `place` is the
+    format for the velocity of the maximum.
     """
     at, rise = float(found.place[0]), float(found.rise[0])
     change = f"d ln mu / d ln v = {rise:.2g}"
@@ -232,7 +235,7 @@ def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: st
 
 
 def rising(force: FloatArray, velocity: FloatArray, mean: FloatArray, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which of the known cases are in regions I to III: at each load, the velocities up to the maximum."""
+    """Return which of the known cases are in regions I to III: at each load, up to the velocity of largest friction."""
     used = known & (mean > 0)
     for load in np.unique(force[used]):
         same = np.flatnonzero(used & (force == load))

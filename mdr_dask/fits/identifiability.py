@@ -16,7 +16,8 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.posterior import Posterior
 
 #: The data leave an end of an axis open if they hardly exclude this end: the logarithm of the posterior density at the
-#: end is less than `OPEN` below its maximum. For a normal density, this means within two standard errors.
+#: end is less than `OPEN` below its maximum. If the density is normal, such an end is within two standard errors of the
+#: maximum.
 OPEN = 2.0
 #: An unknown is also undetermined if the unknowns with an open end explain more than this share of its variance.
 LINKED = 0.25
@@ -51,8 +52,7 @@ def open_ends(found: Posterior) -> list[Ends]:
 def undetermined(found: Posterior, ends: Sequence[Ends]) -> list[int]:
     """Return the indices of the unknowns that the data do not determine.
 
-    The data leave an end of their axis open (see `OPEN`), or their values depend strongly on such an unknown (see
-    `LINKED`).
+    These are the unknowns with an open end (see `OPEN`), and the unknowns that depend strongly on them (see `LINKED`).
     """
     free = [k for k, end in enumerate(ends) if any(end)]
     if not free:

@@ -18,7 +18,7 @@ from mdr_dask.fits.cases import Variables, constant, each, holds, measure, nonli
 from mdr_dask.fits.friction import FRICTION, KELVIN, MODELS, spectral_slope
 from mdr_dask.physics.sliding import laws
 
-BODY = 0.3  # the law applies up to this ratio of the rms slopes of the body in contact and of the roughness
+BODY = 0.3  # the law applies if the rms slope of the body in contact is at most this times that of the roughness
 
 
 def _body(data: xr.Dataset) -> tuple[Any, float]:

@@ -17,7 +17,8 @@ from mdr_dask.fits.interpolation import FEWEST, LEFT, Scale, chord_error, cubic,
 from mdr_dask.models.base import Status
 from mdr_dask.questions.selection import written_apart
 
-#: Largest number of values of a table, and largest number of its intervals for one interval between computed values.
+#: Largest number of values of a table, and largest number of pieces into which an interval between two computed values
+#: is divided.
 LARGEST, PIECES = 2_000_000, 16
 
 
@@ -84,7 +85,10 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
 
 
 def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray]:
-    """Return the mean of an output and the half width of its interval, or its discretisation error without interval."""
+    """Return the mean of an output, and the half width of its interval.
+
+    If there is no interval, the discretisation error is returned instead of the half width.
+    """
     if "realisation" not in dataset[output].dims:
         return dataset[output], xr.zeros_like(dataset[output])
     kept = [name for name in (output, dataset[output].attrs.get("ancillary_variables")) if name in dataset]
@@ -104,7 +108,7 @@ def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray
 
 
 def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.DataArray, xr.DataArray]:
-    """Interpolate the cases that an adaptive axis left out, and add the error of this interpolation."""
+    """Interpolate the cases that an adaptive axis left out; their half widths include the interpolation error."""
     axes = [k for k, dim in enumerate(mean.dims) if _is_numeric(mean, str(dim))]
     table, error = scale.of_values(mean.to_numpy()).copy(), half.to_numpy().copy()
     for axis in axes * 2:  # twice, because values filled along one axis are used along the other axes

@@ -102,5 +102,5 @@ def chord_error(table: FloatArray, grid: FloatArray, axis: int) -> FloatArray:
 
 
 def _largest(padded: FloatArray) -> FloatArray:
-    """Return the largest value of every three neighbours along the last axis."""
+    """Return, for every three neighbours along the last axis, the largest value."""
     return np.asarray(np.max([padded[..., :-2], padded[..., 1:-1], padded[..., 2:]], axis=0))

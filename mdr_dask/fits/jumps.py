@@ -88,7 +88,7 @@ class Jumps(NamedTuple):
 
     Attributes
     ----------
-    before, jump, after : array, shape (1 + RESAMPLES + 2 groups, cases)
+    before, jump, after : array, shape (rows, cases)
         Stacks of mu_1, d_mu_0 and mu_2 (see `mdr_dask.bootstrap`).
     change, slope : array, shape (cases,)
         dv / v_1 and the rms slope. The slope is NaN for smooth lines.
@@ -186,7 +186,7 @@ def _constant(before: FloatArray, jump: FloatArray, count: int) -> Variables:
         return measured | holds(reason, reason)
 
     def model(constants: FloatArray) -> FloatArray:
-        # rows of data shifted by the departures from the law are additional; they belong to mu_1 of the first row
+        # the fit is repeated for data shifted by their departures from the law; mu_1 is then that of the first row
         law: FloatArray = np.log(jump_law(before if len(constants) == len(before) else before[:1], np.exp(constants)))
         return law
 
@@ -206,7 +206,7 @@ def _limit(
 ) -> Variables:
     """Return the mean of a number over some cases, and a sentence on whether the number has its stated value.
 
-    `meaning` describes the mean, and `question` the sentence.
+    `meaning` and `question` are the descriptions of the mean and of the sentence in the result.
     """
     if not stack.shape[1]:
         nothing = constant(name, np.full(1 + bootstrap.RESAMPLES, np.nan), count, meaning)
@@ -244,7 +244,7 @@ def _jump_linearity(data: xr.Dataset) -> Variables:
         count,
     )
     line = both @ np.linalg.pinv(np.vstack([np.ones(change.size), change]))
-    moved = scale * (flat.constants[len(both) :] - flat.constants[0])  # departures from the mean count as errors
+    moved = scale * (flat.constants[len(both) :] - flat.constants[0])  # changes due to departures from the mean
     level = np.concatenate([line[:, :, 0], line[0, :, 0] + moved])
     with np.errstate(divide="ignore", invalid="ignore"):  # zeta may be zero within its error
         trend = line[:, :, 1] / line[:, :1, 0]

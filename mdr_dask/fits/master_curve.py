@@ -57,21 +57,24 @@ def master_curve(
         different temperatures, the default is ``modulus`` or ``compliance``; otherwise it is ``none``.
     reference : float, optional
         Value of the group at which the factors are zero; by default that of the middle group. If the reference lies
-        between two groups, the factor there is interpolated about the best law, and the intervals include the error of
-        this interpolation. With two kinds of groups, the reference becomes the nearest value of the first kind.
+        between two groups, the factor at the reference is that of the best law plus the interpolated departure of the
+        shift factors from this law. The intervals include the error of this interpolation. With two kinds of groups,
+        the reference becomes the nearest value of the first kind.
 
     Returns
     -------
     Dataset
-        ``shift_factor`` and ``vertical_factor`` are added, in decades, to the logarithms of abscissa and ordinate; they
-        have the dimension of the group, and ``_error`` (68 %), ``_low`` and ``_high`` (95 %), ``covariance`` and
-        ``draws``. ``point_abscissa``, ``point_ordinate`` and ``point_group`` are all points after shifting.
-        ``curve_abscissa``, ``curve_ordinate`` and ``curve_error`` are the merged curve and its error in decades; its
-        attrs contain the range that was measured at the reference. A second ordinate has ``point_companion``,
-        ``curve_companion`` and ``curve_companion_error``. The constants of the laws that apply are also included. With
-        two kinds of groups, there are also ``second_factor`` over the second kind and the constants of its laws; the
-        attrs then contain ``second`` and ``second_reference``, and ``chi_squared`` and ``probability`` of the sum of
-        both factors. The attr ``vertical`` describes the vertical factors that were used.
+        ``shift_factor`` and ``vertical_factor`` contain, for each group, the decades that are added to the logarithms
+        of abscissa and ordinate. Both come with ``_error`` (half width of the 68 % interval), and with ``_low`` and
+        ``_high`` (ends of the 95 % interval). ``covariance`` and ``draws`` belong to the shift factors,
+        ``vertical_covariance`` and ``vertical_draws`` to the vertical factors. ``point_abscissa``, ``point_ordinate``
+        and ``point_group`` are all points after shifting. ``curve_abscissa``, ``curve_ordinate`` and ``curve_error``
+        are the merged curve and its error in decades; its attrs contain the range that was measured at the reference. A
+        second ordinate has ``point_companion``, ``curve_companion`` and ``curve_companion_error``. The constants of the
+        laws that apply are also included. With two kinds of groups, there are also ``second_factor``, the shift factor
+        of the second kind, and the constants of its laws. The attrs then contain ``second``, ``second_reference``, and
+        ``chi_squared`` and ``probability`` of the test whether each shift is a sum of two factors. The attr
+        ``vertical`` describes the vertical factors that were used.
 
     Raises
     ------
@@ -172,7 +175,10 @@ def _of_two_groups(
 
 
 def _inside(groups: FloatArray, reference: float) -> float:
-    """Return the reference, or the nearest group if the reference lies just outside, as measured set points scatter."""
+    """Return the reference, or the nearest group if the reference lies just outside the groups.
+
+    It may lie outside by a tenth of the mean distance between groups, because measured set points scatter.
+    """
     margin = 0.1 * np.ptp(groups) / max(groups.size - 1, 1)
     if not groups.min() - margin <= reference <= groups.max() + margin:
         got, low, high = distinguishable(reference, groups.min(), groups.max(), digits=6)
@@ -250,7 +256,7 @@ def _dataset(
 
 
 def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
-    """Return a master curve, as returned by `master_curve` or read from a file, for another reference.
+    """Convert a master curve, as returned by `master_curve` or read from a file, to another reference.
 
     Raises
     ------
@@ -291,11 +297,11 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
 
 
 def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    """Return the friction due to roughness, for a master curve against force, from the series of a store.
+    """Return the friction that is due to roughness, as a function of force and velocity.
 
     It is the coefficient of friction of the first rough series that varies force and velocity, averaged over
-    realisations. There may be a series with the same forces and velocities but without roughness. Its friction is due
-    to the bulk alone and is subtracted.
+    realisations. If a series has the same forces and velocities but no roughness, its friction is due to the bulk alone
+    and is subtracted.
 
     Raises
     ------

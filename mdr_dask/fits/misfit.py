@@ -51,9 +51,10 @@ class Residuals(NamedTuple):
 
 
 def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str:
-    """Return a sentence on whether the model explains the measured points, with the verdicts of a law.
+    """Return a sentence on whether the model explains the measured points.
 
-    The verdict is *not tested* if the errors are so large that they would hide any misfit.
+    It begins with *yes*, *no* or *not tested*. It is *not tested* if the errors are so large that they would hide any
+    misfit, or if there are too few points.
     """
     size = f"residuals are {100 * residuals.relative:.2g} % of the measured values, rms"
     hidden = (
@@ -78,7 +79,7 @@ def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str
 
 
 def trend(scaled: FloatArray, conditions: Mapping[str, FloatArray]) -> tuple[float, str]:
-    """Return the probability that chance causes such a trend of the residuals, and the condition along which it occurs.
+    """Return the probability that a trend of the residuals is due to chance, and the condition that shows the trend.
 
     A parabola is fitted to the residuals against the rank of each condition. The condition with the smallest
     probability is returned. This probability is multiplied by the number of conditions, because several were tried.

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 #: Largest number of unknowns.
 MOST = 4
-#: Means are interpolated linearly in a dense table: largest number of its values, and largest number of its intervals
-#: for one interval between computed values.
+#: Means are interpolated linearly in a dense table: largest number of its values, and largest number of pieces into
+#: which an interval between two computed values is divided.
 LARGEST, PIECES = 4e6, 16
 #: Relative difference up to which a measured and a computed value of a parameter count as equal.
 SAME = 1e-6
@@ -275,7 +275,7 @@ def _at_point(fields: FloatArray, axes: Sequence[FloatArray], place: Sequence[fl
 def _interpolators(
     at_points: FloatArray, unknowns: Mapping[str, FloatArray], count: int, logarithmic: bool
 ) -> Prediction:
-    """Return a prediction that interpolates linearly: means in a dense table, errors between the computed values."""
+    """Return a prediction by linear interpolation, of means in a dense table and of errors at the computed values."""
     from scipy.interpolate import RegularGridInterpolator
 
     scales = [Scale.of(values) for values in unknowns.values()]

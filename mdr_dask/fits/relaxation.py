@@ -35,7 +35,7 @@ from mdr_dask.fits.cases import (
 from mdr_dask.fits.jumps import LAW, LEAST, LEVELS, MODELS, each_jump, jump_law, jumps_of
 
 WINDOW = 8.0  # the exponential is fitted up to t' = WINDOW / (rate by eq. 4.12)
-FLOOR = 0.01  # assumed grid error of mu - mu_2 at every moment, divided by its largest value (docs/kinetics.md)
+FLOOR = 0.01  # assumed grid error of mu - mu_2 at every time, divided by its largest value (docs/kinetics.md)
 GRID = 400  # number of rates that are tried, evenly spaced on a logarithmic scale
 
 TRUSTED = 0.5  # a rate is used to fit the power law if the half width of the interval of ln(rate) is below this
@@ -82,7 +82,7 @@ def widths(time: FloatArray) -> FloatArray:
 
 
 def tried_rates(time: FloatArray) -> FloatArray:
-    """Return the rates that are tried for a trace; its moments do not resolve slower or faster rates."""
+    """Return the rates that are tried for a trace; its times do not resolve slower or faster rates."""
     rates: FloatArray = np.geomspace(0.02 / time[-1], 2 / time[time > 0][0], GRID)
     return rates
 
@@ -96,7 +96,7 @@ def exponential(time: FloatArray, traces: FloatArray, weights: FloatArray) -> tu
     Parameters
     ----------
     time : array, shape (m,)
-        Moments, beginning with 0.
+        Times, beginning with 0.
     traces : array, shape (n, m)
         Traces that relax to zero.
     weights : array, shape (m,)
@@ -125,7 +125,7 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
     ----------
     time : array, shape (m,)
         t', beginning with 0.
-    traces : array, shape (1 + RESAMPLES + 2 groups, m)
+    traces : array, shape (rows, m)
         Stack of mu - mu_2 over the realisations.
     error : array, shape (m,)
         Standard error of the mean.
@@ -134,9 +134,9 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
     expected : float
         Rate by eq. 4.12.
     """
-    inside = time <= max(WINDOW / expected, time[min(8, time.size - 1)])  # at least eight moments after the first one
+    inside = time <= max(WINDOW / expected, time[min(8, time.size - 1)])  # at least eight times after the first one
     t, y = time[inside], traces[:, inside]
-    # A moment counts by the duration that it represents, because neighbours on a dense grid carry the same information.
+    # The weight of a time is proportional to the interval around it, because neighbours carry the same information.
     weights = widths(t) / (error[inside] ** 2 + (FLOOR * np.abs(y[0]).max()) ** 2)
     weights /= weights.sum()
     rate, amplitude = exponential(t, y, weights)

@@ -106,7 +106,7 @@ def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> Floa
     fraction : array
         Length in contact divided by the length of the line.
     hurst, points : float
-        Hurst exponent and number of Nyquist points of the line.
+        Hurst exponent, and number of points of the line, two for the shortest wave.
     """
     power = 2 * (1 - hurst)
     # wave numbers 2 pi / L_cont and q_max, both in units of 2 pi / L
@@ -132,7 +132,7 @@ def _contact_slope(data: xr.Dataset) -> Variables:
     found = linear(np.ones((1, used.size)), bootstrap.difference(slopes.logarithms(used), law), count)
     fraction = fractions.mean()[used]
     holding = found.holds(lambda k: f"L_cont / L = {fraction[k]:.2g}")
-    if np.ptp(np.log(fraction)) < WITHIN:  # as the factor is fitted, equal contact lengths cannot contradict the law
+    if np.ptp(np.log(fraction)) < WITHIN:  # with equal contact lengths, the fitted factor alone explains the slopes
         holding = f"not tested: the lengths in contact of these cases differ by less than {WITHIN:.0%}"
     return {
         **constant("factor", np.exp(found.constants[:, 0]), count, "slope in contact divided by eq. 3.21", True),
@@ -266,7 +266,7 @@ def _natural(knots: FloatArray, place: FloatArray) -> FloatArray:
 
 
 def _collapse(data: xr.Dataset) -> Variables:
-    """Shift the curves of friction against velocity, up to its maximum, at all loads onto one common curve."""
+    """Shift the curves of friction against velocity at all loads onto one common curve, each up to its maximum."""
     table = table_of(data, spectral_slope(data), *loads_and_velocities(data))
     force, velocity = table.columns
     known = rising(force, velocity, np.nan_to_num(table.mean()), np.ones(force.size, dtype=bool))
@@ -301,7 +301,7 @@ def _collapse(data: xr.Dataset) -> Variables:
 
 
 def _shifts(forces: FloatArray, loads: FloatArray, found: Collapse, stated: FloatArray, count: int) -> Variables:
-    """Return the shifts of the curves of all loads in decades; NaN for undetermined shifts, and without a curve."""
+    """Return the shift of the curve of every load in decades; NaN if it is undetermined or if there is no curve."""
     decades = np.where(found.vague, np.nan, found.shifts / np.log(10))
     columns = {"horizontal_stated": (stated / np.log(10), "shift along log velocity by eqs. 3.17 and 3.23")}
     for k, name in enumerate(("horizontal", "vertical")):

@@ -56,8 +56,8 @@ def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
     -----
     Failed cases are left out. In Saltelli's design, the index of an input needs three cases for each base point; if one
     of them failed, the base point is left out. The intervals follow from a jackknife over groups of points and over
-    realisations. Points of a Sobol sequence fill space more evenly than random points. Therefore the intervals are
-    rather too wide than too narrow.
+    realisations. Points of a Sobol sequence fill space more evenly than random points. Therefore the intervals tend to
+    be too wide.
 
     References
     ----------
@@ -142,7 +142,7 @@ def _is_saltelli(columns: FloatArray) -> bool:
 def _product(left: FloatArray, right: FloatArray) -> FloatArray:
     """Return for each point the mean of left times right, over all pairs of different realisations.
 
-    With only one realisation, the product of its two outputs is returned.
+    If there is only one realisation, it is paired with itself.
     """
     count = len(left)
     if count == 1:
@@ -202,7 +202,7 @@ def _with_interval(values: FloatArray, indices: Callable[[FloatArray], FloatArra
 
 
 def _jackknife(parts: list[FloatArray]) -> FloatArray:
-    """Return the half width of an interval from the indices that result without each part of the data in turn."""
+    """Return the half width of an interval; each item of `parts` contains the indices without one part of the data."""
     count = len(parts)
     error = np.sqrt((count - 1) / count * np.sum((np.array(parts) - np.mean(parts, axis=0)) ** 2, axis=0))
     half: FloatArray = t.ppf(bootstrap.TAILS[1], count - 1) * error

@@ -17,7 +17,7 @@ FLAT = 0.05  # points that are below the maximum by at most this fraction count 
 
 
 def smoothed(mean: FloatArray) -> FloatArray:
-    """Return a smoothed curve, from which the points that are fitted are chosen."""
+    """Return a smoothed curve; it only serves to choose the points to which a parabola is fitted."""
     smooth = mean.copy()
     for _ in range(2):
         smooth[1:-1] = (smooth[:-2] + 2 * smooth[1:-1] + smooth[2:]) / 4
