@@ -250,8 +250,8 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
     text, source : str
         The table and the name of its file.
     is_name : callable, optional
-        For tables whose entries may be words. It returns whether a text is the name of a column; the first line with
-        such a name is the line of names.
+        For tables whose entries may be words. The function returns whether a text is the name of a column; the first
+        line with such a name is the line of names.
 
     Raises
     ------
@@ -353,9 +353,9 @@ class _Head(NamedTuple):
 def _head(grid: _Grid) -> _Head:
     """Find the names and units.
 
-    They are lines of text above the numbers with as many cells as most lines of the table. The line above the last line
-    of units contains the names. If no line of units follows the names, the last line contains the names; the line above
-    it may then contain the units.
+    Names and units are in lines of text above the numbers, with as many cells as most lines of the table. The line
+    above the last line of units contains the names. If no line of units follows the names, the last line contains the
+    names; the line above it may then contain the units.
     """
     data, numeric = _lines_of_numbers(grid)
     full = np.flatnonzero(data & (grid.length == numeric.size))

@@ -263,8 +263,8 @@ _FAR = 3.0
 def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
     """Return whether a number without a unit may have been meant in another unit than the SI unit.
 
-    The number is doubtful if, taken in SI, it differs from the first usual value by more than 3 decades. It is also
-    doubtful if it is nearer to that value when it is taken in the unit of one of the usual values.
+    The number is doubtful if, taken in SI, it differs from the first usual value by more than 3 decades. The number is
+    also doubtful if, taken in the unit of one of the usual values, it is nearer to the first usual value.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ COMMAND = "mdr_dask.command"
 
 
 class Drawing(click.Command):
-    """A command that draws figures. It writes the data of each figure, with the command line, to a table next to it."""
+    """A command that draws figures, and writes the data of each figure, with the command line, to a table."""
 
     def parse_args(self, context: click.Context, arguments: list[str]) -> list[str]:
         """Store the command line as it was typed, then parse it."""
@@ -130,7 +130,7 @@ def _require_quantities(units: Mapping[str, str], groups: Mapping[str, xr.Datase
     known = sorted({str(name) for data in groups.values() for name in data.variables})
     for name in units:
         if name not in known:
-            raise DataError(f"no quantity {name!r} to give a unit{did_you_mean(name, known)}")
+            raise DataError(f"--units: no quantity {name!r}{did_you_mean(name, known)}")
 
 
 def _with_notes(figure: Plot, where: str, warnings: list[str]) -> Plot:

@@ -84,9 +84,9 @@ def titled(name: str, unit: str) -> str:
 def print_aligned(titles: Sequence[str], columns: Sequence[Sequence[Any]], keys: int = 1, note: str = "") -> None:
     """Print columns side by side, within the width of the terminal.
 
-    The text `note` is printed above the table. It is followed by the columns that have the same value in all rows, and
-    by the names of columns without any value. If a table is too wide, it is printed in parts. Each part begins with the
-    first `keys` columns, which identify a row. A single row that is too wide is printed as a list.
+    The text `note` is printed above the table. The note is followed by the columns that have the same value in all
+    rows, and by the names of columns without values. If a table is too wide, it is printed in parts. Each part begins
+    with the first `keys` columns, which identify a row. A single row that is too wide is printed as a list.
     """
     rows = len(columns[0]) if columns else 0
     cells = [[short(value) for value in column] for column in columns]

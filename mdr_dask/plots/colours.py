@@ -40,7 +40,7 @@ def colour(number: int) -> str:
 def line_and_marker(number: int) -> tuple[str, str]:
     """Return line and marker of a curve.
 
-    They differ between curves if the style is grey, or if the style defines lines and markers.
+    Lines and markers differ between curves if the style is grey, or if the style defines lines and markers.
     """
     from matplotlib.colors import to_rgb
 

@@ -159,7 +159,7 @@ class Figure:
     Parameters
     ----------
     panels : list of Panel
-        The panels. They fill rows from left to right; with `stack`, they fill columns from left to right.
+        The panels. Panels fill rows from left to right; with `stack`, panels fill columns from left to right.
     subject : str
         Subject of the figure, for the title.
     fixed : str

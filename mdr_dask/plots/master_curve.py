@@ -19,8 +19,8 @@ INSIDE, OUTSIDE = "measured at the reference", "reached by shifting"
 def draw_master_curve(curve: xr.Dataset) -> Figure:
     """Return the figure of a master curve from :func:`mdr_dask.fits.master_curve.master_curve`.
 
-    It shows the curves as measured, the merged curve and the shift factors. Bars and band are 68 % intervals. The
-    merged curve is dashed beyond the range that was measured at the reference.
+    The figure shows the curves as measured, the merged curve and the shift factors. Bars and band are 68 % intervals.
+    The merged curve is dashed beyond the range that was measured at the reference.
     """
     curve = _in_shown_units(curve)
     attrs = curve.attrs

@@ -93,7 +93,7 @@ def _apart(measured: Measured, data: xr.Dataset) -> list[str]:
 def _add(panel: Panel, measured: Measured, data: xr.Dataset) -> int:
     """Add the measured points that have the conditions of a panel, and return their number.
 
-    Points have the colours of their curves. They are black if there is only one curve, or if the table lacks a
+    Points have the colours of their curves. Points are black if there is only one curve, or if the table lacks a
     parameter in which the curves differ.
     """
     found, keys = 0, panel.entries()

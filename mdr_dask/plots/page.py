@@ -46,7 +46,8 @@ class Page:
     title : str, optional
         Title. With None, the figure has a description as its title, or no title if a size was requested.
     style : str, optional
-        A style file of matplotlib, or the name of a style. Its settings take precedence over those of the page.
+        A style file of matplotlib, or the name of a style. The settings of the style take precedence over those of the
+        page.
     units : mapping of str to str
         Requested units by the name of the quantity.
     used : set of str

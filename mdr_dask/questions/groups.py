@@ -24,8 +24,8 @@ CASES = "cases"
 def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None = None) -> xr.Dataset:
     """Average every output over the cases of each group, so that the scatter over realisations is kept.
 
-    A group has C cases. Its mean m is the mean of the means m_c of its cases, with the same weight for each case. All
-    cases use the same R realisations, so their results are correlated. Realisation r of a group is
+    A group has C cases. The mean m of the group is the mean of the means m_c of the cases, with the same weight for
+    each case. All cases use the same R realisations, so their results are correlated. Realisation r of a group is
     therefore ``m + R u_r``, where ``u_r`` is the sum over the cases c of ``(x_cr - m_c) / (n_c C)``. Here x_cr is the
     result of case c in realisation r, and n_c is the number of realisations of case c. The mean and the standard error
     of these R numbers are the mean and the standard error of the group, even if the numbers n_c differ. If every case

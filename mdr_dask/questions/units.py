@@ -45,7 +45,7 @@ def as_written(study: xr.Dataset) -> dict[str, str]:
 def in_units(dataset: xr.Dataset, wanted: Mapping[str, str]) -> xr.Dataset:
     """Convert variables and coordinates. An output is converted together with its statistics and errors.
 
-    `wanted` are units by the name of an axis, a parameter or an output. They may be spelt as in a campaign file.
+    `wanted` are units by the name of an axis, a parameter or an output. Units may be spelt as in a campaign file.
 
     Raises
     ------

@@ -109,7 +109,7 @@ SUBJECTS: dict[str, Subject] = {
     "velocity_jump": Subject(
         "A body slides steadily over a rough line under a constant load until its velocity jumps. Friction before the "
         "jump and long after it follows from steady solutions. The indentation depth between them is computed in time "
-        "steps. In each step, one pass along the line finds the patches in contact, and their forces are closed "
+        "steps. In each step, one pass along the line finds the patches in contact; their forces have closed "
         "forms. Every line has its own steady friction after the jump.",
         (
             Equation(
@@ -135,7 +135,7 @@ SUBJECTS: dict[str, Subject] = {
         "in the theory of Johnson, Greenwood and Poon. The film is the film of a line contact, and the asperities are "
         "springs of the method of dimensionality reduction. Where the lines overlap by more than the film thickness, "
         "clusters of points are in contact. A cluster breaks through the boundary layer if it squeezes the layer to "
-        "less than its smallest thickness.",
+        "less than the smallest thickness of the layer.",
         (
             Equation(
                 r"F_a(h) + \gamma F = F",

@@ -30,7 +30,7 @@ COARSEST = 64  # largest number of nodes of the grid on which the search for the
 # the error of the extrapolation over the last step.
 CONVERGED = 1e-9
 EXACT_STEP = 1e-13  # the search also ends after a relative step of the depth that is as small as rounding errors
-COARSE = 1e-3  # replaces CONVERGED on all grids except the finest
+COARSE = 1e-3  # value of CONVERGED on all grids except the finest
 
 BLOCK = 256  # number of nodes in a block
 LANES = 8  # number of cases in one vector instruction

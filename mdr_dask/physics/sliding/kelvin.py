@@ -1,7 +1,7 @@
 """One sweep along a line of cubic cells: the steady state of a Kelvin foundation at a given depth.
 
 All lengths are in cells: a cell has the length 1, a slope is the rise over one cell, and ``deborah`` is v tau / dx with
-the length dx of a cell. Heights are positive towards the elastomer. They are measured from the highest point of the
+the length dx of a cell. Heights are positive towards the elastomer. Heights are measured from the highest point of the
 line, so that the penetration is w = depth + height with depth > 0. The displacement of an element is u = w in contact;
 after contact ends, u decays as exp(-s / deborah) with the distance s. The derivative of u with respect to the depth is
 1 in contact, and decays like u after contact ends. A change of the depth also shifts the places where contact begins
@@ -126,7 +126,7 @@ def _decayed(x: float) -> float:
     """Return 1 - exp(-x) for x >= 0; for small x by a series, which is faster and exact to rounding."""
     if x > 1 / 32:
         return -math.expm1(-x)
-    # products with reciprocals, because divisions would make a sweep a tenth slower
+    # products with reciprocals, because divisions would make a sweep 10 % slower
     rest = 1 - x * (1 / 5) * (1 - x * (1 / 6) * (1 - x * (1 / 7)))
     return x * (1 - x * (1 / 2) * (1 - x * (1 / 3) * (1 - x * (1 / 4) * rest)))
 
@@ -324,8 +324,7 @@ def sweep_cells(
     i, x, contact, patches = 0, start, cells.periodic, 0
     if contact and begins.size > 0:
         begins[0] = start
-    # u: displacement at the end of the last contact; left: place of this end; free: displacement at the start of the
-    # cell
+    # u: displacement at the end of the last contact; left: place of this end; free: displacement where the cell starts
     u = free = left = 0.0
     # the period ends at the highest point, inside a last cell that repeats the start of the first cell
     last = n if cells.periodic and start > 0 else n - 1

@@ -51,8 +51,8 @@ def full_contact(force: Any, velocity: Any) -> Any:
 def interpolation(force: Any, velocity: Any, exponent: Any, beta: Any) -> Any:
     """Return mu / (sqrt 2 slope) in regions I to III and both zones (eq. 3.17, 3.18); arguments as in `zone_one`.
 
-    The result combines three laws, 1 / mu^2 = 1 / mu_1^2 + 1 / mu_2^2 + 1 / mu_3^2. Here mu_1 is the plateau, mu_2
-    the result of `full_contact`, and mu_3 the result of `zone_one`.
+    The result combines three laws, 1 / mu^2 = 1 / mu_1^2 + 1 / mu_2^2 + 1 / mu_3^2. In this formula, mu_1 is the
+    plateau, mu_2 the result of `full_contact`, and mu_3 the result of `zone_one`.
     """
     return (1 + (crossover(force, exponent, beta) / velocity) ** 2) ** -0.5
 

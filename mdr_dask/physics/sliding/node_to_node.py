@@ -3,7 +3,7 @@
 All lengths are in cells: neighbouring nodes have the distance 1, and De = v tau is the Deborah number in cells. Inside
 a cell the penetration w = d + h is a cubic, which follows from heights and slopes at the two nodes (d is the depth, h
 the height of the line). Contact ends where the force w + De w' falls to 0. Contact begins where the line reaches the
-displacement u of the free element. Both places are computed approximately.
+displacement u of the free element. The places where contact begins and ends are computed approximately.
 
 The load is the integral of w in contact and of u out of contact. The drag is the integral of De w'^2 in contact and of
 u^2 / De out of contact. All terms are positive, so that no digits are lost in slow sliding. The integrals over cells
@@ -281,8 +281,8 @@ RESOLVED = 10  # a grid resolves the contact if at least this number of cells is
 
 ITERATIONS = 25
 COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most COARSENING * COARSEST nodes
-LAST_STEP = 0.03  # largest last step of the search, relative to the depth; the results are extrapolated over it
-SECANT_ERROR = 0.1  # assumed error of this extrapolation, as a fraction of the extrapolated change
+LAST_STEP = 0.03  # largest last step of the search, divided by the depth; results are extrapolated over this step
+SECANT_ERROR = 0.1  # assumed error of an extrapolation over the last step, as a fraction of the extrapolated change
 FIRST_STEP, FIRST_ERROR = 0.1, 0.03  # values of LAST_STEP and the allowed error on grids that only provide a guess
 ROUNDING = 1e-12  # relative step of the depth that is as small as rounding errors
 ORDER = 3.0  # order of convergence: four inside cells, lower where contact begins or ends; measured: 3.3
@@ -709,10 +709,10 @@ class NodeToNode:
     def _solution(self, results: FloatArray, depth: FloatArray, level: int) -> Solution:
         """Return the results on a grid.
 
-        Two grids may both miss a small patch of contact. Such a patch is hardly longer than a cell, because a longer
-        one contains nodes. It therefore increases the length in contact by at most one cell. The slope is small near
-        the summit of an asperity, so that the patch reduces the rms slope of the contact. The relative reduction is at
-        most half the relative increase of the length.
+        Two grids may both miss a small patch of contact. A missed patch is hardly longer than a cell, because a longer
+        patch contains nodes. The patch therefore increases the length in contact by at most one cell. The slope is
+        small near the summit of an asperity, so that the patch reduces the rms slope of the contact. The relative
+        reduction is at most half the relative increase of the length.
         """
         drag, fraction, slope = results.T
         with np.errstate(invalid="ignore", divide="ignore"):

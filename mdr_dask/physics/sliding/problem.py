@@ -69,7 +69,8 @@ class Request:
         Whether to estimate the errors if the solid is a Kelvin solid and the grid is given. In all other cases the
         errors are always estimated.
     contact : bool
-        Whether contact fraction and contact slope are requested. These need finer grids than the other results.
+        Whether contact fraction and contact slope are requested. These two results need finer grids than the other
+        results.
     """
 
     accuracy: float = 0.01
@@ -103,8 +104,8 @@ def solve(
     Steady
         A case that misses the accuracy on the finest grid keeps its results and errors.
     array, shape (4, cases)
-        Estimated absolute discretisation errors of `Steady.columns`. They are infinite for a Kelvin solid on a given
-        grid if `with_errors` is False.
+        Estimated absolute discretisation errors of `Steady.columns`. The errors are infinite for a Kelvin solid on a
+        given grid if `with_errors` is False.
     """
     cases = Cases(deborah, loads)
     if terms is not None:

@@ -2,7 +2,7 @@
 
 `viscoelastic_sweep` moves an element once along the line. In this module, Newton's method finds the depth. For a
 periodic line it also finds the stretches e_m = u - a_m of the Prony terms at the start (u is the displacement of the
-element, a_m that of the dashpot of term m). They must repeat after one period.
+element, a_m that of the dashpot of term m). The stretches must repeat after one period.
 """
 
 from __future__ import annotations
@@ -305,9 +305,9 @@ def newton_step(
 ) -> None:  # pragma: no cover
     """Solve the linear system of a Newton step on a periodic line by the method of generalised conjugate residuals.
 
-    The rows of the matrix of derivatives are divided by `scale`. It is then the identity plus an operator that is
-    smooth as a function of the relaxation time. The singular values of such an operator decrease fast, so that four to
-    seven products of the matrix and a vector are enough for any number of terms.
+    The rows of the matrix of derivatives are divided by `scale`. The matrix is then the identity plus an operator that
+    is smooth as a function of the relaxation time. The singular values of such an operator decrease fast, so that four
+    to seven products of the matrix and a vector are enough for any number of terms.
 
     Parameters
     ----------
@@ -446,12 +446,10 @@ def solve_sliding(
             scale[terms] = totals[3]
             newton_step(residual, scale, swept, workspace, step)
         else:
-            # if the depth changes, all stretches change by the same amount, because the strains of the dashpots stay
-            # the same
+            # all stretches change as much as the depth, because the strains of the dashpots do not change
             residual[:] = 1.0
             follow(residual, swept, False, product, workspace)
-            # the load is the integral of the stress here; u behind the line is unknown if the end of the line is in
-            # contact
+            # the load is computed from the stress, because u behind the line may be unknown
             step[terms] = max((strain_area - totals[1]) / product[terms], -DEEPEST_STEP * unknown[terms])
         largest = 0.0
         for j in range(size):

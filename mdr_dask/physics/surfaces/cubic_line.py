@@ -75,8 +75,8 @@ def indented_line(height: FloatArray, slope: FloatArray | None, body: shapes.Sha
     height, slope
         Heights and slopes of the periodic roughness, as in :func:`periodic_line`.
     body : Shape
-        The shape under the roughness, with its tip at node n // 2. Its lengths are in units of the length of the line,
-        its heights in the unit of the roughness.
+        The shape under the roughness, with its tip at node n // 2. The shape has lengths in units of the length of the
+        line, and heights in the unit of the roughness.
     """
     n = height.size
     smooth, left, right = body.at((np.arange(n + 1) - n // 2) / n)
@@ -155,7 +155,7 @@ def _peak(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> t
     here, after = np.uintp(i), np.uintp(i + 1)
     first, last, begin, end = enter[here], leave[here], height[here], height[after]
     rise, place, peak = end - begin, 0.0 if begin >= end else 1.0, max(begin, end)
-    between = 3 * rise - first - last  # Bezier coefficient of the slope; no extreme if all three have the same sign
+    between = 3 * rise - first - last  # slope at a control point; with one sign of all three slopes there is no extreme
     if not (min(min(first, between), last) >= 0 or max(max(first, between), last) <= 0):
         b, c = 3 * rise - 2 * first - last, first + last - 2 * rise
         inside = summit(first, b, c)

@@ -156,7 +156,7 @@ def without_trend(surface: SurfaceMap, order: Order) -> SurfaceMap:
 def hann_disc(points: tuple[int, int], size: tuple[float, float]) -> FloatArray:
     """Return Hann's window as a function of the distance from the centre.
 
-    Its mean square is 1, and it is 0 beyond half the shorter side of the map.
+    The mean square of the window is 1; the window is 0 beyond half the shorter side of the map.
     """
     x, y = (length * np.arange(n // 2 + 1) / n for n, length in zip(points, size, strict=True))
     distance = np.minimum(np.hypot(x[:, None], y) / (0.5 * min(size)), 1.0)
@@ -240,7 +240,7 @@ class MapSpectrum:
         """
         there = np.flatnonzero(significant(self.wavenumber, self.density))
         octave = np.floor(np.log2(self.wavenumber[there] / self.wavenumber[there[0]] + 1e-9)).astype(int)
-        _, octave = np.unique(octave, return_inverse=True)  # omits octaves without a ring
+        _, octave = np.unique(octave, return_inverse=True)  # octaves without a ring get no number
         power = self.density[there] * self.wavenumber[there]
         weight = np.bincount(octave, power)
         scatter = np.bincount(octave, power**2 * 2 / (self.count[there] * self.independent)) / weight**2
@@ -271,7 +271,8 @@ def spectrum_of_map(surface: SurfaceMap, hann: bool = True) -> MapSpectrum:
     waves = fft.rfft2(height, overwrite_x=True)
     power = np.abs(waves) ** 2 / height.size**2
     power[0, 0] = 0.0
-    power[:, 1 : (points[1] + 1) // 2] *= 2  # rfft2 omits the conjugate half of the plane
+    # rfft2 omits half of the waves, which are the complex conjugates of the others
+    power[:, 1 : (points[1] + 1) // 2] *= 2
     del waves, height
     q_x, q_y = wavenumbers(points, size)
     return _rings(power, q_x, q_y, points, size, HANN_MODES * (min(size) / max(size)) if hann else 1.0)

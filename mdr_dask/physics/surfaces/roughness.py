@@ -81,8 +81,7 @@ def _generator(seed: int, realisation: int) -> np.random.Generator:
 
 def phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     """Return exp(i phi_k) for the phases of a realisation, shape (modes,); cached."""
-    # the number of modes is rounded up to a power of two, so that lines with similar numbers share an entry of the
-    # cache
+    # the number of modes is rounded up to a power of two, so that similar lines use the same entry of the cache
     return _phase_factors(seed, realisation, 1 << max(modes - 1, 0).bit_length())[:modes]
 
 

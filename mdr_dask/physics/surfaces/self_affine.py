@@ -85,8 +85,8 @@ def fit_self_affine(bins: Cut) -> SelfAffine | None:
     -------
     SelfAffine or None
         Schwarz's information criterion decides whether there are cut-offs, and at which bins. The confidence intervals
-        follow from the likelihood. They are widened if the spectrum deviates from the fitted law by more than the
-        errors of the spectrum.
+        follow from the likelihood. The intervals are widened if the spectrum deviates from the fitted law by more than
+        the errors of the spectrum.
     """
     wavenumber, density, error = bins
     if wavenumber.size < LEAST_BINS:
@@ -138,7 +138,7 @@ def fit_self_affine(bins: Cut) -> SelfAffine | None:
 
 class _Fit(NamedTuple):
     chi_squared: float
-    slope: float  # of the power law between the cut-offs
+    slope: float  # slope of the power law between the cut-offs
     error: float
 
 

@@ -84,9 +84,9 @@ class PowerLaw:
 class RoundedCone:
     """The line of a cone with a rounded tip.
 
-    The body is f = s r^2 / (2 b) up to r = b, and f = s (r - b/2) beyond b. Its line is
-    g = s x^2 / b up to x = b, and g = s x (x / b (1 - sqrt(1 - b^2 / x^2)) + arccos(b / x)) beyond b (Popov, Hess and
-    Willert, Handbook of Contact Mechanics, 2.5.8).
+    The body is f = s r^2 / (2 b) up to r = b, and f = s (r - b/2) beyond b. The line of the cone is g = s x^2 / b up to
+    x = b, and g = s x (x / b (1 - sqrt(1 - b^2 / x^2)) + arccos(b / x)) beyond b (Popov, Hess and Willert, Handbook of
+    Contact Mechanics, 2.5.8).
 
     Parameters
     ----------

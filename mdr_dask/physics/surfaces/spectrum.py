@@ -109,9 +109,9 @@ class Spectrum:
     def continued(self, longest: float = 0.0, shortest: float = 0.0, decades: float = 1.0) -> Spectrum:
         """Return the spectrum, continued by power laws up to the wavelength `longest` and down to `shortest`, m.
 
-        An end whose wavelength is given as 0 is not continued. Each power law starts at the outermost point. Its
+        An end whose wavelength is given as 0 is not continued. Each power law starts at the outermost point. The
         exponent is the slope of a straight line, which is fitted to the logarithms of the points within `decades` of
-        this end.
+        the end.
         """
         q, density = [self.wavenumber], [self.density]
         for index, end in (

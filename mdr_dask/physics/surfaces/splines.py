@@ -84,7 +84,7 @@ def _at_nodes(phase: FloatArray) -> FloatArray:
 
 @jit
 def piece(spline: FloatArray, k: int) -> Piece:
-    """Return the polynomial of the four coefficients k to k + 3. It is valid between the nodes k + 1 and k + 2."""
+    """Return the polynomial between the nodes k + 1 and k + 2, from the four coefficients k to k + 3."""
     c0, c1, c2, c3 = spline[k], spline[k + 1], spline[k + 2], spline[k + 3]
     return (c0 + 4 * c1 + c2) / 6, (c2 - c0) / 2, (c0 - 2 * c1 + c2) / 2, (c3 - 3 * c2 + 3 * c1 - c0) / 6
 
@@ -117,7 +117,8 @@ def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
     the four is positive.
     """
     of = piece(spline, k)
-    end = (spline[k + 1] + 4 * spline[k + 2] + spline[k + 3]) / 6  # the same formula as at the start of the next piece
+    # the same formula as in `piece`, so that adjacent pieces agree
+    end = (spline[k + 1] + 4 * spline[k + 2] + spline[k + 3]) / 6
     t_before, before = 0.0, of[0]
     first, second = _extremes(of)
     for number in range(3):
@@ -135,7 +136,7 @@ def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
 @jit
 def _extremes(of: Piece) -> tuple[float, float]:
     """Return the positions of the extremes of a piece, ascending; an extreme outside 0 to 1 is replaced by 0."""
-    a, b, c = 3 * of[3], of[2], of[1]  # a t^2 + 2 b t + c
+    a, b, c = 3 * of[3], of[2], of[1]  # the slope is a t^2 + 2 b t + c
     root = b * b - a * c
     if root <= 0:
         return 0.0, 0.0

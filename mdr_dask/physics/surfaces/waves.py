@@ -71,7 +71,7 @@ def waves_of(height: FloatArray) -> Waves:
     """Return the waves of the periodic line through equidistant samples, without the mean.
 
     For an even number of samples, the shortest wave is two samples long. The sine part of this wave is zero at all
-    samples. It cannot be computed from the samples and is set to 0.
+    samples. The sine part cannot be computed from the samples and is set to 0.
     """
     coefficients = np.fft.rfft(height)[1:] / height.size
     if height.size % 2 == 0:

@@ -3,7 +3,7 @@
 The steady states before and after a jump, and the instant of the jump, are solved on finer and finer grids
 (:mod:`mdr_dask.physics.refine`). The transient between them is marched on one grid. Only the difference between the
 march and the steady state on the same grid is used, so that the transient is accurate even if it is much smaller than
-the friction. Its error is estimated by a second march on half as many nodes with half as many steps.
+the friction. The error of the transient is estimated by a second march on half as many nodes with half as many steps.
 """
 
 from __future__ import annotations

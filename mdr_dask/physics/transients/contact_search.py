@@ -1,9 +1,10 @@
 """Find the contact patches at one instant after a velocity jump.
 
-The search visits the cells of the line one by one. It starts at the highest point and follows the direction in which
-the elements move. It records where contact last ended and where free elements may have separated (`FreeRecovery`). The
-force on an element in contact is lift + h + D h'. Here h is the height of the line, D is the Deborah number v tau in
-cells, and the lift is the sum of the depth and the rate of the depth. In each cell that is examined:
+The search visits the cells of the line one by one. The search starts at the highest point and follows the direction in
+which the elements move. It records where contact last ended and where free elements may have separated
+(`FreeRecovery`). The force on an element in contact is lift + h + D h'. Here h is the height of the line, D is the
+Deborah number v tau in cells, and the lift is the sum of the depth and the rate of the depth. In each cell that is
+examined:
 
 * Inside a patch, contact ends where the force falls through zero, or where free elements arrive with a displacement
   larger than the depth plus the height of the line (contact is then lost although the contact force is positive).
@@ -75,7 +76,7 @@ PERIODS = 3  # largest number of periods of the line for which the search is rep
 VISITS = 6  # largest number of changes of contact in a cell: a cubic force changes sign at most three times
 ROUNDING = 1e-9  # margin for rounding errors, relative to a displacement
 CLOSE = 1e-9  # accuracy, in cells, of the place where free elements end a contact
-FULL = -1  # returned instead of the number of patches if the arrays are too small or a patch extends beyond its run
+FULL = -1  # returned if the arrays are too small for all patches, or if a patch extends beyond its run of cells
 DEPTH_CHANGES = 4.0  # assumed largest derivative of a displacement with respect to the last depth
 
 # Entries of `Workspace.scan`, the state of the search
@@ -294,7 +295,7 @@ def _add_approach(now: Instant, bounds: PathBounds, state: FloatArray) -> None:
     """
     history, last = now.history, now.history.count - 1
     depth, drift = history.depth[last], bounds.most_drift[WINDOWS - 1]
-    if now.time == state[TIME]:  # same instant, another guess of the depth
+    if now.time == state[TIME]:  # the last search was at the same instant, with another guess of the depth
         state[APPROACH] += DEPTH_CHANGES * abs(depth - state[DEPTH])
     elif last > 0 and history.time[last - 1] == state[TIME]:
         before = history.depth[last - 1]

@@ -1,18 +1,18 @@
 """The displacement of elements that recover freely after a velocity jump.
 
-An element that is now at x was at x' = x - D (t - t') at the time t', with the Deborah number D = v tau in cells. Its
-displacement is the largest of the displacements that the line imposed on it earlier, each reduced by the decay since
-then:
+An element that is now at x was at x' = x - D (t - t') at the time t', with the Deborah number D = v tau in cells. The
+displacement of the element is the largest of the displacements that the line imposed on it earlier, each reduced by the
+decay since then:
 
     u(x, t) = max over t' <= t of (d(t') + h(x')) exp(-(t - t'))
 
-This needs only the history of the depth d(t); no element is followed in time. The place where an element
+This formula needs only the history of the depth d(t); no element is followed in time. The place where an element
 separated from the line is the place x' where the expression in the maximum is stationary. The force on the element was
 zero there. `FreeRecovery` contains the places near which elements can have separated.
 
-The *drift* of free elements is D u' + u, where u' is the derivative along the line. It is equal to minus the rate of
-the depth at the time of separation, reduced by the decay since then. The extremes of the drift over the recent past
-(`PathBounds`) bound how fast u can change along the line.
+The *drift* of free elements is D u' + u, where u' is the derivative along the line. The drift is equal to minus the
+rate of the depth at the time of separation, reduced by the decay since then. The extremes of the drift over the recent
+past (`PathBounds`) bound how fast u can change along the line.
 """
 
 from __future__ import annotations
@@ -361,7 +361,8 @@ def prune(now: Instant, recovery: FreeRecovery, x: float, pressed: float, deepes
     for k in range(recovery.count[0]):
         place, farthest = recovery.place[k], recovery.farthest[k]
         u = _from_separation(now, recovery, k, x)[0]
-        if u < 0 and x - now.deborah * now.time < farthest:  # elements beyond x may have separated at this entry
+        # elements that are now beyond x may have separated at this place
+        if u < 0 and x - now.deborah * now.time < farthest:
             height = height_at(now.track, _in_period(now, place))[0]
             u = (deepest + height) * np.exp(-max(x - farthest, 0.0) / now.deborah)
         if u + 2 * recovery.bounds.spread[window(2 * (x - place) + MARGIN)] >= pressed:

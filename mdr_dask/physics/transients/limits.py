@@ -48,7 +48,7 @@ class PreparedLine(NamedTuple):
 
     @classmethod
     def of(cls, line: CubicLine) -> PreparedLine:
-        """Prepare a line. Its barriers are computed later, when they are needed."""
+        """Prepare a line. The barriers of the line are computed later, when they are needed."""
         cells = cut(line)
         return cls(cells, blocks_of(cells), track_of(cells), {})
 

@@ -114,7 +114,7 @@ def _drag_rate(sums: FloatArray, stiff: float, step: float) -> float:
     """Return the rate of the drag at constant load.
 
     Growing patches add load; the lift (the depth plus its rate) falls to compensate for it. `step` is the last Newton
-    step of the depth. It also changes the rate of the depth, and therefore the growth of the patches at their edges.
+    step of the depth. This step also changes the rate of the depth, and therefore the growth of the patches.
     """
     edges = sums[STIFFNESS] - sums[LENGTH] * (1 + stiff)
     edges_drag = sums[DRAG_STIFFNESS] - sums[TILT] * (1 + stiff)

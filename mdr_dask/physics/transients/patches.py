@@ -28,7 +28,8 @@ class Track(NamedTuple):
     Parameters
     ----------
     height : array, shape (n + 2,)
-        Heights at the nodes minus the height of the highest point. This avoids rounding errors in light contacts.
+        Heights at the nodes minus the height of the highest point. These differences avoid rounding errors in light
+        contacts.
     enter, leave, peak : array, shape (n + 1,)
         Slope at the start and at the end of each cell, and largest height in the cell; the last cell repeats the first
         cell.

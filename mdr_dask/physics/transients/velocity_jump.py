@@ -307,7 +307,7 @@ def _runs(track: Track, slower: Patches, low: float, high: float) -> tuple[IntAr
     """Return the runs of cells where contact is possible at depths from `low` to `high`, and a bound for each cell.
 
     A run is given by its first and last node. The bound is the largest depth at which the cell is certainly out of
-    contact. It follows from the steady state at the lower velocity: if the depth is smaller by some length,
+    contact. The bound follows from the steady state at the lower velocity: if the depth is smaller by some length,
     displacements are smaller by at most this length.
     """
     cells, decay = track.peak.size, np.exp(-1 / slower.deborah)

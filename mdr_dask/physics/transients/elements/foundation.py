@@ -67,7 +67,7 @@ def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundat
     g, tau = g[order], tau[order]
     pole, weight = (np.append(0.0, tau), np.append(viscosity, g * tau)) if viscosity > 0 else (tau, g * tau)
     zeros, distance = recovery_times(weight, pole)
-    # modes with u = 1 and a_m = -lambda / (tau_m - lambda); they are orthogonal with respect to the weights
+    # modes with u = 1 and a_m = -lambda / (tau_m - lambda); they are orthogonal if weighted with `weight`
     modes = -zeros / distance
     modes /= np.sqrt(weight @ modes**2)
     load = np.append(1.0, 0 * g) if viscosity > 0 else g / (1 + g.sum())
@@ -184,9 +184,9 @@ def release(
 ) -> tuple[float, float]:
     """Return the fraction of a duration after which an element in contact separates, and its displacement at that time.
 
-    The element follows the line. Its displacement changes from w0 to w1; the rates at the start and at the end are
-    `rise0` and `rise1`. The fraction is 1 if the element does not separate. The force is taken as linear in time, and
-    the displacement as cubic.
+    The element follows the line. The displacement of the element changes from w0 to w1; the rates at the start and at
+    the end are `rise0` and `rise1`. The fraction is 1 if the element does not separate. The force is taken as linear in
+    time, and the displacement as cubic.
     """
     begin = pull(solid, w0, terms, i) + solid.viscosity * rise0
     if begin <= 0:
@@ -253,7 +253,7 @@ def advance(
     """
     if w1 > after:
         rest, fades = lapse.time, lapse.fades
-        if not touching:  # contact begins when the gap vanishes, which is taken as linear in time
+        if not touching:  # contact begins when the gap vanishes; the gap is taken as linear in time
             part = (u0 - w0) / ((u0 - w0) + (w1 - after)) if u0 > w0 else 0.0
             fading(solid, part * lapse.time, lapse.part_decay, lapse.part_fades)
             u0 = recover(solid, u0, terms, i, lapse.part_decay, lapse.modes) if part > 0 else u0

@@ -68,9 +68,9 @@ def untouched(elements: int, terms: int) -> State:
 def steady_start(line: CubicLine, solid: Foundation, deborah: float, load: float) -> tuple[State, float, Outcome]:
     """Return the steady state of the elements at the nodes, sliding at constant speed under a constant load.
 
-    One element is moved along the line, period after period, until its state repeats. It moves in steps of half a cell,
-    by the method of :func:`follow_line`. The depth is found from the mean displacement, which increases with the depth.
-    At ``deborah = 0`` the elements are in equilibrium at rest under the load.
+    One element is moved along the line, period after period, until its state repeats. The element moves in steps of
+    half a cell, by the method of :func:`follow_line`. The depth is found from the mean displacement, which increases
+    with the depth. At ``deborah = 0`` the elements are in equilibrium at rest under the load.
 
     Returns
     -------
@@ -198,8 +198,9 @@ def follow_line(
     Parameters
     ----------
     line : CubicLine
-        If the line is not periodic, elements enter undeformed. Forces are interpolated linearly between elements. This
-        is most accurate for a line without kinks (:func:`~mdr_dask.physics.surfaces.cubic_line.without_kinks`).
+        If the line is not periodic, elements enter undeformed. Forces are interpolated linearly between elements. The
+        interpolation is most accurate for a line without kinks
+        (:func:`~mdr_dask.physics.surfaces.cubic_line.without_kinks`).
     solid : Foundation
     schedule : Schedule
         Travel, velocity and load at every moment.

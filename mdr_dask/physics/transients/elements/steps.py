@@ -417,7 +417,7 @@ def _move(
         elif solid.viscosity > 0:
             state.free[j] = recover(solid, state.free[j], state.free_terms, j, lapse.decay, lapse.modes)
         w0, w1 = old_depth + workspace.old_under[j], depth + workspace.under[j]
-        if not was and w1 <= after[j]:  # the free recovery is already known
+        if not was and w1 <= after[j]:  # the displacement after free recovery is already known
             u[j] = after[j]
             for m in range(solid.times.size):
                 state.terms[j, m] = workspace.after_terms[j, m]
