@@ -62,9 +62,10 @@ def test_a_case_that_crashes_its_process_has_failed(example, options):
 
 
 @pytest.mark.slow
-def test_a_crash_in_a_thread_ends_the_run_and_processes_finish_it(example):
-    assert example("run", "pin.yaml", "--quiet", "--threads", "1", line=CRASH).returncode == -11
-    assert "4 failed" in example("run", "pin.yaml", "--quiet", "--workers", "1", line=CRASH).stdout
+def test_a_crash_in_a_thread_ends_the_run_and_the_next_run_finds_the_case(example):
+    command = ("run", "pin.yaml", "--quiet", "--threads", "1")
+    assert example(*command, line=CRASH).returncode == -11
+    assert "4 failed" in example(*command, line=CRASH).stdout
 
 
 @pytest.mark.parametrize(

@@ -51,6 +51,13 @@ class Executor(AbstractContextManager["Executor"]):
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
+    def apart(self) -> None:
+        """Compute all blocks in child processes, because a case may have crashed the last run."""
+        if hasattr(os, "fork") and not self._resources.remote and self._compute == self._here:
+            self._compute = self._in_child
+            sentence = "the last run was killed or crashed: blocks are computed in child processes, to find the cause"
+            self._tell(Event("after a crash", {}, sentence))
+
     def connect(self) -> None:
         """Start the cluster or connect to it, if the resources name one. Call this before anything is written."""
         if self._resources.remote and self._window is None:

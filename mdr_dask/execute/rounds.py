@@ -126,6 +126,8 @@ def run(
         with store.exclusive(url) if part is None else store.shared(url, part) as lock:
             if store.exists(url):
                 store.require_undamaged(url, store.series_names(url), to_run=True)
+            if lock.after_crash:
+                execute.apart()
             job = _Job(stage, url, lock, execute, part, retry_failed, report, tell)
             progress = _run_stages(job)
             if progress.blocks:

@@ -24,7 +24,7 @@ import time
 import uuid
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from glob import escape
 from pathlib import Path
 from typing import Any
@@ -79,6 +79,8 @@ class Lock:
     owner: str
     # Number of the claim. None for a lock of the operating system.
     claim: int | None = None
+    # Whether the process of an earlier run crashed or was killed while it held this lock, or the lock of a part.
+    after_crash: bool = False
 
 
 @dataclass(frozen=True, order=True)
@@ -122,6 +124,7 @@ def exclusive(url: str) -> Iterator[Lock]:
             lock = held.enter_context(acquire(url))
             if lock.owner:
                 for name in _part_locks(url) if local(url) is not None else ():
+                    lock = replace(lock, after_crash=lock.after_crash or bool(_runners(url, name)))
                     _retire(url, name)
                     _lock_file(url, name).unlink(missing_ok=True)
                 sweep(url)
@@ -365,8 +368,8 @@ def _registered(url: str, name: str) -> Iterator[Lock]:
 
     While a task writes, it holds a shared lock on the runner file of its run.
     """
+    lock = Lock(name, uuid.uuid4().hex, after_crash=bool(_runners(url, name)))
     _retire(url, name)
-    lock = Lock(name, uuid.uuid4().hex)
     with guarded(url, "locking it"):
         _runner(url, lock).write_text(_this_process())
     try:
