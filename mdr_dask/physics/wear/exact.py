@@ -7,6 +7,7 @@ differences.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -17,7 +18,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.half_integrals import Panels, graded_panels, interpolate
 from mdr_dask.physics.mdr.revolution import Profile, bisect
 from mdr_dask.physics.mdr.transforms import gauss
-from mdr_dask.physics.wear.evolution import at, integral_along, march
+from mdr_dask.physics.wear.evolution import NotConvergedError, at, integral_along, march
 from mdr_dask.physics.wear.rules import limit, limit_radius
 from mdr_dask.physics.wear.slip import GrossSlip, PartialSlip, SlipMoment, partial_slip, rising
 from mdr_dask.physics.wear.worn import (
@@ -168,7 +169,11 @@ def exact(
         solve = partial(_fretted, profile, stick_radius, wanted, constant_force)
     coarsest = COARSEST_OF_MOVING if constant_force and stick_radius > 0.0 else COARSEST
     resolution = Resolution(min(accuracy, coarsest))
-    found, *rougher = [solve(resolution._replace(rougher=rougher)) for rougher in range(3 if errors else 1)]
+    found, rougher = solve(resolution), []
+    if errors:
+        rougher.append(solve(resolution._replace(rougher=1)))
+        with suppress(NotConvergedError):  # then the error follows from one difference
+            rougher.append(solve(resolution._replace(rougher=2)))
     contacts = {
         amount: one if one.relative_error > 0.0 else replace(one, rougher=tuple(other[amount] for other in rougher))
         for amount, one in found.items()

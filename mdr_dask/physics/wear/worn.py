@@ -53,7 +53,7 @@ class Worn:
     steps : int
         Number of time steps.
     rougher : tuple of Worn
-        Two rougher solutions of the same contact, from which its error is estimated.
+        One or two rougher solutions of the same contact, from which its error is estimated.
     least_errors : mapping of str to float
         Smallest stated error of an output, by the name of the output. It is given for outputs in which the rougher
         solutions may agree by chance.
