@@ -130,7 +130,9 @@ def _require_quantities(units: Mapping[str, str], groups: Mapping[str, xr.Datase
     known = sorted({str(name) for data in groups.values() for name in data.variables})
     for name in units:
         if name not in known:
-            raise DataError(f"--units: no quantity {name!r}{did_you_mean(name, known)}")
+            raise DataError(
+                f"expected the name of a parameter or an output for a unit, got {name!r}{did_you_mean(name, known)}"
+            )
 
 
 def _with_notes(figure: Plot, where: str, warnings: list[str]) -> Plot:

@@ -239,7 +239,7 @@ def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
 
 
 def _print_outliers(curve: xr.Dataset) -> None:
-    """Print the number of points whose distance from the curve scatter cannot explain, and the farthest point."""
+    """Print how many points are farther from the curve than scatter explains, and which point is farthest."""
     import numpy as np
 
     x, y = np.log10(curve["point_abscissa"].to_numpy()), np.log10(curve["point_ordinate"].to_numpy())

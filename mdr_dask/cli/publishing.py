@@ -18,8 +18,8 @@ from mdr_dask.cli.writing import require_suffix, writing
 def report(stores: tuple[str, ...], output: Path) -> None:
     """Write a page about studies: one HTML file that any browser opens, without a network.
 
-    It holds the campaign, the progress, every figure with its numbers, laws with intervals, errors, method and limits,
-    and how to run the study again. It can be written during a run.
+    The page holds the campaign, the progress, every figure with its numbers, laws with intervals, errors, method and
+    limits, and how to run the study again. The page can also be written during a run.
 
     \b
     mdr-dask report results/quickstart.zarr -o report.html

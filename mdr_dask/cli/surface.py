@@ -51,8 +51,8 @@ def surface(
 
     FILES are maps, scans, or tables of a spectrum, all of the same surface. Sq and Sa (maps) and Pq (scans) are
     computed from the levelled heights. Gradient, slopes and Hurst exponent are computed from the windowed spectrum.
-    Intervals are 95 % intervals. Rolloff and cutoff are the wavelengths at which the power law ends. They are empty if
-    it does not end within the data.
+    Intervals are 95 % intervals. Rolloff and cutoff are the wavelengths at which the power law ends. Rolloff and cutoff
+    are empty if the power law does not end within the data.
 
     \b
     mdr-dask surface road.npy --spacing 2um --unit um --plot road.png -o c2d.csv

@@ -22,7 +22,8 @@ UNCOUNTED = OPTIONS | {"_nrt": False}  # without its runtime, numba does not cou
 def jit(function: Kernel) -> Kernel:
     """Compile a function of numbers and arrays, and store the machine code in numba's cache.
 
-    If the cache cannot be written or read, every process compiles the function again. This takes time, but is harmless.
+    If the cache cannot be written or read, every process compiles the function again. The repeated compilation takes
+    time, but is harmless.
     """
     return _cached(function, OPTIONS)
 
@@ -47,7 +48,7 @@ def jit_inline_uncounted(function: Kernel) -> Kernel:
 
 def _cached(function: Kernel, options: dict[str, Any]) -> Kernel:
     kernel: Any = numba.njit(**options)(function)
-    if hasattr(kernel, "enable_caching"):  # false if NUMBA_DISABLE_JIT is set
+    if hasattr(kernel, "enable_caching"):  # if NUMBA_DISABLE_JIT is set, nothing is compiled
         try:
             kernel.enable_caching()
         except RuntimeError:  # neither the package folder nor the home folder is writable

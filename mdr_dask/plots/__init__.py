@@ -32,7 +32,7 @@ def available(model: str) -> dict[str, Plot]:
 
 
 def figures_of(model: str, groups: Mapping[str, xr.Dataset]) -> dict[str, Plot]:
-    """Return the named figures for a model; if none is for special models, add a figure of each output of a study."""
+    """Return the named figures for a model; if none is made for this model, add a figure of each output of a study."""
     from mdr_dask.plots.view import View, figure_of, main_axis, varied
 
     known = available(model)

@@ -135,7 +135,7 @@ def family(data: xr.Dataset, output: str, along: str, by: str = "") -> Family:
     With `by`, the curves differ in this parameter alone, and other axes are fixed at their middle value. Without `by`,
     all curves are drawn if there are enough colours. Otherwise one axis is shown by colours, another axis with few
     values by line styles, and the remaining axes are fixed. An axis with more values than colours gets a colour bar.
-    If its values are words, some of them are left out instead.
+    If the values of such an axis are words, some values are left out instead.
 
     Parameters
     ----------

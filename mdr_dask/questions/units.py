@@ -56,7 +56,9 @@ def in_units(dataset: xr.Dataset, wanted: Mapping[str, str]) -> xr.Dataset:
         own = {name, *(f"{name}_{ending}" for ending in (*_OF_OUTPUTS, *_DIFFERENCES))}
         found = [str(each) for each in dataset.variables if each in own]
         if not found:
-            raise DataError(f"no column {name!r} to give a unit{did_you_mean(name, _known(dataset))}")
+            raise DataError(
+                f"expected the name of a column for a unit, got {name!r}{did_you_mean(name, _known(dataset))}"
+            )
         dataset = dataset.assign({each: _converted(dataset[each], unit, name) for each in found})
     return dataset
 

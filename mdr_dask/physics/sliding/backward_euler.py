@@ -26,8 +26,8 @@ from mdr_dask.physics.sliding.cases import Cases
 ITERATIONS = 200
 COARSENING = 8  # ratio of the numbers of nodes of successive grids in the search for the depth
 COARSEST = 64  # largest number of nodes of the grid on which the search for the depth starts
-# The search ends if the product of the last two relative steps of the depth is at most CONVERGED. This product is about
-# the error of the extrapolation over the last step.
+# The search ends if the product of the last two relative steps of the depth is at most CONVERGED.
+# The product is about the error of the extrapolation over the last step.
 CONVERGED = 1e-9
 EXACT_STEP = 1e-13  # the search also ends after a relative step of the depth that is as small as rounding errors
 COARSE = 1e-3  # value of CONVERGED on all grids except the finest

@@ -350,7 +350,7 @@ def _contact_end(
     """Return the place where the force falls to 0 in a cell, w at this place, and the remaining fraction of w.
 
     The remaining fraction is the ratio of the free element's displacement at the end of the cell to w. The Deborah
-    number is r, and `inverse` is 1 / r. The force is `force` at the place `begins`, where it begins to fall, and
+    number is `r`, and `inverse` is 1 / r. The force is `force` at the place `begins`, where it begins to fall, and
     `force_end` at the end of the cell. Linear interpolation between these two places gives a first estimate, which one
     Newton step improves.
     """

@@ -157,8 +157,8 @@ def _states(
     """Solve cases on one line at one Deborah number, in order of load; write results in the order of `cases.COLUMNS`.
 
     The search for the depth of a case starts from the guess for this case. If the guess is NaN, the search starts from
-    the depth of the previous case; the first case starts from the trail `first`. The trail of the first solved case
-    replaces `first`.
+    the depth of the previous case; the first case starts from the trail `first`. The array `first` is overwritten with
+    the trail of the first solved case.
     """
     (cells, _, _, _), (deborahs, loads) = line, cases
     n, places = cells.mean.size - 1, places_for(0)

@@ -1,8 +1,8 @@
 """Steady sliding of any linear viscoelastic foundation along a rough line or under an indenter.
 
 `viscoelastic_sweep` moves an element once along the line. In this module, Newton's method finds the depth. For a
-periodic line it also finds the stretches e_m = u - a_m of the Prony terms at the start (u is the displacement of the
-element, a_m that of the dashpot of term m). The stretches must repeat after one period.
+periodic line, Newton's method also finds the stretches e_m = u - a_m of the Prony terms at the start (u is the
+displacement of the element, a_m that of the dashpot of term m). The stretches must repeat after one period.
 """
 
 from __future__ import annotations

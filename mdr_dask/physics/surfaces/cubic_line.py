@@ -103,7 +103,7 @@ class Cells(NamedTuple):
     ----------
     height : array, shape (n + 2,)
         Heights at the nodes minus the height of the highest point; they are never positive. Under light loads only
-        small distances from the highest point matter. In this form they have no rounding error.
+        small distances from the highest point matter, which have no rounding error in this form.
     enter, leave : array, shape (n + 1,)
         Slopes at the start and the end of each cell.
     peak : array, shape (n + 1,)
@@ -247,8 +247,8 @@ def _turned(
 def _is_resolved(slope: FloatArray, stretch: FloatArray) -> bool:
     """Return whether the line has more than two nodes per shortest wave.
 
-    In that case the sum of the squared slopes at the nodes is close to the integral of the squared slope over the
-    cells.
+    With more than two nodes per wave, the sum of the squared slopes at the nodes is close to the integral of the
+    squared slope over the cells.
     """
     by_nodes, by_cells = np.dot(slope, slope), np.sum(stretch)
     return bool(abs(by_nodes - by_cells) < UNRESOLVED * by_cells)

@@ -24,8 +24,8 @@ rigorous, so that no contact is missed.
   of the gap. The gap closes at most at the rate of the depth plus the largest drift. The integral of this rate over
   time is called the *approach*.
 
-Elements that travel more than a whole period of the line can pass the highest point out of contact. In that case the
-search is repeated with the places of separation of the previous period.
+Elements that travel more than a whole period of the line can pass the highest point out of contact. For such elements
+the search is repeated with the places of separation of the previous period.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ class Reachable(NamedTuple):
 
 
 class SkipBounds(NamedTuple):
-    """For each cell out of contact, the approach (see the module) up to which it can be skipped.
+    """For each cell out of contact, the approach (defined above) up to which the cell can be skipped.
 
     Parameters
     ----------
@@ -289,7 +289,7 @@ def _motion_until(now: Instant, second: float) -> Motion:
 
 @jit_inline_uncounted
 def _add_approach(now: Instant, bounds: PathBounds, state: FloatArray) -> None:
-    """Add the approach (see the module) since the last search.
+    """Add the approach of the line to free elements since the last search.
 
     If the last search was neither at this instant nor at the previous instant of the history, no cell remains skipped.
     """

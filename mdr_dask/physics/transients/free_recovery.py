@@ -33,7 +33,8 @@ MET = 1e-3  # largest last step towards the place where contact begins, in cells
 CREST = 1e-3  # accuracy, in cells, of the place where the gap between line and free elements is smallest
 FARTHEST = 200  # largest number of cells of a stretch in which the place of separation is searched for
 MARGIN = 64.0  # the window of a bound is chosen for twice a distance plus this number of cells
-WINDOW, WINDOWS = 8.0, 16  # cells travelled in the shortest window; number of windows, each twice as long as the last
+# cells travelled in the shortest window; number of windows, each twice as long as the previous one
+WINDOW, WINDOWS = 8.0, 16
 
 
 class Instant(NamedTuple):

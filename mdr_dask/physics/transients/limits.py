@@ -27,9 +27,9 @@ from mdr_dask.physics.transients.patches import (
     track_of,
 )
 
-# barriers are kept for up to this many cells in total (16 bytes each), but always for up to 4 velocities
+# barriers are kept for at most KEPT_CELLS cells in total (16 bytes each), but always for up to KEPT_SPEEDS velocities
 KEPT_CELLS, KEPT_SPEEDS = 2**21, 4
-WHOLE = 1 - 1e-12  # fraction of the line in contact that counts as full contact, within rounding
+WHOLE = 1 - 1e-12  # contact counts as full if at least this fraction of the line is in contact
 NEWTON_STEPS = 60
 NEARLY = 1e-6  # largest relative error of the load before the last Newton step; the step squares this error
 

@@ -1,8 +1,8 @@
 """Contact patches on a line, and the forces on them.
 
-Lengths are in cells of the line and slopes are rises per cell, as in the steady sweep. Heights are in any unit, times
-in relaxation times. The Deborah number D is v tau in cells. The lift is the sum of the depth and its rate, so that the
-force on an element in contact, divided by 4 G dx, is lift + h + D h'.
+The unit of length is a cell of the line, and slopes are rises per cell, as in the steady sweep. Heights are in any
+unit, times in relaxation times. The Deborah number D is v tau in cells. The lift is the sum of the depth and its rate,
+so that the force on an element in contact, divided by 4 G dx, is lift + h + D h'.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ def height_at(track: Track, x: float) -> tuple[float, float, float]:
 
 @jit_inline_uncounted
 def _part(c0: float, c1: float, c2: float, c3: float, y: float) -> tuple[float, float, float]:
-    """Return the height at y of a cubic on [0, 1], and the integrals of height and slope squared from 0 to y."""
+    """Return the height at y of a cubic on [0, 1], and the integrals of height and squared slope from 0 to y."""
     height = c0 + y * (c1 + y * (c2 + y * c3))
     area = y * (c0 + y * (c1 / 2 + y * (c2 / 3 + y * c3 / 4)))
     square = y * c1 * c1 + y * y * (

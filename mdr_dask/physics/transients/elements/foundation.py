@@ -1,7 +1,7 @@
 """One element of a viscoelastic foundation during one step: moved at constant speed, or recovering without force.
 
 In all functions, `terms` contains the strains of the dashpots of the Prony terms of all elements, shape (n, terms), and
-i is the index of one element. An index is passed, because this is faster than slicing.
+i is the index of one element. Functions take the index, because slicing an array would take longer.
 
 The static modulus is 1. Heights are in any unit, lengths in units of the length of the line, and times in any unit.
 """
@@ -53,7 +53,8 @@ def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundat
     moduli, times : array_like, shape (terms,)
         G_m / G_inf, positive, and tau_m, distinct, in any unit of time.
     viscosity : float
-        eta / G_inf in the same unit of time. For a Kelvin solid (no terms) this is 1 if the unit of time is tau.
+        eta / G_inf in the same unit of time. For a Kelvin solid (no terms) the viscosity is 1 if the unit of time is
+        tau.
 
     Raises
     ------
