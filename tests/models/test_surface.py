@@ -144,7 +144,7 @@ def test_a_line_too_short_for_the_spectrum_is_a_status(tmp_path):
     surface = {"spectrum": table(tmp_path / "road.csv")}
     found = solved(MODEL, SlidingFriction, length=LENGTH / 1000, surface=surface)
     assert np.all(found.status == Status.FAILED)
-    assert "expected wavelengths of the line in 100 um to 5 mm" in found.messages[0, 0]
+    assert "expected wavelengths of the line in the range 100 um to 5 mm" in found.messages[0, 0]
 
 
 def test_two_rollers_have_spectra_of_their_own(tmp_path):

@@ -31,8 +31,8 @@ from mdr_dask.physics.wear.worn import Worn, virgin_load
 
 #: Outputs that have a closed form; the closed forms are computed for many cases at once.
 _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border")
-#: Outputs whose name differs from that of the attribute of `Worn`, each with the name of the attribute. The output
-#: cannot be called `normal_force`, because a parameter already has this name.
+#: Names of outputs, each with the name of the same quantity in `Worn`, if the two names differ. The output cannot be
+#: called `normal_force`, because a parameter already has this name.
 _RENAMED = {"contact_force": "normal_force"}
 #: Requested error of the profile, divided by eta d0, when the evolution is solved. It is `_USUAL` if the campaign
 #: states no accuracy, and never below `_FINEST`.

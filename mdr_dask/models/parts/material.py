@@ -116,7 +116,7 @@ class Material(Parameters):
             raise ValueError(f"expected one of {', '.join(LAWS)}, got {' and '.join(laws)}")
         superposing = self.dma_table is not None and self.dma_table.table_temperature is None
         if (self.temperature is not None and not laws) or (self.temperature is None and laws and not superposing):
-            raise ValueError(f"expected a temperature together with one of {', '.join(LAWS)}, got only one of both")
+            raise ValueError(f"expected a temperature together with one of {', '.join(LAWS)}, got only one of the two")
         check_in_campaign(info, lambda: solid_of(self))
         return self
 

@@ -81,7 +81,7 @@ class SlidingProblems:
     faults: dict[int, str]
 
     def groups(self, *columns: NDArray[Any]) -> Iterator[tuple[Setting, IntArray]]:
-        """Yield groups of the cases that can be solved. The cases of a group have equal settings and equal columns."""
+        """Yield groups of the cases that can be solved; a group has one setting, and equal values in each column."""
         is_sound = self.which >= 0
         is_sound[list(self.faults)] = False
         sound = np.flatnonzero(is_sound)

@@ -172,7 +172,7 @@ def lines_of(surface: Surface, length: float, modes: int) -> tuple[FloatArray, .
             longest, shortest = spectrum.wavelengths
             (last, least), (first, most) = shown_apart("m", length, shortest), shown_apart("m", length / modes, longest)
             raise DataError(
-                f"{file.name}: expected wavelengths of the line in {least} to {most}, got {first} to {last}: "
+                f"{file.name}: expected wavelengths of the line in the range {least} to {most}, got {first} to {last}: "
                 "change length or points"
             )
         line.flags.writeable = False
