@@ -70,7 +70,9 @@ def sign_of(over: str) -> int:
 
 
 def kelvins(temperatures: FloatArray, unit: str, groups: FloatArray | None = None) -> FloatArray:
-    """Return temperatures in K; if they have no unit, they count as K if their median exceeds 250, else as degC.
+    """Return temperatures in K.
+
+    Temperatures without a unit count as K if their median exceeds 250, otherwise as degC.
 
     Parameters
     ----------

@@ -150,7 +150,7 @@ def _zone_one(data: xr.Dataset) -> Variables:
 
 
 def _plateau(data: xr.Dataset) -> Variables:
-    """Find the largest friction over all velocities; compare it with the rms slope of the line, and in contact."""
+    """Compare the largest friction over all velocities with the rms slope of the line, and with that in contact."""
     require(data, "shear_modulus", "relaxation_time")
     velocities, form = _velocities(data)
     table = table_of(data, spectral_slope(data), velocities)
@@ -181,8 +181,8 @@ def _plateau(data: xr.Dataset) -> Variables:
 def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], count: int, reached: str) -> Variables:
     """Test mu = sqrt 2 times the rms slope, with the slope in contact (eq. 3.15) and with the slope of the line.
 
-    `height` is the stack of the plateau, `flat` are the indices of the cases on the plateau, and `reached` is the
-    sentence on whether friction reaches its maximum.
+    `height` is the stack of the height of the plateau, `flat` are the indices of the cases on the plateau, and
+    `reached` is the sentence on whether friction reaches its maximum.
     """
     meaning = "largest mu divided by the rms slope in contact"
     if "contact_slope" in data:

@@ -108,7 +108,7 @@ def products(found: Posterior, values: FloatArray, free: Sequence[int]) -> list[
 
 
 def _reduced(rows: FloatArray) -> FloatArray:
-    """Return rows that span the same space, each with a leading 1 and as few other terms as possible."""
+    """Return rows that span the same space as `rows`, each with a leading 1 and as few other terms as possible."""
     rows = rows.copy()
     done: list[int] = []
     for i in range(len(rows)):

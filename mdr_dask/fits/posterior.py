@@ -48,7 +48,7 @@ class Noise(NamedTuple):
     pattern: FloatArray | None
 
     def variances(self, mean: FloatArray) -> FloatArray:
-        """Return the variances for predicted values of shape (sets, points); shape (sizes, sets, points)."""
+        """Return the variances, shape (sizes, sets, points), for predicted values of shape (sets, points)."""
         pattern = np.abs(mean) if self.pattern is None else np.broadcast_to(self.pattern, mean.shape)
         square: FloatArray = self.sizes[:, None, None] ** 2 * pattern**2
         return square

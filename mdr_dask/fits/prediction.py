@@ -215,7 +215,7 @@ def _fields(
 
 
 def _and_neighbours(absent: NDArray[np.bool_], axis: int) -> NDArray[np.bool_]:
-    """Return the missing cases and their neighbours: a cubic between two cases also depends on the next cases."""
+    """Return the missing cases and their neighbours, because a cubic depends on two cases on each side."""
     along = np.moveaxis(absent, axis, 0).copy()
     before = along.copy()
     along[1:] |= before[:-1]

@@ -4,9 +4,9 @@ Symbols: The velocity jumps at the time t_0 from v_1 to v_2 = v_1 + dv. The coef
 the jump and mu_2 long after it; it changes by d_mu_0 at t_0. The rms slope is s. The body has the relaxation time tau,
 and t' = (t - t_0) / tau. The largest wave number of the roughness is q_max.
 
-By eqs. 4.13 to 4.15, mu - mu_2 is proportional to exp(-b t') and begins at mu_1 + d_mu_0 - mu_2, with d_mu_0 by
-eq. 4.11. By eq. 4.12, the rate b is a power of v_1 tau q_max. The power is 1 below v_1 tau q_max = 1, and 1 - H above
-it, with the Hurst exponent H.
+By eqs. 4.13 to 4.15, mu - mu_2 is proportional to exp(-b t') and begins at mu_1 + d_mu_0 - mu_2, with d_mu_0 by eq.
+4.11. By eq. 4.12, the rate b is a power of v_1 tau q_max. The exponent of this power is 1 if v_1 tau q_max is below 1,
+and otherwise 1 - H, with the Hurst exponent H.
 """
 
 from __future__ import annotations

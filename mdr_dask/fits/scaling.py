@@ -106,7 +106,7 @@ def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> Floa
     fraction : array
         Length in contact divided by the length of the line.
     hurst, points : float
-        Hurst exponent, and number of points of the line, two for the shortest wave.
+        Hurst exponent, and number of points of the line; the shortest wave has two points.
     """
     power = 2 * (1 - hurst)
     # wave numbers 2 pi / L_cont and q_max, both in units of 2 pi / L
@@ -183,7 +183,7 @@ class Collapse(NamedTuple):
     constants : int
         Number of fitted constants: heights of the common curve at its knots, and shifts.
     vague : array, shape (curves,)
-        Whether a shift of the curve is undetermined, because the curve or the curve beside it is straight.
+        Whether the data do not determine a shift of the curve, as for straight curves.
     """
 
     shifts: FloatArray
@@ -301,7 +301,7 @@ def _collapse(data: xr.Dataset) -> Variables:
 
 
 def _shifts(forces: FloatArray, loads: FloatArray, found: Collapse, stated: FloatArray, count: int) -> Variables:
-    """Return the shift of the curve of every load in decades; NaN if it is undetermined or if there is no curve."""
+    """Return the shifts of the curves in decades, one for each load; NaN if undetermined or if there is no curve."""
     decades = np.where(found.vague, np.nan, found.shifts / np.log(10))
     columns = {"horizontal_stated": (stated / np.log(10), "shift along log velocity by eqs. 3.17 and 3.23")}
     for k, name in enumerate(("horizontal", "vertical")):
