@@ -1,8 +1,9 @@
 """Time integration of a worn contact with backward differentiation formulas at fixed radii, for any kind of slip.
 
 A quantity, for example the worn depth, accumulates at every radius (see `Problem`). The contact is mapped onto graded
-panels in r^2, which follow the moving edge. Each step is a stiff backward differentiation formula (BDF) of order 1 to
-3. Newton's method solves it for the image and the edge together, and reuses its Jacobian as long as it converges.
+panels in r^2, which follow the moving edge. Each step uses a backward differentiation formula (BDF) of order 1 to 3,
+because the equations are stiff. Newton's method solves for the image and the edge together, and reuses its Jacobian as
+long as it converges.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from mdr_dask.physics.linear import Factors, factorise
 from mdr_dask.physics.mdr.half_integrals import Panels
 from mdr_dask.physics.outcome import Outcome
 
-#: Local error of a BDF step of order 1, 2, 3, as a fraction of the difference between the step's result and the
-#: extrapolation of the past steps.
+#: Local error of a BDF step of order 1, 2 and 3. It is given as a fraction of the difference between the result of the
+#: step and the extrapolation of the past steps.
 _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
 
 
@@ -78,13 +79,13 @@ class Problem(Protocol):
         """Return whether the unknowns describe a possible contact."""
 
     def admits(self, unknowns: FloatArray, tolerance: float) -> bool:
-        """Return whether a solution is a possible contact within a tolerance; the equations have other solutions."""
+        """Return whether a solution is a possible contact, within a tolerance; not every solution is one."""
 
     def start(self) -> Moment:
         """Return the virgin contact."""
 
     def memory(self, past: Sequence[Any], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """Return a function that computes, from the unknowns, the weighted sum of past accumulated values at nodes."""
+        """Return a function of the unknowns: the weighted sum of the past accumulated values at the nodes."""
 
     def moment(self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Any]) -> Moment:
         """Return the moment at the end of a solved step."""
@@ -160,7 +161,7 @@ def march(
 def settled(problem: Problem) -> Any:
     """Return the virgin contact as a solution of the discrete equations.
 
-    Otherwise the first time step would contain a jump from the exact to the discrete solution.
+    If a march began with the exact virgin contact, its first step would contain a jump to the discrete solution.
     """
     virgin = problem.start()
     known = problem.memory([virgin], np.zeros(1))
@@ -169,7 +170,7 @@ def settled(problem: Problem) -> Any:
 
 
 def at(problem: Problem, history: Sequence[Any], time: float, tolerance: float) -> tuple[int, Any]:
-    """Return the number of steps before a time, and the moment at this time, computed by one additional step or a few.
+    """Return the number of steps before a time, and the moment at this time, computed by one or a few additional steps.
 
     Parameters
     ----------
@@ -284,7 +285,7 @@ class _Newton:
     def _renew(
         self, unknowns: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray], residual: FloatArray
     ) -> None:
-        """Factorise the Jacobian. The columns of the panels' width and of later unknowns are finite differences."""
+        """Factorise the Jacobian. Its columns for the panels' width and later unknowns are finite differences."""
         matrix = self.problem.jacobian(unknowns, theta)
         for column in range(self.problem.panels.nodes.size - 1, unknowns.size):
             moved = unknowns.copy()
@@ -296,7 +297,7 @@ class _Newton:
 
 @jit
 def _backward_shares(times: FloatArray) -> FloatArray:
-    """Return the weights that give the derivative, at times[0], of the polynomial through values at all times."""
+    """Return weights of values at given times; the weighted sum is the derivative of their polynomial at times[0]."""
     weights = np.zeros(times.size)
     for j in range(1, times.size):
         weights[j] = 1.0 / (times[j] - times[0])
@@ -309,7 +310,7 @@ def _backward_shares(times: FloatArray) -> FloatArray:
 
 @jit
 def _lagrange(times: FloatArray, time: float) -> FloatArray:
-    """Return the weights that give the value, at `time`, of the polynomial through values at all times."""
+    """Return weights of values at given times; the weighted sum is the value of their polynomial at another time."""
     weights = np.ones(times.size)
     for j in range(times.size):
         for m in range(times.size):

@@ -33,30 +33,31 @@ from mdr_dask.physics.wear.worn import (
 )
 
 COARSEST = 2e-3
-"""Largest accuracy used for panels and steps; if a larger accuracy is requested, this value is used instead, because
-coarser panels do not resolve the image of a steep body."""
+"""Largest allowed error for which panels and steps are chosen. If a larger error is allowed, this value is used
+instead, because coarser panels do not resolve the image of a steep body."""
 COARSEST_OF_MOVING = 3e-4
-"""The same under constant force. With a larger value, the steps are too long to follow the border: more steps fail, and
-the solution takes longer."""
+"""Largest allowed error for which panels and steps are chosen under constant force. With a larger value, the steps are
+too long to follow the border: more steps fail, and the solution takes longer."""
 ENDED = 1e4
 """Value of N / sqrt(a^2 - c^2) from which on the limiting profile is returned; a is a bound of the contact radius. The
 difference from the limiting profile falls at least as fast as exp(-N / (5 sqrt(a^2 - c^2))), so it is below the
 rounding error."""
 JUMP = 0.1
-"""The border stops when y = 1 - (d - g) / eta in the panel next to the border exceeds this value, because the image
-jumps there."""
+"""If y = 1 - (d - g) / eta exceeds this value in the panel next to the border, the image jumps at the border; the
+border then no longer moves."""
 FLAT = 1e-2
-"""Change of the depth divided by eta, as a fraction of the error of a step, during which the path of the border is not
-computed. A steep body is so flat at the border that the border moves far during the first moments of wear."""
+"""The path of the border is computed only after (d - 1) / eta has reached this fraction of the allowed error of a step.
+A steep body is so flat at the border that the border moves far during the first moments of wear."""
 ROUGHER = 4.0
 """Ratio of the step tolerance of each rougher solution to that of the previous solution."""
 EDGE = 0.2
-"""Smallest stated error of a radius, as a fraction of the change of this radius in the last time step. All solutions
-have this error in common: a position that the edge passes within a step begins to wear only at the end of this step."""
+"""The stated error of a radius is never smaller than this fraction of the change of the radius in the last time step.
+All solutions have this error in common: a position that the edge passes within a step begins to wear only at the end of
+this step."""
 NEAR_AXIS = 1e-5
 """Radius, in units of a0, at which the exponent of a body at its tip is evaluated."""
 SHARPEST = 8.0
-"""Largest factor on the number of halvings of the panels at the tip of a sharp body in gross slip."""
+"""Largest factor that multiplies the number of halvings of the panels at the tip of a sharp body in gross slip."""
 
 
 class Resolution(NamedTuple):
@@ -204,7 +205,7 @@ class _Leg(NamedTuple):
 
 
 class _Common(NamedTuple):
-    """Dissipated energy divided by mu, number of steps, and smallest stated error of the contact radius."""
+    """Dissipated energy divided by mu, number of steps, and lower limit of the stated error of the contact radius."""
 
     energy: float
     steps: int
@@ -284,7 +285,7 @@ def _refuse_beyond(inside: bool, profile: Profile, c: float) -> None:
     if not inside:
         raise ValueError(
             f"the contact reaches beyond the table, which ends at r = {profile.largest_radius:.4g} contact radii; "
-            f"extend it, got stick radius {c!r}"
+            f"extend the table or choose a larger stick radius (a smaller amplitude) than {c:.4g}"
         )
 
 
@@ -320,7 +321,7 @@ def _end(problem: PartialSlip, moment: SlipMoment) -> Worn:
     """
     profile, c, eta = problem.profile, problem.inner_radius, problem.eta
     border, frozen = problem.radius(moment.path[0, -1]), _frozen(problem, moment.path)
-    # the stick zone now also carries the load of the slip zone before wear: subtract int_c^b (d' - eta) db' from b d
+    # int_0^b g dx includes the annulus from c to b, where g = d' - eta; d' is the depth when the border was there
     annulus = float(np.trapezoid((frozen.depths - 1.0) / eta - 1.0, frozen.reached))
     load = float(problem.load or 0.0)
     depth = 1.0 + eta * (load + annulus) / border

@@ -21,8 +21,8 @@ from mdr_dask.physics.wear.worn import Worn
 STEP_SHARE = 0.45
 """Time step as a fraction of the largest stable explicit step, which is 1.7 grid spacings."""
 LEAST_EDGE_ERROR = 0.5
-"""Smallest stated error of contact radius and stick border, in cells of the grid. The position of a border between two
-nodes is uncertain, and the results of two grids may agree by chance."""
+"""The stated error of contact radius and stick border is never smaller than this number of cells of the grid. The
+position of a border between two nodes is uncertain, and the results of two grids may agree by chance."""
 
 
 @dataclass(frozen=True)
@@ -135,8 +135,8 @@ def _state(grid: UniformGrid, image: FloatArray, block: LoadBlock) -> _State:
     depth = block.depth if block.depth is not None else grid.depth(image, float(block.force or 0.0))
     if image[-1] <= depth:
         raise ValueError(
-            f"the contact reaches beyond the table or grid, which ends at r = {grid.nodes[-1]:.4g} contact radii; "
-            f"give a larger reach, got depth {depth:.4g}"
+            f"at the depth {depth:.4g} the contact reaches beyond the table or grid, which ends at "
+            f"r = {grid.nodes[-1]:.4g} contact radii; increase reach, or extend the table"
         )
     load = np.maximum(depth - image, 0.0)
     free = np.maximum(1.0 - load / block.slip_share, 0.0)

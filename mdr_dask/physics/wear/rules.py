@@ -87,7 +87,7 @@ def limit_radius(profile: Profile, stick_radius: float) -> float:
     if np.isnan(radius):
         raise ValueError(
             f"the contact reaches beyond the table, which ends at r = {profile.largest_radius:.4g} contact radii; "
-            f"extend it, got stick radius {stick_radius!r}"
+            f"extend the table or choose a larger stick radius (a smaller amplitude) than {stick_radius!r}"
         )
     return radius
 

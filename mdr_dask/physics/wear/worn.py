@@ -26,8 +26,8 @@ FUNCTIONS = {"worn_profile": "height", "worn_image": "image", "pressure": "press
 JUMP_WIDTH = 1e-9
 """Distance from a border, as a fraction of the border's radius, within which a change of the image counts as a jump."""
 REACH = 5
-"""Number of neighbouring positions on each side among which the largest difference of a function is used, because the
-differences have zeros."""
+"""The error of a function at a position is the largest difference there and at this number of neighbours on each side.
+This is necessary, because the difference of two functions vanishes where they intersect."""
 NOWHERE = np.zeros(0)
 
 
@@ -55,7 +55,7 @@ class Worn:
     rougher : tuple of Worn
         One or two rougher solutions of the same contact, from which its error is estimated.
     least_errors : mapping of str to float
-        Smallest stated error of an output, by the name of the output. It is given for outputs in which the rougher
+        Lower limits of the stated errors, by the names of the outputs. They are given for outputs in which the rougher
         solutions may agree by chance.
     relative_error : float
         Error of every output divided by the largest value of the output; used if there is no rougher solution.
@@ -205,7 +205,8 @@ def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, bo
 
     def slope(x: FloatArray) -> FloatArray:
         inside = np.maximum(x, c)
-        changes = (x > c) & ~(np.abs(x - border) < JUMP_WIDTH * border)  # closer changes are part of the jump
+        # nearer to the border, a change is part of the jump
+        changes = (x > c) & ~(np.abs(x - border) < JUMP_WIDTH * border)
         return np.asarray(profile.image_slope(x) + np.where(changes, scar.slope(inside), 0.0))
 
     near = np.array([border * (1.0 - JUMP_WIDTH), border * (1.0 + JUMP_WIDTH), edge * (1.0 - 1e-13)])
