@@ -130,7 +130,7 @@ def _hint(text: str, index: int) -> str:
 
 
 def _is_indented_otherwise(lines: list[str]) -> bool:
-    """Return whether the last two lines begin in different columns although the earlier one has no colon at its end."""
+    """Return whether the last line is indented differently from the line before, which does not end with a colon."""
     written = [line for line in lines if line.strip() and not line.lstrip().startswith("#")][-2:]
     if len(written) < 2 or written[0].rstrip().endswith(":"):
         return False

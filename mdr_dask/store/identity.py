@@ -124,7 +124,7 @@ def _study_differences(url: str, campaign: Campaign) -> list[str]:
 
 
 def _with_root(url: str, campaign: Campaign) -> Campaign:
-    """Return the campaign, in which a series that matches the results at the root of the store gets an empty name."""
+    """Return the campaign with an empty name for a series that matches the results at the root of the store, if any."""
     root = _group_attributes(url, "")
     if root is None or any(not series.name for series in campaign.series):
         return campaign

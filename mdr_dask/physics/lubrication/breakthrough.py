@@ -25,7 +25,7 @@ from mdr_dask.physics.surfaces.splines import integral, piece, shares, zeros
 #: ``whole``: the whole cluster is tested and counted. ``inside``: a cut cluster is ignored.
 EDGE_RULES: tuple[str, ...] = ("part", "clip", "whole", "inside")
 _PART, _CLIP, _WHOLE, _INSIDE = range(4)
-#: Number of parts of a spacing. Lengths in contact are counted in whole parts.
+#: A spacing is divided into this number of parts. Lengths in contact are counted in whole parts.
 PARTS = 64
 
 

@@ -177,7 +177,7 @@ def interpolate(mesh: Mesh, values: FloatArray, places: FloatArray) -> FloatArra
 def interpolate_weighted(mesh: Mesh, rows: FloatArray, shares: FloatArray, stretch: FloatArray) -> FloatArray:
     """Return a weighted sum of piecewise polynomials with stretched arguments, at all nodes.
 
-    The sum at the node z is that of shares[k] p_k(stretch[k] z) over k, where p_k is the piecewise polynomial through
+    The terms of the sum are shares[k] p_k(stretch[k] z) at the node z, where p_k is the piecewise polynomial through
     rows[k].
     """
     result = np.zeros(mesh.nodes.size)

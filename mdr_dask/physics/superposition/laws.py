@@ -119,7 +119,7 @@ def fit_wlf(
     slope, bend = fitted.x
     factor, c2 = slope / bend**2, 1 / bend + moved
     c1, half_of_bend = factor / c2, fitted.quantile * float(np.sqrt(fitted.spread[1, 1]))
-    if bend - half_of_bend <= straight:  # a straight line is within the errors: the intervals extend to infinity
+    if bend - half_of_bend <= straight:  # if a straight line fits within the errors, the intervals extend to infinity
         least = 1 / min(bend + half_of_bend, steepest) + moved
         first, last = sorted([slope * (least - moved) ** 2 / least, float(np.copysign(np.inf, slope))])
         constants = {"c1": (c1, first, last), "c2": (c2, least, np.inf)}

@@ -21,8 +21,8 @@ class TwoShifts:
     Parameters
     ----------
     first, second : Superposition
-        The merged points and curve, which are the same in both. `first` contains the factors a and the groups v,
-        `second` the factors b and the groups T; `member` is the index of v or T, respectively.
+        Both contain the same merged points and curve. `first` contains the factors a and the groups v, `second` the
+        factors b and the groups T; `member` is the index of v or T, respectively.
     chi_squared : float
         Reduced chi-squared of the differences between the factors of all pairs and the sums a + b. If it is above one,
         the errors are multiplied by its square root.
@@ -95,8 +95,8 @@ def _split(
 ) -> TwoShifts:
     """Fit the sum to the factors of all curves by least squares, weighted by their covariance.
 
-    `design` maps the factors of both quantities to the factors of the curves. `columns` are the indices of the factors
-    that are not zero by definition.
+    The matrix `design`, multiplied by the factors of both quantities, gives the factors of the curves. `columns` are
+    the indices of the factors that are not zero by definition.
     """
     curves, both = free.groups.size, design.shape[1]
     rows, moved = (design - design[0])[1:, columns], np.arange(1, curves)

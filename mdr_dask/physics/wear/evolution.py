@@ -297,7 +297,7 @@ class _Newton:
 
 @jit
 def _backward_shares(times: FloatArray) -> FloatArray:
-    """Return weights of values at given times; the weighted sum is the derivative of their polynomial at times[0]."""
+    """Return the weights for the derivative at times[0] of the polynomial that interpolates values at `times`."""
     weights = np.zeros(times.size)
     for j in range(1, times.size):
         weights[j] = 1.0 / (times[j] - times[0])
@@ -310,7 +310,7 @@ def _backward_shares(times: FloatArray) -> FloatArray:
 
 @jit
 def _lagrange(times: FloatArray, time: float) -> FloatArray:
-    """Return weights of values at given times; the weighted sum is the value of their polynomial at another time."""
+    """Return the weights for the value at `time` of the polynomial that interpolates values at `times`."""
     weights = np.ones(times.size)
     for j in range(times.size):
         for m in range(times.size):

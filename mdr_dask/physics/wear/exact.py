@@ -108,7 +108,7 @@ class Resolution(NamedTuple):
         return graded_panels(round(sharpness * tip), edge, 4 - min(self.rougher, 2))
 
 
-#: Function that returns the contacts after all wanted amounts of wear, from one solution at a resolution.
+#: Function that returns the contact after each wanted amount of wear, from a single solution at a given resolution.
 Solver = Callable[[Resolution], dict[float, Worn]]
 
 
@@ -215,7 +215,7 @@ class _Common(NamedTuple):
 def _fretted(
     profile: Profile, stick_radius: float, wanted: Sequence[float], constant_force: bool, resolution: Resolution
 ) -> dict[float, Worn]:
-    """Return the contacts after all wanted numbers of cycles, from one solution."""
+    """Return the contact after each wanted number of cycles, from a single solution."""
     c = max(_moved(profile, stick_radius, FLAT * resolution.step), stick_radius) if constant_force else stick_radius
     reach = profile.largest_radius
     if np.isinf(reach):
@@ -408,7 +408,7 @@ def _breaks(c: float, border: float) -> tuple[float, ...]:
 
 
 def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resolution: Resolution) -> dict[float, Worn]:
-    """Return the contacts after all wanted sliding paths, from one solution.
+    """Return the contact after each wanted sliding path, from a single solution.
 
     At the axis f is the power n/2 of r^2, so a body with an exponent n below 2 needs smaller panels there. After a long
     path under constant force the pressure is uniform and jumps to zero at the edge.
