@@ -318,8 +318,8 @@ def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
     """Return the lengths of a block along each dimension.
 
     A block first gets all values of the axes along which cases share work; these axes are cut only if the block would
-    become too large. As far as the number of its operations allows, it then gets more realisations, more values of the
-    other axes, and finally the realisations of later rounds.
+    become too large. As far as the number of its operations allows, the block then gets more realisations, more values
+    of the other axes, and finally the realisations of later rounds.
     """
     whole = _whole_dims(template, model)
     chunks = {dim: size if dim in whole else 1 for dim, size in template.sizes.items()}

@@ -277,8 +277,8 @@ def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray
     the axis, 1 for its middle, 2 for the quarters, ... `groups`, shape (1 + groups, lines, values), are means as in
     `Mean.groups`, and `error`, shape (lines, values), their discretisation errors. The result, shape (lines, values -
     1), is the largest absolute difference between a prediction and the interpolation through all values, minus the part
-    that the scatter of the realisations and the discretisation errors can explain. The result is negative if scatter
-    and errors can explain more than the difference.
+    that can be due to the scatter of the realisations and to the discretisation errors. The result is negative if this
+    part is larger than the difference.
     """
     from scipy.interpolate import CubicSpline, PchipInterpolator
     from scipy.special import ndtri

@@ -230,7 +230,7 @@ def _make(folder: Path) -> list[Path]:
 
 
 def _flush(paths: Sequence[Path]) -> None:
-    """Wait until files, and the entries of folders, are on the disk, which can flush several files at the same time."""
+    """Wait until files and the entries of folders are on the disk; several of them are flushed at the same time."""
     with ThreadPoolExecutor(FLUSHERS) as pool:
         list(pool.map(flush, paths))
 

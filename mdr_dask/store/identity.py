@@ -44,8 +44,9 @@ def reconcile(url: str, campaign: Campaign) -> Stored:
     """Compare a campaign with the existing store that it resumes or extends.
 
     A campaign with series may extend a store whose results have no series. These results stay at the root of the store.
-    If a series of the campaign has the same parameters and axes as these results, it is continued at the root. If the
-    store was made from another campaign, raise StoreError with every difference; the store is unchanged.
+    If a series of the campaign has the same parameters and axes as these results, new results of this series are added
+    at the root. If the store was made from another campaign, raise StoreError with every difference; the store is
+    unchanged.
     """
     attributes(url)  # raises StoreError if this is not a study
     campaign = _with_root(url, campaign)

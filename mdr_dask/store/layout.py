@@ -341,7 +341,7 @@ def _study_attributes(campaign: Campaign, earlier: Mapping[str, Any]) -> dict[st
 
 
 def _measured(campaign: Campaign) -> dict[str, Any]:
-    """Return the table of measured points of a campaign, which is stored with the results."""
+    """Return the table of measured points of a campaign; this table is stored with the results."""
     table = campaign.measured
     return {"measured": {"name": table.name, "text": table.read_text()}} if table else {}
 

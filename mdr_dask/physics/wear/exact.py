@@ -1,7 +1,7 @@
 """Worn contacts by the exact evolution, with errors: fretting and sliding, at constant depth and under constant force.
 
 Each contact is solved three times, with coarser panels and longer steps each time, and the error is estimated from the
-differences.
+differences. If the roughest solution fails, one difference is used.
 """
 
 from __future__ import annotations
@@ -173,7 +173,7 @@ def exact(
     found, rougher = solve(resolution), []
     if errors:
         rougher.append(solve(resolution._replace(rougher=1)))
-        with suppress(NotConvergedError):  # then the error follows from one difference
+        with suppress(NotConvergedError):  # without this solution, the error follows from one difference
             rougher.append(solve(resolution._replace(rougher=2)))
     contacts = {
         amount: one if one.relative_error > 0.0 else replace(one, rougher=tuple(other[amount] for other in rougher))

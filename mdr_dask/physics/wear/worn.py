@@ -104,7 +104,7 @@ class Worn:
         """Return the distance of an output from the rougher solutions.
 
         This is the larger of two numbers: the difference from the first rougher solution, and half the difference from
-        the second one. Both are needed, because two solutions may agree by chance.
+        the second one, if there is a second one. Both are used, because two solutions may agree by chance.
         """
         value = self.value(output, places)
         with np.errstate(invalid="ignore"):
