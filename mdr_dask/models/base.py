@@ -49,10 +49,10 @@ class Parameters(BaseModel):
     * `alternatives`: groups of alternatives; a user gives exactly one member of each group. A member is a tuple of
     parameters that are given together; in the path of a nested parameter, a dot separates the names.
     * `overrides`: parameters that replace another parameter, each with the name of the replaced parameter.
-    * `settings`: parameters of the numerical solution, such as its resolution or the stored points. They do not change
-    the physical problem.
-    * `requires`: parameters that have an effect only if another parameter has a certain value. Each is listed with the
-    name and the value of that other parameter.
+    * `settings`: parameters of the numerical solution, such as its resolution or the stored points. These parameters do
+    not change the physical problem.
+    * `requires`: parameters that have an effect only if another parameter has a certain value. Each of these parameters
+    is listed with the name and the value of the other one.
     """
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
@@ -188,7 +188,7 @@ def canonical(number: ArrayLike) -> Any:
 
 
 def deferred(module: str, name: str) -> Callable[..., Any]:
-    """Return a function that is imported at its first call, in order that declarations import quickly.
+    """Return a function that imports another function at its first call, so that declarations are quick to import.
 
     Parameters
     ----------
@@ -224,11 +224,11 @@ class Output:
     comment : str
         A limitation of the output, stored as its attribute ``comment``.
     scatter : str
-        Name of another output: the standard error of this output, estimated from a single realisation. It is stored
-        together with the errors.
+        Name of another output: the standard error of this output, estimated from a single realisation. This standard
+        error is stored together with the errors.
     floor : float
-        A value in `unit`, for outputs that can normally be zero. If the output is smaller, its error is relative to
-        `floor` instead of the value. An accuracy a allows the error ``a * max(abs(value), floor)``.
+        A value in `unit`, for outputs that can normally be zero. If the output is smaller than `floor`, its error is
+        relative to `floor`. An accuracy a allows the error ``a * max(abs(value), floor)``.
     allow_nan : bool
         Whether NaN and infinity are normal values. If they are not, a case of a user's own model that gives NaN or
         infinity counts as failed.
@@ -261,8 +261,8 @@ class Number:
     name, meaning : str
         Name of the number, and its meaning in one line.
     formula : str
-        A formula for `mdr_dask.questions.expression`. It may contain parameters (names of nested ones joined by ``_``),
-        outputs and other numbers.
+        A formula for `mdr_dask.questions.expression`. The formula may contain parameters (names of nested ones joined
+        by ``_``), outputs and other numbers.
     """
 
     name: str
@@ -381,8 +381,8 @@ class Model(Generic[P]):
     name : str
         Name for the key ``model`` of a campaign file.
     version : int
-        Version number. It is increased when a change of the code changes results. Only the version that created a store
-        can extend it.
+        Version number. The number is increased when a change of the code changes results. Only the version that created
+        a store can extend it.
     summary : str
         One line for ``mdr-dask models``.
     parameters : type

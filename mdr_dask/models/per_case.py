@@ -39,8 +39,9 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
         Receives the parameters of one case in SI units, and the random generator of a realisation. All cases of a
         realisation get the same random numbers. Returns every output of the model by name. If an output has an error,
         the error is returned as ``<output>_error``. A case has failed if `solve` raises any exception, even SystemExit,
-        or if an error is negative. It has also failed if an output is missing, is not a real number or an array of real
-        numbers, is not finite (unless declared with ``allow_nan=True``), or has a shape other than the declared one.
+        or if an error is negative. A case has also failed if an output is missing, is not a real number or an array of
+        real numbers, is not finite (unless declared with ``allow_nan=True``), or has a shape other than the declared
+        one.
 
     Notes
     -----
@@ -58,7 +59,7 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
         for case in range(block.cases):
             parameters = block.case(case)
             for number, (stream, start) in enumerate(zip(streams, starts, strict=True)):
-                stream.bit_generator.state = start  # setting the state is much faster than making a generator
+                stream.bit_generator.state = start  # setting the state is much faster than making a new generator
                 try:
                     outputs = _limited(solve, parameters, stream)
                     found[case, number] = {name: _output(name, outputs) for name in block.outputs}
@@ -111,8 +112,8 @@ def reason(error: BaseException) -> str:
 def where(error: BaseException) -> str:
     """Return the file and line of the user's function in which an exception was raised, in parentheses after a space.
 
-    If the exception was raised in another file, this is the line of the user's file that led to it. If it was raised in
-    this package, for example because of an invalid output, the text is empty.
+    If the exception was raised in another file, this is the line of the user's file that led to it. If the exception
+    was raised in this package, for example because of an invalid output, the text is empty.
     """
     frames = [(frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)]
     others = [(file, line) for file, line in frames if not file.startswith(PACKAGE)]

@@ -177,7 +177,7 @@ OUTPUTS = (
 def groups(lookup: Callable[[str], Any]) -> tuple[Any, Any, Any]:
     """Return the dimensionless parameters W (load), U (speed) and G (material).
 
-    Each is taken as given, or computed from the quantities with units.
+    Each of these numbers is taken as given, or computed from the quantities with units.
 
     Parameters
     ----------

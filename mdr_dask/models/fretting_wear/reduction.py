@@ -49,7 +49,8 @@ class Numbers:
 def indenters(block: Block[FrettingWear]) -> list[Indenter]:
     """Return the indenter of every case, or only one.
 
-    One is returned if all indenters are equal, or are power laws of the same shape that differ only in their numbers.
+    Only one indenter is returned if all indenters are equal, or are power laws of the same shape that differ only in
+    their numbers.
     """
     if isinstance(block.parameters.indenter, Pressed) and any(path.startswith("indenter") for path in block.columns):
         return [block.case(case).indenter for case in range(block.cases)]

@@ -49,8 +49,8 @@ Places = list[tuple[int, int]]
 class Task:
     """Input of a solution that several cases share.
 
-    It contains all data except the number of cycles N and the factor xi of the fast rule. `extent` is the last radius
-    of the profiles, divided by a0.
+    A task contains all data except the number of cycles N and the factor xi of the fast rule. `extent` is the last
+    radius of the profiles, divided by a0.
     """
 
     table: Pressed | None
@@ -159,8 +159,8 @@ def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
 def _is_plain(block: Block[FrettingWear]) -> bool:
     """Return whether closed forms are sufficient for a block.
 
-    They are sufficient if the body is a power law, the depth is constant without a history, the limiting profile or the
-    fast rule is requested, and all outputs are single numbers.
+    Closed forms are sufficient if the body is a power law, the depth is constant without a history, the limiting
+    profile or the fast rule is requested, and all outputs are single numbers.
     """
     simple = set(block.columns.get("wear_rule", [block.parameters.wear_rule])) <= {"limit", "fast"}
     depth = set(block.columns.get("hold", [block.parameters.hold])) == {"depth"}
@@ -360,7 +360,7 @@ def _contacts(
 def _solved(
     task: Task, wanted: Sequence[tuple[float, float]], accuracy: float, *, errors: bool
 ) -> list[Sequence[Worn]]:
-    """Return the contact for every (N, xi) at an accuracy; for a history, return the contacts after every block."""
+    """Return the contact for every (N, xi), solved with an accuracy; for a history, the contacts after every block."""
     profile, force = task.profile, task.hold == "force"
     if task.blocks:
         return [_loaded(task, profile, errors=errors)] * len(wanted)

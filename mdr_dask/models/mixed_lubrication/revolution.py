@@ -88,8 +88,8 @@ def _windows(operation: Operation, lines: FloatArray, travels: ArrayLike) -> Int
 def values(operation: Operation, revolution: Revolution, errors: FloatArray) -> dict[str, float]:
     """Return the scalar outputs of a realisation and their errors.
 
-    `errors` are the errors of the probability and of the length in m. Conductance and resistance are those of the whole
-    width of the rollers, across which the squares conduct in parallel.
+    `errors` are the errors of the probability and of the length in m. Conductance and resistance apply to the whole
+    width of the rollers, which consists of squares that conduct in parallel.
     """
     specific, length = operation.case.resistivity / operation.squares, revolution.length
     of_probability, off = errors.tolist()

@@ -163,8 +163,8 @@ def dimensions(file: DataFile) -> int:
 def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[float, float]]:
     """Return the unit of the heights in m and the spacings along x and y in m, as stated by the file or the user.
 
-    If positions have no unit, the spacing stated by the user is used. It must equal the step of the positions times a
-    power of ten.
+    If positions have no unit, the spacing stated by the user is used. This spacing must equal the step of the positions
+    times a power of ten.
     """
     height = _one_unit(file, "unit", grid.stated.height, units.height)
     position = _one_unit(file, "x_unit", grid.stated.position, units.position)

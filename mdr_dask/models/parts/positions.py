@@ -71,8 +71,8 @@ def without_positions(rows: FloatArray) -> Outer:
 def _leading(lines: FloatArray) -> int:
     """Return the number of lines at the beginning that hold positions or row numbers.
 
-    Lines of positions only rise or only fall. Lines of heights may also do so on a tilted or curved surface, but a line
-    of positions differs from the adjacent lines much more than a line of heights does.
+    Lines of positions only rise or only fall. Lines of heights on a tilted or curved surface may also only rise or only
+    fall. But the difference between a line and the adjacent lines is much larger for positions than for heights.
     """
     inner = lines[:, OUTER:-OUTER]
     rises = rising(inner)
