@@ -84,9 +84,9 @@ def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -
     """Return, for each series, the half width that the interval would have without scatter of the realisations.
 
     This half width is due to grid errors and to the misfit of the law, and more realisations do not reduce it. The fit
-    is repeated with the scatter multiplied by ``1 - LESS``, and the half width is extrapolated linearly to zero
-    scatter. The same is done with ``1 + LESS``. The smaller of the two results is returned, because the half width
-    jumps if a change of the scatter alters the verdict on the law.
+    is repeated with the scatter multiplied by ``1 - LESS`` and by ``1 + LESS``. From each of these fits, the half width
+    is extrapolated linearly to zero scatter. The smaller of the two results is returned, because the half width jumps
+    if a change of the scatter alters the verdict on the law.
     """
     now = half_widths(fit, constant, groups)
 
@@ -112,8 +112,8 @@ def still_wide(
 ) -> dict[str, xr.DataArray]:
     """Return, for each series, where an interval is too wide and more realisations are worth while.
 
-    They are not worth while if the half width due to scatter alone is already within the tolerance, but the total half
-    width would exceed the tolerance even with `at_most` realisations.
+    More realisations are not worth while if the half width due to scatter alone is already within the tolerance, but
+    the total half width would exceed the tolerance even with `at_most` realisations.
 
     Raises
     ------

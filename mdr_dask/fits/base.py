@@ -1,8 +1,8 @@
 """The class `Fit`: a law, with a function that fits its constants to the series of a store and tests the law.
 
-Every result has a variable ``law_holds``: a sentence that begins with *yes*, *approximately*, *no* or *not tested*. It
-is about the law with the constants that the source of the law states. If constants are fitted, ``fitted_law_holds`` is
-the corresponding sentence about the law with the fitted constants.
+Every result has a variable ``law_holds``: a sentence that begins with *yes*, *approximately*, *no* or *not tested*.
+This sentence is about the law with the constants that its source states. If constants are fitted, ``fitted_law_holds``
+is the corresponding sentence about the law with the fitted constants.
 
 If scatter and errors do not explain the departures of the data from the fitted law, the intervals of the constants
 become wider (see `fitted`). A constant that the data do not determine is NaN (see `undetermined`).
@@ -100,7 +100,7 @@ FITTED_LAW_HOLDS = {"units": "1", "long_name": "whether the law holds with the f
 
 
 def _judged(result: xr.Dataset) -> xr.Dataset:
-    """Return a result with ``law_holds`` as its last variable. If the fit gives no verdict, it is *not tested*."""
+    """Return a result with ``law_holds`` as its last variable. Without a verdict of the fit, it is *not tested*."""
     sentence = result.get("law_holds", xr.DataArray("not tested: this fit compares no law with its data"))
     return result.drop_vars("law_holds", errors="ignore").assign(law_holds=sentence.assign_attrs(LAW_HOLDS))
 
@@ -148,7 +148,7 @@ def fitted(
     """Fit a law to a stack of data.
 
     If scatter and errors do not explain the residuals, the law is also fitted to data that are shifted by the
-    residuals. This widens the intervals of the constants.
+    residuals, which widens the intervals of the constants.
 
     Parameters
     ----------

@@ -153,9 +153,10 @@ def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
 
     Notes
     -----
-    The likelihood is a normal distribution. Its covariance has four parts: the errors of measurement; the scatter of
-    the rough lines, which is common to all points; half of the estimated errors of grid and interpolation, as an error
-    common to all points; and the other half, as an error that is independent for each point.
+    The likelihood is a normal distribution. The covariance of the measured points has four parts: the errors of
+    measurement; the scatter of the rough lines, which is common to all points; half of the estimated errors of grid and
+    interpolation, as an error that is common to all points; and the other half, as an error that is independent for
+    each point.
 
     If the table gives no errors of measurement, two kinds are considered: errors that are equal for all points, and
     errors proportional to the values. Their size is unknown; its logarithm has a uniform prior.

@@ -3,7 +3,7 @@
 Symbols: mu is the coefficient of friction, F_N the normal force, v the velocity, L the length of the line and h its rms
 height, G the shear modulus and tau the relaxation time.
 
-Friction against velocity has four regions. It is proportional to the velocity in region I, grows more slowly in
+Friction against velocity has four regions. Friction is proportional to the velocity in region I, grows more slowly in
 region II, is at its plateau in region III, and falls in region IV. The load has two zones: the line is in partial
 contact in zone 1, at low loads, and in full contact in zone 2.
 """

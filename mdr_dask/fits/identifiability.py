@@ -52,7 +52,8 @@ def open_ends(found: Posterior) -> list[Ends]:
 def undetermined(found: Posterior, ends: Sequence[Ends]) -> list[int]:
     """Return the indices of the unknowns that the data do not determine.
 
-    These are the unknowns with an open end (see `OPEN`), and the unknowns that depend strongly on them (see `LINKED`).
+    Undetermined are the unknowns with an open end (see `OPEN`), and the unknowns that depend strongly on them (see
+    `LINKED`).
     """
     free = [k for k, end in enumerate(ends) if any(end)]
     if not free:

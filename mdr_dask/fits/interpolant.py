@@ -125,7 +125,7 @@ def _between(scale: Scale, places: FloatArray, line: FloatArray, error: FloatArr
     """Return the values along an axis, with missing values interpolated, and the errors of all values."""
     known = np.isfinite(line)
     filled = cubic(places[known], line[known], places, 0, Scale.of(places))
-    # the factor LEFT is removed, because gaps at missing values are as wide as those from which the error is estimated
+    # without the factor LEFT: gaps at missing values are as wide as the gaps from which the error is estimated
     left_out = left_out_error(scale, line[known], places[known], 0) / LEFT
     between = np.interp(places, places[known], error[known] + left_out)
     inside = (places >= places[known][0]) & (places <= places[known][-1])

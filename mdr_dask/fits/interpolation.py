@@ -10,8 +10,8 @@ from mdr_dask.arrays import FloatArray
 
 #: Smallest number of values along an axis: if every second one is left out, enough must remain for a curve.
 FEWEST = 4
-#: Error of interpolation between all values, divided by the error between every second value. The ratio is 1/4 for an
-#: error of second order; at a kink it would be 1/2.
+#: Error of interpolation from all values, divided by the error of interpolation from every second value. The ratio is
+#: 1/4 for an error of second order; at a kink it would be 1/2.
 LEFT = 0.25
 
 

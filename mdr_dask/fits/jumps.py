@@ -68,7 +68,7 @@ def each_jump(
 ) -> xr.Dataset:
     """Fit a law as `mdr_dask.fits.cases.each` does, after checking that the series has jumps of the velocity.
 
-    The outputs `LEVELS` and ``rms_slope`` are always needed, `outputs` in addition.
+    The series needs the outputs `LEVELS`, the output ``rms_slope``, and the given `outputs`.
 
     Raises
     ------

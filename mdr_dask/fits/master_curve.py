@@ -65,8 +65,8 @@ def master_curve(
     -------
     Dataset
         ``shift_factor`` and ``vertical_factor`` contain, for each group, the decades that are added to the logarithms
-        of abscissa and ordinate. Both come with ``_error`` (half width of the 68 % interval), and with ``_low`` and
-        ``_high`` (ends of the 95 % interval). ``covariance`` and ``draws`` belong to the shift factors,
+        of abscissa and ordinate. Both factors come with ``_error`` (half width of the 68 % interval), and with ``_low``
+        and ``_high`` (ends of the 95 % interval). ``covariance`` and ``draws`` belong to the shift factors,
         ``vertical_covariance`` and ``vertical_draws`` to the vertical factors. ``point_abscissa``, ``point_ordinate``
         and ``point_group`` are all points after shifting. ``curve_abscissa``, ``curve_ordinate`` and ``curve_error``
         are the merged curve and its error in decades; its attrs contain the range that was measured at the reference. A
@@ -177,7 +177,7 @@ def _of_two_groups(
 def _inside(groups: FloatArray, reference: float) -> float:
     """Return the reference, or the nearest group if the reference lies just outside the groups.
 
-    It may lie outside by a tenth of the mean distance between groups, because measured set points scatter.
+    The reference may lie outside by a tenth of the mean distance between groups, because measured set points scatter.
     """
     margin = 0.1 * np.ptp(groups) / max(groups.size - 1, 1)
     if not groups.min() - margin <= reference <= groups.max() + margin:

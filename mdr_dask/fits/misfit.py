@@ -53,8 +53,8 @@ class Residuals(NamedTuple):
 def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str:
     """Return a sentence on whether the model explains the measured points.
 
-    It begins with *yes*, *no* or *not tested*. It is *not tested* if the errors are so large that they would hide any
-    misfit, or if there are too few points.
+    The sentence begins with *yes*, *no* or *not tested*. A model is *not tested* if the errors are so large that they
+    would hide any misfit, or if there are too few points.
     """
     size = f"residuals are {100 * residuals.relative:.2g} % of the measured values, rms"
     hidden = (

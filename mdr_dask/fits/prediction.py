@@ -179,7 +179,7 @@ def _is_computed(axis: FloatArray, wanted: FloatArray) -> bool:
 def _fields(
     dataset: xr.Dataset, output: str, along: Sequence[str], unknowns: Sequence[str], between: Mapping[str, bool]
 ) -> tuple[FloatArray, bool]:
-    """Return the numbers of every case that are interpolated, and whether the means are replaced by their logarithms.
+    """Return the numbers to interpolate for every case, and whether the means are replaced by their logarithms.
 
     The shape is (conditions ..., unknowns ..., numbers). The numbers of a case are its mean, a flag for a missing mean,
     the part of the scatter that is independent of other cases, the error of grid and interpolation, and the modes of

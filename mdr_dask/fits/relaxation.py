@@ -64,7 +64,7 @@ class Relaxation(NamedTuple):
         Stacks of the fitted rate, and of the rate that follows from the integral of the trace (see
         `mdr_dask.bootstrap`). If scatter and errors do not explain the departures of the trace from one exponential,
         `rate` has additional rows at its end: rates fitted to the trace shifted by these departures, and the integral
-        rate. They widen the interval.
+        rate. These rows widen the interval of the rate.
     holds : str
         Sentence on whether one exponential fits; its departures are relative to the largest value of the trace.
     """
@@ -183,7 +183,8 @@ def _outputs(case: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
 def _fit_case(case: xr.Dataset) -> Relaxation | None:
     """Fit one exponential to a case; return None if it has too few realisations, or if friction does not relax.
 
-    The discretisation error of mu includes that of mu_2. Therefore the error of mu - mu_2 is the difference of both.
+    The discretisation error of mu includes that of mu_2. Therefore the error of mu - mu_2 is the difference between the
+    two errors.
     """
     time, values, error = _outputs(case)
     before, jump, after = values[:, :3].T

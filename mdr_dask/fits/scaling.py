@@ -99,7 +99,8 @@ def _balance(data: xr.Dataset, used: list[int]) -> Variables:
 def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> FloatArray:
     """Return the slope in contact divided by that of the line, by eq. 3.21.
 
-    Eq. 3.21 includes only waves that are shorter than the length in contact. The result is NaN if there are none.
+    Eq. 3.21 includes only waves that are shorter than the length in contact. The result is NaN if there are no such
+    waves.
 
     Parameters
     ----------

@@ -168,10 +168,10 @@ def _exchanged(values: FloatArray) -> FloatArray:
 def _of_neighbours(values: FloatArray) -> FloatArray:
     """Return value and interval ends of the first-order index, and NaN for the total index, shape (3, 2).
 
-    There are two estimates. The first uses products of neighbours only, and is right for random points. The second also
-    uses the product of each point with itself, and is right for points that fill space evenly, such as a Sobol
-    sequence, because neighbours then differ systematically in their other inputs. The index is the mean of both
-    estimates, and its interval contains both.
+    There are two estimates. The first estimate uses products of neighbours only, and is right for random points. The
+    second estimate also uses the product of each point with itself, and is right for points that fill space evenly,
+    such as a Sobol sequence, because neighbours then differ systematically in their other inputs. The index is the mean
+    of both estimates, and its interval contains both.
     """
     (without, with_itself), (low, _), (_, high) = _with_interval(values, _neighbours)
     first = [(without + with_itself) / 2, low, high]

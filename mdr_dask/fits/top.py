@@ -30,8 +30,8 @@ class Top(NamedTuple):
     Attributes
     ----------
     height : array, shape (rows,)
-        Stack of the maximum, corrected for its bias (see `mdr_dask.bootstrap`). Residuals of the parabola count as an
-        error.
+        Stack of the maximum, corrected for its bias (see `mdr_dask.bootstrap`). The interval of the maximum includes
+        the residuals of the parabola.
     place, rise : array, shape (rows,)
         Stacks of the logarithm of the velocity at the maximum, and of d ln(friction) / d ln(velocity) there. This slope
         is 0 unless the maximum is at an end of the range of velocities.
@@ -45,7 +45,8 @@ class Top(NamedTuple):
 def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
     """Fit a parabola to the points near the largest friction, to as many of them as possible.
 
-    The residuals must not exceed what scatter and errors explain.
+    Points far from the maximum are left out until scatter and errors explain the residuals, or until the last of `TOPS`
+    is reached.
 
     Parameters
     ----------
