@@ -112,8 +112,8 @@ _MEANINGS = {
     "W": ("a power", "1 W"),
 }
 
-#: Texts with more characters, and exponents of more than two digits, are refused, because pint may need an extremely
-#: long time to parse them.
+#: Texts with more characters, and exponents of more than two digits, are refused.
+#: Pint may need an extremely long time to parse them.
 _MOST_LETTERS = 60
 _BAD_POWER = re.compile(r"(\*\*|\^)\s*(?!\(?[-+]?\d{1,2}\)?(?![\d.]|\s*(\*\*|\^)))")
 
@@ -123,8 +123,7 @@ _FACTOR = re.compile(
 )
 _DEGREES = re.compile(r"(?:(?i:deg(?:rees?)?\.?|°)\s*([CFcf])|([CF]))")
 _NOT_A_UNIT = re.compile(r"[,._]|\d(?!\s*/)|.*%.*%")
-#: Patterns of a number with a decimal comma, of a number whose comma may separate thousands, and of a text that looks
-#: like several numbers.
+#: Patterns of a number with a decimal comma, of a number whose comma may separate thousands, and of several numbers.
 _COMMA = re.compile(r"\s*[+-]?\d*,\d+\s*([eE][+-]?\d+)?\s*[^\d,]*\Z")
 _THOUSANDS = re.compile(r"[+-]?\d{1,3},\d{3}")
 _SEVERAL = re.compile(r"\d.*?(,|;|\.\.|\bto\b|\s-\s)\s*[+-]?[\d.]")
@@ -315,7 +314,7 @@ def is_unit(text: str) -> bool:
         return False
     try:
         registry().parse_units(unit)
-    except Exception:  # pint's parser raises many types
+    except Exception:  # pint's parser raises many types of exceptions
         return False
     return True
 
@@ -368,7 +367,7 @@ def conversion(given: str, unit: str) -> tuple[float, float]:
             if one.is_compatible_with(target):
                 hint = f" (1 {spelling} is {one.to(target).magnitude:.4g} {unit})"
         raise ValueError(f"expected {expected(unit)}{hint}") from None
-    except Exception:  # pint's parser raises many types: TypeError, AssertionError, ...
+    except Exception:  # pint's parser raises many types of exceptions: TypeError, AssertionError, ...
         raise ValueError(f"expected {expected(unit)}") from None
     factor = one - zero
     return (before * (1.0 if math.isclose(factor, 1.0) else factor), zero) if zero else (before * one, 0.0)

@@ -65,6 +65,6 @@ class Steady:
 
 
 def valid(deborah: FloatArray, loads: FloatArray) -> NDArray[np.bool_]:
-    """Return which cases have a positive, finite Deborah number and load."""
+    """Return a mask of the cases with a positive, finite Deborah number and load."""
     good: NDArray[np.bool_] = np.isfinite(deborah) & np.isfinite(loads) & (deborah > 0) & (loads > 0)
     return good

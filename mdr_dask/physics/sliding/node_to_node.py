@@ -669,7 +669,7 @@ class NodeToNode:
         self._cases, self._error, self._contact = cases, error, contact
         loads = cases.loads
         self._rates = np.full((loads.size, SECANTS), np.nan)
-        self._depth = np.full(loads.size, np.nan)  # of the mean line
+        self._depth = np.full(loads.size, np.nan)  # depth of the mean line
 
     def solve(self, level: int, cases: IntArray) -> Solution:
         """Solve cases on a grid of `level` nodes per Nyquist point.

@@ -16,8 +16,7 @@ from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.surfaces import shapes
 
 NONE = 2.0  # result of `summit` if the cell has no maximum
-# largest rise of a cubic above its ends, divided by the sum of the upward slope at its start and the downward slope at
-# its end
+# largest rise of a cubic above its ends, divided by (upward slope at its start + downward slope at its end)
 STEEPEST_RISE = 4 / 27
 UNRESOLVED = 0.5  # a line is not resolved if the mean squared slopes at nodes and in cells differ by this fraction
 
