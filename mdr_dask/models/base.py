@@ -230,8 +230,8 @@ class Output:
         A value in `unit`, for outputs that can normally be zero. If the output is smaller than `floor`, its error is
         relative to `floor`. An accuracy a allows the error ``a * max(abs(value), floor)``.
     allow_nan : bool
-        Whether NaN and infinity are normal values. If they are not, a case of a user's own model that gives NaN or
-        infinity counts as failed.
+        Whether NaN and infinity are normal values. If NaN and infinity are not normal, a case of a user's own model
+        that gives them counts as failed.
     """
 
     name: str

@@ -1,6 +1,6 @@
 """Make the function `compute` of a model from a function that solves one case.
 
-This is the easiest way to define a model of your own.
+The function `per_case` is the easiest way to define a model of your own.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Find the results that miss the accuracy of a campaign, for all models.
 
-The accuracy limits the relative error of every output: the error divided by the value. For a profile or a history, it
-is the largest error divided by the largest value. For an output that can be zero, the model gives a floor in the unit
-of the output. If the output is smaller than its floor, the error is divided by the floor instead.
+The accuracy limits the relative error of every output: the error divided by the value. For a profile or a history, the
+relative error is the largest error divided by the largest value. For an output that can be zero, the model gives a
+floor in the unit of the output. If the output is smaller than its floor, the error is divided by the floor instead.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def missed_accuracy(
 
 
 def _relative_errors(values: ArrayLike, errors: ArrayLike, floor: ArrayLike) -> FloatArray:
-    """Return the relative error of an output of every case, shape (cases,); infinite for a value 0 with an error."""
+    """Return the relative error of an output of every case, shape (cases,); infinite if only the error is not 0."""
     size, error = (np.abs(np.atleast_1d(np.asarray(each, dtype=np.float64))) for each in (values, errors))
     known = ~(np.isnan(size) | np.isnan(error))
     largest_error, largest = (

@@ -479,8 +479,8 @@ def _scattered(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame
 def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]:
     """Return positions and heights of a table in m.
 
-    The columns are found by their names. If the table has no names, they are found by their numbers. A table of heights
-    alone needs a spacing.
+    The columns are found by their names. If the table has no names, the positions are the column that only rises or
+    only falls. A table of heights alone needs a spacing.
     """
     import numpy as np
 

@@ -71,7 +71,7 @@ class ModulusTable(NamedByFile):
         return self
 
     def notes(self) -> tuple[str, ...]:
-        """Return notes on unused columns, and on a modulus whose name does not say whether it is one of shear."""
+        """Return notes on unused columns, and on a modulus whose name does not say whether it is a shear modulus."""
         table = _table(self)
         heading = table.headings["storage modulus"]
         notes = [table.remark] if table.remark else []
@@ -191,7 +191,7 @@ def _vertical(chosen: ModulusTable) -> str:
 def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
     """Return log10 of the horizontal and the vertical shift factor of each temperature, and a text about the factors.
 
-    Curves that are shifted by these factors overlap at the reference temperature.
+    Curves that are shifted by these factors form a single curve, which belongs to the reference temperature.
     """
     from mdr_dask.physics.superposition.master_curve import rereference, superpose
 
@@ -236,7 +236,7 @@ def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, referenc
 
 
 def _require_overlap(storage: FloatArray, member: IntArray, levels: FloatArray) -> None:
-    """Raise DataError if there is a gap between the moduli of two curves, because no horizontal shift can close it."""
+    """Raise DataError if there is a gap between the moduli of two curves, which no horizontal shift can close."""
     low, high = (
         np.array([find(storage[member == number]) for number in range(levels.size)]) for find in (np.min, np.max)
     )
@@ -284,7 +284,7 @@ def _table(chosen: ModulusTable) -> Read:
 def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
     """Return angular frequency, storage modulus, loss modulus and temperature (or None) of a file, in SI units.
 
-    Raise DataError for moduli in tension without a Poisson ratio, and for moduli of shear with one.
+    Raise DataError for moduli in tension without a Poisson ratio, and for shear moduli with a Poisson ratio.
     """
     name, table = chosen.file.name, _table(chosen)
     omega, storage, loss = table["frequency"], table["storage modulus"], table.get("loss modulus")

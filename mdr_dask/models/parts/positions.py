@@ -38,7 +38,7 @@ class Outer(NamedTuple):
 def rising(lines: FloatArray) -> NDArray[np.bool_]:
     """Return which lines only rise or only fall.
 
-    Lines of positions and of row numbers do so; lines of rough heights do not.
+    Lines of positions and of row numbers only rise or only fall; lines of rough heights do not.
     """
     steps = np.diff(lines, axis=1)
     known = np.isfinite(steps)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.scans import Cut
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
-CUT_ERROR = 0.05  # relative error of every point of a tabulated spectrum of straight profiles
+CUT_ERROR = 0.05  # assumed relative error of every point of a tabulated spectrum of straight profiles
 # largest anisotropy of a surface that counts as isotropic; its slopes along x and y differ by about a quarter at most
 MOST_ANISOTROPY = 0.25
 STRIPES = 10.0  # a map has stripes if waves along an axis have more than this times the mean power of their ring

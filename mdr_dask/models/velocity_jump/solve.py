@@ -228,7 +228,10 @@ class _Followed(_Group):
     """One case that is computed from the motion of all elements: any history, solid and indenter."""
 
     def found(self, waves: Waves) -> tuple[_Found, int]:
-        """Solve the case with a quarter, half and all of the nodes. The time step is proportional to their spacing."""
+        """Solve the case with a quarter, half and all of the nodes.
+
+        The time step is proportional to the spacing of the nodes.
+        """
         nodes = waves.points * self.oversampling
         grids = [nodes // every for every in (4, 2, 1) if nodes % every == 0 and nodes // every >= waves.points]
 
