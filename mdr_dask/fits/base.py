@@ -43,9 +43,9 @@ class Fit:
         The law, in one line.
     compute : callable, mapping of str to Dataset -> Dataset
         Takes the groups of a store by the name of the series (``""`` for a store without series). Each group has the
-        dimensions (axes..., realisation, ...). Its coordinates are all scalar parameters, varied or fixed. Returns
-        every constant with the ends of its 95 % interval, ``<name>_low`` and ``<name>_high``, measures of the goodness
-        of fit, and ``law_holds``. Units are in the attrs.
+        dimensions (axes..., realisation, ...). The coordinates of a group are all scalar parameters, varied or fixed.
+        Returns every constant with the ends of its 95 % interval, ``<name>_low`` and ``<name>_high``, measures of the
+        goodness of fit, and ``law_holds``. Units are in the attrs.
     apart : bool
         Whether each series of a store is fitted separately. ``compute`` then gets a mapping with one series.
     constants : tuple of str, or callable, Campaign -> tuple of str
@@ -100,7 +100,7 @@ FITTED_LAW_HOLDS = {"units": "1", "long_name": "whether the law holds with the f
 
 
 def _judged(result: xr.Dataset) -> xr.Dataset:
-    """Return a result with ``law_holds`` as its last variable. Without a verdict of the fit, it is *not tested*."""
+    """Return a result with ``law_holds`` as its last variable. It is *not tested* if the fit gives no verdict."""
     sentence = result.get("law_holds", xr.DataArray("not tested: this fit compares no law with its data"))
     return result.drop_vars("law_holds", errors="ignore").assign(law_holds=sentence.assign_attrs(LAW_HOLDS))
 
@@ -256,8 +256,8 @@ def law_holds(
     departures : array
         Relative departures of the data from the law.
     chance : float or None
-        Probability that scatter and errors alone cause departures of this size. NaN if it is unknown; None if they
-        cannot cause such departures.
+        Probability that scatter and errors alone cause departures of this size. NaN if the probability is unknown; None
+        if scatter and errors cannot cause such departures.
     constants : int
         Number of constants fitted to these data.
     where : str

@@ -1,7 +1,7 @@
 """Calibration: estimate unknown parameters of a study from measured points.
 
-The unknowns are the axes of the study that are not columns of the table of measured points. Their posterior density is
-computed on cells, which divide the ranges of these axes (see `mdr_dask.fits.posterior`).
+The unknowns are the axes of the study that are not columns of the table of measured points. The posterior density of
+the unknowns is computed on cells, which divide the ranges of these axes (see `mdr_dask.fits.posterior`).
 """
 
 from __future__ import annotations
@@ -159,7 +159,8 @@ def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
     each point.
 
     If the table gives no errors of measurement, two kinds are considered: errors that are equal for all points, and
-    errors proportional to the values. Their size is unknown; its logarithm has a uniform prior.
+    errors proportional to the values. The size of these errors is unknown; the logarithm of the size has a uniform
+    prior.
     """
     predicted = prediction(dataset, measured)
     named = (*predicted.unknowns, *measured.conditions, measured.output)

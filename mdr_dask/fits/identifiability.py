@@ -75,7 +75,7 @@ def _explained(centred: FloatArray, weights: FloatArray, k: int, by: list[int]) 
 
 
 class Product(NamedTuple):
-    """A product of powers of unknowns that the data determine.
+    """A product of powers of unknowns, which the data determine.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class Product(NamedTuple):
 
 
 def products(found: Posterior, values: FloatArray, free: Sequence[int]) -> list[Product]:
-    """Return the products of undetermined unknowns that the data determine.
+    """Return products of powers of undetermined unknowns; the data determine each product.
 
     `values` are the unknowns in SI units at the centre of each cell, shape (cells, unknowns), and `free` are the
     indices of the undetermined unknowns.

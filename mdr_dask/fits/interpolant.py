@@ -151,7 +151,7 @@ def _provenance(dataset: xr.Dataset) -> dict[str, str]:
 
 
 class Law:
-    """A law from a file that ``mdr-dask law`` wrote. Call it to evaluate it at many points.
+    """A law from a file that ``mdr-dask law`` wrote. A law is called like a function, to evaluate it at many points.
 
     Parameters
     ----------

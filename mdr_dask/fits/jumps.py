@@ -1,12 +1,12 @@
 """The jump of friction that a jump of the velocity causes: its size and its law (thesis eqs. 4.8 to 4.11).
 
 Symbols: The velocity jumps at the time t_0 from v_1 to v_2 = v_1 + dv. The coefficient of friction mu is mu_1 before
-the jump and mu_2 long after it. It changes by d_mu_0 at t_0, and relaxes from mu(t_0+) = mu_1 + d_mu_0 to mu_2 after
-it. The rms slope is s.
+the jump and mu_2 long after it. The coefficient of friction changes by d_mu_0 at t_0, and then relaxes from mu(t_0+) =
+mu_1 + d_mu_0 to mu_2. The rms slope is s.
 
-Eq. 4.11 is d_mu_0 v_1 / (dv s) = [(s / mu_1)^2 + 1 / c^2]^(-1/2) with the constant c = 0.4. For slow sliding (region I)
-it becomes eq. 4.9, d_mu_0 / mu_1 = dv / v_1. On the plateau of friction it becomes eq. 4.10, in which the left side
-is c.
+Eq. 4.11 is d_mu_0 v_1 / (dv s) = [(s / mu_1)^2 + 1 / c^2]^(-1/2) with the constant c = 0.4. For slow sliding (region
+I), eq. 4.11 becomes eq. 4.9, d_mu_0 / mu_1 = dv / v_1. On the plateau of friction, eq. 4.11 becomes eq. 4.10,
+d_mu_0 v_1 / (dv s) = c.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ def jumps_of(data: xr.Dataset) -> Jumps:
     """Return friction before, at and after the jump in all cases of a series."""
     tables = [table_of(data, 1.0, data["velocity_change"], output=name) for name in LEVELS]
     values = np.stack([table.values.T for table in tables], axis=1)
-    values = values + 0 * values.sum(axis=1, keepdims=True)  # a NaN in one level makes all three NaN
+    values = values + 0 * values.sum(axis=1, keepdims=True)  # if one level is NaN, all three become NaN
     errors = np.stack([table.mean_error() for table in tables])
     slopes = table_of(data, 1.0, output="rms_slope").values
     known = np.isfinite(slopes) & (slopes > 0)

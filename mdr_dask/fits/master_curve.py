@@ -299,7 +299,7 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
 def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Return the friction that is due to roughness, as a function of force and velocity.
 
-    It is the coefficient of friction of the first rough series that varies force and velocity, averaged over
+    The result is the coefficient of friction of the first rough series that varies force and velocity, averaged over
     realisations. If a series has the same forces and velocities but no roughness, its friction is due to the bulk alone
     and is subtracted.
 

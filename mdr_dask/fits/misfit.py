@@ -1,7 +1,7 @@
 """Test a model against measured points.
 
-If the errors of measurement are known, chi squared is used. Otherwise a trend of the residuals counts against the
-model.
+If the errors of measurement are known, chi squared is used. If these errors are unknown, a trend of the residuals
+counts against the model.
 """
 
 from __future__ import annotations

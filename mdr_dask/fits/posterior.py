@@ -64,8 +64,8 @@ def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) 
     values : array, shape (points,)
         Measured values.
     noises : list of Noise
-        Possible errors of measurement. All elements have the same prior probability, and so have all sizes within one
-        element.
+        Possible errors of measurement. All items of this list have the same prior probability, and so have all sizes of
+        one item.
 
     Returns
     -------

@@ -27,8 +27,8 @@ MOST = 4
 LARGEST, PIECES = 4e6, 16
 #: Relative difference up to which a measured and a computed value of a parameter count as equal.
 SAME = 1e-6
-#: The scatter of different cases is correlated, because they use the same rough lines. A few modes represent it:
-#: largest number of modes, and share of the variance that they must represent.
+#: The scatter of different cases is correlated, because they use the same rough lines. A few modes represent this
+#: scatter. These are the largest number of modes, and the share of the variance that they must represent.
 MODES, SHARE = 6, 0.999
 
 
@@ -131,7 +131,7 @@ def prediction(dataset: xr.Dataset, measured: Measured) -> Prediction:
 
 
 def _at_fixed(dataset: xr.Dataset, measured: Measured) -> xr.Dataset:
-    """Return a study without axes of one value; raise DataError if a measured point lies outside the study."""
+    """Return a study without its axes of a single value; raise DataError if a measured point lies outside the study."""
     array = dataset[measured.output]
     single = [str(dim) for dim in array.dims if dim in array.coords and array.sizes[dim] == 1 and dim != "realisation"]
     dataset = dataset.squeeze(single)
@@ -243,7 +243,7 @@ def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray)
         return np.zeros_like(mean), np.zeros((*mean.shape, 0))
     spare = np.maximum(number * (number - 1), 1)
     few = np.maximum(number, 2)
-    widened = bootstrap.widening(few) * np.sqrt((few - 1) / few)  # quantile of Student's t over that of the normal law
+    widened = bootstrap.widening(few) * np.sqrt((few - 1) / few)  # ratio of quantiles, Student's t to normal
     each = np.nan_to_num(deviations) * (widened / np.sqrt(spare))[..., None]
     size = np.where(np.abs(mean) > 0, np.abs(mean), 1.0)
     relative = np.nan_to_num(each / size[..., None]).reshape(-1, count)
