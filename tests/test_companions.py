@@ -72,7 +72,7 @@ def test_show_distinguishes_scatter_and_grid_error(filled, capsys):
     assert main(["show", filled, "width"]) == 0
     note, *_, units, first, last = capsys.readouterr().out.splitlines()
     assert note.startswith("mean +- standard error +- grid error; in all rows: realisations = 6")
-    assert units.split() == ["[m]", "[m]"]
+    assert units.split() == ["position", "[m]", "width", "[m]"]
     assert [line.count("+-") for line in (first, last)] == [2, 2]
     assert main(["show", filled, "width", "--json"]) == 0
     row = json.loads(capsys.readouterr().out)["rows"][0]

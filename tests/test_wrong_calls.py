@@ -18,11 +18,9 @@ WRONG = [
     ("run small.yaml --part 4/3", "K/N", "'4/3'"),
     ("show STORE -o x.csv --json", "--json and --output"),
     ("show STORE -o x.nc --sort velocity", ".csv", "--sort"),
-    ("plot STORE friction_coefficient", "--over"),
     ("plot STORE friction_coefficient --over velocity --effects", "--over once", "--effects"),
     ("plot STORE friction_coefficient --over velocity --log q", "xyz", "'q'"),
     ("plot STORE friction_coefficient --over velocity --size 85", "'85mm'"),
-    ("plot STORE velocity --by normal_force", "--by", "--over"),
     # names
     ("models nobody", "'nobody'", "known: sliding_friction"),
     ("show STORE friction", "'friction'", "did you mean 'friction_coefficient'?"),
