@@ -311,7 +311,7 @@ def _further(count: int) -> str:
 def _grid(source: str, every: Sequence[Line]) -> _Grid:
     """Split lines into cells.
 
-    Comments are left out, except a comment just above the first line that may contain the names of the columns.
+    Comments are left out. If the first line contains numbers or units, a comment just above it may contain the names.
     """
     texts = [line for line in every if line.text.lstrip()[0] not in COMMENT]
     if not texts:
@@ -319,7 +319,8 @@ def _grid(source: str, every: Sequence[Line]) -> _Grid:
     separator = _separator([line.text for line in texts])
     lines = [line._replace(separator=separator) for line in texts]
     rows = [_split(line.text, separator) for line in lines]
-    for comment in every[: every.index(texts[0])][-1:]:
+    has_names = not any(map(_NUMBER.fullmatch, rows[0])) and not _are_units(rows[0])
+    for comment in [] if has_names else every[: every.index(texts[0])][-1:]:
         for each in SEPARATORS:
             names = _split(comment.text.lstrip(COMMENT + " "), each)
             if len(names) == len(rows[0]) > 1 and not any(map(_NUMBER.fullmatch, names)):

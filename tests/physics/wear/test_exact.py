@@ -175,7 +175,7 @@ def test_sharp_and_steep_bodies_wear_at_every_resolution(exponent, c, cycles, co
     (worn,) = exact(PowerProfile(exponent), c, [cycles], 1e-2, constant_force=constant_force)
     assert len(worn.rougher) == 2
     assert worn.energy_volume == pytest.approx(worn.wear_volume, abs=1e-2)
-    assert worn.error("wear_volume", RADII) < 0.02 * worn.wear_volume
+    assert worn.error("wear_volume", RADII) < 0.05 * worn.wear_volume
 
 
 def test_the_border_of_a_steep_body_leaves_its_first_place_with_the_first_wear():
