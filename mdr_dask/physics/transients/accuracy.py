@@ -1,9 +1,10 @@
 """Velocity jumps solved to a requested accuracy, with estimated errors.
 
 The steady states before and after a jump, and the instant of the jump, are solved on finer and finer grids
-(:mod:`mdr_dask.physics.refine`). The transient between them is marched on one grid. Only the difference between the
-march and the steady state on the same grid is used, so that the transient is accurate even if it is much smaller than
-the friction. The error of the transient is estimated by a second march on half as many nodes with half as many steps.
+(:mod:`mdr_dask.physics.refine`). The transient between them is marched on one grid. The transient is the difference
+between the march and the steady state on the grid of the march. This difference is added to the accurate steady state.
+The transient is therefore accurate even if it is much smaller than the friction. The error of the transient is
+estimated by a second march on half as many nodes with half as many steps.
 """
 
 from __future__ import annotations
@@ -22,8 +23,9 @@ from mdr_dask.physics.transients.velocity_jump import Jump, MarchRequest, Path, 
 
 FINEST = 64  # largest number of nodes per Nyquist point in steady states
 ORDER = 2  # lower bound of the order of convergence of the steady states
-CAUTION = 2 * SAFETY  # safety factor of steady states: contacts of a few nodes change irregularly from grid to grid
-TRANSIENT = SAFETY  # safety factor of a transient; it converges at first order, because single asperities enter contact
+CAUTION = 2 * SAFETY  # safety factor of steady states; a contact of a few nodes changes irregularly from grid to grid
+# safety factor of a transient, which converges at first order because single asperities enter contact
+TRANSIENT = SAFETY
 
 
 class Levels(NamedTuple):
@@ -39,7 +41,7 @@ class Levels(NamedTuple):
 
     @classmethod
     def of(cls, limits: list[SteadyLimits]) -> Levels:
-        """Return the levels from the steady limits of every case."""
+        """Return the levels of all cases; `limits` contains the steady limits of each case."""
         rows = [(each.before, each.at - each.before, each.after, each.depth[1]) for each in limits]
         return cls(*np.array(rows).reshape(-1, 4).T)
 
@@ -94,9 +96,9 @@ def solve_jumps(
     deborah : array, shape (cases, 2)
         v_1 tau / L and v_2 tau / L.
     accuracy : float or None
-        Allowed relative error of the quantities in `Levels`. The error of a depth that is smaller than h is relative to
-        h. With None, the steady states are solved on the grid of the march only; this is allowed if no error estimates
-        are requested.
+        Allowed relative error of the quantities in `Levels`. If a depth is smaller than h, the error of the depth is
+        relative to h. If `accuracy` is None, the steady states are solved on one grid only, the grid of the march. No
+        error estimates can then be requested.
     oversampling : int
         Nodes per Nyquist point in the march, an even number; the steady states use at least as many nodes.
     march : MarchRequest or None
@@ -149,7 +151,10 @@ def solve_jumps(
 
 
 def _left_out(jump: Jump, limits: SteadyLimits, request: MarchRequest) -> FloatArray:
-    """Return the errors of drag and depth if a jump was not marched: the neglected changes, or 0 in full contact."""
+    """Return the errors of drag and depth of a jump that was not marched.
+
+    The errors are the neglected changes of drag and depth. In full contact they are 0.
+    """
     changes = np.array([jump.left_out, abs(limits.depth[1] - limits.depth[0]) if jump.left_out > 0 else 0.0])
     return np.repeat(changes[:, None], request.times.size, axis=1)
 
@@ -157,7 +162,7 @@ def _left_out(jump: Jump, limits: SteadyLimits, request: MarchRequest) -> FloatA
 def _change(
     fine: Path, limits: SteadyLimits, coarse: Path | None, others: SteadyLimits, times: FloatArray
 ) -> FloatArray:
-    """For every given time, return the largest differences of drag and of depth between two paths from this time on.
+    """Return the largest differences of drag and of depth between two paths from each given time to the end.
 
     The paths are the same march on two grids. The steady state on the same grid is subtracted from each path. The paths
     are compared at the given times and at all time steps of the fine path. If there is no path on the coarse grid, the

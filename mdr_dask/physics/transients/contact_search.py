@@ -10,22 +10,22 @@ examined:
   larger than the depth plus the height of the line (contact is then lost although the contact force is positive).
 * Outside a patch, contact begins where the line rises above the free elements and the force would be positive.
 
-A patch is added to the sums when its end is found. Most cells can be skipped because of three bounds. The bounds are
-rigorous, so that no contact is missed.
+When the end of a patch is found, the forces on the patch are added to the total load and drag. Most cells can be
+skipped because of three bounds. The bounds are rigorous, so that no contact is missed.
 
 * A cell in contact is skipped if two conditions are met. First, the elements that are now further along the line were
   under a positive force while they passed the cell. Second, the displacement u of free elements cannot exceed
   w = depth + h in the cell. Along the line u' = (drift - u) / D, so that u stays below w wherever w + D h' exceeds the
   largest drift (see `free_recovery`).
-* A free cell is skipped if depth + h is smaller everywhere in the cell than a lower bound of the displacement of the
-  free elements. The bound is computed along the line from the last known displacement and the least drift.
-* A free cell is also skipped if its gap is wider than any gap that can have opened since the elements separated,
-  because the cell was then out of contact all the time. The cell is skipped until the line has approached by the width
-  of the gap. The gap closes at most at the rate of the depth plus the largest drift. The integral of this rate over
-  time is called the *approach*.
+* A cell out of contact is skipped if depth + h is smaller everywhere in the cell than a lower bound of the displacement
+  of the free elements. The bound is computed along the line from the last known displacement and the least drift.
+* A cell out of contact is also skipped if its gap is wider than any gap that can have opened since the free elements
+  separated. In this case there was a gap in the cell all the time. The cell is skipped until the line has approached by
+  the width of the gap. The gap closes at most at the rate of the depth plus the largest drift. The integral of this
+  rate over time is called the *approach*.
 
-Elements that travel more than a whole period of the line can pass the highest point out of contact. For such elements
-the search is repeated with the places of separation of the previous period.
+Free elements may pass the highest point without contact, and travel more than a whole period of the line. If there may
+be such elements, the search is repeated with the places of separation of the previous period.
 """
 
 from __future__ import annotations
@@ -126,8 +126,9 @@ class Workspace(NamedTuple):
         Sums over the patches, and their derivatives.
     scan : array
         State of the search, in this order: place where the current patch begins; place where contact last ended; place
-        up to which contact is certain; barrier below which cells in contact can be skipped; place up to which this
-        barrier is valid; and least displacement of free elements at the end of the previous cell.
+        up to which contact is certain; limit of the barrier (a cell in contact can be skipped if the barrier of the
+        cell is below this limit); place up to which this limit is valid; and least displacement of free elements at the
+        end of the previous cell.
     recovery : FreeRecovery
     skip : SkipBounds
     barriers : Barriers
@@ -163,13 +164,13 @@ class Motion(NamedTuple):
     Parameters
     ----------
     rise : float
-        Largest mean rate at which the lift has risen between any earlier moment and now.
+        Largest mean rate of the lift from an earlier moment until now, among all earlier moments.
     fall : float
-        Largest rate at which the lift has fallen between two successive moments.
+        Largest rate at which the lift has fallen from one moment to the next.
     deepest, highest : float
         Largest depth and largest lift so far.
     passes_top : bool
-        Whether elements that separated before the patch of the highest point may have passed this point out of contact.
+        Whether free elements may have passed the highest point of the line without contact.
     """
 
     rise: float
@@ -221,7 +222,9 @@ class Cell(NamedTuple):
 
 @jit_uncounted
 def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
-    """Find the contact patches at an instant, for the last depth and rate of the history, and add up their forces.
+    """Find the contact patches at an instant, and add up their forces.
+
+    The depth and the rate of the depth are the last ones of the history.
 
     Parameters
     ----------
@@ -324,7 +327,7 @@ def _search_period(search: Search, runs: IntArray) -> int:
     for run in range(runs.shape[0]):
         i, stop = runs[run, 0], runs[run, 1]
         if not contact:
-            scan[LOWEST] = 0.0  # displacements between two runs of cells are not computed
+            scan[LOWEST] = 0.0  # the displacement is not computed between two runs of cells
         while True:
             i = _skip_pressed(search, i, stop) if contact else _skip_free(search, i, stop)
             if i >= stop:
@@ -449,10 +452,11 @@ def _examine(search: Search, i: int, contact: bool, found: int) -> tuple[bool, i
 
 @jit_inline_uncounted
 def _contact_end(search: Search, cell: Cell, x: float) -> tuple[float, float, bool, bool]:
-    """Return where contact ends in a cell from x on, the place from which elements are free, and two flags.
+    """Find where contact ends in a cell beyond x; return two places and two flags.
 
-    The first flag is True if contact ends because free elements arrive with a displacement beyond the line. The second
-    flag is True if the force falls to zero. If contact does not end in the cell, both are False.
+    Contact ends at the first place. At the second place, the search for the next contact starts. The first flag is True
+    if contact ends because free elements arrive that have a larger displacement than the line. The second flag is True
+    if the force falls to zero. If contact does not end in the cell, both flags are False.
     """
     now, scan, recovery, (c0, c1, c2, c3) = search.now, search.work.scan, search.work.recovery, cell.line
     place = NONE
@@ -481,8 +485,8 @@ def _contact_end(search: Search, cell: Cell, x: float) -> tuple[float, float, bo
 def _overtaking(search: Search, held: float, x: float, w: float) -> float:
     """Return the displacement at x of free elements that may arrive inside a patch, or 0 if no such element exists.
 
-    An element in contact at x has the displacement w. Up to `held` the patch is certainly in contact. Beyond `held` no
-    element of the patch has separated.
+    An element in contact at x has the displacement w. The patch is certainly in contact up to the place `held`. Between
+    `held` and x no element of the patch has separated.
     """
     now, recovery = search.now, search.work.recovery
     if x > held:
@@ -510,7 +514,7 @@ def _close_patch(search: Search, end: float, is_lost: bool, found: int) -> None:
 
 @jit_inline_uncounted
 def _lowest_behind(search: Search, u: float) -> float:
-    """Return the least displacement of free elements one cell behind a place at which the displacement is u."""
+    """Return the least displacement of free elements one cell beyond a place where their displacement is u."""
     now, drift = search.now, search.work.recovery.bounds.least_drift[WINDOWS - 1]
     return float((u - drift) * np.exp(-1 / min(now.deborah, now.first.deborah)) + drift)
 
@@ -520,8 +524,8 @@ def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[b
     """Return whether contact begins in a cell from x on, and where it begins (or else where the search continues).
 
     Contact can begin only between the place `low`, where the force becomes positive, and the place `high`, where the
-    force falls to zero again. Elements may have separated at `high` at an earlier time. `ended` states that contact or
-    a positive force has ended at x.
+    force falls to zero again. Even if there is no contact now, elements may have separated near the place `high` at an
+    earlier time. If `ended` is True, contact or a positive force has just ended at x.
     """
     now, work, scan, recovery = search.now, search.work, search.work.scan, search.work.recovery
     i, lift, depth, (c0, c1, c2, c3) = cell.i, search.lift, search.depth, cell.line
@@ -561,11 +565,12 @@ def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[b
 
 @jit_inline_uncounted
 def _add_edge(search: Search, place: float, steep: float, by_depth: float, opening: float) -> None:
-    """Add the derivatives of load and drag, with respect to depth and time, due to the motion of an edge of a patch.
+    """Add the changes of load and drag that are caused by the motion of one edge of a patch.
 
-    The force at this edge is not zero. The gap is the height of the line above the free elements: `steep` is the slope
-    of the gap towards the inside of the patch, `by_depth` the derivative of the gap with respect to the depth, and
-    `opening` the rate at which the gap changes.
+    The edge moves if the depth or the time changes. The derivatives of load and drag with respect to depth and time are
+    added to the sums. The force at this edge is not zero. The gap is the height of the line above the free elements:
+    `steep` is the slope of the gap towards the inside of the patch, `by_depth` the derivative of the gap with respect
+    to the depth, and `opening` the rate at which the gap changes.
     """
     sums = search.work.sums
     h, slope, _ = height_at(search.now.track, place)
@@ -615,7 +620,10 @@ def _add_stretch(recovery: FreeRecovery, cell: float, barrier: float) -> None:
 
 @jit_inline_uncounted
 def _force_slopes(track: Track, deborah: float, i: int) -> tuple[float, float, float]:
-    """Return three bounds of the slope of the force in a cell: at its start, at a control point and at its end."""
+    """Return three Bernstein coefficients of the slope of the force in a cell.
+
+    The slope lies between the smallest and the largest coefficient.
+    """
     _, c1, c2, c3 = cubic(track.height, track.enter, track.leave, i)
     enter, bend, turn = c1 + 2 * deborah * c2, c2 + 3 * deborah * c3, 3 * c3
     return enter, enter + bend, enter + 2 * bend + turn

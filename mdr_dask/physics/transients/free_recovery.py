@@ -27,12 +27,14 @@ from mdr_dask.physics.jit import jit_inline_uncounted, jit_uncounted, last_until
 from mdr_dask.physics.transients.patches import History, Patches, Track, height_at
 
 ITERATIONS = 60  # largest number of iterations of Newton's method with bisection
-NEAR = 0.02  # largest last Newton step towards a place of separation, in cells; the error is about its cube
+# largest last Newton step towards a place of separation, in cells; the error is about the cube of this step
+NEAR = 0.02
 STRIDE = 2.0  # longest step towards a place of separation, in cells
-MET = 1e-3  # largest last step towards the place where contact begins, in cells; the error is about its cube
+# largest last step towards the place where contact begins, in cells; the error is about the cube of this step
+MET = 1e-3
 CREST = 1e-3  # accuracy, in cells, of the place where the gap between line and free elements is smallest
 FARTHEST = 200  # largest number of cells of a stretch in which the place of separation is searched for
-MARGIN = 64.0  # the window of a bound is chosen for twice a distance plus this number of cells
+MARGIN = 64.0  # number of cells added to twice a distance, so that the window of a bound is long enough
 # cells travelled in the shortest window; number of windows, each twice as long as the previous one
 WINDOW, WINDOWS = 8.0, 16
 
@@ -91,11 +93,12 @@ class FreeRecovery(NamedTuple):
     Parameters
     ----------
     earliest, place, farthest : array
-        If ``earliest == place``, contact ends at `place` now; at earlier instants after the jump it ended between
-        `place` and `farthest`. Otherwise no contact ends there now, but elements can have separated in the cells from
+        An entry is a place of separation if ``earliest == place``. The force on elements in contact falls to zero at
+        this place now. At earlier instants after the jump, the force fell to zero somewhere from `place` to `farthest`.
+        All other entries are stretches: the force is positive now, but elements can have separated in the cells from
         `earliest` to `place`.
     barrier : array
-        Elements can have separated in a stretch only while the lift was below this value.
+        Elements can have separated in a stretch only at times when the lift was below this value.
     count : int array, shape (1,)
         Number of places and stretches.
     bounds : PathBounds
@@ -250,7 +253,10 @@ def _separated_within(now: Instant, x: float, low: float, high: float) -> tuple[
 
 @jit_inline_uncounted
 def _from_separation(now: Instant, recovery: FreeRecovery, k: int, x: float) -> tuple[float, float, float]:
-    """Return displacement, slope and du/d(depth) at x of elements that separated at entry k of `recovery`."""
+    """Return displacement, slope and du/d(depth) of an element at x that separated in one place or stretch.
+
+    This place or stretch is entry k of `recovery`.
+    """
     if recovery.earliest[k] < recovery.place[k]:
         if recovery.bounds.least_lift[window(x - recovery.earliest[k])] > recovery.barrier[k]:
             return -1.0, 0.0, 0.0
@@ -354,7 +360,7 @@ def nearest_approach(now: Instant, recovery: FreeRecovery, low: float, high: flo
 
 @jit_inline_uncounted
 def prune(now: Instant, recovery: FreeRecovery, x: float, pressed: float, deepest: float) -> None:
-    """Remove the places of separation whose elements can no longer have a larger displacement at x than `pressed`.
+    """Remove places of separation from which no element can have a displacement above `pressed` at x any more.
 
     `deepest` is the largest depth since the jump.
     """

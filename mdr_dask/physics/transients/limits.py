@@ -27,7 +27,8 @@ from mdr_dask.physics.transients.patches import (
     track_of,
 )
 
-# barriers are kept for at most KEPT_CELLS cells in total (16 bytes each), but always for up to KEPT_SPEEDS velocities
+# The barriers of several velocities are kept, for at most KEPT_CELLS cells in total (16 bytes for each cell). For long
+# lines this limit does not apply: the barriers of up to KEPT_SPEEDS velocities are always kept.
 KEPT_CELLS, KEPT_SPEEDS = 2**21, 4
 WHOLE = 1 - 1e-12  # contact counts as full if at least this fraction of the line is in contact
 NEWTON_STEPS = 60
@@ -116,7 +117,7 @@ class SteadyLimits(NamedTuple):
 def steady_limits(
     line: PreparedLine, loads: FloatArray, deborah: FloatArray, guesses: FloatArray | None = None
 ) -> list[SteadyLimits]:
-    """Solve the steady states before and after jumps on one line, and the instants of the jumps.
+    """Solve the steady states before and after jumps on one line, and the states just after the jumps.
 
     At the instant of a jump the displacements and the depth do not change. The rate of the depth changes, and
     elements whose force would become negative separate.

@@ -29,7 +29,8 @@ TRIALS = 80  # largest number of Newton steps for the depth at one moment
 ORDER = 3  # order of the backward differentiation
 EXACT = 1e-11  # relative error of the load below which no Newton step is needed
 NEWTON_LOAD = 0.03  # largest relative error of the load before the last Newton step
-SETTLED = 1.5  # a march ends when depth and drag have been near their final values from a time t to this factor times t
+# a march ends at the time t if depth and drag have been near their final values since the time t / SETTLED
+SETTLED = 1.5
 LEFT_LIMITS = -1  # outcome of a march whose depth leaves the interval for which the reachable cells are known
 
 
@@ -171,9 +172,8 @@ def _balance(
 def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
     """Return two numbers a and b: at moment `now` of a march the rate of the depth is a d + b, where d is the depth.
 
-    The numbers follow from backward differentiation with respect to log(1 + t / onset). As a function of this variable
-    the relaxation is smooth, and the steps are equal. For the first step, they follow from the known rate just after
-    the jump.
+    The numbers follow from backward differentiation with respect to log(1 + t / onset), because the relaxation is a
+    smooth function of this variable. In the first step, the numbers follow from the known rate just after the jump.
     """
     time, place, depth = found.time, found.place, found.depth
     if now == 1:

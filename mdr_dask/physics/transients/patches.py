@@ -17,7 +17,7 @@ from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, contact_end, write_
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
 ROOT_STEPS = 60
-CLOSE = 1e-2  # cells: last step towards a zero of the force; the error is about the cube of this step
+CLOSE = 1e-2  # largest last step towards a zero of the force, in cells; the error is about the cube of this step
 LOAD, DRAG, LENGTH, TILT, STIFFNESS, DRAG_STIFFNESS, GROWTH, DRAG_GROWTH = range(8)
 SUMS = 8
 
@@ -113,8 +113,8 @@ def _part(c0: float, c1: float, c2: float, c3: float, y: float) -> tuple[float, 
 def add_patch(track: Track, start: float, end: float, lift: float, deborah: float, sums: FloatArray) -> None:
     """Add the exact load, drag, length and rise (integral of the slope) of a patch in contact to `sums`.
 
-    The force on an element is lift + h + deborah h'. The integrals over whole cells follow from the integrals in
-    `Track`, the integrals over parts of cells from the cubics.
+    The force on an element is lift + h + deborah h'. The integrals over whole cells are taken from `Track`. The
+    integrals over parts of cells are computed from the cubics.
     """
     last = track.enter.size - 1
     i, j = min(int(start), last), min(int(end), last)

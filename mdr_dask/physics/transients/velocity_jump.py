@@ -30,14 +30,16 @@ ONSET = 0.5
 ROOT = 10.0  # the first step is smaller by this factor if the velocity falls, because contact then grows as sqrt(t)
 # NEWTON and SETTLED are divided by the number of steps per decade
 NEWTON = 0.2  # largest last Newton step of the depth, divided by the change of the steady depth
-SETTLED = 0.04  # a march ends at this distance from the steady depth and drag, divided by the total change of each
-OF_ACCURACY = 0.1  # distance from the steady drag that is always small enough, divided by the allowed error of the drag
-NEGLIGIBLE = 1e-5  # smallest change of depth that is used in these ratios, divided by the mean displacement
+# A march ends if depth and drag differ from the steady values by less than a certain fraction of their change. The
+# fraction is SETTLED or, if larger, OF_ACCURACY times the allowed error of the drag divided by the estimated transient.
+SETTLED = 0.04
+OF_ACCURACY = 0.1
+NEGLIGIBLE = 1e-5  # the change of the steady depth counts as at least this fraction of the mean displacement
 # the march has failed if, after LONG relaxation times, the drag differs from the steady drag by more than
 # NOT_STEADY[0] times the range of the drag plus NOT_STEADY[1] times the steady drag
 LONG, NOT_STEADY = 15.0, (0.02, 1e-3)
-# the depth may leave the interval between the steady depths by MARGIN times its length; if it goes farther, the march
-# is repeated with four times this margin, for at most WIDENINGS attempts in total
+# The depth may leave the interval between the steady depths by MARGIN times the length of this interval. If the depth
+# leaves the interval by more, the march is repeated with four times this margin. At most WIDENINGS attempts are made.
 MARGIN, WIDENINGS = 0.25, 3
 SHALLOW = 0.01  # least depth of a march, divided by the smaller steady depth
 MOMENTS = 3000  # largest number of moments of a march
@@ -57,8 +59,8 @@ class MarchRequest(NamedTuple):
         Steps per factor of ten in time.
     accuracy : float
         Allowed error of the friction relative to the steady friction after the jump. A transient that is smaller than
-        this error is not marched; with 0 every transient is marched. A march ends when drag and depth are close enough
-        to the steady values. A tenth of this error is always close enough for the drag.
+        this error is not marched. With ``accuracy = 0`` every transient is marched. A march ends when drag and depth
+        are close to the steady values. The larger this error, the earlier the march ends.
     """
 
     times: FloatArray
@@ -100,11 +102,11 @@ class Path(NamedTuple):
 
 
 def _limited_cubic(x: FloatArray, rows: FloatArray, slopes: FloatArray, places: FloatArray) -> FloatArray:
-    """Return the values at `places` of piecewise cubics; each row contains the points of one curve with given slopes.
+    """Interpolate curves by piecewise cubics with given slopes; return the values at `places`.
 
-    If the first slope of a row is NaN, the first piece of this row is a parabola. A slope that is much steeper than the
-    secants at its point is due to a single asperity that enters or leaves contact. Such a slope is reduced, so that the
-    cubic does not overshoot.
+    Each row contains the points of one curve. If the first slope of a row is NaN, the first piece of this row is a
+    parabola. A slope that is much steeper than the secants at its point is due to a single asperity that enters or
+    leaves contact. Such a slope is reduced, so that the cubic does not overshoot.
     """
     secants = np.diff(rows) / np.diff(x)
     beside = np.abs(secants)[:, [0, *range(x.size - 1), -1]]
@@ -169,7 +171,7 @@ def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], re
 def jump_between(
     line: PreparedLine, load: float, deborah: FloatArray, limits: SteadyLimits, request: MarchRequest
 ) -> Jump:
-    """Return the friction of one jump, if its steady states (`limits`) are known.
+    """Return the friction before and after one jump, from the known steady states `limits` of this jump.
 
     The other parameters are those of :func:`velocity_jump`.
     """
@@ -226,9 +228,9 @@ class _Relaxation(NamedTuple):
     def stepping(self) -> Stepping:
         """Sizes of the time steps.
 
-        The steps grow in a constant ratio after `ONSET` times the time in which the line travels 1 / q_max. The line
-        travels at v_2. If the velocity falls, contact behind a patch grows at the speed v_1 - v_2. The larger of the
-        two speeds is used.
+        The steps grow in a constant ratio after `ONSET` times the time in which the line travels 1 / q_max, but at the
+        latest after `ONSET` relaxation times. The line travels at the speed v_2. If the velocity falls, contact behind
+        a patch grows at the speed v_1 - v_2; this speed replaces v_2 if it is larger than v_2.
         """
         before, after = self.deborah / self.line.track.cells
         growth = 10 ** (1 / self.request.per_decade)
@@ -307,8 +309,8 @@ def _runs(track: Track, slower: Patches, low: float, high: float) -> tuple[IntAr
     """Return the runs of cells where contact is possible at depths from `low` to `high`, and a bound for each cell.
 
     A run is given by its first and last node. The bound is the largest depth at which the cell is certainly out of
-    contact. The bound follows from the steady state at the lower velocity: if the depth is smaller by some length,
-    displacements are smaller by at most this length.
+    contact. The bound follows from the steady state at the lower velocity. At a depth that is smaller than in this
+    state, the displacements are smaller by at most the difference of the two depths.
     """
     cells, decay = track.peak.size, np.exp(-1 / slower.deborah)
     bound = np.full(cells + 1, -np.inf)

@@ -79,7 +79,7 @@ class Problem(Protocol):
         """Return whether the unknowns describe a possible contact."""
 
     def admits(self, unknowns: FloatArray, tolerance: float) -> bool:
-        """Return whether a solution is a possible contact, within a tolerance; not every solution is one."""
+        """Return whether a solution of the equations is a possible contact, within a tolerance."""
 
     def start(self) -> Moment:
         """Return the virgin contact."""
@@ -97,7 +97,7 @@ class Problem(Protocol):
         """Return the derivatives of the residual with respect to the nodal unknowns."""
 
     def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return the quantity whose step error is controlled, relative to the largest possible wear."""
+        """Return the quantity whose error is controlled in every step; its unit is the largest possible wear."""
 
 
 def march(
@@ -285,7 +285,10 @@ class _Newton:
     def _renew(
         self, unknowns: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray], residual: FloatArray
     ) -> None:
-        """Factorise the Jacobian. Its columns for the panels' width and later unknowns are finite differences."""
+        """Factorise the Jacobian.
+
+        The columns for the width of the panels and for all later unknowns are finite differences.
+        """
         matrix = self.problem.jacobian(unknowns, theta)
         for column in range(self.problem.panels.nodes.size - 1, unknowns.size):
             moved = unknowns.copy()

@@ -1,7 +1,7 @@
 """Worn contacts by the exact evolution, with errors: fretting and sliding, at constant depth and under constant force.
 
 Each contact is solved three times, with coarser panels and longer steps each time, and the error is estimated from the
-differences. If the roughest solution fails, one difference is used.
+differences. If the third solution fails, the error is estimated from one difference.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Resolution(NamedTuple):
     Parameters
     ----------
     accuracy : float
-        Allowed error of f, divided by eta d0.
+        Allowed error of the profile f, divided by eta d0.
     rougher : int
         0 for the solution, 1 and 2 for the two rougher solutions from which its error is estimated.
     """
@@ -83,7 +83,7 @@ class Resolution(NamedTuple):
     def first(self) -> float:
         """The length of the first step, as a fraction of the time scale of the contact.
 
-        The upper limit keeps the error of small amounts of wear below 2 %.
+        The upper limit of this length keeps the error of small amounts of wear below 2 %.
         """
         return min(0.1 * self.accuracy, 1e-3) * ROUGHER**self.rougher
 
@@ -173,7 +173,7 @@ def exact(
     found, rougher = solve(resolution), []
     if errors:
         rougher.append(solve(resolution._replace(rougher=1)))
-        with suppress(NotConvergedError):  # without this solution, the error follows from one difference
+        with suppress(NotConvergedError):  # if this solution fails, the error is estimated from one difference
             rougher.append(solve(resolution._replace(rougher=2)))
     contacts = {
         amount: one if one.relative_error > 0.0 else replace(one, rougher=tuple(other[amount] for other in rougher))
@@ -266,7 +266,8 @@ def _moved(profile: Profile, c: float, rise: float) -> float:
 def farthest_contact(profile: Profile, stick_radius: float) -> float:
     """Return an upper bound of the contact radius under constant force.
 
-    The bound is the end of a table, or, for other bodies, the radius at the largest possible depth.
+    If the profile is a table, the bound is the end of the table. For other bodies, the bound is a radius at which the
+    virgin profile is at least as high as the largest possible depth.
     """
     if np.isfinite(profile.largest_radius):
         return profile.largest_radius
@@ -292,7 +293,8 @@ def _refuse_beyond(inside: bool, profile: Profile, c: float) -> None:
 class _Frozen(NamedTuple):
     """The image in the annulus that the border has passed.
 
-    It follows from pairs of values: a radius that the border reached, and the depth, divided by d0, at that moment.
+    The image follows from pairs of values: a radius of the border, and the depth at the moment when the border reached
+    this radius. Depths are divided by d0.
     """
 
     reached: FloatArray

@@ -75,7 +75,7 @@ def history(
     reach : float
         Largest radius of the grid, in units of a0.
     errors : bool
-        Whether to estimate the errors by further solutions on grids of half and a quarter as many cells.
+        Whether to estimate the errors by two further solutions, on grids with 1/2 and 1/4 of the cells.
 
     Returns
     -------

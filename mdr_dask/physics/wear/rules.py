@@ -3,9 +3,9 @@
 The functions are compiled.
 
 The fast rule (thesis eq. 6.11) has a closed form. Inside the first contact, y = (g - g0(c)) / eta follows a logistic
-law, with eta = 1 - g0(c). Outside the first contact, g - 1 decays. Both are functions of the remaining fraction
-exp(-xi N / a(c)), which is zero for the limiting profile (thesis eqs. 6.8-6.10). Where the rule would give a profile
-below the virgin one, the virgin profile is used.
+law, with eta = 1 - g0(c). Outside the first contact, g - 1 decays. Both laws contain the factor exp(-xi N / a(c)),
+called the remaining fraction. This factor is zero for the limiting profile (thesis eqs. 6.8-6.10). Where the rule would
+give a profile below the virgin profile, the virgin profile is used.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Rule(NamedTuple):
 
 
 class Quadrature(NamedTuple):
-    """Gauss nodes on [0, 1], and the ends of the pieces of integration: c, three radii next to it, and 1."""
+    """Gauss nodes on [0, 1], and the ends of the pieces of integration: c, three radii between c and 1, and 1."""
 
     abscissa: FloatArray
     weight: FloatArray
@@ -63,8 +63,7 @@ class Quadrature(NamedTuple):
 class Bracket(NamedTuple):
     """Interval that contains the root of a falling function: its ends, and the values of the function at the ends.
 
-    `newer` is -1 if the value at the lower end is the newer one, 1 if the value at the higher end is, and 0 at the
-    start.
+    `newer` is -1 if the lower end was replaced last, 1 if the higher end was replaced last, and 0 at the start.
     """
 
     low: float
@@ -241,7 +240,7 @@ def _changes(rule: Rule, places: FloatArray, result: FloatArray) -> None:
 
 @jit
 def _put_cuts(rule: Rule, cuts: FloatArray) -> None:
-    """Write the ends of the pieces to `cuts`: c, the end of the layer beyond it, two larger radii, and 1."""
+    """Write the ends of the pieces to `cuts`: c, the end of the layer beyond c, two larger radii, and 1."""
     low, high, level = 0.0, 1.0 - rule.c, rule.eta * rule.rest / (1.0 + rule.rest)
     if rule.rest == 0.0:
         high = 0.0
@@ -322,7 +321,7 @@ def _limit_radius(rule: Rule, largest: float, quadrature: Quadrature) -> float:
 
 @jit
 def _numbers(rule: Rule, limit: float, quadrature: Quadrature) -> tuple[float, float, float]:
-    """Return scar radius, volume and normal force, and write the ends of the pieces to the cuts of the quadrature."""
+    """Return scar radius, volume and normal force; write the ends of the pieces of integration to `quadrature`."""
     abscissa, weight, cuts = quadrature
     _put_cuts(rule, cuts)
     radius = limit

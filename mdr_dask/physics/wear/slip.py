@@ -1,7 +1,7 @@
 """The equations of one time step of partial slip and of gross slip, for `evolution.march`.
 
-Partial slip at constant depth and under constant force differ in the unknowns only. At constant depth the stick border
-b stays at its first value c. Under constant force the depth d grows, and the border moves outwards until the image has
+Partial slip has fewer unknowns at constant depth than under constant force. At constant depth the stick border b
+stays at its first value c. Under constant force the depth d grows, and the border moves outwards until the image has
 a jump at the border; then the border no longer moves. Inside the border the image is frozen: it keeps the value
 g = d - eta that it had when the border passed. The slip is s = (f - f_star) / eta. Here f_star is the profile of an
 image that equals g up to the border and has the constant value d - eta (the plateau) beyond the border. While the
@@ -96,7 +96,7 @@ class Past(NamedTuple):
     path : array, shape (2, k)
         The path of the newest past moment, see `SlipMoment`.
     carried : float
-        int (1 - d) db along the path, where b is the radius of the border and d is counted as in `Place`.
+        The integral of (1 - d) db along the path, where b is the radius of the border, and d is `Place.depth`.
     """
 
     shares: FloatArray
@@ -223,7 +223,8 @@ class PartialSlip:
     def memory(self, past: Sequence[SlipMoment], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
         """Return a function of the unknowns that computes the contributions of the past moments to the residual.
 
-        The contributions are those to s and to the worn depth at the nodes, and the additional load of the stick zone.
+        The function returns the contributions to s and to the worn depth at the nodes, and the additional load of the
+        stick zone.
         """
         places = [self.place(moment.unknowns) for moment in past]
         worn = np.array([moment.accumulated for moment in past])
@@ -257,7 +258,7 @@ class PartialSlip:
         return np.asarray(np.log1p(np.maximum(moment.accumulated, 0.0) / virgin))
 
     def path_to(self, before: SlipMoment, place: Place) -> FloatArray:
-        """Return the path up to the moment that follows `before`."""
+        """Return the path of the moment `before`, extended to `place` if the border moves."""
         end = [[place.border], [place.depth]]
         return before.path if self.border is not None else np.append(before.path, end, axis=1)
 
@@ -309,8 +310,8 @@ class PartialSlip:
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
         """Return s - known - theta (p / eta) s at the nodes and, under constant force, the deviation of the force.
 
-        The row of the last node makes s continuous at the edge. If the border moves, the last row is y at the border,
-        which has to be zero.
+        The row of the last node is the condition that s is continuous at the edge. If the border moves, one more row is
+        y at the border, which must be zero.
         """
         size, y, place = self.size, self.image(unknowns), self.place(unknowns)
         root, factor = math.sqrt(self.body.width * place.width), self._factor(place)
@@ -340,7 +341,7 @@ class PartialSlip:
         return result
 
     def carried(self, path: FloatArray) -> float:
-        """Return int (1 - d) db along a path, where b is the radius of the border."""
+        """Return int (1 - d) db along a path, where b is the radius of the border, and d is `Place.depth`."""
         radii = np.sqrt(self.body.square + self.body.width * path[0])
         steps = self.body.width * np.diff(path[0]) / (radii[1:] + radii[:-1])
         return float(steps @ (1.0 - 0.5 * (path[1, 1:] + path[1, :-1])))
@@ -362,7 +363,7 @@ class PartialSlip:
     ) -> SlipMoment:
         """Return the moment at the end of a solved step.
 
-        Its worn depth is the past contribution plus the wear in the step.
+        The worn depth at this moment is the contribution of the past moments plus the wear in the step.
         """
         size, place = self.size, self.place(unknowns)
         worn = known[size : 2 * size] + theta * self.rate(unknowns) * self.slip(unknowns)
@@ -399,7 +400,7 @@ def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: f
 
 
 def rising(path: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the positions that the border reached for the first time, and the depths at these moments."""
+    """Return the points of a path at which the border is farther out than ever before: positions and depths."""
     furthest = np.maximum.accumulate(path[0])
     new = np.append(True, np.diff(furthest) > 0.0)
     return furthest[new], path[1, new]
@@ -407,7 +408,7 @@ def rising(path: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 @jit
 def _fill_known(mesh: Mesh, body: VirginBody, past: Past, place: Place, result: FloatArray) -> None:
-    """Write the past contributions to s and to the worn depth at the nodes, and the sticking load, to `result`."""
+    """Write three results: the past contributions to s and to the worn depth at the nodes, and the sticking load."""
     nodes, path, is_still = result.size // 2, past.path, past.frozen == past.frozen
     border, depth = path[0, -1], path[1, -1]
     for i in range(nodes):
@@ -511,7 +512,7 @@ class GrossSlip:
         return bool(unknowns[self.panels.nodes.size - 1] > 0.0)
 
     def admits(self, unknowns: FloatArray, tolerance: float) -> bool:
-        """Return True: no other solutions of the equations are known."""
+        """Return True, because no solution of the equations is known that is not a possible contact."""
         return True
 
     def start(self) -> Moment:
@@ -548,7 +549,7 @@ class GrossSlip:
     def wear_rate(self, unknowns: FloatArray) -> float:
         """Return dV/ds = F_N = 2 int_0^a (d - g) dx."""
         image = self.image(unknowns)
-        # int_0^1 u dz / sqrt(z) is the last row of the full half-integral of u sqrt(1 - z)
+        # the last row of `full`, multiplied by u sqrt(1 - z), is the integral of u / (pi sqrt(z)) over z from 0 to 1
         load = (image[-1] - image) * np.sqrt(1.0 - self.panels.nodes)
         return float(np.pi * self.edge(unknowns) * self.panels.full[-1] @ load)
 

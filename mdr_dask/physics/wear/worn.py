@@ -55,8 +55,8 @@ class Worn:
     rougher : tuple of Worn
         One or two rougher solutions of the same contact, from which its error is estimated.
     least_errors : mapping of str to float
-        Lower limits of the stated errors, by the names of the outputs. They are given for outputs in which the rougher
-        solutions may agree by chance.
+        Lower limits of the stated errors, indexed by the name of the output. A limit is given if the rougher solutions
+        may agree by chance in this output.
     relative_error : float
         Error of every output divided by the largest value of the output; used if there is no rougher solution.
     """
@@ -86,9 +86,9 @@ class Worn:
         """Return the expected absolute error of an output; for functions, at the positions `places`.
 
         The error follows from the differences between this solution and the rougher solutions. Without rougher
-        solutions, it is the fraction `relative_error` of the largest value. For a function of position, the error at a
-        position is the largest difference there and at the neighbouring positions, which are dense at the borders of
-        stick zone and contact.
+        solutions, the error is the largest value times `relative_error`. For a function of position, the differences
+        are also computed at positions that are dense at the borders of stick zone and contact. The error at a position
+        is the largest difference at this position and at its neighbours.
         """
         if not self.rougher:
             value = np.asarray(self.value(output, places), dtype=float)
@@ -205,7 +205,7 @@ def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, bo
 
     def slope(x: FloatArray) -> FloatArray:
         inside = np.maximum(x, c)
-        # nearer to the border, a change is part of the jump
+        # a change of the image that is very near to the border is included in the jump
         changes = (x > c) & ~(np.abs(x - border) < JUMP_WIDTH * border)
         return np.asarray(profile.image_slope(x) + np.where(changes, scar.slope(inside), 0.0))
 
@@ -226,7 +226,7 @@ def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, bo
         inside = radius < edge
         r = np.maximum(radius[inside], 1e-12 * edge)
         sums = np.zeros_like(r)
-        for low, high in pairwise(cuts):  # x = r cosh(angle); one piece at a time to save memory
+        for low, high in pairwise(cuts):  # substitution x = r cosh(angle), piece by piece to save memory
             begin, end = (np.arccosh(np.maximum(x / r, 1.0)) for x in (low, high))
             angle = begin[:, None] + (end - begin)[:, None] * abscissa
             sums += (end - begin) * (slope(np.minimum(r[:, None] * np.cosh(angle), edge)) @ weight)

@@ -33,7 +33,7 @@ class Foundation(NamedTuple):
         Transformation from the modes to the state of an element, and back. The state consists of the strains a_m of
         the dashpots of the Prony terms. If the solid has a dashpot of its own, the displacement u precedes them.
     push : array, shape (modes,)
-        Rates at which the modes grow under a unit load; these modes describe the mean state of all elements.
+        Rates at which the modes grow under a unit load, for the mean state of all elements.
     """
 
     moduli: FloatArray
@@ -210,8 +210,8 @@ def free_after(
 ) -> float:
     """Return the displacement of an element at the end of a duration.
 
-    During the fraction `part` of the duration the element is moved to the displacement `leaves`; then it is free. The
-    strains of the element at the end are written to `lapse.strains`; `terms` is not changed.
+    First, during the fraction `part` of the duration, the element is moved to the displacement `leaves`. Then the
+    element is free. The strains of the element at the end are written to `lapse.strains`; `terms` is not changed.
     """
     strains, decay, fades = lapse.strains, lapse.part_decay, lapse.part_fades
     for m in range(solid.times.size):
@@ -238,7 +238,9 @@ def advance(
     terms: FloatArray,
     i: int,
 ) -> tuple[float, bool]:
-    """Move one element through a duration; return displacement and contact at its end; overwrite the `terms`.
+    """Move one element through a duration; return its displacement and contact at the end of the duration.
+
+    The strains `terms` of the element are overwritten.
 
     Parameters
     ----------

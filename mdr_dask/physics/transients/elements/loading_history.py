@@ -1,7 +1,8 @@
 """Friction under any loading history, from the motion of every element; second-order accurate in the time step.
 
-Times are in the unit of the solid, travel is divided by the length of the line, loads are F_N / (4 G_inf L) in the unit
-of height. A single velocity jump of a Kelvin solid on a periodic line is solved much faster by `velocity_jump`.
+Times are in the unit of time of the solid. Travel is divided by the length of the line. Loads are F_N / (4 G_inf L) in
+the unit of height. A single velocity jump of a Kelvin solid on a periodic line is solved much faster by
+`velocity_jump`.
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ def untouched(elements: int, terms: int) -> State:
 
 
 def steady_start(line: CubicLine, solid: Foundation, deborah: float, load: float) -> tuple[State, float, Outcome]:
-    """Return the steady state of the elements at the nodes, sliding at constant speed under a constant load.
+    """Return the steady state of the elements at the nodes, for a constant speed and a constant load.
 
     One element is moved along the line, period after period, until its state repeats. The element moves in steps of
     half a cell, by the method of :func:`follow_line`. The depth is found from the mean displacement, which increases
@@ -228,7 +229,10 @@ ROUNDING = 1e-12  # relative difference of times that counts as a rounding error
 
 @dataclass(frozen=True)
 class Piece:
-    """Velocity and load between two times: linear in time, with an optional sine that begins at `start`."""
+    """Velocity and load between the times `start` and `end`.
+
+    Both are linear in time. An optional sine, which begins at the time `start`, is added.
+    """
 
     start: float
     end: float
@@ -289,7 +293,7 @@ class Piece:
         count = max(int(np.ceil((span - late) / most)), 1)
         rest = late + (span - late) * np.arange(1, count + 1) / count
         moments: FloatArray = self.start + np.concatenate([[0.0], grown, rest])
-        moments[-1] = end  # without rounding errors: the next piece begins at this time, which may also be requested
+        moments[-1] = end  # the exact time, because the next piece begins at this time, and `end` may be requested
         return moments
 
 

@@ -28,10 +28,11 @@ from mdr_dask.physics.transients.elements.foundation import (
 
 
 class Edges(NamedTuple):
-    """The last known edge of contact in the cell before each element, if the force is zero at this edge.
+    """The last known edges of contact, at most one in the cell before each element.
 
-    One of the two elements of such a cell is in contact. `place` is the distance of the edge from this element, in
-    cells, or -1 if there is no edge. `gap` is the gap of the other element at the moment at which the edge was found.
+    The force is zero at such an edge. One of the two elements of the cell is in contact. `place` is the distance of the
+    edge from this element, in cells, or -1 if there is no edge. `gap` is the gap of the other element at the moment at
+    which the edge was found.
     """
 
     place: FloatArray
@@ -76,9 +77,10 @@ class Drive(NamedTuple):
 
 @jit
 def under_elements(line: CubicLine, travel: float, under: FloatArray, slope_under: FloatArray) -> int:
-    """Write height and slope of the line at every element after a travel; return the number of whole cells travelled.
+    """Write the height and the slope of the line at every element, when the line has travelled by `travel`.
 
-    Slopes are derivatives with respect to x / L, where L is the length of the line.
+    Return the number of whole cells that the line has travelled. Slopes are derivatives with respect to x / L, where L
+    is the length of the line.
     """
     n = under.size
     cells = travel * n
@@ -98,10 +100,10 @@ def under_elements(line: CubicLine, travel: float, under: FloatArray, slope_unde
 
 @jit
 def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) -> tuple[float, bool]:
-    """Return the depth d at which the mean displacement max(d + h, free) has a given value, and whether it was found.
+    """Return the depth d at which the mean displacement is `mean`, and whether this depth was found.
 
-    h is the height of the line at an element (`under`), and `free` the displacement of the element without contact. The
-    mean is a convex, increasing function of d.
+    The displacement of an element is max(d + h, free). Here h is the height of the line at the element (`under`), and
+    `free` is the displacement of the element without contact. The mean is a convex, increasing function of d.
     """
     n = under.size
     for _ in range(200):
@@ -130,7 +132,7 @@ def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) ->
 
 @jit_inline
 def _whole(values: FloatArray, j: int) -> float:
-    """Integrate the cubic through the four nearest values over the cell before node j."""
+    """Return the mean value in the cell before node j, from the cubic through the four nearest values."""
     n = values.size
     return float((13 * (values[j - 1] + values[j]) - values[j - 2] - values[(j + 1) % n]) / 24)
 
@@ -152,7 +154,10 @@ def _limit(inner: float, outer: float, place: float, gap: float) -> float:
 def _cell(
     j: int, gaps: FloatArray, force: FloatArray, touching: BoolArray, edges: Edges, keep: bool
 ) -> tuple[float, float]:
-    """Return where contact starts and ends in the cell before element j, between 0 and 1; write the edge if `keep`."""
+    """Return where contact starts and ends in the cell before element j, as positions from 0 to 1.
+
+    If `keep` is True, write the edge of contact.
+    """
     f0, f1 = force[j - 1], force[j]
     before, after = touching[j - 1], touching[j]
     if keep and before == after:
@@ -177,9 +182,9 @@ def _cell(
 
 @jit
 def _forces(contact: Contact, first: int, keep: bool) -> tuple[float, float, float]:
-    """Return mean load, drag and fraction in contact; write the edges if `keep`.
+    """Return the mean load, the mean drag and the fraction of the line in contact.
 
-    The cell before the element `first` does not exist.
+    If `keep` is True, write the edges of contact. The cell before the element `first` does not exist.
     """
     force, power, slope, touching, edges = contact.force, contact.power, contact.slope, contact.touching, contact.edges
     n = force.size
@@ -215,7 +220,7 @@ def _pressing_rate(contact: Contact, weight: float, deborah: float) -> float:
 
 @jit
 def carrying_rate(contact: Contact, weight: float, rate: float, drive: Drive) -> tuple[float, float, float]:
-    """Find the rate of the depth at which the load is carried; write the edges of contact.
+    """Find the rate of the depth at which the elements carry the load, and write the edges of contact.
 
     Return this rate, the drag and the fraction of the line in contact. The force of an element pressed to the line is
     `pulls` plus `weight` times ``rate + deborah * slope``. With a dashpot, `weight` is the viscosity and `rate` the
@@ -301,7 +306,7 @@ def mean_after(solid: Foundation, state: State, load: float, next_load: float, s
 def _load_instantly(
     solid: Foundation, state: State, under: FloatArray, load: float, depth: float
 ) -> tuple[float, bool]:
-    """Load elements without a dashpot instantly; return the depth, and whether it was found."""
+    """Apply a load at once to elements without a dashpot; return the depth, and whether the depth was found."""
     n, mean = under.size, 0.0
     for j in range(n):
         state.free[j] = at_rest(solid, state.terms, j)
@@ -389,7 +394,10 @@ def _separate(
     depth: float,
     deborah: tuple[float, float],
 ) -> None:
-    """Write when elements separate during a step to `depth`, and their displacements at the end of the step."""
+    """Write the times at which elements separate during a step, and the displacements at the end of the step.
+
+    The depth at the end of the step is `depth`.
+    """
     parts, leaves, fall = workspace.parts, workspace.leaves, (depth - old_depth) / lapse.time
     for j in range(workspace.under.size):
         if state.touching[j]:
@@ -439,9 +447,10 @@ def _step(
     guess: float,
     deborah: tuple[float, float],
 ) -> tuple[float, bool]:
-    """Move all elements through a step, at the end of which they have a given mean displacement.
+    """Move all elements through a step; return the depth at the end of the step, and whether the depth was found.
 
-    `deborah` contains v tau / L at the start and at the end of the step. Return the depth, and whether it was found.
+    At the end of the step the mean displacement of the elements is `mean`. The pair `deborah` contains v tau / L at the
+    start and at the end of the step.
     """
     for j in range(workspace.under.size):
         workspace.parts[j] = 1.0 if state.touching[j] else 0.0
@@ -462,12 +471,11 @@ def _step(
 def forces_now(
     solid: Foundation, state: State, workspace: StepWorkspace, depth: float, rate: float, drive: Drive
 ) -> tuple[float, float, float, float]:
-    """Find the depth and its rate at which the load is carried; write the edges of contact.
+    """Return the depth, the rate of the depth, the drag and the fraction of the line in contact.
 
-    Return the depth, its rate, the drag and the fraction of the line in contact.
-
-    Without a dashpot the depth is corrected until it carries the load. The depth that follows from the mean
-    displacement is less accurate, because this mean is taken over the elements only.
+    With a dashpot the rate of the depth is found at which the elements carry the load. Without a dashpot the depth is
+    corrected until the elements carry the load. The depth that follows from the mean displacement is less accurate,
+    because this mean is taken over the elements only. The edges of contact are written to `state`.
     """
     gaps, pulls = workspace.gaps, workspace.pulls
     for j in range(workspace.under.size):
