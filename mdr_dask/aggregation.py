@@ -1,8 +1,8 @@
 """Reduce results over realisations to means, standard deviations, quantiles and intervals.
 
-An output may have a companion that holds its discretisation errors. A mean has two errors, which are stored separately:
-``standard_error`` from the scatter of the realisations, and ``grid_error`` from the discretisation. The interval of the
-mean combines both.
+An output may have a companion: a second variable with the discretisation errors of the output. A mean has two errors,
+which are stored separately: ``standard_error`` from the scatter of the realisations, and ``grid_error`` from the
+discretisation. The interval of the mean combines both.
 """
 
 from __future__ import annotations
@@ -61,7 +61,10 @@ def standard_error(array: xr.DataArray) -> xr.DataArray:
 
 
 def grid_error(error: xr.DataArray) -> xr.DataArray:
-    """Return the discretisation error of the mean: the mean of the absolute errors, because errors need not cancel."""
+    """Return the discretisation error of the mean.
+
+    It is the mean of the absolute errors, because the errors of different realisations need not cancel.
+    """
     return mean(abs(error))
 
 
@@ -84,8 +87,8 @@ def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
 def mean_and_ends(array: xr.DataArray, error: xr.DataArray | None) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
     """Return the mean and both ends of its `interval`.
 
-    If the scatter is unknown, for example with one realisation, the ends are the mean plus and minus its discretisation
-    error. If the discretisation error is unknown too, they are NaN.
+    If the scatter is unknown, for example with one realisation, the ends are the mean minus and plus the discretisation
+    error of the mean. If the discretisation error is unknown too, the ends are NaN.
     """
     known = (array,) if error is None else xr.broadcast(array, abs(error))
     found: tuple[xr.DataArray, xr.DataArray, xr.DataArray] = xr.apply_ufunc(
@@ -119,7 +122,8 @@ def _mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
 def _interval(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Return the ends of intervals, shape (..., 2).
 
-    The last axis of `values` holds `count` realisations, and after them the discretisation error if there is one.
+    The last axis of `values` has `count` realisations. If the discretisation error of the mean is known, this error is
+    one further entry at the end of the axis.
     """
     flat = values.reshape(-1, values.shape[-1])
     bounds = np.full((len(flat), 2), np.nan)

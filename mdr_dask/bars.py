@@ -40,7 +40,7 @@ def reporter(quiet: bool) -> Iterator[Callable[[Progress], None]]:
 
 @contextmanager
 def at_work(what: str) -> Iterator[None]:
-    """On a terminal, print the text `what` and the time since the start every few seconds."""
+    """Every few seconds, print the text `what` and the elapsed time, if stderr is a terminal."""
 
     def draw(_: Progress | None, elapsed: float) -> None:
         _write(", ".join([what, seconds(round(elapsed)), *(["compiling ..."] if _compiles() else [])]))
@@ -94,7 +94,7 @@ def _live() -> Iterator[Draw]:
 
 @contextmanager
 def _in_notebook() -> Iterator[Draw]:
-    """Draw a bar below the cell of a notebook while it runs."""
+    """Draw a bar below the cell of a notebook while the cell runs."""
     from IPython.display import HTML, display
 
     handle = display(HTML(_html(None, 0.0)), display_id=True)

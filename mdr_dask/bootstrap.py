@@ -16,10 +16,11 @@ from numpy.typing import ArrayLike
 from mdr_dask.arrays import FloatArray
 
 CONFIDENCE = 0.95
-#: Number of resamples: the ends of an interval are then known to about 5 % of its width.
+#: Number of resamples. With this number, the ends of an interval are accurate to about 5 % of the width of the
+#: interval.
 RESAMPLES = 400
-#: Neighbouring values are put into groups; this is the number of groups. In each shifted row, the values of one group
-#: are shifted by their errors, all with the same sign.
+#: Neighbouring values are put into groups; this is the largest number of groups. In each shifted row, the values of one
+#: group are shifted by their errors, all with the same sign.
 GROUPS = 32
 #: Probabilities of the ends of an interval.
 TAILS = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
@@ -70,7 +71,10 @@ def complete(values: FloatArray) -> FloatArray:
 
 
 def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
-    """Return values shifted up and down by their errors, shape (2 groups, ...); in each row only one group is shifted.
+    """Return values shifted up and down by their errors.
+
+    The result has two rows for each group of neighbouring values. In the first row, only the values of this group are
+    shifted up; in the second row, only these values are shifted down.
 
     A value with an infinite error is shifted by its own absolute value.
     """
@@ -92,7 +96,8 @@ def with_errors(stack: FloatArray, errors: FloatArray) -> FloatArray:
 def difference(one: FloatArray, other: FloatArray) -> FloatArray:
     """Return the stack of the difference of two stacks with the same resamples.
 
-    In the shifted rows, first the errors of the first stack shift the difference, then those of the second stack.
+    The shifted rows of the difference have two parts. In the first part, the errors of `one` shift the difference; in
+    the second part, the errors of `other` do.
     """
     plain = 1 + RESAMPLES
     rows = [one[:plain] - other[:plain], one[plain:] - other[0], one[0] - other[plain:]]
@@ -108,9 +113,10 @@ def logarithms(stack: FloatArray) -> FloatArray:
 
 
 def _reach(shifts: FloatArray) -> FloatArray:
-    """Return the largest upward shift of each group, summed over all groups.
+    """Return the sum of the largest upward shifts of all groups.
 
-    Each group has two shifts, one for each sign of the errors. A shift that is negative or NaN counts as 0.
+    Each group has two shifts, one for each sign of the errors; the larger one is used. A shift that is negative or NaN
+    counts as 0.
     """
     known = np.where(np.isnan(shifts), 0.0, shifts)
     reach: FloatArray = np.maximum(np.maximum(known[0::2], known[1::2]), 0.0).sum(axis=0)
@@ -118,9 +124,10 @@ def _reach(shifts: FloatArray) -> FloatArray:
 
 
 def regrouped(stack: FloatArray) -> FloatArray:
-    """Return a stack in which neighbouring cases are shifted by their errors together, with the same sign.
+    """Return a stack with new shifted rows: in each of these rows, a whole group of neighbouring cases is shifted.
 
-    In the given stack, each case is shifted in separate rows, by its error alone.
+    All cases of the group are shifted in the same direction. In the shifted rows of the given stack, only one case is
+    shifted in each row.
     """
     shifts = stack[1 + RESAMPLES :] - stack[0]
     own = np.maximum(_reach(shifts), _reach(-shifts))
@@ -132,8 +139,8 @@ def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tup
 
     With few realisations, the percentiles of a bootstrap lie too close to the value. Their distances from the value are
     therefore multiplied by sqrt(n / (n - 1)) t / z. Here t is the 97.5 % quantile of Student's distribution with n - 1
-    degrees of freedom, and z is that of the normal distribution. The shifts by discretisation errors are added
-    linearly, because an error that is the same in every realisation does not average out.
+    degrees of freedom, and z is that of the normal distribution. The shifts by discretisation errors are added to these
+    distances. They are added linearly, because an error that is the same in every realisation does not average out.
 
     Parameters
     ----------
@@ -158,7 +165,7 @@ def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tup
 
 
 def widening(count: ArrayLike) -> FloatArray:
-    """Return the factor sqrt(n / (n - 1)) t / z for deviations of resamples of n realisations (see `interval`)."""
+    """Return the factor sqrt(n / (n - 1)) t / z for n = `count` realisations (see `interval`)."""
     from scipy.special import ndtri, stdtrit
 
     number = np.maximum(np.asarray(count, dtype=np.float64), 2.0)
@@ -170,9 +177,9 @@ def chance(residuals: FloatArray, count: int, draws: int = RESAMPLES) -> float:
     """Return the probability that scatter and errors alone cause an rms residual at least as large as that of the data.
 
     `residuals`, shape (1 + RESAMPLES + 2 groups, ...), is a stack of the differences between data and law; those of the
-    data are in its first row. If the law holds, the first row differs from zero by about as much as the `draws`
-    resamples differ from the first row. `count` is the number of realisations that were resampled. The probability is
-    NaN if there are too few resamples, for example with one realisation.
+    data are in its first row. The next `draws` rows are resamples. If the law holds, the first row differs from zero by
+    about as much as the resamples differ from the first row. `count` is the number of realisations that were resampled.
+    The probability is NaN if there are too few resamples, for example with one realisation.
     """
     caused = _caused(residuals, count, draws)
     return float(np.mean(caused >= np.sqrt(np.mean(residuals[0] ** 2)))) if caused.size else np.nan
@@ -192,7 +199,8 @@ def _caused(residuals: FloatArray, count: int, draws: int) -> FloatArray:
 
     The array is empty if there are too few resamples.
 
-    The errors of different groups affect different cases, so the squares of the residuals that they cause are added.
+    Errors of different groups affect different cases. The residuals that the groups cause are therefore combined as the
+    root of the sum of their squares.
     """
     flat = residuals.reshape(residuals.shape[0], -1)
     away = np.sqrt(np.mean((flat[1:] - flat[0]) ** 2, axis=1))

@@ -1,4 +1,4 @@
-"""The exceptions of mdr_dask, which can be pickled for workers, and parts of messages."""
+"""The exceptions of mdr_dask, and parts of their messages. Workers send exceptions to the driver in pickled form."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ def distinguishable(
 ) -> tuple[str, ...]:
     """Return a number and its limits as texts.
 
-    The texts have `digits` digits. They have more digits if the text of the number would otherwise equal the text of a
-    limit that differs from the number.
+    The texts have `digits` digits. If the number differs from a limit but both texts would be equal, all texts get more
+    digits.
     """
     for more in range(digits, _ALL_DIGITS):
         first, *others = (write(number, more) for number in (value, *limits))
@@ -68,7 +68,7 @@ def distinguishable(
     return tuple(write(number, _ALL_DIGITS) for number in (value, *limits))
 
 
-#: Names of the parameters and outputs that may be meant, by other common names of the quantity.
+#: For each common name of a quantity: the parameters and outputs that a user may mean by this name.
 _SYNONYMS = {
     "load": ("normal_force", "line_load"),
     "force": ("normal_force", "line_load"),
@@ -89,7 +89,8 @@ _SYNONYMS = {
     "alpha": ("pressure_viscosity",),
     "slip": ("slide_roll_ratio",),
 }
-#: Texts that follow a suggested name in a message, by the quantity that the user named: they say how the two differ.
+#: For some names that a user may write: the text that follows the suggested name in the message. The text states how
+#: the suggested quantity differs from the quantity that the user named.
 _DIFFERENCES = {"diameter": ", half the diameter", "pressure": ", a load instead of a pressure"}
 
 

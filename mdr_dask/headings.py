@@ -40,7 +40,7 @@ wear volume, worn volume, verschleißvolumen
 )  # fmt: skip
 #: Words in front of or behind the name of a quantity that do not change its meaning.
 IGNORED = {"mean", "average", "avg", "mittel", "sample", "test", "step", "measured", "linear"}
-#: Units that may be joined to a name, as in ``freq_hz``, by their spelling in lower case.
+#: Units that may be joined to a name, as in ``freq_hz``. Each key is the unit as it appears in the name, in lower case.
 JOINED = {unit.casefold(): unit for unit in ("Pa", "kPa", "MPa", "GPa", "mPa", "Hz", "K", "N")} | {"f": "degF"}
 JOINED |= {"c": "degC"}
 _ALIKE = str.maketrans({"’": "'", "′": "'", "″": "''", '"': "''", "µ": "μ"})
@@ -84,7 +84,7 @@ class Column:
 
 
 def plain(name: str) -> str:
-    """Return a name in lower case, with single blanks instead of punctuation, and one kind of prime.
+    """Return a name in lower case, with single blanks instead of punctuation and one character for all kinds of primes.
 
     The case of a single letter is kept: t is a time, T a temperature.
     """
@@ -134,8 +134,8 @@ def nearest(heading: str, names: Sequence[str]) -> str:
 def split_unit(heading: str) -> tuple[str, str]:
     """Return the name and the unit of a heading: ``f [Hz]``, ``f (Hz)``, ``f / Hz``, ``f, Hz`` or ``f in Hz``.
 
-    Text in square brackets is always taken as a unit. Any other text is taken as a unit only if it looks like one. A
-    symbol of the quantity in other brackets is not taken as a unit, as in ``force (F)``.
+    Text in square brackets is always taken as a unit. Any other text is taken as a unit only if it looks like one. In
+    ``force (F)``, for example, F is not taken as a unit, because F is a symbol of the force.
     """
     found = _BRACKETED.fullmatch(heading.strip())
     if found:

@@ -20,8 +20,8 @@ from mdr_dask.errors import CampaignError, ModelError, distinguishable
 from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, with_value
 from mdr_dask.models.numbers import numbers_of
 
-#: Number of operations of a block. They take of the order of a second, whereas scheduling and writing a block take
-#: milliseconds.
+#: Number of operations that a block of a large study should need. Such a block takes about a second to compute, but
+#: only milliseconds to schedule and to write.
 OPERATIONS = 1e9
 #: A small study is cut into about this number of blocks, so that several workers can share it, but a block needs at
 #: least `LEAST` operations.
@@ -54,7 +54,8 @@ class Template:
     chunks: Mapping[str, int]
     # The arrays, without ``status``.
     outputs: tuple[Output, ...]
-    # Dimensions that outputs have in addition to those of cases and realisations, with their coordinates.
+    # Coordinates of the further dimensions of outputs, by dimension. Cases and realisations are not among these
+    # dimensions.
     extra: Mapping[str, Coordinate]
 
     @property
@@ -78,14 +79,15 @@ class Template:
         return tuple(math.ceil(size / self.chunks[dim]) for dim, size in self.sizes.items())
 
     def extra_shape(self, output: Output) -> tuple[int, ...]:
-        """Lengths of the dimensions that an output has in addition to those of cases and realisations."""
+        """Return the lengths of the further dimensions of an output, other than cases and realisations."""
         return tuple(self.extra[dim].values.size for dim in output.dims)
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Notes of the model and of parts of its parameters, without duplicates.
+        """Notes of the model, and notes of parts of its parameter sets; each note is given once.
 
-        They are collected from parameter sets in which one axis at a time is varied.
+        The notes come from several parameter sets of the series. Each set differs from the first one by a value of one
+        axis.
         """
         base = self.series.parameters
         sets = [base, *(with_value(base, axis.path, value) for axis in self.series.axes for value in axis.some)]
@@ -130,8 +132,8 @@ class Template:
     def operations(self, index: BlockIndex) -> float:
         """Return the approximate number of operations of a block.
 
-        They are counted for the block with the same cases and the first realisations. If the given block has fewer
-        realisations, the number is smaller in proportion.
+        The operations are counted for another block, which has the same cases and the first realisations. If the given
+        block has fewer realisations, the number is reduced in proportion.
         """
         *cases, last = index
         chunk, size = self.chunks["realisation"], self.sizes["realisation"]
@@ -246,7 +248,7 @@ def templates(
 ) -> tuple[Template, ...]:
     """Lay out every series of a checked campaign for a number of realisations.
 
-    `stored_chunks` are the chunk lengths of the groups that already exist, by the names of their series. Raise
+    `stored_chunks` contains the chunk lengths of each group that already exists, by the name of its series. Raise
     CampaignError with all problems if a series has too many results or one of its cases needs too much memory, and
     ModelError if an output has a dimension for which the model gives no coordinates.
     """
@@ -318,8 +320,8 @@ def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
     """Return the lengths of a block along each dimension.
 
     A block first gets all values of the axes along which cases share work; these axes are cut only if the block would
-    become too large. As far as the number of its operations allows, the block then gets more realisations, more values
-    of the other axes, and finally the realisations of later rounds.
+    become too large. If the block then still has few operations, it gets more realisations, then more values of the
+    other axes, and finally the realisations of later rounds.
     """
     whole = _whole_dims(template, model)
     chunks = {dim: size if dim in whole else 1 for dim, size in template.sizes.items()}
@@ -350,10 +352,10 @@ def _whole_dims(template: Template, model: Model[Any]) -> list[str]:
 
 
 def _is_cut(template: Template, chunks: Mapping[str, int], dim: str, most: float) -> bool:
-    """Return whether blocks should be halved along a dimension along which cases share work.
+    """Return whether blocks should be halved along the dimension `dim`; cases along this dimension share work.
 
-    Blocks are halved if they need more than `most` operations. But if they need at most `MOST_SHARED`, they are halved
-    only if the halves repeat little of the shared work (`REPEATED_WORK`).
+    Blocks with at most `most` operations are not halved. Blocks with more than `MOST_SHARED` operations are halved.
+    Blocks between these limits are halved only if the halves repeat little of the shared work (`REPEATED_WORK`).
     """
     now = template.mean_operations(chunks)
     if now <= most or now > MOST_SHARED:
@@ -376,8 +378,8 @@ def _is_whole(axis: Axis, path: str) -> bool:
 def _part(template: Template, dim: str, most: int) -> int:
     """Return the length of the parts into which a dimension is cut: at most `most`, in nearly equal parts.
 
-    If rounds add realisations, the parts along ``realisation`` instead have the largest length that divides the number
-    of realisations of the first round.
+    Along ``realisation`` another rule holds if rounds add realisations. The length is then the largest number up to
+    `most` that divides the number of realisations of the first round.
     """
     size = template.sizes[dim]
     replication = template.campaign.replication

@@ -1,9 +1,10 @@
 """Choose the values of an adaptive axis, stage after stage, until interpolation meets every tolerance.
 
 Outputs are interpolated by monotone cubics on the linear or logarithmic scale of the axis. Every new value lies halfway
-between two older values, so that neighbouring cases use the same values. An interval is tested by a prediction: the
-newer one of its two ends is ignored, and the output in the interval is predicted from older values only. If the error
-of the prediction is within the tolerance, the interval is accepted. Otherwise the interval is halved.
+between two older values. So cases that differ in other parameters use the same values of the axis. An interval is
+tested by a prediction: the newer one of its two ends is ignored, and the output in the interval is predicted from older
+values only. If the error of the prediction is within the tolerance, the interval is accepted. Otherwise the interval is
+halved.
 """
 
 from __future__ import annotations
@@ -80,8 +81,8 @@ class Mesh:
     # Shape (values,): positions of the values of each adaptive axis, from 0 to 1 between the ends of the axis. The key
     # is the index of the axis among all axes of the series.
     shares: Mapping[int, FloatArray]
-    # Shape (lengths of the non-adaptive axes..., values): for each combination of values of the non-adaptive axes, the
-    # values of an adaptive axis that are needed. The key is the index of the adaptive axis.
+    # Shape (lengths of the non-adaptive axes..., values): a mask of the needed values of an adaptive axis, for each
+    # combination of values of the non-adaptive axes. The key is the index of the adaptive axis.
     used: Mapping[int, BoolArray]
 
     @classmethod
@@ -166,8 +167,8 @@ def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]
 
     All needed cases of the mesh must have results. `means` contains the means of each output for which an adaptive axis
     has a tolerance. The returned mesh has more values; it is unchanged if no further value is needed or allowed. Also
-    return, for each adaptive axis, in how many combinations of non-adaptive values an interval remains that misses a
-    tolerance or was not tested, but may not be halved.
+    return a number for each adaptive axis: in this number of combinations of non-adaptive values, some intervals miss a
+    tolerance or were not tested, but none of these intervals may be halved.
     """
     found, short = mesh, {}
     for number in mesh.used:
@@ -245,7 +246,7 @@ def _lines(mean: Mean, number: int) -> Mean:
 
 
 def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolerance) -> FloatArray:
-    """Return, for each interval, the largest ratio of interpolation error and tolerance of all lines.
+    """Divide interpolation errors by the tolerance; return the largest ratio of all lines for each interval.
 
     Failed cases are left out of their line. If every line has a failed case at an end of an interval, the ratio of this
     interval is minus infinity.
@@ -271,14 +272,14 @@ def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray
     A value of level n lies halfway between two values of lower levels. In the two intervals next to this value, the
     output is predicted from all values of lower levels, once by a monotone cubic and once by a cubic spline. Both
     predictions are compared with the monotone cubic through all values, at the newer end and at the quarters of the
-    interval. One point would not suffice, because a prediction may be right there by chance.
+    interval. Several points are compared, because a prediction may be right at a single point by chance.
 
     `places`, shape (values,), are the ascending positions along the axis, and `levels` their levels: 0 for the ends of
     the axis, 1 for its middle, 2 for the quarters, ... `groups`, shape (1 + groups, lines, values), are means as in
-    `Mean.groups`, and `error`, shape (lines, values), their discretisation errors. The result, shape (lines, values -
-    1), is the largest absolute difference between a prediction and the interpolation through all values, minus the part
-    that can be due to the scatter of the realisations and to the discretisation errors. The result is negative if this
-    part is larger than the difference.
+    `Mean.groups`, and `error`, shape (lines, values), their discretisation errors. The result has the shape (lines,
+    values - 1). It is the largest absolute difference between a prediction and the interpolation through all values,
+    minus an allowance. The allowance covers the scatter of the realisations and the discretisation errors. If the
+    allowance is larger than the difference, the result is negative.
     """
     from scipy.interpolate import CubicSpline, PchipInterpolator
     from scipy.special import ndtri

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.models.base import Model, Status
 
-#: A round multiplies the number of realisations by the factor with which half of the unfinished cases will probably
-#: have enough realisations. This factor is at least `LEAST_GROWTH`, so that there are few rounds, and at most
-#: `MOST_GROWTH`, because few results estimate their scatter poorly.
+#: A round multiplies the number of realisations by a factor. With this factor, about half of the unfinished cases
+#: should have enough realisations after the round. The factor is at least `LEAST_GROWTH`, so that there are few rounds,
+#: and at most `MOST_GROWTH`, because few results estimate their scatter poorly.
 LEAST_GROWTH, MOST_GROWTH = 1.25, 4.0
 #: Factor by which a round for a fitted constant multiplies the number of realisations. It is fixed, because the number
 #: of realisations that such a constant needs cannot be estimated.
@@ -76,9 +76,10 @@ def growth_needed(
 
 
 def known_scatter(model: Model[Any], until: Collection[str], outputs: Collection[str]) -> dict[str, str]:
-    """Return, for outputs with a tolerance, the outputs that estimate their scatter from one realisation.
+    """Return the outputs that estimate the scatter of other outputs from one realisation.
 
-    An output without such an estimate, or whose estimate is not computed, is left out.
+    The keys are the outputs with a tolerance whose scatter is estimated in this way. An output is left out if no such
+    estimate exists or if the study does not compute the estimate.
     """
     scatter = {output: model.output(output).scatter for output in until}
     return {output: own for output, own in scatter.items() if own in outputs}

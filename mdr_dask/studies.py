@@ -54,8 +54,8 @@ def read(source: Source) -> Campaign:
     Parameters
     ----------
     source : mapping, str, Path or Campaign
-        The path of a campaign file, or its keys: numbers in SI units, strings with units, pint quantities, lists and
-        numpy arrays. The key ``name`` is optional.
+        The path of a campaign file, or a mapping with the keys of such a file. Values may be numbers in SI units,
+        strings with units, pint quantities, lists and numpy arrays. The key ``name`` is optional.
 
     Raises
     ------

@@ -78,9 +78,10 @@ def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
 
 
 def _defaults(campaign: Campaign) -> list[str]:
-    """Return the parameters that have an effect and that the campaign file leaves at their defaults, with the values.
+    """Return names and values of the parameters that are not in the campaign file but have an effect (the defaults).
 
-    If only some series use the default, their names follow in brackets. Defaults that are zero or empty are left out.
+    If only some series use a default, the names of these series follow in brackets. Defaults that are zero or empty are
+    left out.
     """
     found: dict[str, list[str]] = {}
     for series in campaign.series:

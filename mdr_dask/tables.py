@@ -53,7 +53,10 @@ Cells = NDArray[np.object_]
 
 
 class Problem(NamedTuple):
-    """One problem: line and column of its cell, counted from 1, and a text. On line 0, no single cell is wrong."""
+    """One problem: line and column of a cell, counted from 1, and a text.
+
+    Line 0 means that the problem is not at a single cell, or that the text names the cell of a workbook.
+    """
 
     line: int
     column: int
@@ -340,7 +343,8 @@ class _Head(NamedTuple):
 
     `names`, `units` and `labels` are the positions of the line of names, of the line of units, and of the line with a
     label for each pair of columns; each is None if there is no such line. `begin` is the position of the first line
-    below them. `numeric` marks the columns that contain numbers, and `data` the lines that contain numbers.
+    below these three lines. `numeric` marks the columns that contain numbers, and `data` the lines that contain
+    numbers.
     """
 
     names: int | None
@@ -354,9 +358,9 @@ class _Head(NamedTuple):
 def _head(grid: _Grid) -> _Head:
     """Find the names and units.
 
-    Names and units are in lines of text above the numbers, with as many cells as most lines of the table. The line
-    above the last line of units contains the names. If no line of units follows the names, the last line contains the
-    names; the line above it may then contain the units.
+    Names and units are in lines of text above the numbers. Only text lines with as many cells as most lines of the
+    table are used. If a line of units follows the names, the line just above the last line of units contains the names.
+    Otherwise the last text line contains the names, and the line above the names may contain the units.
     """
     data, numeric = _lines_of_numbers(grid)
     full = np.flatnonzero(data & (grid.length == numeric.size))
@@ -380,11 +384,11 @@ def _head(grid: _Grid) -> _Head:
 def _lines_of_numbers(grid: _Grid) -> tuple[BoolArray, BoolArray]:
     """Return masks of the lines and of the columns that contain numbers.
 
-    A column is numeric if it contains numbers in at least half of the lines of the commonest length. A line contains
-    numbers if, in the numeric columns, at least half of its filled cells are numbers or marks of missing numbers. A
-    line that begins with a word is nevertheless text in two cases. First, the word is in a numeric column: the line is
-    a setting above the table, or a mean below it. Second, the line fills less than half of the columns, or just half of
-    them if it has fewer cells than most lines.
+    A column is numeric if it contains numbers in at least half of the lines that have the most frequent number of
+    cells. A line contains numbers if, in the numeric columns, at least half of its filled cells are numbers or marks of
+    missing numbers. A line that begins with a word is nevertheless text in two cases. First, the word is in a numeric
+    column: the line is a setting above the table, or a mean below it. Second, less than half of the columns are filled
+    in this line. Exactly half is too few as well if the line has fewer cells than most lines.
     """
     mostly = grid.number.any(axis=1) & (grid.number.sum(axis=1) >= grid.word.sum(axis=1))
     mostly = mostly if mostly.any() else grid.number.any(axis=1)  # the table has more words than numbers
@@ -416,9 +420,11 @@ def _head_of_words(grid: _Grid, is_name: Callable[[str], bool]) -> _Head:
 
 
 def _body(grid: _Grid, head: _Head) -> tuple[list[int], list[tuple[str, str] | None], tuple[str, ...]]:
-    """Return the positions of the lines of numbers, the temperature stated above each line, and the text below them.
+    """Return the positions of the lines of numbers, the temperature stated above each of these lines, and notes.
 
-    The text between lines of numbers must repeat the line of names; other text raises TableError.
+    The notes are the first cells of the lines of text below the last numbers.
+
+    Text between two lines of numbers must contain the line of names; otherwise TableError is raised.
     """
     kept, stated, wrong = [], [], []
     between: list[int] = []
@@ -465,7 +471,7 @@ def _names_and_units(grid: _Grid, head: _Head) -> tuple[tuple[str, ...], tuple[s
 def _require_even(grid: _Grid, rows: Sequence[int], width: int, head: _Head) -> None:
     """Raise TableError if a line lacks a number, or has more cells than there are names."""
     first = grid.lines[rows[0] if head.names is None else head.names]
-    blanks = width > head.numeric.size and first.separator == BLANKS  # names that contain blanks, separated by blanks
+    blanks = width > head.numeric.size and first.separator == BLANKS  # a blank inside a name looks like a separator
     wrong = [
         row
         for row in rows
@@ -498,7 +504,10 @@ def _with_points(grid: _Grid, rows: Sequence[int]) -> Cells:
 
 
 def _from_pairs(grid: _Grid, sheet: Sheet, labels: int | None) -> Sheet:
-    """Return pairs of columns as three columns; the third contains the temperature above each pair."""
+    """Convert a table with pairs of columns into a table with three columns: the two of a pair, and the temperature.
+
+    The temperature of each pair is read from the label above the pair.
+    """
     count = len(sheet.names) // 2
     above = [] if labels is None else [cell for cell in grid.cells[labels] if cell]
     known = [found for cell in above if (found := re.match(r"\D*?([+-]?\d+(?:[.,]\d+)?)[\s\])(\[]*([^\])]*)", cell))]
@@ -532,7 +541,8 @@ def _are_units(row: Sequence[str]) -> bool:
 def matched(sheet: Sheet, columns: Sequence[Column]) -> list[tuple[Column | None, str, bool]]:
     """Return for each column of a table its meaning, its unit, and whether its entries are common logarithms.
 
-    The meaning is one of the given `columns`, or None if the name fits none of them.
+    The meaning is one of the given `columns`; it is None if the name of the column in the table fits none of the given
+    `columns`.
 
     If the table has no names, its columns are the given `columns` in this order.
     """

@@ -37,7 +37,7 @@ class Work:
     # them.
     versions: tuple[str, int]
     block: Block[Any]
-    # Results to compute, and results to mark as not needed, in the shape of the block.
+    # Masks with the shape of the block: results to compute, and results to mark as not needed.
     wanted: NDArray[np.bool_]
     spared: NDArray[np.bool_]
     # Number of the attempt, from 1: the number of times that the computation of the block was started, including this
@@ -124,7 +124,7 @@ def run_block(work: Work) -> Outcome:
 
 
 def finished(work: Work) -> Outcome | None:
-    """Return the outcome of a task that another worker finished before it died, or None if the task is not finished.
+    """Return the outcome of a task that a worker finished before this worker died; None if the task is not finished.
 
     The record of an attempt contains the digest of the ledger of the block. The task is finished if the stored ledger
     has this digest.
@@ -162,8 +162,9 @@ LONGEST_MESSAGE = 1000
 def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
     """Call the model for a block.
 
-    If it raises an exception, call it for each result of the block separately, to find the failing results. If `is_own`
-    is true, the user wrote the model. Then every exception counts as a failed case, and results are checked.
+    If the model raises an exception, it is called for each result of the block separately, to find the results that
+    fail. If `is_own` is true, the user wrote the model. Then every exception counts as a failed case, and the results
+    are checked.
     """
     is_single = block.cases == len(block.realisations) == 1
     try:
@@ -262,7 +263,10 @@ def _compute_part(
     values: dict[str, NDArray[np.float64]],
     status: NDArray[np.int8],
 ) -> Result:
-    """Compute the wanted results of a block, and put them into arrays that already hold its other results."""
+    """Compute the wanted results of a block.
+
+    These results are put into the arrays `values` and `status`, which already hold the other results of the block.
+    """
     flat_status = status.reshape(wanted.shape)
     cases, numbers = np.flatnonzero(wanted.any(axis=1)), np.flatnonzero(wanted.any(axis=0))
     if cases.size == 0:

@@ -85,7 +85,7 @@ ohm = volt / ampere = Ω
 siemens = ampere / volt = S
 """
 
-#: Names of quantities for messages, each with an example, by SI unit.
+#: For each SI unit: the name of the quantity and an example, for messages.
 _MEANINGS = {
     "1": ("a number", ""),
     "m": ("a length", "20 mm"),
@@ -152,8 +152,8 @@ def to_si(value: str, unit: str) -> float:
     Returns
     -------
     float
-        The value in SI. For decimal units it is correctly rounded: ``"1.1 mm"`` is 0.0011, not the product 1.1 x 0.001,
-        which has a rounding error.
+        The value in SI. For decimal units, the value is correctly rounded: ``"1.1 mm"`` is 0.0011, not the product 1.1
+        x 0.001, which has a rounding error.
 
     Raises
     ------
@@ -262,8 +262,9 @@ _FAR = 3.0
 def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
     """Return whether a number without a unit may have been meant in another unit than the SI unit.
 
-    The number is doubtful if, taken in SI, it differs from the first usual value by more than 3 decades. The number is
-    also doubtful if, taken in the unit of one of the usual values, it is nearer to the first usual value.
+    The number is first taken as a number in the SI unit. It is doubtful if it then differs from the first usual value
+    by more than 3 decades. It is also doubtful if another unit brings it nearer to the first usual value; the units of
+    all usual values are tried.
 
     Parameters
     ----------
@@ -285,8 +286,8 @@ def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
 def likely(value: float, unit: str, usual: Sequence[str]) -> str:
     """Return a number with the unit in which it was probably meant, or an empty text.
 
-    The units of the usual values are tried. The result has the unit with which the number is nearest to the first usual
-    value; it is empty if the number is then still more than 3 decades away.
+    The units of the usual values are tried. The unit that brings the number nearest to the first usual value is used.
+    If even this unit leaves a difference of more than 3 decades, the text is empty.
     """
     found = {}
     for each in usual:

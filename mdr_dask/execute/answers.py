@@ -27,10 +27,11 @@ def cases_that_narrow(
 ) -> list[BoolArray]:
     """Return the cases that need more realisations.
 
-    A case needs them if the interval of a fitted constant that depends on this case is too wide.
+    A case needs more realisations if it affects a fitted constant whose interval is too wide. Until some case has
+    `FEWEST` realisations, all new cases of the stage need more.
 
-    `places` are the positions of the cases of the stage in the store. `taken` contains, for each group, the number of
-    realisations of every case that are used. Further realisations in the store are ignored.
+    `places` are the positions of the cases of the stage in the store. `taken` contains an array for each group: the
+    number of realisations that are used of every case. Further realisations in the store are ignored.
     """
     answers = stage.campaign.replication.answers
     if max(int(each.max()) for each in taken) < FEWEST:
@@ -79,7 +80,7 @@ def unanswered(url: str, stage: Stage, layout: Sequence[Template], taken: Sequen
 
 
 def _groups(url: str, stage: Stage, layout: Sequence[Template], taken: Sequence[IntArray]) -> dict[str, xr.Dataset]:
-    """Return the cases of a campaign by series.
+    """Return the results of a campaign: a dataset for each series, by the name of the series.
 
     Failed realisations, and realisations beyond the number in `taken`, are NaN.
     """
@@ -103,6 +104,6 @@ def _coordinates(series: Series) -> dict[str, list[object]]:
 
 
 def _of_mesh(cases: xr.DataArray, mesh: Mesh) -> BoolArray:
-    """Return a mask of cases with the dimensions of a series, in the order of its axes and of their values."""
+    """Return a mask of cases as an array. Its dimensions, and the values along them, are in the order of the series."""
     ordered = cases.sel({dim: own for dim, own in _coordinates(mesh.series).items() if dim in cases.indexes})
     return np.asarray(ordered.transpose(*mesh.series.sizes).to_numpy())

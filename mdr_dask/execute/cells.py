@@ -23,7 +23,7 @@ class Cells:
 
     # The group.
     template: Template
-    # Shape of the group. Results to compute, and results to mark as not needed.
+    # Masks with the shape of the group: results to compute, and results to mark as not needed.
     wanted: NDArray[np.bool_]
     spared: NDArray[np.bool_]
     # Number of results of the round that are already in the store, and number of these that have failed.
@@ -38,7 +38,8 @@ class Cells:
     def operations(self, index: BlockIndex) -> float:
         """Return the number of operations that a round needs in a block.
 
-        It is the number for the whole block, multiplied by the fraction of its results that the round has to compute.
+        The number of operations of the whole block is multiplied by a fraction: the part of the results of the block
+        that the round has to compute.
         """
         part = float(np.mean(self.wanted[self.template.region(index)]))
         return part * self.template.operations(index) if part else 0.0
@@ -55,9 +56,9 @@ def find_cells(
 ) -> Cells:
     """Compare a round with the ledger to find the results that are missing.
 
-    `asked` marks the cases of the stage and `needed` the cases that need the realisations of the round. `realisations`
-    contains the number of the first realisation of the round, and the number of the last one plus 1. `own` marks the
-    results of this part; with None, the run computes all results.
+    `asked` marks the cases of the stage. `needed` marks the cases that need the realisations of the round.
+    `realisations` contains the number of the first realisation of the round, and the number of the last one plus 1.
+    `own` marks the results of this part; None means that the results of all parts are included.
     """
     status = store.ledger(url, template.series.name, template.shape)
     open_states = [Status.MISSING, Status.NOT_NEEDED]
@@ -86,10 +87,10 @@ def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]
 
 
 def tasks(url: str, groups: Iterable[Cells], lock: Lock) -> Iterator[Work]:
-    """Yield the tasks of a round one by one, so that only tasks that are submitted need memory."""
+    """Yield the tasks of a round one by one, so that tasks need no memory before they are submitted."""
     laid_out = store.layout_mark(url)
     if laid_out is None:
-        raise StoreError(f"{url}: removed since it was laid out")
+        raise StoreError(f"{url}: the store has been removed")
     begun = itertools.count(1)
     for cells in groups:
         if not cells.new:

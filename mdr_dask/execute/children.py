@@ -30,7 +30,8 @@ from mdr_dask.task import KIND, Outcome, Work, kind, run_block, write_off
 
 #: Code that the server process runs.
 COMMAND = "import sys; from mdr_dask.execute.children import serve; serve(sys.argv[1], [int(x) for x in sys.argv[2:]])"
-#: Environment variables that limit the libraries for linear algebra to one thread, without importing these libraries.
+#: Environment variables that limit libraries for linear algebra to one thread. To set a variable, the library need not
+#: be imported.
 BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 #: Time in s between the time limit of a case and the moment when its process is killed. A case in plain Python raises
 #: TimeoutError at the limit, so its process need not be killed.
@@ -80,7 +81,7 @@ class Child:
 
 @contextmanager
 def children(count: int, model: str) -> Iterator[list[Child]]:
-    """Start child processes for a model. At the end of the context, wait until each of them has finished its block."""
+    """Start child processes for a model. At the end of the context, wait until each child has finished its block."""
     pipes = [Pipe() for _ in range(count)]
     numbers = [theirs.fileno() for _, theirs in pipes]
     path = os.pathsep.join(filter(None, sys.path))
@@ -102,7 +103,7 @@ def compute_apart(child: Child, work: Work, limit: float | None = None) -> Itera
     If it crashes, its halves are computed separately, and so on down to single results.
 
     A single result that crashes its process is marked as failed. If `MOST_CRASHES` results of a case have crashed, the
-    other results of this case are marked as failed without computing them.
+    other results of this case are not computed, but also marked as failed.
     """
     pieces, attempts = [work], itertools.count(work.attempt)
     crashed: Counter[int] = Counter()
@@ -189,7 +190,7 @@ def _compute_blocks(pipe: Connection) -> None:
 
 
 class _limited:  # noqa: N801
-    """Context in which a case of a plain Python model raises TimeoutError if it takes too long."""
+    """Context that limits the time of a case of a plain Python model; a case that takes longer raises TimeoutError."""
 
     def __init__(self, limit: float | None) -> None:
         self._limit = limit

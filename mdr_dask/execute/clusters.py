@@ -28,8 +28,8 @@ from mdr_dask.task import one_blas_thread
 SCHEDULER_PATIENCE = 10
 #: Address of the web page of a scheduler. Only programs on this machine can open this page.
 DASHBOARD = "127.0.0.1:0"
-#: Time in which an adaptive cluster should finish all waiting tasks. Dask starts as many workers as this requires. The
-#: time is about that of one block.
+#: Time in which an adaptive cluster should finish all waiting tasks. Dask starts as many workers as necessary. One
+#: block takes about this time.
 TARGET_DURATION = "1s"
 #: Loggers whose messages explain why workers cannot be started. Messages of the run quote these messages.
 STARTING = ("distributed.deploy", "dask_jobqueue", "tornado")
@@ -110,7 +110,7 @@ def _require_guard() -> None:
 
 
 def _loggers(names: tuple[str, ...]) -> list[logging.Logger]:
-    """Return the named loggers and all loggers below them. Dask adds handlers to both."""
+    """Return the named loggers and all loggers below them, because Dask adds handlers to both kinds of loggers."""
     below = [known for known in logging.root.manager.loggerDict for name in names if known.startswith(f"{name}.")]
     return [logging.getLogger(name) for name in (*names, *below)]
 
@@ -168,7 +168,10 @@ def cluster_class(name: str) -> type[Cluster]:
 
 
 def _closed_to_others(kind: type[Cluster], arguments: Mapping[str, Any], stack: ExitStack) -> dict[str, Any]:
-    """Add arguments that keep other users out, unless they are set: TLS, and a web page for this machine only."""
+    """Keep other users out: add arguments for TLS, and for a web page that only this machine can open.
+
+    Arguments that are already set are kept.
+    """
     own = dict(arguments)
     if issubclass(kind, LocalCluster):
         own["dashboard_address"] = own.get("dashboard_address") or DASHBOARD
@@ -195,7 +198,7 @@ def _in_files(keys: Security, folder: Path) -> Security:
 
 
 def _most(plan: Mapping[str, Any]) -> int:
-    """Return the largest number of threads of an adaptive cluster according to its file, or 0 for other clusters."""
+    """Return the largest number of threads that the file of a cluster allows; 0 if the file states no limit."""
     arguments = plan.get("arguments", {})
     adapt = plan.get("adapt", {})
     each = arguments.get("cores", 1) if "maximum_jobs" in adapt else arguments.get("threads_per_worker", 1)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from mdr_dask.execute.children import Child
     from mdr_dask.execute.window import TaskWindow
 
-#: Number of blocks for each thread that are submitted at the same time, so that no thread is idle.
+#: The number of submitted blocks is this multiple of the number of threads, so that no thread is idle.
 AHEAD = 2
 
 

@@ -12,8 +12,9 @@ from mdr_dask.task import Outcome
 class Progress:
     """The state of a run, counted in results. A result is one case in one realisation."""
 
-    # Numbers of results. `total` are those of all rounds so far, and `kept` those that were in the store before the
-    # run. `done`, `failed` (including not converged) and `not_needed` are those that this run has written.
+    # Numbers of results. `total` counts the results of all rounds so far, and `kept` the results that were in the store
+    # before the run. `done`, `failed` (including not converged) and `not_needed` count the results that this run has
+    # written.
     total: int = 0
     kept: int = 0
     done: int = 0
@@ -26,11 +27,11 @@ class Progress:
     # Number of blocks and number of solutions that this run has computed. Several results may share one solution.
     blocks: int = 0
     solves: int = 0
-    # Number of operations of all rounds so far, and of the finished blocks.
+    # Number of operations of all rounds so far, and number of operations of the finished blocks.
     estimated: float = 0.0
     finished: float = 0.0
-    # Times in s: for computing models; the part of it for compiling kernels; for writing; and since the start of the
-    # run. The first three are sums over all threads.
+    # Times in s: for computing models, including compilation; for compiling kernels alone; for writing; and since the
+    # start of the run. The first three are sums over all threads.
     compute_seconds: float = 0.0
     compile_seconds: float = 0.0
     write_seconds: float = 0.0

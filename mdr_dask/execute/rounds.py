@@ -55,15 +55,15 @@ class _Round:
 
     # The shape of the store.
     layout: tuple[Template, ...]
-    # For each group, the positions of the cases of the stage in the store.
+    # For each group, the positions in the store at which the cases of the stage lie.
     places: Places
-    # Shape of the cases. For each group, the cases of the stage, and the cases that need the realisations of this
+    # For each group, two masks of its cases: the cases of the stage, and the cases that need the realisations of this
     # round.
     asked: list[BoolArray]
     needed: list[BoolArray]
     # Number of the first realisation of the round, and number of the last one plus 1.
     realisations: tuple[int, int]
-    # Shape of the cases. For each group, the number of realisations of each case after the round.
+    # For each group, an array with the shape of its cases: the number of realisations of each case after the round.
     taken: tuple[IntArray, ...]
 
 
@@ -151,9 +151,9 @@ def outlook(campaign: Campaign, url: str) -> Progress:
     """Return how many results of a campaign are in its store and how many are missing. The store is not changed.
 
     If realisations are added in rounds, only the results of the first round are counted. If axes are adaptive, all
-    values that are known to be needed are counted. If realisations are added in rounds and axes are adaptive, only the
-    first values of these axes are counted. Raise StoreError if the store was made from another campaign, and
-    CampaignError if the campaign is too large to be run.
+    values that are known to be needed are counted. If axes are adaptive and outputs have tolerances for their standard
+    errors, only the first values of the axes are counted. Raise StoreError if the store was made from another campaign,
+    and CampaignError if the campaign is too large to be run.
     """
     stage: Stage | None = Stage.first(campaign)
     count = campaign.replication.at_least
@@ -258,14 +258,14 @@ def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], None], rea
 
 
 def _without_answers(job: _Job) -> _Job:
-    """Return the job without tolerances of fitted constants. It is used until all values of adaptive axes are known."""
+    """Return the job without tolerances of fitted constants, for the stages that choose values of adaptive axes."""
     campaign = job.stage.campaign
     campaign = replace(campaign, replication=replace(campaign.replication, answers={}))
     return replace(job, stage=replace(job.stage, campaign=campaign))
 
 
 def _next(job: _Job, last: _Round | None) -> _Round:
-    """Return the next round. If any case needs more realisations, extend the store for them, while other parts wait."""
+    """Return the next round. If a case needs more realisations, first extend the store; meanwhile other parts wait."""
     replication = job.stage.campaign.replication
     with store.gate(job.url):
         layout, places = stored_layout(job.stage, job.url)

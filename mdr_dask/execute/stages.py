@@ -1,7 +1,7 @@
-"""Find the cases of a stage of a campaign with adaptive axes in the store, and choose the values of the next stage.
+"""For campaigns with adaptive axes: find the cases of a stage in the store, and choose the values of the next stage.
 
-A stage depends only on the results of the previous stage. So the same stage is found again at any time, even if the
-store contains further results.
+A stage depends only on the results of the previous stage. So a repeated run finds the same stage again, even if the
+store already contains results of later stages.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from mdr_dask.models.base import Status
 from mdr_dask.plan import Template, templates
 from mdr_dask.refinement import Mean, Mesh, Stage, refined
 
-#: For each group and each dimension, the positions in the store of the values of a stage.
+#: The positions in the store at which the values of a stage lie, for each group and each dimension.
 Places = tuple[Mapping[str, IntArray], ...]
 
 
 def stored_layout(stage: Stage, url: str) -> tuple[tuple[Template, ...], Places]:
-    """Return the layout of the stored study, extended by a stage, and the positions of the cases of this stage in it.
+    """Return the layout of the stored study with the new cases of a stage, and the positions of all cases of the stage.
 
     Raise StoreError if the store was made from another campaign, and CampaignError if the campaign is too large to be
     run.
@@ -85,7 +85,10 @@ def _short(series: str, mesh: Mesh, number: int, count: int) -> str:
 def _means(
     url: str, mesh: Mesh, template: Template, place: Mapping[str, IntArray], realisations: int
 ) -> dict[str, Mean]:
-    """Return the means of all outputs with a tolerance for interpolation, over the cases of a series."""
+    """Return the means of each output with a tolerance for interpolation.
+
+    The means are taken over the realisations of each case of a series.
+    """
     dims, own, name = template.dims[:-1], list(mesh.series.sizes), template.series.name
     cases = np.ix_(*(place[dim] for dim in dims), np.arange(realisations))
     order = [*(dims.index(dim) for dim in own), len(dims)]

@@ -19,8 +19,8 @@ from mdr_dask.execute.children import Child, children, compute_apart
 from mdr_dask.execute.events import Event, Settle, Tell, of_block
 from mdr_dask.task import Outcome, Work, finished, one_blas_thread, run_block, write_off
 
-#: Time in s between two checks of the cluster. Because of this time and the next one, a user learns within five seconds
-#: that there is no worker.
+#: Time in s between two checks of the cluster. This time and `REPORT_PAUSE` together are less than five seconds, so a
+#: user soon learns that there is no worker.
 CHECK_PAUSE = 1.0
 #: Time in s between two messages that there is no worker.
 REPORT_PAUSE = 3.0
@@ -30,8 +30,8 @@ ANSWER_LIMIT = 3.0
 TOPIC = "mdr_dask"
 KEPT = "what is in the store is kept: run the campaign again"
 
-#: Context of the child process of a worker, and the lock with which the threads of the worker take turns to use this
-#: child process.
+#: Context in which a worker keeps its child process, and a lock. The threads of the worker use the child process one
+#: after the other; a thread holds the lock meanwhile.
 _OPEN, _APART = ExitStack(), threading.Lock()
 
 Outcomes = list[tuple[Work, Outcome]]

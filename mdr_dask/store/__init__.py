@@ -4,8 +4,8 @@ A group contains one array for every output, the array ``status`` (the ledger, w
 and a coordinate for every parameter. The dimensions of the arrays are the axes and ``realisation``. An output may have
 further dimensions. The process that started the run (the driver) creates the arrays. The process that computes a block
 also writes it, in this order: the record of the block, with the digest of every chunk; one whole chunk of every output;
-and the chunk of ``status``. Readers use only the metadata of the whole study in ``zarr.json``, which are replaced in
-one write.
+and the chunk of ``status``. Readers use only ``zarr.json``. This file holds the metadata of the whole study and is
+replaced in one write.
 """
 
 from mdr_dask.store.blocks import Place, is_written, layout_mark, read_block, values, write_block

@@ -110,7 +110,7 @@ def _opened(url: str, series: str, store: Store, names: Iterable[str] = ()) -> d
     """Return the named arrays of a group. Without names, return the ledger and all outputs."""
     held = document(url, series)
     if held is None:
-        raise StoreError(f"{url}: removed since it was laid out")
+        raise StoreError(f"{url}: this store, or one of its groups, has been removed")
     shown = held["consolidated_metadata"]["metadata"]
     wanted = names or ("status", *held["attributes"]["outputs"])
     return {name: array_of(shown[name], store, group_name(series, name)) for name in wanted}
@@ -138,7 +138,7 @@ def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict
 
 
 def _whole_chunks(array: Any) -> dict[str, Any]:
-    """Return the metadata of an array, with its shape rounded up to whole chunks."""
+    """Return the metadata of an array that is made larger, so that all its chunks are whole."""
     shape = [-(-size // length) * length for size, length in zip(array.shape, array.chunks, strict=True)]
     return {**array.metadata.to_dict(), "shape": shape}
 

@@ -266,7 +266,10 @@ def create(url: str, name: str, content: bytes) -> bool:
 
 
 def conditional(url: str) -> bool:
-    """Return whether `create` is atomic: for local files, and for servers that create a file with a single request."""
+    """Return whether `create` is atomic.
+
+    It is atomic for local files, and for servers that create a file with a single request.
+    """
     if local(url) is not None:
         return True
     from fsspec import AbstractFileSystem

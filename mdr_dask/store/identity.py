@@ -75,7 +75,7 @@ def reconcile(url: str, campaign: Campaign) -> Stored:
 
 
 def _require_version(url: str, campaign: Campaign) -> None:
-    """Raise StoreError if another version of the model made the store, because their results must not be mixed."""
+    """Raise StoreError if another version of the model made the store: results of two versions must not be mixed."""
     held, version = attributes(url), models.load(campaign.model).version
     if held["model"] == campaign.model and held["model_version"] != version:
         program = held.get("versions", {}).get("mdr_dask", "another version")
@@ -91,7 +91,7 @@ def _require_version(url: str, campaign: Campaign) -> None:
 
 @lru_cache(maxsize=16)
 def _warn_of_changed_model(url: str, model: str, version: int) -> None:
-    """Log a warning of a changed model, only once for each store."""
+    """Log a warning that the file of a model has changed, only once for each store."""
     log.warning(
         "%s: the file of the model %s has changed since the store was made, and its version is still %d: increase the "
         "version if the results are different, so that old and new results are not mixed",
@@ -125,7 +125,7 @@ def _study_differences(url: str, campaign: Campaign) -> list[str]:
 
 
 def _with_root(url: str, campaign: Campaign) -> Campaign:
-    """Return the campaign with an empty name for a series that matches the results at the root of the store, if any."""
+    """Return the campaign; a series that matches the results at the root of the store gets an empty name."""
     root = _group_attributes(url, "")
     if root is None or any(not series.name for series in campaign.series):
         return campaign
@@ -165,7 +165,7 @@ def _series_differences(series: Series, held: Mapping[str, Any], outputs: tuple[
 
 
 def _leaves(tree: Mapping[str, Any], prefix: str) -> dict[str, Any]:
-    """Flatten nested parameters to dotted paths. The value of a named file is its digest."""
+    """Flatten nested parameters to dotted paths. A parameter that names a file gets the digest of the file as value."""
     found: dict[str, Any] = {}
     for name, value in tree.items():
         if isinstance(value, Mapping) and not _is_file(value):
@@ -189,8 +189,8 @@ def _by_digest(value: Any) -> Any:
 def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, IntArray]]:
     """Append the new entries of a series to the stored entries.
 
-    Return the extended series. Also return, for each of its dimensions, the positions in it of the entries of the given
-    series.
+    Return the extended series. Also return an array for each dimension: for each entry of the given series, the
+    position of this entry in the extended series.
     """
     places = {}
     axes = []
@@ -210,9 +210,10 @@ def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, 
 def _entries(columns: list[list[Any]]) -> dict[tuple[str, int], int]:
     """Return the position of every entry of a dimension.
 
-    A key consists of the values of the entry as text, and a counter of the earlier entries with the same values.
+    Each key contains the values of an entry as text, and the number of earlier entries with the same values.
 
-    Values that agree to `SAME_DIGITS` are equal. The counter is needed because sampled whole numbers may repeat a case.
+    Values that agree to `SAME_DIGITS` digits count as equal. The number of earlier entries is needed, because two cases
+    may be equal if their parameters are sampled whole numbers.
     """
     found: dict[tuple[str, int], int] = {}
     seen: Counter[str] = Counter()
@@ -237,7 +238,7 @@ def _longer(series: Series, axis: Axis, stored: Mapping[str, Any], new: list[int
 
 
 def _restore(series: Series, path: str, plain: Any) -> Any:
-    """Return a value of an axis from its stored form; the field of the parameter validates lists and mappings."""
+    """Return a value of an axis from its stored form; a list or mapping is validated as a value of the parameter."""
     if not isinstance(plain, Mapping | list):
         return plain
     *above, last = path.split(".")

@@ -91,7 +91,10 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
 
 
 def _write(url: str, root: bytes, coordinates: Mapping[str, bytes]) -> None:
-    """Write the record of a layout, then the files that differ from the new layout, and ``zarr.json`` (`root`) last."""
+    """Write the files of a layout in the order that `lay_out` describes; `root` is the content of ``zarr.json``.
+
+    Of the coordinates and the metadata of arrays, only files with new content are written.
+    """
     metadata = metadata_files(json.loads(root))
     members = json.loads(root)["consolidated_metadata"]["metadata"]
     groups = {name: metadata.pop(name) for name in [f"{group}/zarr.json" for group in group_names(members)]}
@@ -139,7 +142,7 @@ def metadata_files(root: Mapping[str, Any]) -> dict[str, bytes]:
 
 
 def coordinate_files(root: Mapping[str, Any], names: Iterable[str]) -> list[str]:
-    """Return those of the names that belong to chunks of coordinates, according to the metadata of the study."""
+    """Return the names that belong to chunks of coordinates, according to the metadata of the study."""
     members = root["consolidated_metadata"]["metadata"]
     groups = {"": root["attributes"]} | {name: members[name]["attributes"] for name in group_names(members)}
     data = {group_name(name, array) for name, of in groups.items() for array in ("status", *of.get("outputs", ()))}
@@ -210,7 +213,7 @@ def layout_faults(url: str) -> Iterator[Finding]:
 
 
 def _signpost(members: Mapping[str, Any]) -> dict[str, str]:
-    """Return an attribute for a study with series that says how to open it.
+    """Return an attribute with a hint how to open a study that has series.
 
     Without it, such a study would look empty when opened as one dataset.
     """

@@ -108,8 +108,8 @@ def require_undamaged(url: str, series: Sequence[str], to_run: bool = False) -> 
     """Raise StoreError if the layout of a study is damaged or a chunk of a finished block is missing.
 
     Only the layout and the ledger are read, not the values. `mdr_dask.store.verify` compares every file with its
-    digest. A run writes missing files of the layout again, so with `to_run` missing files are no fault. If a store has
-    no record of its layout, its metadata and coordinates are not checked.
+    digest. With `to_run`, missing files of the layout are no fault, because the run writes these files again. If a
+    store has no record of its layout, its metadata and coordinates are not checked.
     """
     faults = _faults(url, series, to_run)
     if any(faults):  # check again, because a run may have changed a file during the first check

@@ -77,9 +77,10 @@ class Lock:
     name: str
     # Unique identifier of the run. It is empty if the run can only read.
     owner: str
-    # Number of the claim. None for a lock of the operating system.
+    # Number of the claim; None if the lock is one of the operating system.
     claim: int | None = None
-    # Whether the process of an earlier run crashed or was killed while it held this lock, or the lock of a part.
+    # Whether the process of an earlier run crashed or was killed while it held this lock. For the exclusive lock,
+    # earlier runs of parts count too.
     after_crash: bool = False
 
 
@@ -133,10 +134,10 @@ def exclusive(url: str) -> Iterator[Lock]:
 
 @contextmanager
 def shared(url: str, part: Part) -> Iterator[Lock]:
-    """Lock one part of a study; the other parts of the same division may run at the same time.
+    """Lock one part of a study; the other parts may run at the same time.
 
-    Raise StoreBusyError if another process runs this part, runs the whole study exclusively, or runs a part of the
-    study that was divided into a different number of parts. Otherwise as for `exclusive`.
+    Raise StoreBusyError if another process already runs this part or the whole study. Also raise StoreBusyError if an
+    active part belongs to a division into another number of parts. Otherwise as for `exclusive`.
     """
     with ExitStack() as held:
         with gate(url), acquire(url):
@@ -168,7 +169,7 @@ def gate(url: str) -> Iterator[None]:
 
 
 def at_work(url: str) -> tuple[str | None, list[Part]]:
-    """Return the holder of the exclusive lock of a study, or None, and the active parts.
+    """Return the process that holds the exclusive lock of a study (None if no process does), and the active parts.
 
     Nothing is written.
     """
@@ -291,7 +292,7 @@ def _flock(descriptor: int, shared: bool = False) -> None:
 
 
 def _is_held(url: str, name: str = "") -> bool:
-    """Return whether a process holds a lock, without writing anything."""
+    """Return whether a process holds a lock. Nothing is written."""
     standing = _numbers(url, name)
     if standing and _is_alive(url, name, max(standing)):
         return True
@@ -472,7 +473,7 @@ def _is_alive(url: str, name: str, number: int) -> bool:
 
 
 def _read_claim(url: str, name: str) -> dict[str, Any]:
-    """Return the content of a claim or of a sign of life; empty if the file is missing or not yet complete."""
+    """Return the content of a claim or of a sign of life; an empty dictionary if the file is missing or incomplete."""
     try:
         return read_json(url, name) or {}
     except StoreError:

@@ -47,8 +47,8 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
     """Open a study for reading, finished or not; return every group by the name of its series.
 
     The values of numeric axes are in ascending order. The results of a study without series have the name ``""``, or
-    ``"-"`` if series were added later. Arrays are loaded when they are used. In a group larger than `LAZY_BYTES` they
-    are Dask arrays, which are computed chunk by chunk. Raise StoreError if there is no study of mdr_dask at `url`.
+    ``"-"`` if series were added later. Arrays are loaded when they are used. Groups larger than `LAZY_BYTES` contain
+    Dask arrays, which are computed chunk by chunk. Raise StoreError if there is no study of mdr_dask at `url`.
     """
     with readable(url):
         names = series_names(url)

@@ -98,7 +98,7 @@ def records(url: str, series: str) -> Iterator[dict[str, Any]]:
 
 @lru_cache(maxsize=16)
 def _warn_of_damaged(url: str, count: int) -> None:
-    """Log a warning of damaged records; for each store, repeat it only if their number has changed."""
+    """Log a warning of damaged records. The warning is repeated only if the number of damaged records has changed."""
     log.warning("%s: %d damaged records are left out; 'mdr-dask verify %s' names them", url, count, url)
 
 

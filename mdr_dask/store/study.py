@@ -89,7 +89,7 @@ def _group(root: Mapping[str, Any], group: str) -> tuple[dict[str, Any] | None, 
 
 
 def members_of(members: Mapping[str, Any], group: str) -> dict[str, Any]:
-    """Return those members of a study that lie in a group, by their names inside the group."""
+    """Return the metadata of the members of a group. Each key is the name of a member inside the group."""
     return {name.removeprefix(f"{group}/"): each for name, each in members.items() if name.startswith(f"{group}/")}
 
 

@@ -42,7 +42,8 @@ IGNORED = ".partial"
 PUBLISHED = "published/"
 CHECKSUMS = f"{PUBLISHED}checksums.sha256"
 
-#: For each attempt at a block, in order, the digests of the chunks that it has written, by the name of the array.
+#: All attempts at a block in their order. For each attempt: the digests of the chunks that it has written, by the name
+#: of the array.
 History = list[Mapping[str, str]]
 
 
@@ -108,7 +109,7 @@ def repair(url: str) -> tuple[Inspection, Inspection]:
 
 
 def of_store(names: Iterable[str]) -> Iterator[str]:
-    """Yield those of the names that belong to the study itself, and not to an active run or a publication."""
+    """Yield the names of files of the study itself, without the files of an active run or of a publication."""
     for name in names:
         if not name.endswith(IGNORED) and not name.startswith((CLAIMS, PUBLISHED)):
             yield name
@@ -207,10 +208,10 @@ def _check_blocks(url: str, group: Group, found: Inspection, present: set[str]) 
 
 
 def _histories(url: str, group: Group) -> tuple[dict[BlockIndex, History], set[BlockIndex]]:
-    """Return the digests of the chunks of every block, from intact records, and the blocks that have a merged record.
+    """Return the `History` of each block, and the set of blocks that have a merged record; use only intact records.
 
-    Records are merged only when their block is in the ledger. So the ledger must contain the blocks with merged
-    records.
+    The record of a block is merged only when the block is in the ledger. So a block with a merged record must be in the
+    ledger.
     """
     known: dict[tuple[BlockIndex, int], Mapping[str, str]] = {}
     merged = set()
@@ -250,8 +251,9 @@ def _faults(
 def _expected(history: History, status: str, name: str) -> set[str]:
     """Return the digests that the chunk of an array may have; `status` is the digest of the ledger of the same block.
 
-    The chunk was written by the attempt that wrote this ledger or, if that attempt did not write the array, by the last
-    earlier attempt that did. It may also come from a later attempt that was killed before it wrote its ledger.
+    Normally, the attempt that wrote this ledger has also written the chunk. If that attempt wrote only the ledger, the
+    chunk comes from the last earlier attempt that wrote the array. The chunk may also come from a later attempt that
+    was killed before it wrote its ledger.
     """
     first = next((i for i, chunks in enumerate(history) if chunks.get("status") == status), len(history))
     found, last = set[str](), set[str]()
