@@ -1,4 +1,7 @@
-"""The data classes of a campaign. They cannot be changed; their values are checked and in SI units."""
+"""The data classes of a campaign.
+
+Instances of these classes cannot be changed. Their values are in SI units and have been checked.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +15,11 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.models.base import Parameters
 from mdr_dask.models.data_file import DataFile
 
-#: Digits of the values of a range: two fewer than a double has, so that rounding errors do not show.
+#: Number of digits to which the values of a range are rounded. A double has two digits more; rounding errors, which
+#: affect these two digits, thus disappear.
 _DIGITS = 14
-#: Number of digits in which two values of an axis must agree to count as equal; equal values are computed only once.
-#: These are two fewer than `_DIGITS`, because the values may come from different formulas.
+#: Two values of an axis count as equal if they agree in this number of digits. The number is smaller than `_DIGITS` by
+#: two, because the values may come from different formulas.
 SAME_DIGITS = 12
 #: Largest number of values that `Axis.some` returns, so that a check of an axis with a million values is fast.
 SOME = 64
@@ -23,7 +27,7 @@ SOME = 64
 
 @dataclass(frozen=True)
 class Spread:
-    """An interval from which values are taken, evenly spread either in the value or in its logarithm."""
+    """An interval from which values are taken. Either the values or their logarithms are evenly spaced."""
 
     low: float
     high: float
@@ -50,7 +54,7 @@ class Spread:
 
 
 def tidy(value: float, whole: bool, exact: bool = False) -> float:
-    """Return a number of a range, rounded.
+    """Round a number that belongs to a range.
 
     It is rounded to a whole number if `whole` is true. Otherwise it is rounded to 14 digits, or not at all if `exact`
     is true.
@@ -68,7 +72,8 @@ class Axis:
     path: str
     # Name of its coordinate in the store: the path with ``_`` for ``.``.
     name: str
-    # Its dimension in the store: `name` in a grid, or ``case`` in a study whose parameters vary together.
+    # Its dimension in the store. In a grid, the dimension is `name`; in a study whose parameters vary together, it is
+    # ``case``.
     dim: str
     # Checked values in SI, in the order of the file: numbers, names, or whole parameter sets.
     values: tuple[Any, ...]
@@ -89,7 +94,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Series:
-    """One series of a campaign, which is one group of the store: its parameters, and its axes."""
+    """The parameters and the axes of one series of a campaign. Each series is one group of the store."""
 
     # Name of the Zarr group. It is empty in a campaign without series, whose arrays are at the root of the store.
     name: str
@@ -105,7 +110,9 @@ class Series:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """The largest accepted relative and absolute error. An error is accepted if it is within either of them.
+    """The largest accepted relative error and the largest accepted absolute error.
+
+    An error is accepted if it does not exceed at least one of these two limits.
 
     `place` is the position of the tolerance in the campaign file.
     """
@@ -119,7 +126,7 @@ class Tolerance:
 class Refinement:
     """The rule by which a study chooses the values of an adaptive axis."""
 
-    # The interval of the axis, with the scale on which outputs are interpolated.
+    # The interval of the axis. Its scale, linear or logarithmic, is also used to interpolate the outputs.
     spread: Spread
     # Largest accepted interpolation error of each output. A relative error refers to the largest value of the output
     # along the axis.
@@ -129,9 +136,12 @@ class Refinement:
 
 @dataclass(frozen=True)
 class Replication:
-    """The number of realisations of each case: first `at_least`, then more in rounds until every tolerance is met."""
+    """The number of realisations of each case.
 
-    # Number of realisations in the first round, and largest number of realisations in all rounds together.
+    The first round has `at_least` realisations. Further rounds follow until every tolerance is met.
+    """
+
+    # Number of realisations in the first round (`at_least`), and largest total number in all rounds (`at_most`).
     at_least: int
     at_most: int
     # Largest accepted standard error of the mean of each output.
@@ -141,7 +151,7 @@ class Replication:
 
     @property
     def goes_on(self) -> bool:
-        """Whether there may be more than one round."""
+        """Whether a second round of realisations may follow the first."""
         return bool(self.until or self.answers)
 
 
@@ -164,7 +174,8 @@ class Campaign:
     blocks: Mapping[str, int]
     text: str
     source: str
-    # Questions about numbers without a unit that are far from the usual values, each with its position in the file.
+    # Questions and remarks for the user: numbers without a unit that are unusually large or small, each with its
+    # position in the file, and columns of a table of cases that are not used.
     remarks: tuple[str, ...] = ()
     # Table of measured values of an output, for the fit ``calibration``. None if the campaign has no table.
     measured: DataFile | None = None

@@ -19,7 +19,7 @@ from mdr_dask.errors import CampaignError
 
 _TAG = "tag:yaml.org,2002:"
 _DEEPEST = 50  # nesting levels; no campaign has more than ten, and Python can read about 1000
-_LARGEST = 200_000  # values of a file; by aliases, a short text can have billions of values
+_LARGEST = 200_000  # values of a file; with YAML aliases, a short text can stand for billions of values
 _LONGEST = 300_000  # characters of a file; reading them takes about a second
 _TOO_DEEP = "too deeply nested, or an alias that contains itself"
 _MOST_DIGITS = 300  # digits of a number; a double has at most 309 before the point
@@ -47,11 +47,14 @@ class Document:
         return self._at(self._nodes[path]) if path in self._nodes else Place(self.source, 1, 1)
 
     def key_place(self, path: Path) -> Place:
-        """Return the position of the key at a path; for an entry of a list, the position of its value."""
+        """Return the position of the key at a path.
+
+        An entry of a list has no key; for an entry, return the position of its value.
+        """
         return self._at(self._keys[path]) if path in self._keys else self.place(path)
 
     def report(self, path: Path, what: str, key: bool = False) -> None:
-        """Add a problem of the value at a path, or of its key."""
+        """Add a problem at a path. The problem belongs to the key if `key` is true, and to the value otherwise."""
         self.problems.add(self.key_place(path) if key else self.place(path), dotted(path), what)
 
     def flow(self, path: Path) -> str:
@@ -113,7 +116,10 @@ _COLON_WITHIN = re.compile(r"\s*(?:- )?\w+: +[^\s'\"{\[#][^#]*: ")
 
 
 def _hint(text: str, index: int) -> str:
-    """Return a hint to the likely mistake at a syntax error or in the lines just above the error."""
+    """Return a hint that names the likely mistake.
+
+    The mistake is looked for at the syntax error and in the lines just above the error.
+    """
     if text[index : index + 1] == "\t":
         return " (indent with spaces, not with tabs)"
     end = text.find("\n", index)
@@ -130,7 +136,10 @@ def _hint(text: str, index: int) -> str:
 
 
 def _is_indented_otherwise(lines: list[str]) -> bool:
-    """Return whether the last line is indented differently from the line before, which does not end with a colon."""
+    """Return whether the last line is indented differently from the line above.
+
+    If the line above ends with a colon, return False.
+    """
     written = [line for line in lines if line.strip() and not line.lstrip().startswith("#")][-2:]
     if len(written) < 2 or written[0].rstrip().endswith(":"):
         return False
@@ -139,7 +148,10 @@ def _is_indented_otherwise(lines: list[str]) -> bool:
 
 
 class _EndlessError(Exception):
-    """Raised to stop reading a document that is too large or contains itself, after this problem was reported."""
+    """Raised to stop reading a document.
+
+    The document is too large or contains itself, and this problem has been reported.
+    """
 
 
 class _Reader:

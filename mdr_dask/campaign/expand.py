@@ -33,7 +33,9 @@ def expand(
     directory: str,
     outputs: Sequence[str],
 ) -> tuple[tuple[Series, ...], tuple[str, ...]]:
-    """Return the series of a campaign that have no problems, and questions about numbers without a unit.
+    """Return the series of a campaign that have no problems, and questions and remarks for the user.
+
+    The user is asked about numbers without a unit, and a remark names columns of a table of cases that are not used.
 
     `directory` is the folder to which the names of files are relative, and `outputs` are the names of the requested
     outputs. Every problem of parameters, ranges and tables is added to the problems of the document.
@@ -158,7 +160,7 @@ class _Expansion:
     ) -> list[Any] | None:
         """Return the checked values of one axis, or None if a value is wrong.
 
-        The values are checked together with the first values of all other axes.
+        Each value is checked in combination with the first value of every other axis.
         """
         one = variations[index]
         known = _checked(base, self._substituted(self.data, variations, 0), {one.path[0]})
@@ -169,7 +171,7 @@ class _Expansion:
         values: list[Any] = []
         seen, are_valid = set(), None not in (base, last)
         for position, item in enumerate(one.items):
-            # a value between the ends of a range is valid if both ends are valid
+            # if the field is checked by its bounds alone, a value between two valid ends of a range is valid
             if item.inner and (not are_valid or independent):
                 values.append(item.value)
                 continue
@@ -271,7 +273,7 @@ class _Expansion:
     def _refined(
         self, axes: Sequence[Axis], variations: Sequence[Variation], model: Model[Any], outputs: Sequence[str]
     ) -> Iterator[Axis]:
-        """Yield all axes; the rule by which further values are chosen is added to each adaptive axis."""
+        """Yield all axes. Each adaptive axis gets the rule by which its further values are chosen."""
         for axis, one in zip(axes, variations, strict=True):
             if one.written and one.spread:
                 found = refinement(self.document, one.written, one.spread, model, outputs)

@@ -41,7 +41,10 @@ def walk(parameters: type[BaseModel], before: str = "") -> Iterator[Entry]:
 
 
 def members(annotation: Any) -> tuple[Any, ...]:
-    """Return the types that an annotation allows, with unions and ``Annotated`` resolved."""
+    """Return the types that an annotation allows.
+
+    Unions and ``Annotated`` are replaced by the types that they contain.
+    """
     origin = get_origin(annotation)
     if origin is Annotated:
         return members(get_args(annotation)[0])
@@ -51,7 +54,10 @@ def members(annotation: Any) -> tuple[Any, ...]:
 
 
 def holds_list(info: FieldInfo) -> bool:
-    """Return whether a list is one value of this field; in other fields, a list contains the values of an axis."""
+    """Return whether a single value of this field is a list.
+
+    In any other field, a list contains the values of an axis.
+    """
     kinds = [get_origin(kind) or kind for kind in members(info.annotation)]
     return any(isinstance(kind, type) and issubclass(kind, Sequence) and kind is not str for kind in kinds)
 
@@ -70,8 +76,9 @@ def structures(info: FieldInfo) -> tuple[type[BaseModel], ...]:
 def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
     """Return the parameter set that a mapping describes, from its fixed keys such as ``shape: cone``.
 
-    If several sets fit, return the one that has most of the keys of the mapping. If several sets have equally many of
-    these keys, return the one whose fields resemble most of the keys. In this way, misspelt keys count too.
+    If several sets fit, return the set that has the largest number of keys in common with the mapping. If several sets
+    have equally many keys in common with the mapping, count also misspelt keys: return the set whose fields resemble
+    the largest number of keys.
     """
     if not isinstance(value, dict):
         return None
@@ -84,7 +91,7 @@ def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
 
 
 def _likeness(kind: type[BaseModel], value: Mapping[Any, Any]) -> tuple[int, int]:
-    """Return how many keys of a mapping are fields of a parameter set, and how many resemble a field."""
+    """Return how many keys of a mapping are fields of a parameter set, and how many resemble the name of a field."""
     keys = [str(key) for key in value]
     return (
         sum(key in kind.model_fields for key in keys),
@@ -107,7 +114,7 @@ def required(kind: type[BaseModel]) -> list[str]:
 
 
 def written(kind: type[BaseModel], values: Mapping[str, str]) -> str:
-    """Return a parameter set on one line, with the given values: ``{shape: power, radius: ...}``."""
+    """Return a parameter set with the given values as text on one line: ``{shape: power, radius: ...}``."""
     texts = {**values, **fixed(kind)}
     return "{" + ", ".join(f"{key}: {texts[key]}" for key in kind.model_fields if key in texts) + "}"
 

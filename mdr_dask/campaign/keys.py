@@ -43,7 +43,8 @@ def _plain(value: Any) -> Any:
     if hasattr(value, "magnitude") and hasattr(value, "units"):
         return _quantity(_plain(value.magnitude), f"{value.units:~}")
     if isinstance(value, np.floating):
-        return tidy(float(str(value)), whole=False)  # a float32 is printed as the number that was meant, such as 0.1
+        # a float32 of 0.1 is converted through its text: it stays 0.1 and does not become 0.10000000149
+        return tidy(float(str(value)), whole=False)
     if isinstance(value, np.generic):
         return value.item()
     array = value if isinstance(value, np.ndarray) else getattr(value, "values", None)

@@ -47,11 +47,11 @@ class Measured:
     errors : array, shape (points,), or None
         Standard errors of the values; None if the table does not contain them.
     error_column : str
-        A text that names the column of the errors.
+        A text with the name of the column that contains the errors.
     conditions : dict of str to array, shape (points,)
         The values of the parameters at each measured point, in SI, by the names of their coordinates in the store.
     lines : tuple of Line
-        The line of each measurement in the table.
+        For each measured point, the line in the table from which the point was read.
     remark : str
         A text that names unused columns and counts rows that lack a number; empty if all columns and rows are used.
     """
@@ -119,11 +119,12 @@ def read_measured(
 def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...], str, bool]:
     """Find the columns that contain errors of the output.
 
-    Return their headings, the unit of the errors if no heading states it, and whether the errors are relative. The
-    output is the last of `columns`. Errors without a unit have the unit of the output. Errors in percent are relative
-    to the values, unless the values are in percent as well.
+    Return the headings of these columns; the unit of the errors, empty if a heading states a unit; and whether the
+    errors are relative. The output is the last entry of `columns`. Errors without a unit have the unit of the output.
+    Errors in percent are relative to the values, unless the values are in percent as well.
 
-    A heading without the name of a quantity, such as ``std``, means the error of the nearest known column before it.
+    If a heading does not name a quantity, such as ``std``, the column holds errors of the nearest known column before
+    it.
     """
     output, headings, given, before = columns[-1], [], "", None
     for name, unit in zip(sheet.names, sheet.units, strict=True):
@@ -146,14 +147,20 @@ def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...],
 
 
 def _short_names(names: Sequence[str], structures: Iterable[str]) -> dict[str, list[str]]:
-    """Return, for nested parameters, the name without the name of the structure, if this short name is unique."""
+    """Return short names of nested parameters: the name of the parameter without the name of its structure.
+
+    Only short names that are unique are returned.
+    """
     short = [(name, name.removeprefix(f"{one}_")) for one in structures for name in names if name.startswith(f"{one}_")]
     called = [*names, *(inner for _, inner in short)]
     return {name: [inner] for name, inner in short if called.count(inner) == 1}
 
 
 def require_readable(text: str, source: str, model: str, outputs: Sequence[str], series: Sequence[Series]) -> None:
-    """Raise DataError if a table fits no series of a campaign; the message gives the reason for the first series."""
+    """Raise DataError if a table is too large, or does not fit any series of a campaign.
+
+    If the table fits no series, the message says why the table does not fit the first series.
+    """
     if len(text) > LARGEST:
         size, most = distinguishable(len(text) / 1e6, LARGEST / 1e6)
         raise DataError(f"{source}: expected a table of at most {most} MB, got {size} MB")
@@ -224,7 +231,7 @@ def _reach(name: str, series: Series, conditions: Iterable[str]) -> dict[str, tu
 
 
 def unknowns(campaign: Campaign) -> tuple[str, ...]:
-    """Return the axes of a campaign that have no column in its table of measured points.
+    """Return the axes of a campaign for which the table of measured points has no column.
 
     If the campaign has no table, return no axes.
     """

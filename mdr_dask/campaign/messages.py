@@ -72,7 +72,10 @@ def path_into(data: Any, details: ErrorDetails) -> Path:
 
 
 def _is_of_another_branch(details: ErrorDetails, kind: type[BaseModel], data: Any) -> bool:
-    """Return whether an error belongs to another structure than the one that the keys of the value select."""
+    """Return whether an error comes from a structure that the user did not mean.
+
+    The keys of the value show which structure is meant.
+    """
     path: Path = ()
     value = data
     for part in details["loc"]:
@@ -118,7 +121,7 @@ def _report_group(path: Path, group: list[ErrorDetails], kind: type[BaseModel], 
 
 
 def _entry(value: Any, what: str) -> Path:
-    """Return the path from a list to the entry that a message quotes; it is empty if there is no such entry."""
+    """Return the path from a list to the entry that a message quotes; the path is empty if no entry is quoted."""
     entries = value if isinstance(value, list) else []
     return tuple(index for index, entry in enumerate(entries) if what.endswith(f"got {entry!r}"))[:1]
 
@@ -137,7 +140,10 @@ def _hint(group: list[ErrorDetails], value: Any) -> str:
 
 
 def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return a hint that a unit may be missing after a number that is out of bounds."""
+    """Return a hint that a unit may have been forgotten after a number.
+
+    The number is out of bounds without the unit.
+    """
     value, info, unit = value_at(data, path), _field(kind, path, data), fields.unit_at(kind, path, data)
     usual = fields.usual(info) if info else ()
     if not isinstance(value, int | float) or group[0]["type"] not in _BOUNDS:
@@ -149,7 +155,10 @@ def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel]
 
 
 def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return a hint how to write the mapping or list that a parameter needs, if only a word was given."""
+    """Return a hint for a parameter that needs a mapping or a list, but got a single word.
+
+    The hint shows how to write the value.
+    """
     value, info = value_at(data, path), _field(kind, path, data)
     if not info or not isinstance(value, str):
         return ""
@@ -167,7 +176,7 @@ def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
 
 
 def _of_file(info: FieldInfo) -> list[str]:
-    """Return, from the structures of a field, the keys whose values are names of files."""
+    """Return the keys in the structures of a field whose values are names of files."""
     inner = [entry for one in fields.structures(info) for entry in one.model_fields.items()]
     named = (DataFile, NamedByFile)
     return [
@@ -203,7 +212,7 @@ def _wanted(details: ErrorDetails, path: Path, kind: type[BaseModel], data: Any)
 
 
 def _kinds(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return ``a mapping with shape: 'cone' or 'plane'`` for a parameter that has several structures."""
+    """Return the kinds of mappings that a parameter accepts, such as ``a mapping with shape: 'cone' or 'plane'``."""
     info = _field(kind, path, data)
     structures = fields.structures(info) if info else ()
     keys = [(key, value) for one in structures for key, value in fields.fixed(one).items()]
@@ -230,13 +239,16 @@ def _missing(path: Path, kind: type[BaseModel], data: Any) -> str:
 
 
 def _quantity(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return the name of a quantity with a usual value; empty for a field without a unit."""
+    """Return a description of a quantity that contains a usual value. The text is empty for a field without a unit."""
     info, unit = _field(kind, path, data), fields.unit_at(kind, path, data)
     return expected(unit, "".join(fields.usual(info)[:1])) if info and unit else ""
 
 
 def _unknown(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return the message about an unknown key: its new name if it was renamed, otherwise the nearest known key."""
+    """Return the message about an unknown key.
+
+    The message gives the new name if the key was renamed, and otherwise the known key that is most similar.
+    """
     around = _structure_around(path, kind, data)
     instead = getattr(around, "renamed", {}).get(path[-1])
     if instead:

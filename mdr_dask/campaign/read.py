@@ -24,8 +24,8 @@ from mdr_dask.units import to_si
 def load(path: str | FilePath) -> Campaign:
     """Read a campaign file. Names of files in it are relative to its folder.
 
-    If the file has problems, raise CampaignError with all of them by line: ``force.yaml:12:12: parameters.hurst:
-    expected a number of at most 1, got 1.2``.
+    If the file has problems, raise CampaignError. The error lists all problems, sorted by line, such as
+    ``force.yaml:12:12: parameters.hurst: expected a number of at most 1, got 1.2``.
     """
     return loads(read_text(path), str(path), str(FilePath(path).parent))
 
@@ -34,7 +34,7 @@ def loads(text: str, source: str, directory: str) -> Campaign:
     """Read a campaign from its text (YAML 1.2).
 
     `source` is the name of the campaign file in messages, and `directory` the folder to which the names of files in the
-    campaign are relative. If the text has problems, raise CampaignError with all of them by line.
+    campaign are relative. If the text has problems, raise CampaignError. The error lists all problems, sorted by line.
     """
     document = parse(text, source)
     if not isinstance(document.data, dict):
@@ -81,7 +81,10 @@ def loads(text: str, source: str, directory: str) -> Campaign:
 
 
 def _spec(document: Document, directory: str) -> tuple[CampaignSpec, set[str]]:
-    """Return the checked keys, in which wrong keys have default values, and the names of the wrong keys."""
+    """Return the checked keys and the names of the wrong keys.
+
+    Among the checked keys, each wrong key has its default value.
+    """
     wrong: set[str] = set()
 
     def report(path: Path, what: str, key: bool) -> None:

@@ -24,7 +24,7 @@ _NOT_A_HEADING = "expected the name of a parameter, perhaps with a unit in brack
 
 
 def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Variation, ...]:
-    """Return the varied parameters with the values of a design: one value of each for every point of the design.
+    """Return the varied parameters with their values. Every parameter has one value for each point of the design.
 
     The values are drawn from the intervals of the parameters, and `seed` makes the drawing repeatable. A longer Sobol
     sequence begins with the points of a shorter one.
@@ -51,7 +51,8 @@ def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Va
 def _exchanged(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return the points of the design of Saltelli from pairs of points a and b.
 
-    For each pair these are a, b, and for every input a copy of a in which this input is taken from b.
+    Each pair gives the points a and b, and one further point for every input: a copy of a in which this input has its
+    value from b.
     """
     import numpy as np
 
@@ -77,9 +78,9 @@ def tabled(
     Return None if there is a problem.
 
     `name` is the name of the file, relative to `directory`, and `origin` the position of this name in the campaign.
-    `data` are the values of the other parameters as read from the campaign file. Problems of the table, such as
-    misspelt columns, wrong units and missing cells, are added to `problems`. A sentence that names the ignored columns
-    is added to `remarks`.
+    `data` are the values of all parameters that are not in the table, as read from the campaign file. Problems of the
+    table, such as misspelt columns, wrong units and missing cells, are added to `problems`. A sentence that names the
+    ignored columns is added to `remarks`.
     """
     path = Path(directory, name)
     try:
@@ -114,7 +115,7 @@ def tabled(
 
 
 def _is_unused(heading: str, entries: Iterable[str], parameters: type[Parameters]) -> bool:
-    """Return whether a column is ignored, which is the case if its heading does not name a parameter.
+    """Return whether a column is ignored. It is ignored if its heading does not name a parameter.
 
     A column of numbers whose heading is similar to the name of a parameter is not ignored, but counts as a misspelt
     parameter.

@@ -26,7 +26,7 @@ def tolerances(
     model: Model[Any],
     outputs: Sequence[str],
 ) -> dict[str, Tolerance]:
-    """Return the tolerance of every output named at a path of a document, in SI.
+    """Return the tolerance, in SI, of every output that is named at a path of a document.
 
     `given` are the tolerances as written, by output, and `outputs` the outputs of the campaign. Unknown names and wrong
     tolerances are reported.
@@ -51,7 +51,10 @@ def is_of_fit(name: str, model: Model[Any]) -> bool:
 
 
 def answers(document: Document, path: Path, given: Mapping[str, Written]) -> dict[str, Tolerance]:
-    """Return the tolerances of fitted constants by ``fit.constant``; a number with ``%`` is relative."""
+    """Return the tolerances of fitted constants, indexed by names of the form ``fit.constant``.
+
+    A tolerance with ``%`` is relative to the constant. A number without ``%`` is absolute.
+    """
     found = {}
     for name, written in given.items():
         constant = name if "." in name else f"{name}.{name}"

@@ -27,7 +27,10 @@ DECADE = 10.0
 
 @dataclass(frozen=True)
 class Origin:
-    """The place where a value is written, for messages: name of its key, position, and path if it has one."""
+    """The place where a value is written, for messages: the name of the key, the position in the file, and the path.
+
+    Values from a table have no path.
+    """
 
     name: str
     place: Place
@@ -47,7 +50,10 @@ class Item(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The text of the value in the file; for an inner value of a range, the number."""
+        """The text of the value as written in the file.
+
+        A value that was computed from a range has no such text; its number is used.
+        """
         return self.written or f"{self.value:g}"
 
 
@@ -55,7 +61,7 @@ class Item(NamedTuple):
 class Variation:
     """A varied parameter: its path in the parameters, and its values or the interval from which they are drawn.
 
-    An adaptive axis has both values and an interval; for such an axis, `written` is the path of its entry in the
+    An adaptive axis has both values and an interval. For an adaptive axis, `written` is the path of the axis in the
     document.
     """
 
@@ -66,7 +72,7 @@ class Variation:
     written: Path = ()
 
     def drawn(self, shares: Any) -> Variation:
-        """Return this variation with values at the given fractions (0 to 1) of its interval."""
+        """Return this variation with new values, which lie at the given fractions (0 to 1) of its interval."""
         assert self.spread is not None
         return replace(self, items=tuple(Item(value, self.origin) for value in self.spread.at(shares)))
 
@@ -81,8 +87,8 @@ def find(
     """Return the varied parameters, in the order of the data, and report wrong ranges and empty lists.
 
     `data` are the values of the parameters as read from the file, and `paths` their paths in the document. If `drawn`
-    is true, values will be drawn from the ranges, so a range is written without a number of values. If a parameter has
-    a problem, its variation has neither values nor an interval.
+    is true, values will be drawn from the ranges, so the user writes a range without the number of values. If a
+    parameter has a problem, its variation has neither values nor an interval.
     """
     search = _Search(document, parameters, data, drawn)
     return tuple(found for name, value in data.items() for found in search.below((name,), value, paths[name]))

@@ -40,10 +40,10 @@ def questions(
     paths: Mapping[str, Path],
     units: Mapping[str, str],
 ) -> Iterator[str]:
-    """Yield a question for each parameter with a number without a unit that may not be meant in SI.
+    """Yield a question for each parameter that has a number without a unit, if this number may not be meant in SI.
 
     `data` are the values of the parameters as read from the file, and `paths` their paths in the document. `units`
-    contains the units of the parameters whose unit differs from the declared one, as in a dimensionless campaign.
+    contains only parameters whose unit is not the declared unit, as in a dimensionless campaign.
     """
     asked: set[Path] = set()
     for name, given in data.items():

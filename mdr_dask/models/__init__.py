@@ -1,7 +1,7 @@
 """Find a model by its name; a model is imported only when a campaign names it.
 
-Models come from three sources: this package (`NAMES`), other installed packages, which declare models in the entry
-point group `GROUP`, and modules of the user, written as ``package.module:NAME``.
+Models come from three sources. The models of this package are listed in `NAMES`. Other installed packages declare
+models in the entry point group `GROUP`. A model in a module of the user is named ``package.module:NAME``.
 """
 
 from __future__ import annotations
@@ -111,7 +111,8 @@ def _own(name: str, entry: EntryPoint, module: str) -> Model[Any]:
 def _guarded(model: str, what: str, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """Add checks to a function of a user's model.
 
-    An exception in the function, or an estimate that is not a number, becomes a ModelError.
+    If the function raises an exception, raise ModelError. The functions `operations` and `memory` must also return a
+    finite number that is not negative.
     """
 
     def call(argument: Any) -> Any:

@@ -38,21 +38,21 @@ def unquoted(value: Any) -> Any:
 
 
 class Parameters(BaseModel):
-    """Base of every parameter set, with numbers in SI units and checked bounds.
+    """Base class of every parameter set. The numbers are in SI units, and their bounds are checked.
 
     A parameter set cannot be changed, and unknown keys are errors.
 
     A subclass may declare more about its parameters:
 
-    * `renamed`: names that parameters and outputs had in earlier versions, each with a text that says what to write
-    now.
+    * `renamed`: earlier names of parameters and outputs, each with a text that says what to write now.
     * `alternatives`: groups of alternatives; a user gives exactly one member of each group. A member is a tuple of
     parameters that are given together; in the path of a nested parameter, a dot separates the names.
-    * `overrides`: parameters that replace another parameter, each with the name of the replaced parameter.
+    * `overrides`: parameters that replace another parameter. Each is listed with the name of the parameter that it
+    replaces.
     * `settings`: parameters of the numerical solution, such as its resolution or the stored points. These parameters do
     not change the physical problem.
     * `requires`: parameters that have an effect only if another parameter has a certain value. Each of these parameters
-    is listed with the name and the value of the other one.
+    is listed with the name and the value of the other parameter.
     """
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
@@ -94,7 +94,7 @@ def _may_be_whole(annotation: Any) -> bool:
 
 
 def describe(group: Alternatives) -> str:
-    """Return a group of alternatives as text: ``length with rms_roughness, or profile``."""
+    """Return a group of alternatives as text, such as ``length with rms_roughness, or profile``."""
     return ", or ".join(f"{first} with {', '.join(others)}" if others else first for first, *others in group)
 
 
@@ -224,14 +224,15 @@ class Output:
     comment : str
         A limitation of the output, stored as its attribute ``comment``.
     scatter : str
-        Name of another output: the standard error of this output, estimated from a single realisation. This standard
-        error is stored together with the errors.
+        Name of another output that is the standard error of this output, estimated from a single realisation. If errors
+        are stored, this other output is stored, too.
     floor : float
-        A value in `unit`, for outputs that can normally be zero. If the output is smaller than `floor`, its error is
-        relative to `floor`. An accuracy a allows the error ``a * max(abs(value), floor)``.
+        A value in the unit of the output, for outputs that can be zero in ordinary cases. If the output is smaller than
+        `floor`, the relative error is the error divided by `floor`. An accuracy a thus allows an error up to a times
+        the larger of `abs(value)` and `floor`.
     allow_nan : bool
-        Whether NaN and infinity are normal values. If NaN and infinity are not normal, a case of a user's own model
-        that gives them counts as failed.
+        Whether the output may be NaN or infinite. Otherwise, a case of a user's own model has failed if the output is
+        NaN or infinite.
     """
 
     name: str
@@ -261,8 +262,8 @@ class Number:
     name, meaning : str
         Name of the number, and its meaning in one line.
     formula : str
-        A formula for `mdr_dask.questions.expression`. The formula may contain parameters (names of nested ones joined
-        by ``_``), outputs and other numbers.
+        A formula for `mdr_dask.questions.expression`. The formula may contain outputs, other numbers and parameters;
+        the name of a nested parameter is its path, joined by ``_``.
     """
 
     name: str
@@ -286,8 +287,8 @@ class Block(Generic[P]):
     Parameters
     ----------
     parameters : Parameters
-        The fixed parameters. For a varied parameter, this set has the value of an arbitrary case; use `column` for the
-        values of all cases.
+        The fixed parameters. Do not use the values that this set has for varied parameters: these are the values of an
+        arbitrary case. The method `column` gives the values of all cases.
     columns : mapping of str to array, shape (cases,)
         The varied parameters by dotted path (such as ``velocity`` or ``indenter.angle``), with one value for each case
         in SI units.
@@ -356,7 +357,8 @@ class Result:
     status : int8 array, shape (cases, realisations)
         Values of `Status`.
     messages : dict of (case, realisation position) to str
-        For a failed result, the reason for the failure; for other results, warnings.
+        Messages by case and position of the realisation. The message of a failed result is the reason for the failure.
+        The messages of other results are warnings.
     solves : int
         Number of solutions computed; several cases may share one solution.
     """
@@ -393,9 +395,9 @@ class Model(Generic[P]):
         A pure function. The value of a case depends on its parameters, the seed and its realisation, but not on the
         other cases of the block. The function does not raise an exception for a case that fails.
     operations : callable, Block -> float, optional
-        Approximate number of floating-point operations of `compute` for a block, from which the sizes of blocks follow.
-        The function must be fast; it should use array operations over the cases. Without this function, a study with n
-        results is divided into about sqrt(n) blocks.
+        Approximate number of floating-point operations of `compute` for a block. The sizes of blocks are chosen from
+        this number. The function must be fast; it should use array operations over the cases. Without this function, a
+        study with n results is divided into about sqrt(n) blocks.
     whole : tuple of str
         Parameters whose axes are not divided among blocks, because cases along these axes share work. If a block
         becomes too large, the axis of the last parameter in this list is divided first.
@@ -432,7 +434,10 @@ class Model(Generic[P]):
 
     @property
     def companions(self) -> dict[str, Output]:
-        """The companions that hold errors, by the names of their outputs."""
+        """The companions, which hold the errors.
+
+        The keys are the names of the outputs to which the companions belong.
+        """
         return {output.name: output.error for output in self.outputs if output.has_error}
 
     def output(self, name: str) -> Output:
@@ -440,9 +445,10 @@ class Model(Generic[P]):
         return {output.name: output for output in (*self.outputs, *self.companions.values())}[name]
 
     def with_companions(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Return the given names of outputs, and the names of their standard errors (`Output.scatter`).
+        """Return the given names of outputs, and the names of their standard errors and companions.
 
-        If an output has a companion, the name of the companion follows the name of the output.
+        The standard error of an output is another output, which `Output.scatter` names. If an output has a companion,
+        the name of the companion follows the name of the output.
         """
         companions = self.companions
         asked = {*names, *(self.output(name).scatter for name in names)}

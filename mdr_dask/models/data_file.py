@@ -14,14 +14,14 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.tables import decoded, described
 
-#: Size in bytes from which a file gets no note about its columns.
+#: Size limit in bytes. Larger files get no note about their columns.
 LARGEST_TABLE = 10**7
 
 
 class DataFile(BaseModel):
-    """A file that a campaign names, with the SHA-256 digest of its content when the campaign was read.
+    """A file that is named in a campaign. The SHA-256 digest of its content is computed when the campaign is read.
 
-    The content can be read only as long as it still has this digest.
+    If the content changes later, it cannot be read any more.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -60,12 +60,15 @@ class DataFile(BaseModel):
             raise DataError(f"{self.name}: {problem}") from None
 
     def notes(self) -> tuple[str, ...]:
-        """Return a note with the columns of a table and their ranges. For other files, return no note."""
+        """Return a note on a table: its columns and the range of each column. For other files, return no note."""
         return _notes_of_file(self) if Path(self.path).stat().st_size < LARGEST_TABLE else ()
 
 
 def check_in_campaign(info: ValidationInfo, check: Callable[[], object]) -> None:
-    """If a campaign is being read, call a function; convert its DataError to the ValueError that pydantic expects."""
+    """Call the function `check` if a campaign is being read.
+
+    If the function raises DataError, raise ValueError instead, as pydantic expects.
+    """
     if info.context is not None:
         try:
             check()

@@ -9,9 +9,9 @@ from mdr_dask.models.data_file import DataFile
 
 
 def numbers_of(parameters: BaseModel, prefix: str = "") -> dict[str, tuple[float, str, str]]:
-    """Return value, unit and meaning of each parameter that is a number and has an effect on the result.
+    """Return value, unit and meaning of each parameter that is a number and that no other parameter overrides.
 
-    The name of a nested parameter is its path, joined by ``_``: ``indenter_angle``.
+    The name of a nested parameter is its path, joined by ``_``, such as ``indenter_angle``.
     """
     found: dict[str, tuple[float, str, str]] = {}
     idle = parameters.inactive if isinstance(parameters, Parameters) else {}

@@ -36,17 +36,17 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
     Parameters
     ----------
     solve : callable, (parameters, random generator) -> mapping of output to number or array
-        Receives the parameters of one case in SI units, and the random generator of a realisation. All cases of a
-        realisation get the same random numbers. Returns every output of the model by name. If an output has an error,
-        the error is returned as ``<output>_error``. A case has failed if `solve` raises any exception, even SystemExit,
-        or if an error is negative. A case has also failed if an output is missing, is not a real number or an array of
-        real numbers, is not finite (unless declared with ``allow_nan=True``), or has a shape other than the declared
-        one.
+        The function receives the parameters of one case in SI units, and the random generator of a realisation. All
+        cases of a realisation get the same random numbers. The function returns a mapping from the name of each output
+        to its value. If an output has an error, the error is returned as ``<output>_error``. A case has failed if
+        `solve` raises any exception, even SystemExit, or if an error is negative. A case has also failed if an output
+        is missing, is not a real number or an array of real numbers, is not finite (unless declared with
+        ``allow_nan=True``), or has a shape other than the declared one.
 
     Notes
     -----
-    If the outputs of two cases differ in shape, the returned function raises an exception. The runner then computes the
-    cases one by one and compares the shapes of each case with the declared shapes.
+    If an output has different shapes in two cases, the returned function raises an exception. The runner then computes
+    the cases one by one and compares the shapes of each case with the declared shapes.
     """
 
     def compute(block: Block[Any]) -> Result:
@@ -110,10 +110,12 @@ def reason(error: BaseException) -> str:
 
 
 def where(error: BaseException) -> str:
-    """Return the file and line of the user's function in which an exception was raised, in parentheses after a space.
+    """Return the file and line of the user's function in which an exception was raised.
 
-    If the exception was raised in another file, this is the line of the user's file that led to it. If the exception
-    was raised in this package, for example because of an invalid output, the text is empty.
+    The text is in parentheses after a space, such as ``(model.py:12)``.
+
+    If the exception was raised in another file, the text names the line of the user's file that called the other file.
+    If the exception was raised in this package, for example because of an invalid output, the text is empty.
     """
     frames = [(frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)]
     others = [(file, line) for file, line in frames if not file.startswith(PACKAGE)]
@@ -160,7 +162,7 @@ def _is_real(item: Any) -> bool:
 def _gathered(
     name: str, found: Mapping[tuple[int, int], Mapping[str, NDArray[np.float64]]], shape: tuple[int, int]
 ) -> NDArray[np.float64]:
-    """Return one output of all cases; NaN where a case failed."""
+    """Return one output for all cases. The output of a failed case is NaN."""
     arrays = {place: outputs[name] for place, outputs in found.items()}
     extra = {array.shape for array in arrays.values()} or {()}
     if len(extra) > 1:

@@ -17,8 +17,8 @@ STEEL = 210e9 / (2 * (1 - 0.3**2))
 #: Relative error of the film thickness that is allowed if the campaign states no accuracy.
 ACCURACY = 1e-3
 
-#: Each dimensionless number, the quantity with a unit that can replace it, and the further parameters that are needed
-#: to compute the number from this quantity.
+#: Each row contains a dimensionless number, the quantity with a unit that can replace the number, and the further
+#: parameters that are needed to compute the number from this quantity.
 _PAIRS = (
     ("load_parameter", "line_load", ("radius",)),
     ("speed_parameter", "mean_velocity", ("radius", "viscosity")),
@@ -115,7 +115,10 @@ class EhlLineParameters(Parameters):
 
     @model_validator(mode="after")
     def _one_of_each_pair(self) -> Self:
-        """Require exactly one parameter of each pair, and the further parameters that a dimensional quantity needs."""
+        """Raise ValueError unless exactly one parameter of each pair is given.
+
+        If this is the quantity with a unit, the further parameters that it needs must be given, too.
+        """
         for number, dimensional, companions in _PAIRS:
             given = [name for name in (number, dimensional) if getattr(self, name) is not None]
             if len(given) != 1:
@@ -206,8 +209,8 @@ distinct = deferred("mdr_dask.models.ehl_line.solve", "distinct")
 def operations(block: Block[EhlLineParameters]) -> float:
     """Return the approximate number of operations of `compute`.
 
-    A solution with the default accuracy needs about 6 million operations. An accurate pressure spike requires the
-    finest grid, which needs 1.5 billion operations.
+    A solution with the default accuracy needs about 6 million operations. If the pressure or its spike is requested
+    with an accuracy, the finest grid is needed. A solution on the finest grid needs 1.5 billion operations.
     """
     accuracy = block.accuracy or ACCURACY
     is_sharp = block.accuracy is not None and {"pressure", "spike_pressure", "spike_position"} & set(block.outputs)

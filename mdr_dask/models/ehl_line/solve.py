@@ -28,8 +28,8 @@ from mdr_dask.physics.lubrication.line_contact import (
 )
 from mdr_dask.physics.outcome import Outcome
 
-#: Outputs that are positions, in half widths of the contact. Their errors are relative to one half width, or to the
-#: position itself if it is larger.
+#: Outputs that are positions, in half widths of the contact. The relative error of a position is the error divided by
+#: one half width, or by the position if the position is larger.
 _POSITIONS = {"minimum_position", "rupture_position", "spike_position"}
 
 
@@ -43,7 +43,7 @@ def _groups(block: Block[EhlLineParameters]) -> Groups:
 
 
 def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
-    """Return the dimensionless form of every case; cases with equal dimensionless forms share a solution."""
+    """Return the dimensionless problem of every case; cases with equal dimensionless problems share a solution."""
     names = ("contact_modulus", "viscosity_law", "viscosity", "compressible", "inlet")
     columns = zip(*(block.column(name).tolist() for name in names), strict=True)
     return [
@@ -57,7 +57,7 @@ def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
 
 
 def _readings(case: EhlLineParameters, W: float, contact: LineContact) -> dict[str, Reading]:
-    """Return, for each output, a function that evaluates it from the solution on one grid.
+    """Return a function for each output. The function evaluates the output from the solution on one grid.
 
     Positions are in half widths a, film thicknesses in a^2/R, and pressures in units of Hertz' maximum pressure.
     """
@@ -108,7 +108,7 @@ def _estimates(
 
 
 def compute(block: Block[EhlLineParameters]) -> Result:
-    """Solve the cases of a block; equal cases are solved once, and all realisations of a case have the same result."""
+    """Solve the cases of a block. Equal cases are solved only once. All realisations of a case have the same result."""
     parameters = _groups(block)
     given = {
         "formula_central_film": PAN_HAMROCK_CENTRAL(*parameters),
@@ -160,7 +160,7 @@ def compute(block: Block[EhlLineParameters]) -> Result:
 
 
 def _warnings(block: Block[EhlLineParameters], index: int, parameters: list[float]) -> list[str]:
-    """Return the warnings of one case about the requested outputs."""
+    """Return warnings about the requested outputs of one case."""
     notes = []
     if {"formula_central_film", "formula_minimum_film"} & set(block.outputs):
         notes.append(PAN_HAMROCK_CENTRAL.outside(*parameters))

@@ -73,7 +73,8 @@ def profile_columns(file: NamedFile) -> tuple[FloatArray, FloatArray]:
 
 
 Indenter = Annotated[Parabola | Cone | Power | RoundedCone | Table, Field(discriminator="shape")]
-#: Bodies that are not power laws; for these, each indentation depth needs its own one-dimensional image.
+#: Bodies whose height is not a power of the radius. For these bodies, each indentation depth needs its own
+#: one-dimensional image.
 Pressed = RoundedCone | Table
 
 #: The parameter that gives the size of a body in a dimensional campaign.
@@ -94,7 +95,7 @@ _OSCILLATION = ("effective_shear_modulus", "friction", "amplitude")
 
 
 class FrettingWear(Parameters):
-    """Parameters of fretting wear; if a `path` is given, they describe sliding wear.
+    """Parameters of fretting wear, or of sliding wear if a `path` is given.
 
     A campaign without moduli is dimensionless.
     """
@@ -176,7 +177,10 @@ class FrettingWear(Parameters):
 
     @property
     def dimensionless(self) -> bool:
-        """Whether the campaign is dimensionless, with lengths in units of a0, heights in units of d0, and so on."""
+        """Whether the campaign is dimensionless.
+
+        Its lengths are then in units of a0, its heights in units of d0, and so on.
+        """
         return self.stick_radius is not None or (self.path is not None and self.contact_modulus is None)
 
     @model_validator(mode="after")
@@ -214,7 +218,7 @@ class FrettingWear(Parameters):
     @model_validator(mode="after")
     def _history(self) -> FrettingWear:
         if self.history and self.wear_rule != "exact":
-            raise ValueError(f"expected wear_rule exact for a history, got {self.wear_rule!r}")
+            raise ValueError(f"expected wear_rule: exact, because a history is given, got {self.wear_rule!r}")
         for other, name in self.inactive.items():
             if getattr(self, other) != type(self).model_fields[other].default:
                 raise ValueError(f"{name} replaces {other}: leave out one or the other")
@@ -301,7 +305,10 @@ def coordinates(parameters: FrettingWear) -> dict[str, Coordinate]:
 
 
 def units(parameters: FrettingWear) -> dict[str, str]:
-    """Return the units of a dimensionless campaign, in which every output and the path are pure numbers."""
+    """Return the units that differ from the declared units.
+
+    In a dimensionless campaign, every output and the path have the unit 1. In other campaigns, no unit differs.
+    """
     return {"path": "1"} | {output.name: "1" for output in OUTPUTS} if parameters.dimensionless else {}
 
 

@@ -23,17 +23,18 @@ from mdr_dask.models.parts.indenter import RoundedCone
 if TYPE_CHECKING:
     from mdr_dask.physics.mdr.revolution import TableProfile
 
-#: Units of length, height and force must lie between LEAST and 1 / LEAST; their cubes then do not overflow.
+#: The units of length, height and force of a case must lie between LEAST and 1 / LEAST. The cubes of these units then
+#: do not overflow.
 LEAST = 1e-60
 MOST_CYCLES = 1e12  # largest N; wear has ended long before this N
 
 
 @dataclass(frozen=True)
 class Numbers:
-    """The input of the physics for every case and realisation, and the units of the cases; shape (cases, realisations).
+    """The dimensionless numbers and the units of every case in every realisation; shape (cases, realisations).
 
-    `level` is g_c = 1 - eta, the value of the image at the stick border. `advance` is the factor that converts cycles
-    to N.
+    `level` is g_c = 1 - eta, the value of the one-dimensional image at the stick border. The number of cycles times
+    `advance` is the dimensionless number N.
     """
 
     exponent: FloatArray
@@ -47,10 +48,10 @@ class Numbers:
 
 
 def indenters(block: Block[FrettingWear]) -> list[Indenter]:
-    """Return the indenter of every case, or only one.
+    """Return a list of indenters: one for every case, or a single one for all cases.
 
-    Only one indenter is returned if all indenters are equal, or are power laws of the same shape that differ only in
-    their numbers.
+    A single indenter is enough if all indenters are equal. It is also enough if all are power laws of the same shape,
+    such as cones with different angles.
     """
     if isinstance(block.parameters.indenter, Pressed) and any(path.startswith("indenter") for path in block.columns):
         return [block.case(case).indenter for case in range(block.cases)]
@@ -58,7 +59,7 @@ def indenters(block: Block[FrettingWear]) -> list[Indenter]:
 
 
 def _power_laws(block: Block[FrettingWear]) -> tuple[FloatArray, FloatArray]:
-    """Return coefficient and exponent of the body of every case; NaN if they are not given."""
+    """Return coefficient and exponent of the body of every case; NaN for a body without these numbers."""
     none = np.nan, np.nan
     coefficient, exponent = np.array(
         [none if isinstance(one, Pressed) else one.power_law() for one in indenters(block)]
@@ -74,12 +75,12 @@ def _power_laws(block: Block[FrettingWear]) -> tuple[FloatArray, FloatArray]:
 
 
 def has_tables(block: Block[FrettingWear]) -> bool:
-    """Return whether any indenter is not a power law."""
+    """Return whether the block has an indenter that is not a power law."""
     return any(isinstance(one, Pressed) for one in indenters(block))
 
 
 def _column(block: Block[FrettingWear], name: str) -> FloatArray:
-    """Return the value of a parameter for every case, NaN if it is not given."""
+    """Return the value of a parameter for every case; NaN for a case in which the parameter is not given."""
     if name not in block.columns:
         value = getattr(block.parameters, name)
         return np.full(block.cases, np.nan if value is None else float(value))
@@ -103,7 +104,9 @@ def _factor(block: Block[FrettingWear], name: str, normal: FloatArray) -> FloatA
 
 
 def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str]]:
-    """Return n, g_c, N and the units a0, d0, E* d0 a0 of every case, and messages about cases that cannot be solved.
+    """Return the dimensionless numbers and the units of every case, and messages about cases that cannot be solved.
+
+    The numbers are n, g_c and N. The units are a0, d0 and E* d0 a0.
 
     For sliding wear, g_c is 0 and N is the dimensionless path s.
     """
@@ -157,7 +160,10 @@ def _first_contact(
     modulus: FloatArray,
     messages: dict[tuple[int, int], str],
 ) -> tuple[FloatArray, FloatArray]:
-    """Return contact radius a0 and depth d0 of the cases; add a message if the table of a body ends before a0."""
+    """Return contact radius a0 and depth d0 of every case.
+
+    Add a message if a body is known only up to a radius below a0.
+    """
     from mdr_dask.physics.mdr import power_law_contact as contact
 
     depth, force = _column(block, "depth"), _column(block, "normal_force")
@@ -176,7 +182,7 @@ def _first_contact(
 
 
 def table_profile(indenter: Indenter, depth: float) -> TableProfile:
-    """Return the contact before wear of a body that is not a power law, at an indentation depth."""
+    """Return the contact before wear at an indentation depth, for a body that is not a power law."""
     if not isinstance(indenter, Pressed):
         raise ValueError("power laws and other profiles cannot be mixed along one axis")
     return _pressed_table(indenter.file, depth) if isinstance(indenter, Table) else _pressed_body(indenter, depth)
@@ -211,7 +217,10 @@ def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: di
 
 
 def notes(sets: Sequence[FrettingWear]) -> tuple[str, ...]:
-    """Return a note if cases of a study will fail, judged by their parameters without random scatter."""
+    """Return a note if cases of a study will fail.
+
+    The cases are judged without random scatter of friction, amplitude and wear coefficient.
+    """
     texts: list[str] = []
     for parameters in sets:
         scatter = dict.fromkeys(("friction_scatter", "amplitude_scatter", "wear_coefficient_scatter"), 0.0)

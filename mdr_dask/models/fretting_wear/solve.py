@@ -1,6 +1,7 @@
 """Solution of a block of fretting wear.
 
-Each different combination of body, stick radius and wear rule is solved once for all numbers of cycles.
+With the exact rule and no load history, one solution for each combination of body and stick radius gives the results
+at all numbers of cycles.
 """
 
 from __future__ import annotations
@@ -29,13 +30,13 @@ from mdr_dask.physics.wear.exact import COARSEST_OF_MOVING, exact
 from mdr_dask.physics.wear.history import LoadBlock, history
 from mdr_dask.physics.wear.worn import Worn, virgin_load
 
-#: Outputs that have a closed form; the closed forms are computed for many cases at once.
+#: Outputs that can be computed in closed form, for many cases at once.
 _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border")
-#: Names of outputs, each with the name of the same quantity in `Worn`, if the two names differ. The output cannot be
+#: Outputs whose quantity has another name in `Worn`, each with that other name. The output `contact_force` cannot be
 #: called `normal_force`, because a parameter already has this name.
 _RENAMED = {"contact_force": "normal_force"}
-#: Requested error of the profile, divided by eta d0, when the evolution is solved. It is `_USUAL` if the campaign
-#: states no accuracy, and never below `_FINEST`.
+#: Requested error of the profile, divided by eta d0, in a solution of the evolution. The requested error is `_USUAL` if
+#: the campaign states no accuracy, and never below `_FINEST`.
 _USUAL, _FINEST = 1e-3, 1e-5
 #: If the campaign states an accuracy, the first solution requests the error `_FIRST` times the accuracy. If an output
 #: then misses the accuracy, the next solution requests `_FINER` times this error.
@@ -109,7 +110,10 @@ def operations(block: Block[FrettingWear]) -> float:
 
 
 def _followed(hold: str, accuracy: float) -> float:
-    """Return the number of operations to solve one evolution with its errors, without its evaluation at each N."""
+    """Return the number of operations to solve one evolution and its errors.
+
+    The evaluation at each N is not included.
+    """
     if hold == "force":
         return 9e7 * float(max(COARSEST_OF_MOVING / accuracy, 1.0) ** 1.1)
     return 1.2e7 * float((_USUAL / accuracy) ** 0.6)
@@ -126,7 +130,7 @@ def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int],
 
 
 def _plain_name(name: str) -> tuple[str, bool]:
-    """Return the attribute of `Worn` that holds an output, and whether the output is the error of this attribute."""
+    """Return the name of the quantity of `Worn` that an output contains, and whether the output is its error."""
     owners = {companion.name: owner for owner, companion in MODEL.companions.items()}
     plain = owners.get(name, name).removeprefix("block_")
     return _RENAMED.get(plain, plain), name in owners
@@ -159,8 +163,8 @@ def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
 def _is_plain(block: Block[FrettingWear]) -> bool:
     """Return whether closed forms are sufficient for a block.
 
-    Closed forms are sufficient if the body is a power law, the depth is constant without a history, the limiting
-    profile or the fast rule is requested, and all outputs are single numbers.
+    Closed forms are sufficient if four conditions hold: every body is a power law; the depth is constant and there is
+    no history; only the limiting profile or the fast rule is requested; and every output has a closed form.
     """
     simple = set(block.columns.get("wear_rule", [block.parameters.wear_rule])) <= {"limit", "fast"}
     depth = set(block.columns.get("hold", [block.parameters.hold])) == {"depth"}
@@ -197,7 +201,7 @@ def _solve_plain(
 
 
 def _distinct(rows: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Return the different columns of an array, and for every column its index among the different ones."""
+    """Return the different columns of an array, and for every column its index among the different columns."""
     if rows.shape[1] == 0:
         return rows, np.zeros(0, dtype=np.intp)
     order = np.lexsort(rows)
@@ -219,7 +223,10 @@ def _solve_each(
     status: NDArray[np.int8],
     messages: dict[tuple[int, int], str],
 ) -> int:
-    """Solve the tasks one after another, each for all its numbers of cycles; return the number of solutions."""
+    """Solve the tasks one after another; return the number of solutions.
+
+    Each task is solved for all its numbers of cycles.
+    """
     solves = 0
     for task, wanted in _tasks(block, numbers, status).items():
         places = np.linspace(0.0, task.extent, block.parameters.points)
@@ -255,7 +262,7 @@ def _answer(records: Sequence[Worn], name: str, places: FloatArray) -> float | F
 
 
 def _cut_off(records: Sequence[Worn], block: Block[FrettingWear], extent: float) -> str:
-    """Return a message if a requested profile ends inside the wear scar, or an empty string."""
+    """Return a message if a requested profile ends inside the wear scar; otherwise return an empty string."""
     widest = max(one.contact_radius for one in records)
     if widest <= extent or not any({"radius", "position"} & {*MODEL.output(name).dims} for name in block.outputs):
         return ""
@@ -266,12 +273,12 @@ def _cut_off(records: Sequence[Worn], block: Block[FrettingWear], extent: float)
 
 
 def _missed(records: Sequence[Worn], block: Block[FrettingWear], places: FloatArray) -> str:
-    """Return a message about the outputs that miss the accuracy, or an empty string if all outputs reach it."""
+    """Return a message about outputs that miss the accuracy; return an empty string if there are no such outputs."""
     if block.accuracy is None:
         return ""
 
     def finite(name: str) -> FloatArray:
-        """Return an output as an array with one row, for the case; infinite values, as at a sharp tip, become NaN."""
+        """Return an output of the case as an array with one row. Infinite values, as at a sharp tip, become NaN."""
         answer = np.asarray(_answer(records, name, places))
         return np.where(np.isfinite(answer), answer, np.nan)[None]
 
@@ -332,14 +339,16 @@ def _task(parameters: FrettingWear, indenter: Indenter, numbers: Numbers, place:
 
 
 def _first_resolution(accuracy: float | None, hold: str) -> float:
-    """Return the error that is allowed in the first solution: the error of the profile, divided by eta d0."""
+    """Return the error of the profile, divided by eta d0, that is allowed in the first solution."""
     return _USUAL if accuracy is None else max(_FIRST[hold] * accuracy, _FINEST)
 
 
 def _contacts(
     task: Task, wanted: Sequence[tuple[float, float]], block: Block[FrettingWear], places: FloatArray
 ) -> list[tuple[Sequence[Worn], str]]:
-    """Solve a task for all its pairs (N, xi); solve pairs whose outputs miss the accuracy again at a finer resolution.
+    """Solve a task for all its pairs (N, xi).
+
+    If the outputs of a pair miss the accuracy, the pair is solved again at a finer resolution.
 
     Return the contacts, each with a message about the outputs that miss the accuracy at the last resolution. The final
     resolution of a result depends only on its own case. Results with the same resolution are solved together.
@@ -360,7 +369,10 @@ def _contacts(
 def _solved(
     task: Task, wanted: Sequence[tuple[float, float]], accuracy: float, *, errors: bool
 ) -> list[Sequence[Worn]]:
-    """Return the contact for every (N, xi), solved with an accuracy; for a history, the contacts after every block."""
+    """Return one sequence of contacts for every pair (N, xi).
+
+    For a history, a sequence has the contact after every block; otherwise it has a single contact.
+    """
     profile, force = task.profile, task.hold == "force"
     if task.blocks:
         return [_loaded(task, profile, errors=errors)] * len(wanted)
@@ -375,7 +387,7 @@ def _solved(
 
 
 def _loaded(task: Task, profile: Profile, *, errors: bool) -> list[Worn]:
-    """Return the contacts after every block of a history."""
+    """Return the contact after each block of a history."""
     first = 2.0 * virgin_load(profile, 1.0)
     blocks = [
         LoadBlock(

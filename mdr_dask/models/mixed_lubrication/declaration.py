@@ -27,7 +27,8 @@ from mdr_dask.physics.lubrication.oil import OILS, Oil
 Positive = Annotated[float, Field(gt=0)]
 #: Contact modulus of steel on steel in Pa, with E = 210 GPa and nu = 0.3 for both bodies.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
-#: Circumference of a roller divided by the shortest wavelength, if neither shortest_wavelength nor points are given.
+#: Number of the shortest waves on the circumference of a roller, if neither `shortest_wavelength` nor `points` is
+#: given.
 WAVES = 100_000
 #: Positions of the profiles, in half widths of the contact.
 POSITIONS = np.linspace(-1.5, 1.5, 1501)
@@ -172,7 +173,9 @@ class MixedLubrication(Parameters):
         return self.roller_radius / 2
 
     def source(self) -> Source:
-        """Return the source of the rough lines: generated, measured, or from the spectra of measured surfaces.
+        """Return the source of the rough lines.
+
+        The lines are generated, or they are measured profiles, or they have the spectra of measured surfaces.
 
         Cases with equal sources share their lines.
         """
@@ -335,7 +338,7 @@ OF_LINES = {
 
 
 def operations(block: Block[MixedLubrication]) -> float:
-    """Return the approximate number of operations of a block, for the two coarsest grids of every case."""
+    """Return the approximate number of operations of a block. Only the two coarsest grids of every case are counted."""
     columns = (block.column(name) for name in ("points", "shortest_wavelength", "roller_radius"))
     points_of = np.empty(block.cases)
     for case, (points, shortest, radius) in enumerate(zip(*columns, strict=True)):

@@ -13,8 +13,8 @@ from mdr_dask.models.parts.surface import Surface, lines_of
 
 #: Largest number of points of a line.
 MOST_POINTS = 10**7
-#: For `points: auto`: number of points per shortest wavelength on the coarsest grid, and how often this number may be
-#: doubled.
+#: With `points: auto`, the coarsest grid has `LEAST_PER_WAVE` points in each shortest wavelength. This number of points
+#: is doubled up to `DOUBLINGS` times.
 LEAST_PER_WAVE, DOUBLINGS = 2.5, 3
 
 
@@ -28,14 +28,15 @@ def points_for(modes: int) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class _Random:
-    """Base of pairs of lines with random phases.
+    """Base class of pairs of rough lines with random phases.
 
     Parameters
     ----------
     points : tuple of int
         Number of points of each grid, from coarse to fine. The lines have the same waves on every grid.
     longest, modes : float, int
-        Circumference of a roller divided by the longest wavelength, and by the shortest wavelength.
+        `longest` is the circumference of a roller divided by the longest wavelength of the roughness; `modes` is the
+        circumference divided by the shortest wavelength.
     """
 
     points: tuple[int, ...]
@@ -47,7 +48,7 @@ class _Random:
         return perimeter
 
     def problem(self, perimeter: float) -> str:
-        """Return the reason why these lines are impossible around a roller, or an empty string."""
+        """Return the reason why a roller cannot have these lines; return an empty string if it can."""
         if self.longest > self.modes:
             longest, shortest = distinguishable(perimeter / self.longest, perimeter / max(self.modes, 1), digits=4)
             return f"expected the longest wavelength above the shortest, got {longest} m and {shortest} m"
@@ -107,7 +108,7 @@ class OfSurfaces(_Random):
     perimeter: float
 
     def combined_rms(self) -> float:
-        """Return the rms height of both lines together in m, averaged over all files."""
+        """Return the combined rms height of both lines in m, as a mean over all files."""
         squares = [np.mean([np.sum(line**2) / 2 for line in lines]) for lines in self._both()]
         return float(np.sqrt(sum(squares)))
 
@@ -134,7 +135,10 @@ class OfSurfaces(_Random):
 
 @dataclass(frozen=True)
 class Measured:
-    """Two measured lines, each closed to a ring; in every realisation, the lines begin at random points."""
+    """Two measured lines.
+
+    The end of each line is joined to its beginning, and every realisation begins at random points.
+    """
 
     file_1: ProfileFile
     file_2: ProfileFile
@@ -158,15 +162,15 @@ class Measured:
         return ""
 
     def combined_rms(self) -> float:
-        """Return the rms height of both lines together, in m or in the unit of scaled lines."""
+        """Return the combined rms height of both lines. It is in m, or a pure number if the lines are scaled."""
         return float(np.sqrt(sum(np.mean(line**2) for line in self._pair())))
 
     def lines(self, seed: int, realisation: int, points: int) -> FloatArray:
         """Return the interpolating splines of both lines, shape (2, points), on all points or on every second point.
 
-        Each line begins at a random point of its ring. In one revolution at the mean velocity, the contact passes 1 +
-        S/2 times the length of line 1 and 1 - S/2 times the length of line 2; S is the slide-roll ratio. Means over
-        realisations are therefore unbiased only if both lines begin at random points.
+        Each line begins at one of its points, which is drawn at random. During one revolution at the mean velocity,
+        with a slide-roll ratio S, the contact travels (1 + S/2) times the length of line 1, and (1 - S/2) times the
+        length of line 2. Means over realisations are therefore unbiased only if both lines begin at random points.
         """
         from mdr_dask.physics.surfaces.splines import through_heights
 
@@ -176,7 +180,10 @@ class Measured:
         return np.array([through_heights(np.roll(line, roll)[:: self.points[-1] // points]) for line, roll in rings])
 
     def _pair(self) -> tuple[FloatArray, FloatArray]:
-        """Return the lines without mean and tilt, because the ends of a ring must meet without a large step."""
+        """Return the lines without mean and tilt.
+
+        Without the tilt, the two ends of a line meet without a large step.
+        """
         from mdr_dask.physics.surfaces.measured import detrended, rms_height
 
         lines = [detrended(line_of(file).height[: self.points[-1]], "line") for file in (self.file_1, self.file_2)]

@@ -67,7 +67,10 @@ class OilData(Parameters):
 
     @property
     def two_viscosities(self) -> tuple[float, float, float, float]:
-        """Two temperatures in K, each followed by the kinematic viscosity in m^2/s, as given or from the table."""
+        """Two temperatures in K, each followed by the kinematic viscosity in m^2/s.
+
+        They are given or computed from the table.
+        """
         if self.viscosities is not None:
             found = _fitted(self.viscosities, self.density, self.density_temperature)
             low, high = float(found.temperature[0]), float(found.temperature[-1])

@@ -31,12 +31,12 @@ class Film(NamedTuple):
 
 @dataclass(frozen=True)
 class Operation:
-    """Contact, film and boundary layer of a case.
+    """The smooth contact, the film and the boundary layer of a case.
 
     `viscosity` is the dynamic viscosity in Pa s, and `alpha` the pressure-viscosity coefficient in 1/Pa. `shared` has
-    the film thickness in m and the load shares, and `film_error` is the relative error of the film thickness. `scale`
-    is the unit of the heights of the lines in m, and `strength` is the strength of the layer for heights in this unit.
-    `width` is the width of the contact in m.
+    the film thickness in m and the load shares, and `film_error` is the relative error of the film thickness. The
+    heights of the lines are in units of `scale`, which is in m. `strength` is the strength of the layer for heights in
+    this unit. `width` is the width of the contact in m.
     """
 
     case: MixedLubrication
@@ -68,12 +68,12 @@ class Operation:
 
     @property
     def squares(self) -> float:
-        """Number of squares across the width of the rollers; the side of a square is the longest wavelength."""
+        """Width of the rollers divided by the longest wavelength, which is the side of an independent square."""
         return self.case.roller_width / self.case.longest()
 
     @property
     def rms(self) -> float:
-        """Rms height of both lines together in m."""
+        """Combined rms height of both lines in m."""
         return self.scale * self.source.combined_rms()
 
 
@@ -123,7 +123,11 @@ def _mean_pressure(case: MixedLubrication) -> float:
 def _shared_load(
     case: MixedLubrication, asperities: Asperities, film_of: tuple[Callable[[float], Film], str], accuracy: float
 ) -> tuple[SharedLoad, float, str]:
-    """Return the film thickness with the load shares, the relative error of the film thickness, and a warning."""
+    """Return the film thickness and the load shares, the relative error of the film thickness, and a warning.
+
+    The warning is empty unless the film is so thin that the asperities would carry more than the load, or the case is
+    outside the range of the film formula.
+    """
     pressure = _mean_pressure(case)
 
     def asperity_share(film: float) -> float:
@@ -144,7 +148,10 @@ def _shared_load(
 def _film_of(
     case: MixedLubrication, viscosity: float, alpha: float, accuracy: float
 ) -> tuple[Callable[[float], Film], str]:
-    """Return a function that computes the film from its load share, and a warning outside the range of the formula."""
+    """Return a function that computes the film from the share of the load that it carries, and a warning.
+
+    The warning says that the case is outside the range of the film formula; otherwise it is empty.
+    """
     E_star, radius = case.contact_modulus, case.radius
     velocity = case.rotation_speed * case.roller_radius
     line_load = case.normal_force / case.roller_width
@@ -190,7 +197,7 @@ def fixed_values(operation: Operation) -> dict[str, float]:
     }
     errors = dict.fromkeys(values, 0.0)
     if error > 0:
-        # error of the asperity load: its change if the film thickness decreases by the error of the film
+        # the error of the asperity load is the change of this load when the film becomes thinner by its own error
         asperities = Asperities(operation.rms, operation.case.longest(), operation.case.contact_modulus)
         loaded = asperities.pressure(film * (1 - error)) / _mean_pressure(operation.case)
         errors = {

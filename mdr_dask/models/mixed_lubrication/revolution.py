@@ -15,10 +15,10 @@ from mdr_dask.physics.lubrication import breakthrough, film_formulas
 from mdr_dask.physics.lubrication.clusters import find_clusters
 from mdr_dask.physics.surfaces.splines import heights
 
-#: Number of parts of a revolution; the scatter between the parts gives the standard error.
+#: Largest number of parts into which a revolution is divided. The scatter between the parts gives the standard error.
 PARTS = 16
-#: In rolling with creep, the distance between windows on the coarsest grid is the window width divided by this number.
-#: Two windows at this distance have nearly the same contact.
+#: In rolling with creep, the distance between neighbouring windows on the coarsest grid is the window width divided by
+#: this number. At this distance, neighbouring windows have nearly the same contact.
 WINDOWS = 4
 
 
@@ -31,12 +31,12 @@ class Revolution:
     Parameters
     ----------
     contact : int array, shape (windows,)
-        Length in intimate contact in each window; the windows follow at equal time steps.
+        Length in intimate contact in each window. The windows are equidistant in time.
     unit : float
         Unit of `contact` in m.
     parts : int
-        Number of equal parts of the revolution, whose scatter gives the standard error. A part is at least two windows
-        long, unless there is only one part.
+        Number of equal parts of the revolution. The scatter between the parts gives the standard error. A part is at
+        least two windows long, unless there is only one part.
     """
 
     contact: NDArray[np.int32] | IntArray
@@ -70,7 +70,8 @@ def revolve(operation: Operation, lines: FloatArray) -> Revolution:
     if creep == 0:
         clusters = find_clusters(lines.sum(axis=0), operation.level, spacing, operation.strength)
         contact: NDArray[np.int32] | IntArray = breakthrough.contact_lengths(clusters, width, case.edge_rule)
-    else:  # finer grids have more windows, so that changes between grids include the error of the window positions
+    else:
+        # finer grids have more windows; the change between two grids thus contains the error of the window positions
         stride = max(1, int(operation.width / operation.length * operation.source.points[0] / WINDOWS))
         contact = _windows(operation, lines, np.arange(0, points, stride))
     parts = max(1, min(PARTS, int(operation.length / (2 * operation.width))))
@@ -78,7 +79,10 @@ def revolve(operation: Operation, lines: FloatArray) -> Revolution:
 
 
 def _windows(operation: Operation, lines: FloatArray, travels: ArrayLike) -> IntArray:
-    """Return the length in intimate contact for each distance that the contact has travelled, in spacings of points."""
+    """Return the length in intimate contact at each of the given positions of the contact.
+
+    A position is the distance that the contact has travelled, in spacings between points.
+    """
     spacing = operation.length / lines.shape[1]
     pair = breakthrough.Pair(lines[0], lines[1], operation.level, spacing, operation.strength)
     starts = breakthrough.creep_positions(travels, lines.shape[1], operation.case.slide_roll_ratio)

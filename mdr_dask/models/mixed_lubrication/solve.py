@@ -18,17 +18,17 @@ from mdr_dask.models.mixed_lubrication.revolution import Revolution, drawn, revo
 from mdr_dask.models.parts.accuracy import missed_accuracy
 from mdr_dask.physics.refine import Solution, refine
 
-#: Film ratio below which overlapping asperities merge into large clusters that do not break the layer.
+#: At lower film ratios, overlapping asperities merge into large clusters that do not break the layer.
 LEAST_FILM_RATIO = 0.5
 #: Outputs that follow from the length in intimate contact, and all outputs that need the rough lines.
 _OF_LENGTH = {"contact_length", "contact_conductance", "contact_resistance", *DRAWN}
 _OF_LINES = {"breakthrough_probability", "revolution_error", *_OF_LENGTH}
-#: Outputs that can be zero, each with a magnitude. If an output is smaller than its magnitude, its error is relative to
-#: the magnitude. The magnitude for the contact length is given in widths of the contact.
+#: Outputs that can be zero, each with a floor. If an output is smaller than its floor, its relative error is the error
+#: divided by the floor. The floor of the contact length is in units of the width of the contact.
 _FLOORS = {"asperity_load_share": 1.0, "breakthrough_probability": 0.1, "contact_length": 0.01}
-#: Order of convergence of probability and length with decreasing spacing of the points; it is a lower bound. The
-#: splines converge faster, but a single cluster may break the layer on one grid and not on the next, and contact may
-#: begin between two windows.
+#: Lower bound of the order at which probability and length converge with decreasing spacing of the points. The splines
+#: converge faster. But a single cluster may break the layer on one grid and not on the next grid, and contact may begin
+#: between two windows.
 _ORDER = 1
 
 
@@ -75,7 +75,7 @@ def compute(block: Block[MixedLubrication]) -> Result:
 def _store(
     result: Result, block: Block[MixedLubrication], index: int, position: int | slice, found: Mapping[str, Any]
 ) -> None:
-    """Write the values that the campaign requests to the result."""
+    """Write the requested values to the result."""
     for name in found.keys() & set(block.outputs):
         result.values[name][index, position] = found[name]
 
@@ -106,7 +106,7 @@ def _realise(
     members: list[tuple[int, Operation]],
     position: int,
 ) -> None:
-    """Compute one realisation of all cases that share lines; each case gets as many points as the accuracy requires."""
+    """Compute one realisation of all cases that share lines. The accuracy determines how many points each case gets."""
     lines = lru_cache(maxsize=1)(partial(source.lines, block.seed, block.realisations[position]))
     found: list[Revolution] = [None] * len(members)  # type: ignore[list-item]
     arrays: list[dict[str, FloatArray]] = [{}] * len(members)

@@ -23,7 +23,7 @@ def missed_accuracy(
     floors: Mapping[str, ArrayLike] | None = None,
     where: str = "",
 ) -> dict[int, str]:
-    """Return messages, by the index of the case, for all cases with outputs that miss the accuracy.
+    """Return a message for every case with outputs that miss the accuracy; the keys are the indices of the cases.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def missed_accuracy(
     accuracy : float
         Allowed relative error of every output.
     floors : mapping of str to array, shape (cases,), or float
-        Floors by the name of the output; 0 for outputs that are not named.
+        The floor of each named output, in the unit of the output. The floor of any other output is 0.
     where : str
         Text that is added to the message, such as ``" on the finest grid"``.
     """
@@ -54,7 +54,10 @@ def missed_accuracy(
 
 
 def _relative_errors(values: ArrayLike, errors: ArrayLike, floor: ArrayLike) -> FloatArray:
-    """Return the relative error of an output of every case, shape (cases,); infinite if only the error is not 0."""
+    """Return the relative error of one output for every case, shape (cases,).
+
+    The relative error is infinite if the value and the floor are 0 and the error is not.
+    """
     size, error = (np.abs(np.atleast_1d(np.asarray(each, dtype=np.float64))) for each in (values, errors))
     known = ~(np.isnan(size) | np.isnan(error))
     largest_error, largest = (

@@ -31,7 +31,7 @@ MOST_COLUMNS = 6
 
 
 class Units(NamedTuple):
-    """Units of heights and positions, and distances between points in m.
+    """Units of heights and of positions; and the distances, in m, between points along x and y.
 
     A unit that is not stated is empty, and a distance that is not stated is None.
     """
@@ -58,7 +58,10 @@ class Scan(NamedTuple):
 
 
 class _Grid(NamedTuple):
-    """Heights in the unit of the file, in rows along x, and the steps along x and y in the unit of the positions."""
+    """Heights in the unit of the file, and the steps along x and y in the unit of the positions.
+
+    Rows of heights run along x.
+    """
 
     rows: FloatArray
     steps: tuple[float | None, float | None] = (None, None)
@@ -69,7 +72,8 @@ class _Grid(NamedTuple):
 def read_map(file: DataFile, units: Units) -> Recorded:
     """Return the heights of a map.
 
-    Units and spacings that the file states are used. Rows of text and npy files run along x and are stacked along y.
+    Units and spacings are read from the file if it states them. Rows of text and npy files run along x and are stacked
+    along y.
 
     Parameters
     ----------
@@ -161,10 +165,10 @@ def dimensions(file: DataFile) -> int:
 
 
 def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[float, float]]:
-    """Return the unit of the heights in m and the spacings along x and y in m, as stated by the file or the user.
+    """Return the length, in m, of the unit of the heights, and the spacings along x and y in m.
 
-    If positions have no unit, the spacing stated by the user is used. This spacing must equal the step of the positions
-    times a power of ten.
+    The file or the user states the unit and the spacings. If the positions have no unit, their unit is found from the
+    spacing that the user states: this spacing must be the step of the positions times a power of ten.
     """
     height = _one_unit(file, "unit", grid.stated.height, units.height)
     position = _one_unit(file, "x_unit", grid.stated.position, units.position)
@@ -209,7 +213,7 @@ def _one_unit(file: DataFile, option: str, stated: str, given: str) -> str:
 
 
 def _metre(file: DataFile, unit: str, option: str) -> float:
-    """Return the value of a unit of length in m."""
+    """Return how many metres a unit of length has."""
     try:
         return to_si(f"1 {unit}", "m")
     except ValueError as error:
@@ -217,9 +221,9 @@ def _metre(file: DataFile, unit: str, option: str) -> float:
 
 
 def _channel(file: DataFile) -> Any:
-    """Return the main channel of a file, as read by SurfaceTopography; return None for text that this module reads.
+    """Return the main channel of a file that SurfaceTopography can read.
 
-    This module reads text files in which SurfaceTopography finds no unit.
+    Return None for a text file in which SurfaceTopography finds no unit. This module then reads the file itself.
     """
     file.read_bytes()  # to raise an error if the file has changed
     import warnings
@@ -287,7 +291,7 @@ def _array(file: DataFile) -> FloatArray:
 
 
 def _grid_file(file: DataFile, lines: list[str]) -> _Grid | None:
-    """Return the heights of a grid file of Surfer or ESRI; None for other texts.
+    """Return the heights of a grid file of Surfer or ESRI; return None for any other text.
 
     A Surfer text begins with DSAA, the numbers of points, and the ranges of x, y and z; its rows have ascending y. An
     ESRI text begins with names and numbers; its rows have descending y.
@@ -344,7 +348,9 @@ def _without_positions(file: DataFile, rows: FloatArray, stated: Units, remarks:
 
 
 def _stated(file: DataFile, head: list[str], first: str) -> Units:
-    """Return the units and spacings stated before the heights: in lines, or in a corner cell such as ``y [um]``.
+    """Return the units and spacings that a file states before its heights.
+
+    They are stated in lines of their own, or in a corner cell such as ``y [um]``.
 
     A line that names heights or positions and ends in a unit of length states the unit of this quantity. A line that
     names a spacing states the value of the spacing.
@@ -362,7 +368,7 @@ def _stated(file: DataFile, head: list[str], first: str) -> Units:
         if number and names & {"spacing", "pitch", "pixel", "step", "dx", "dy", "distance"}:
             key = "spacing_y" if names & {"y", "dy"} and not names & {"x", "dx"} else "spacing"
             found.setdefault(key, {})[f"{words[-2]} {words[-1]}"] = line
-        elif not number and bool(along) != bool(upwards):  # a line with names of both kinds is the row of column names
+        elif not number and bool(along) != bool(upwards):  # a line with names of both kinds names the columns
             found.setdefault("position" if along else "height", {})[words[-1]] = line
         elif not number and "unit" in names:
             found.setdefault("height", {})[words[-1]] = line
@@ -384,7 +390,10 @@ def _is_length(unit: str) -> bool:
 
 
 def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
-    """Return the numeric rows of a text as a table, with NaN for words, and the index of the first numeric line."""
+    """Return the numeric rows of a text as a table, and the index of the first numeric line.
+
+    Words in the table become NaN.
+    """
     import pandas as pd
 
     kept = [line for line in lines if line.strip() and line.lstrip()[0] not in "#%"]
@@ -435,7 +444,9 @@ COORDINATES = (
 
 
 def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame) -> tuple[tuple[int, str], ...]:
-    """Return index and unit of the columns named x, y and z in a table; empty if one of these columns is missing.
+    """Return index and unit of the columns x, y and z of a table.
+
+    Return an empty tuple if one of these columns is missing.
 
     If the table has no names, x, y and z are the three columns that do not hold row numbers.
     """

@@ -1,7 +1,7 @@
 """Parameters of indenters.
 
-The model of fretting wear uses these parameters, too. In that model, the sizes of indenters are optional, and an
-indenter may be a measured profile.
+The model of fretting wear extends these parameters: the size of an indenter becomes optional, and an indenter may also
+be a measured profile.
 """
 
 from __future__ import annotations

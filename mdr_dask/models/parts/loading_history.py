@@ -28,7 +28,7 @@ class Jump(Parameters):
 
 
 class _History(Parameters):
-    """Base of all histories except the jump."""
+    """Base class of all histories except the jump."""
 
     start: Literal["steady", "rest"] = Field(
         default="steady",
@@ -78,7 +78,7 @@ class Ramp(_History):
 
 
 class Oscillation(_History):
-    """An oscillation of the velocity about the parameter `velocity`, and of the force about `normal_force`."""
+    """A velocity that oscillates about the parameter `velocity`, and a force that oscillates about `normal_force`."""
 
     shape: Literal["oscillation"]
     amplitude: float = quantity("m/s", "amplitude of the oscillating velocity", usual="20 mm/s", ge=0)
@@ -107,8 +107,8 @@ def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> 
     """Return velocity and normal force before t = 0, and the pieces of the history after t = 0.
 
     Within a piece, velocity and force are linear in time, and a sine may be added to both. The last piece has no end.
-    `velocity` and `force` are the parameters of the body, and `change` is the relative change of the velocity at a
-    jump.
+    `velocity` and `force` are the velocity and the normal force of the sliding body. `change` is the relative change of
+    the velocity at a jump.
 
     Raises
     ------

@@ -144,7 +144,10 @@ def solid_of(material: Material) -> LinearSolid:
 
 
 def _shift(material: Material) -> float | None:
-    """Return the ratio of relaxation times at the material's temperature to those of the data; None without a law."""
+    """Return the relaxation times at the material's temperature, divided by the relaxation times of the data.
+
+    Return None if no law of the temperature dependence is given.
+    """
     law, temperature = material.law, material.temperature
     if law is None or temperature is None:
         return None
@@ -153,9 +156,10 @@ def _shift(material: Material) -> float | None:
 
 
 def _vertical(material: Material) -> float:
-    """Return the vertical factor b_T at the material's temperature for moduli from a table; 1 for other materials.
+    """Return the vertical factor b_T for the moduli of a table; return 1 for other materials.
 
-    The moduli at this temperature are the moduli of the curve, divided by b_T.
+    The table gives one curve of moduli. The moduli at the material's temperature are the moduli of this curve divided
+    by b_T.
     """
     table, temperature = material.dma_table, material.temperature
     if table is None or temperature is None:
@@ -209,7 +213,9 @@ def _power_law_fit(law: PowerLaw) -> SeriesFit:
 
 
 def fit_error(material: Material | None) -> float:
-    """Return the rms relative error of the Prony series fitted to a power law or a table; 0 for other materials.
+    """Return the rms relative error of a fitted Prony series.
+
+    A series is fitted to a power law or a table. For other materials, return 0.
 
     Raises the same errors as `solid_of`.
     """
@@ -218,7 +224,7 @@ def fit_error(material: Material | None) -> float:
 
 
 def frequencies(material: Material) -> tuple[float, float] | None:
-    """Return the range of angular frequency in rad/s of a power law or a table at the material's temperature."""
+    """Return the range of angular frequencies, in rad/s, of a power law or a table at the material's temperature."""
     fit = _fit_of(material)
     if fit is None:
         return None
@@ -243,7 +249,7 @@ def fit_notes(material: Material | None) -> tuple[str, ...]:
 
 
 def _table_notes(material: Material) -> tuple[str, ...]:
-    """Return notes on moduli of a table: their scaling with temperature, and unusual temperatures and moduli."""
+    """Return notes on a table of moduli: how moduli scale with temperature, and unusual temperatures and moduli."""
     table, temperature = material.dma_table, material.temperature
     if table is None:
         return ()

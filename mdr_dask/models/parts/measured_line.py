@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class ProfileFile(NamedByFile):
-    """A measured height profile, given by a file name with or without options."""
+    """A measured height profile. The user gives the name of a file, or a name and options."""
 
     file: NamedFile = Field(
         description="file with two columns x, z; SurfaceTopography reads other formats if it is installed"

@@ -24,7 +24,7 @@ from mdr_dask.units import shown
 #: Patterns for the names of columns with moduli in tension and in shear, in the form returned by `plain`.
 _IN_TENSION = re.compile(r"(?<!\w)e(?:'|\*|1|2| ?stor| ?loss|$)|young|tensile|tension", re.IGNORECASE)
 _IN_SHEAR = re.compile(r"(?<!\w)g(?:'|\*|1|2| ?stor| ?loss|$)|shear", re.IGNORECASE)
-SAME_TEMPERATURE = 1.0  # largest difference, in K, between temperatures that count as equal
+SAME_TEMPERATURE = 1.0  # temperatures that differ by at most this many K count as equal
 #: Largest gap in decades between the moduli of neighbouring curves that the scatter of an instrument can explain.
 APART = 0.02
 
@@ -71,7 +71,7 @@ class ModulusTable(NamedByFile):
         return self
 
     def notes(self) -> tuple[str, ...]:
-        """Return notes on unused columns, and on a modulus whose name does not say whether it is a shear modulus."""
+        """Return notes on unused columns, and a note if the table does not say whether its moduli are shear moduli."""
         table = _table(self)
         heading = table.headings["storage modulus"]
         notes = [table.remark] if table.remark else []
@@ -88,12 +88,12 @@ class Moduli:
     Parameters
     ----------
     omega, storage, loss : array, shape (points,)
-        Angular frequency in rad/s and moduli in Pa. Curves from `one_curve` have shear moduli, other curves the moduli
-        as measured.
+        Angular frequency in rad/s and moduli in Pa. In the result of `one_curve`, they are shear moduli. In all other
+        curves, they are in shear or in tension as measured.
     temperature : float or None
         Temperature of the curve in K; None if the table has no temperatures.
     measured : tuple of float or None
-        Lowest and highest temperature of the table in K; None if it has no temperatures.
+        Lowest and highest temperature of the table in K; None if the table has no temperatures.
     superposed : str
         A text that describes how the curves of several temperatures were superposed; empty for one temperature.
     """
@@ -122,7 +122,7 @@ def one_curve(chosen: ModulusTable, law: Law | None) -> Moduli:
 
 
 def _as_measured(chosen: ModulusTable, law: Law | None) -> Moduli:
-    """Return the moduli at one temperature, in shear or in tension as in the table."""
+    """Return the moduli at one temperature. They are shear moduli or moduli in tension, as in the table."""
     omega, storage, loss, temperature = _measured(chosen)
     if temperature is None:
         if chosen.reference is not None:
@@ -169,9 +169,10 @@ def _levels(temperature: FloatArray) -> tuple[IntArray, FloatArray]:
 
 
 def vertical_factor(chosen: ModulusTable, temperature: FloatArray, reference: float) -> FloatArray:
-    """Return b_T = rho0 T0 / (rho T): moduli at a temperature T in K, times b_T, are moduli at the reference T0 in K.
+    """Return b_T = rho0 T0 / (rho T), the vertical factor of moduli, for each temperature T.
 
-    The densities at T0 and T are rho0 and rho. With `vertical: none`, the factor is 1.
+    A modulus at T, multiplied by b_T, becomes a modulus at the reference temperature T0. Both temperatures are in K.
+    The densities at T0 and T are rho0 and rho. With the option `vertical: none`, b_T is 1.
     """
     from mdr_dask.physics.superposition.master_curve import known_rise
 
@@ -189,7 +190,9 @@ def _vertical(chosen: ModulusTable) -> str:
 
 @lru_cache(maxsize=16)
 def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
-    """Return log10 of the horizontal and the vertical shift factor of each temperature, and a text about the factors.
+    """Return log10 of the horizontal shift factors, log10 of the vertical shift factors, and a text about the factors.
+
+    There is one factor of each kind for every temperature.
 
     Curves that are shifted by these factors form a single curve, which belongs to the reference temperature.
     """
@@ -221,7 +224,10 @@ def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
 
 
 def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, reference: float) -> str:
-    """Return a text with the largest difference between the shift factors of the curves and those of a law."""
+    """Return a text with the largest difference between two sets of shift factors.
+
+    One set was found from the curves, the other set follows from a law.
+    """
     if law is None:
         return ""
     try:
@@ -236,7 +242,7 @@ def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, referenc
 
 
 def _require_overlap(storage: FloatArray, member: IntArray, levels: FloatArray) -> None:
-    """Raise DataError if there is a gap between the moduli of two curves, which no horizontal shift can close."""
+    """Raise DataError if there is a gap between the moduli of two curves. No horizontal shift can close such a gap."""
     low, high = (
         np.array([find(storage[member == number]) for number in range(levels.size)]) for find in (np.min, np.max)
     )

@@ -1,4 +1,4 @@
-"""Parameter sets that a user can write as a file name only."""
+"""Parameter sets that contain a file. Instead of the set, a user can write the name of the file alone."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from mdr_dask.models.base import Parameters
 
 
 class NamedByFile(Parameters):
-    """A parameter set with a field `file` or `files`. A file name alone means this file with the default options."""
+    """A parameter set with a field `file` or `files`.
+
+    If a user writes the name of a file alone, the other fields have their default values.
+    """
 
     model_config = ConfigDict(json_schema_extra={"bare_name": True})
 

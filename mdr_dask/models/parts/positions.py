@@ -36,7 +36,7 @@ class Outer(NamedTuple):
 
 
 def rising(lines: FloatArray) -> NDArray[np.bool_]:
-    """Return which lines only rise or only fall.
+    """Return, for each line, whether its numbers only rise or only fall.
 
     Lines of positions and of row numbers only rise or only fall; lines of rough heights do not.
     """
@@ -72,7 +72,8 @@ def _leading(lines: FloatArray) -> int:
     """Return the number of lines at the beginning that hold positions or row numbers.
 
     Lines of positions only rise or only fall. Lines of heights on a tilted or curved surface may also only rise or only
-    fall. But the difference between a line and the adjacent lines is much larger for positions than for heights.
+    fall. Lines of positions are distinguished by a second property: they differ much more from the adjacent lines than
+    two lines of heights differ from each other.
     """
     inner = lines[:, OUTER:-OUTER]
     rises = rising(inner)
@@ -90,7 +91,7 @@ def is_numbered(line: FloatArray) -> bool:
 
 
 def _common_step(lines: list[FloatArray], name: str) -> float | None:
-    """Return the step that all lines of positions have in common; None if all lines hold the numbers of their points.
+    """Return the common step of all lines of positions. Return None if every line holds the numbers of its points.
 
     Raises
     ------
@@ -116,7 +117,7 @@ def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
     """
     known = np.sort(positions[np.isfinite(positions)])
     gaps = np.diff(known)
-    # points lie on different grid lines if the gap between them is at least one step; the largest gap may be 3 steps
+    # a gap between points on different grid lines is one to about 3 steps; smaller gaps are deviations from the grid
     lines = np.split(known, np.flatnonzero(gaps > 0.25 * gaps.max(initial=0.0)) + 1)
     middles = np.array([line.mean() for line in lines])
     if middles.size < 2 or len(known) != len(positions):
@@ -151,12 +152,12 @@ def scattered(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, 
 
 
 def without_codes(height: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
-    """Replace numbers that cannot be heights by NaN, such as the code 9999 for missing points; also return remarks.
+    """Replace numbers that cannot be heights, such as the code 9999 for missing points, by NaN. Also return remarks.
 
-    The largest and the smallest of all numbers, in m, are replaced if their distance from the other heights exceeds the
-    range of these heights. For a number that occurs only once, the distance must exceed `FAR_ALONE` times this range,
-    because a single deep groove is possible. Nothing is replaced if the other heights have at most `FEW_LEVELS`
-    different values, as on a grating.
+    The largest number is replaced if its distance from all other heights exceeds the range of these other heights. The
+    smallest number is treated in the same way. A number that occurs only once may belong to a deep groove; it is
+    replaced only if the distance exceeds `FAR_ALONE` times the range. Nothing is replaced if the other heights have at
+    most `FEW_LEVELS` different values, as on a grating.
     """
     height = np.where(np.isfinite(height), height, np.nan)
     found: list[str] = []

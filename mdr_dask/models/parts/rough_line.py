@@ -1,4 +1,6 @@
-"""The four kinds of rough lines: self-affine, with the spectrum of a measured surface, a measured profile, and smooth.
+"""The four kinds of lines.
+
+A line is self-affine, has the spectrum of a measured surface, is a measured profile, or is smooth.
 
 All heights are in units of the rms height, and all lengths in units of the length of the line.
 """
@@ -72,7 +74,7 @@ class OfSurface:
     is_random = True
 
     def height(self) -> float:
-        """Return the unit of height in m: the rms height of the lines of all files together."""
+        """Return the unit of height in m: the rms height, averaged over the lines of all files."""
         return _height(self)
 
     def waves(self, seed: int, realisation: int) -> Waves:
@@ -133,7 +135,7 @@ def _waves(line: Measured) -> Waves:
 
 @dataclass(frozen=True)
 class Smooth:
-    """A line without roughness; `points` is the number of points from which a solver makes its grids."""
+    """A line without roughness. A solver chooses its grids from the number `points`."""
 
     points: int
     is_random = False

@@ -37,7 +37,7 @@ NUMBERS = (
 class SlidingBody(Parameters):
     """A viscoelastic body that slides over a rough line.
 
-    The roughness is generated or measured. The line is flat apart from its roughness, or has the shape of an indenter.
+    The roughness is generated or measured. The roughness lies on a plane or on the surface of an indenter.
     """
 
     renamed: ClassVar[Mapping[str, str]] = {
@@ -98,7 +98,7 @@ class SlidingBody(Parameters):
         return self
 
     def _problem_of_line(self) -> str:
-        """Return a message about missing or contradictory parameters of the line, or an empty string."""
+        """Return a message if parameters of the line are missing or contradictory; otherwise return an empty string."""
         if self.surface is None:
             return "" if self.hurst is not None else "expected hurst, because generated roughness needs it, got none"
         both = [name for name in GENERATED if getattr(self, name) is not None]
@@ -128,9 +128,9 @@ class SlidingBody(Parameters):
 
 
 def frequency_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
-    """Return a note for each material, which compares the frequencies of a study with those of the material's data.
+    """Return a note for each material. The note compares the frequencies of a study with the frequencies of the data.
 
-    A wave of the roughness with wave number q excites the angular frequency q v, at the sliding velocity v.
+    At the sliding velocity v, a wave of the roughness with the wave number q excites the angular frequency q v.
     """
     velocities = [one.velocity for one in sets]
     waves = [one.wavelengths() for one in sets]
@@ -148,7 +148,7 @@ def frequency_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
 
 
 def _compared(asked: tuple[float, float], known: tuple[float, float]) -> str:
-    """Return how far the frequencies of a study lie outside the range of the data, as text."""
+    """Return a text that says how far the frequencies of a study lie outside the range of the data."""
     (low, high), (first, last) = np.log10(asked), np.log10(known)
     beyond = {"below": max(first - low, 0.0), "above": max(high - last, 0.0)}
     if high <= first or low >= last:

@@ -39,7 +39,7 @@ LEAST = 1e-100  # a product of three numbers between LEAST and 1 / LEAST does no
 
 @dataclass(frozen=True)
 class Setting:
-    """The roughness, shape and solid that some cases share, in dimensionless form.
+    """The dimensionless roughness, shape and solid that several cases have in common.
 
     `body` is the shape of the indenter, None for a plane. `terms` are the Prony terms of the solid, None for a Kelvin
     solid.
@@ -66,7 +66,7 @@ class SlidingProblems:
         eta v / (G_inf L), with the viscosity eta and the velocity v. For a Kelvin body, this is the Deborah number v
         tau / L.
     length, height : array, shape (cases,)
-        L and h in m, the units of length and of height. L is the length of the line; h is the rms height, or equal to L
+        The units of length and of height, L and h, in m. L is the length of the line. h is the rms height, or equals L
         if there is no roughness.
     faults : dict of int to str
         Messages about cases that cannot be solved, by the index of the case.
@@ -81,7 +81,10 @@ class SlidingProblems:
     faults: dict[int, str]
 
     def groups(self, *columns: NDArray[Any]) -> Iterator[tuple[Setting, IntArray]]:
-        """Yield groups of the cases that can be solved; a group has one setting, and equal values in each column."""
+        """Yield groups of solvable cases.
+
+        All cases of a group have the same setting, and the same value in each given column.
+        """
         is_sound = self.which >= 0
         is_sound[list(self.faults)] = False
         sound = np.flatnonzero(is_sound)
@@ -91,13 +94,16 @@ class SlidingProblems:
             yield self.settings[self.which[sound[k]]], members
 
     def different(self, members: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Return the different pairs (Deborah number, load) of some cases, and for each case the index of its pair."""
+        """Return the different pairs (Deborah number, load) of the cases `members`.
+
+        Also return the index of the pair of each case.
+        """
         pairs, which = np.unique(self.deborah[members] + 1j * self.loads[members], return_inverse=True)
         return pairs.real.copy(), pairs.imag.copy(), which
 
 
 def combinations(*columns: NDArray[Any]) -> tuple[IntArray, IntArray]:
-    """Find the different combinations of values in the rows of some columns; objects are compared by identity.
+    """Find the different rows of a table, which is given by its columns. Objects are compared by identity.
 
     Returns
     -------
@@ -118,7 +124,7 @@ def combinations(*columns: NDArray[Any]) -> tuple[IntArray, IntArray]:
 
 
 def sliding_problems(block: Block[Any]) -> SlidingProblems:
-    """Return the cases of a block of any `SlidingBody` as dimensionless numbers."""
+    """Return the cases of a block as dimensionless numbers. The parameter set of the block is any `SlidingBody`."""
     faults: dict[int, str] = {}
     lines, which_line, length, height = _lines(block, faults)
     static, viscosity, terms, which_solid = _solids(block, faults)
@@ -164,7 +170,10 @@ def _without_units(body: Shape | None, length: float, height: float) -> Shape | 
 
 
 def _travelling(term: tuple[FloatArray, FloatArray] | None, velocity: float, length: float) -> PronyTerms | None:
-    """Return Prony terms with relaxation times divided by L / v, the time to slide by L; None if there are no terms."""
+    """Return dimensionless Prony terms: relaxation times are divided by L / v, the time of sliding over the distance L.
+
+    Return None if there are no terms.
+    """
     from mdr_dask.physics.sliding.problem import PronyTerms
 
     if term is None:
@@ -181,9 +190,9 @@ def refuse_immense(numbers: dict[str, FloatArray], faults: dict[int, str]) -> No
 
 
 def each(block: Block[Any], name: str) -> tuple[list[Any], IntArray]:
-    """Return the different values of a nested parameter, and the index of the value of every case.
+    """Return the different values of a nested parameter, and for every case the index of its value.
 
-    Any part of the nested parameter may vary between the cases.
+    The whole nested parameter may vary between the cases, or only some of its fields.
     """
     varied = [column for path, column in block.columns.items() if path.partition(".")[0] == name]
     if not varied:
@@ -204,7 +213,7 @@ def _numbers(block: Block[Any], name: str) -> FloatArray:
 def _lines(
     block: Block[Any], faults: dict[int, str]
 ) -> tuple[list[Roughness | None], IntArray, FloatArray, FloatArray]:
-    """Return the different lines, the index of the line of every case, and length and height of every case."""
+    """Return the different lines, and for every case the index of its line, its length and its height."""
     length, height = _numbers(block, "length"), _numbers(block, "rms_roughness")
     flat = height == 0
     height = np.where(flat, length, height)
@@ -243,7 +252,8 @@ def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArr
     Returns
     -------
     static, viscosity : array, shape (cases,)
-        Static modulus in Pa; and viscosity of the dashpot divided by the static modulus, in s.
+        `static` is the static modulus in Pa. `viscosity` is the viscosity of the dashpot divided by the static modulus,
+        in s.
     terms : list
         For every different solid, the moduli of its Prony terms divided by the static modulus, and their relaxation
         times in s; None for a Kelvin solid.

@@ -65,7 +65,7 @@ class Surface(Parameters):
         return self
 
     def without_spectrum(self) -> tuple[str, ...]:
-        """Return, for each file without an isotropic spectrum, a sentence with the reason."""
+        """Return a sentence for each file that has no isotropic spectrum. The sentence gives the reason."""
         if self.map is None:
             return ()
         return tuple(reason for file in self.map.files if (reason := anisotropic(self.map, file)))
@@ -110,7 +110,7 @@ def _notes(surface: Surface, file: DataFile, found: Found, spectrum: Spectrum) -
 
 
 def without_exponent(value: Any, surface: str) -> Any:
-    """Return the data of a parameter set, without a Hurst exponent if the surface is measured."""
+    """Return the data of a parameter set. If the surface is measured, the Hurst exponent is None unless it is given."""
     measured = isinstance(value, dict) and value.get(surface) is not None
     return {"hurst": None, **value} if measured else value
 
@@ -131,7 +131,10 @@ def spectra_of(surface: Surface) -> tuple[Spectrum, ...]:
 
 
 def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
-    """Return a spectrum between the cut-offs; if no short cut-off is given, the spectrum ends where noise begins."""
+    """Return a spectrum between the cut-offs.
+
+    If `shortest_wavelength` is not given, the spectrum ends where noise begins.
+    """
     spectrum = found.spectrum
     ends = surface.longest_wavelength or 0.0, surface.shortest_wavelength or 0.0
     if surface.extrapolate:
@@ -157,7 +160,9 @@ def _beyond(name: str, wavelength: float, which: str, end: float) -> str:
 
 @lru_cache(maxsize=64)
 def lines_of(surface: Surface, length: float, modes: int) -> tuple[FloatArray, ...]:
-    """Return the amplitudes in m of the MDR lines that replace a surface, one line for each file.
+    """Return the amplitudes, in m, of the lines that replace a surface in the method of dimensionality reduction (MDR).
+
+    There is one line for each file.
 
     Raises
     ------

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
 CUT_ERROR = 0.05  # assumed relative error of every point of a tabulated spectrum of straight profiles
-# largest anisotropy of a surface that counts as isotropic; its slopes along x and y differ by about a quarter at most
+# a surface counts as isotropic up to this anisotropy; the slopes along x and y then differ by at most about a quarter
 MOST_ANISOTROPY = 0.25
 STRIPES = 10.0  # a map has stripes if waves along an axis have more than this times the mean power of their ring
 FORM = 0.9  # if a parabola explains more than this fraction of the mean square, the heights contain a form
@@ -50,7 +50,7 @@ class Found(NamedTuple):
     resolution : float
         Wavelength in m below which there is only noise; 0 if no noise was found.
     remarks : tuple of str
-        Remarks about missing points, outliers and stripes, and about changes of the data.
+        Remarks about missing points, outliers and stripes, and about points that were changed.
     """
 
     spectrum: Spectrum
@@ -59,7 +59,7 @@ class Found(NamedTuple):
 
 
 class Files(NamedByFile):
-    """Files of one surface; a file name alone means this file with the default options."""
+    """Files of one surface. If a user writes the name of a file alone, all options have their default values."""
 
     files: tuple[NamedFile, ...] = Field(
         strict=False, min_length=1, description="files of the same surface; each realisation uses one of them"
@@ -73,7 +73,8 @@ class Files(NamedByFile):
 class SpectrumTables(Files):
     """Tables with wave number or wavelength, and a spectrum.
 
-    The spectrum is C2D, the C1D of the MDR line, or the spectrum of a straight profile.
+    The spectrum is one of three: C2D of the surface, C1D of the line that replaces the surface in the method of
+    dimensionality reduction, or the spectrum of a straight profile.
     """
 
     def found(self) -> tuple[Found, ...]:
@@ -128,7 +129,10 @@ class MapFiles(HeightFiles):
 
 
 def is_spectrum(text: str) -> bool:
-    """Return whether a text begins with column names of a spectrum: two names, or one name of several letters."""
+    """Return whether a text begins with column names of a spectrum.
+
+    Two such names are enough, or one of several letters.
+    """
     try:
         sheet = read_sheet("\n".join(text.splitlines()[:20]), "")
     except DataError:
@@ -184,7 +188,10 @@ def line_of_scan(scans: ScanFiles, file: DataFile) -> MeasuredLine:
 
 
 def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
-    """Return warnings if a line may contain the form of the measured part, or if its heights may have a wrong unit."""
+    """Return a warning if a line may contain the form of the measured part, and a warning if it is too steep.
+
+    If a line is steeper than 45 degrees, the unit of its heights or positions may be wrong.
+    """
     import numpy as np
 
     place = np.linspace(-1, 1, line.height.size)
@@ -194,7 +201,10 @@ def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
 
 
 def _form(level: FloatArray, curved: FloatArray) -> tuple[str, ...]:
-    """Return a warning if a parabola explains most of the levelled heights: they then contain the form of the part."""
+    """Return a warning if a parabola explains most of the levelled heights.
+
+    The heights may then contain the form of the part.
+    """
     import numpy as np
 
     square, rest = (float(np.nanmean((height - np.nanmean(height)) ** 2)) for height in (level, curved))
@@ -225,7 +235,10 @@ def scanned(scans: ScanFiles, file: DataFile) -> Found:
 
 
 def of_surface_cut(cut: Cut) -> Found:
-    """Return the spectrum of the surface from the spectrum of a straight profile, without the noise at its end."""
+    """Return the spectrum of the surface from the spectrum of a straight profile.
+
+    Short waves that are only noise are left out.
+    """
     import numpy as np
 
     from mdr_dask.physics.surfaces.scans import NOISE_SLOPE, NOISE_TAIL, of_cut
@@ -237,7 +250,10 @@ def of_surface_cut(cut: Cut) -> Found:
 
 @lru_cache(maxsize=16)
 def mapped(maps: MapFiles, file: DataFile) -> Found:
-    """Return the spectrum of one map: averaged in rings, or from the profiles along the given direction."""
+    """Return the spectrum of one map.
+
+    It is averaged over all directions, or found from profiles along the given direction.
+    """
     import numpy as np
 
     from mdr_dask.physics.surfaces.scans import NOISE_SLOPE, averaged
@@ -254,8 +270,9 @@ def mapped(maps: MapFiles, file: DataFile) -> Found:
 
 
 def anisotropic(maps: MapFiles, file: DataFile) -> str:
-    """Return the reason why a map has no isotropic spectrum; empty if the map is isotropic or a sliding direction is
-    given.
+    """Return the reason why a map has no isotropic spectrum.
+
+    The text is empty if the map is isotropic, or if the user gives a sliding direction.
     """
     import numpy as np
 

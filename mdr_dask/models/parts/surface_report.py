@@ -134,10 +134,10 @@ def _of_scan(
 
 
 def mean_spectrum(spectra: tuple[Spectrum, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the wave numbers of the first spectrum, the mean of all spectra, and its relative standard error.
+    """Return the wave numbers of the first spectrum, the mean of all spectra, and the relative error of the mean.
 
-    At each wave number, the mean includes only the spectra that have this wave number in their range. The error is NaN
-    for a single spectrum.
+    At each wave number, the mean includes only the spectra that have this wave number in their range. The error is one
+    standard error; it is NaN for a single spectrum.
     """
     q = spectra[0].wavenumber
     each = np.array([spectrum.at(q) for spectrum in spectra])

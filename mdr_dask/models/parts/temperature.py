@@ -94,7 +94,7 @@ class ShiftFactors(Parameters):
 
 @lru_cache(maxsize=16)
 def _shifts(factors: ShiftFactors) -> tuple[FloatArray, FloatArray]:
-    """Return the temperatures of a table in ascending order, and log10 a_T, which descends."""
+    """Return the temperatures of a table and log10 a_T. Temperatures are in ascending order, so log10 a_T decreases."""
     name = factors.file.name
     columns = (
         Column("temperature", "K", above=0),

@@ -52,12 +52,13 @@ def beyond_tested(setting: Setting, loads: FloatArray, fractions: FloatArray) ->
     Parameters
     ----------
     setting : Setting
-        Line and solid of the cases. The tested range applies only to a plane body on lines that represent a measured
-        surface; other cases give no message.
+        Line and solid of the cases. Only cases with a plane body on lines that represent a measured surface are
+        checked; other cases give no message.
     loads : array, shape (cases,)
-        F_N / (4 G_inf L h); for a history, its largest value.
+        F_N / (4 G_inf L h); for a history, the largest value during the history.
     fractions : array, shape (cases,)
-        Length in contact divided by the length of the line; for a history, its largest value. NaN where it is unknown.
+        Length in contact divided by the length of the line; for a history, the largest value. NaN if the contact is not
+        known.
     """
     if setting.body is not None or not isinstance(setting.roughness, OfSurface):
         return {}

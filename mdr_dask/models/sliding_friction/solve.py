@@ -20,7 +20,7 @@ from mdr_dask.physics.sliding.problem import Request, solve
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 ACCURACY = 0.01  # relative accuracy if the campaign does not give an accuracy
-# finest grid that is usually needed, in grid points per point of the line: for a plane Kelvin body, and otherwise
+# grid points per point of the line on the finest grid that is usually needed: for a plane Kelvin body, and for others
 USUAL_ON_PLANES, USUAL = 2, 16
 BYTES_A_NODE = 150  # peak memory per grid point in bytes, for a line and one case on it; measured: 20 to 130 bytes
 OPERATIONS_A_NODE = 10  # operations for each grid point in one sweep along the line
@@ -32,7 +32,7 @@ OUTPUTS = dict(
 
 
 def compute(block: Block[SlidingFriction]) -> Result:
-    """Solve the cases of a block. Cases with equal dimensionless numbers are solved once per realisation."""
+    """Solve the cases of a block. In each realisation, cases with equal dimensionless numbers are solved only once."""
     shape = (block.cases, len(block.realisations))
     values = {name: np.full(shape, np.nan) for name in block.outputs}
     result = Result(values, np.full(shape, Status.FAILED, np.int8))
@@ -55,7 +55,8 @@ def _groups(
 ) -> Iterator[tuple[Setting, SlidingFriction, IntArray]]:
     """Yield groups of cases with equal setting, oversampling and scheme.
 
-    A group is its setting, the parameters of one of its cases, and the indices of all its cases.
+    Each group consists of the setting, the parameters of one case of the group, and the indices of all cases of the
+    group.
     """
     varied = [block.columns[name] for name in ("oversampling", "scheme") if name in block.columns]
     for setting, members in problems.groups(*varied):
@@ -137,7 +138,10 @@ class _Group:
 
 
 def distinct(block: Block[SlidingFriction]) -> int:
-    """Return the number of different cases in a block, over all realisations."""
+    """Return the number of solutions of a block.
+
+    In each realisation with a new line, every different case is solved once.
+    """
     problems, total = sliding_problems(block), 0
     for setting, _, members in _groups(block, problems):
         total += problems.different(members)[0].size * _lines(block, setting)
@@ -145,18 +149,22 @@ def distinct(block: Block[SlidingFriction]) -> int:
 
 
 def _lines(block: Block[SlidingFriction], setting: Setting) -> int:
-    """Return the number of different lines in the realisations."""
+    """Return the number of realisations that have different lines: all of them, or one if the line is not random."""
     return len(block.realisations) if setting.roughness.is_random else 1
 
 
 def operations(block: Block[SlidingFriction]) -> float:
-    """Return the approximate number of operations of a block, from the grid points of all sweeps."""
+    """Return the approximate number of operations of a block.
+
+    The number is computed from the grid points of all sweeps.
+    """
     problems, nodes = sliding_problems(block), 0.0
     for setting, case, members in _groups(block, problems):
         solves = problems.different(members)[0].size
         visits = 1 if setting.terms is None else 4 * (4 + len(setting.terms.moduli))  # sweeps per case
         grid = 2 if case.oversampling == "auto" else case.oversampling
-        # computing a line costs about ten sweeps; a sweep of a case counts half, because most grids are coarser
+        # computing a line costs about ten sweeps; a sweep of a case counts half, because most of its sweeps are on
+        # coarser grids
         nodes += _lines(block, setting) * setting.roughness.points * grid * (10 + 0.5 * solves * visits)
     return 1e5 + OPERATIONS_A_NODE * nodes
 

@@ -42,10 +42,10 @@ from mdr_dask.physics.transients.elements.loading_history import Trace, trace
 from mdr_dask.physics.transients.velocity_jump import MarchRequest
 
 ACCURACY = 0.01  # relative accuracy of steady friction and of the jump, if the campaign does not give an accuracy
-# operations of a jump, divided by (nodes times steps per decade), and of a history, divided by nodes squared
+# operations of a jump divided by (nodes times steps per decade); operations of a history divided by nodes squared
 OPERATIONS_MARCHED, OPERATIONS_FOLLOWED = 20, 35
 FLAT = 1e-12  # a line is flat if its rms height is at most this fraction of its largest absolute height
-HISTORY_ORDER = 2  # order of convergence of a history as cell size and time step decrease together
+HISTORY_ORDER = 2  # order at which a history converges when cell size and time step decrease together
 
 #: Names of the outputs for which errors are estimated.
 WITH_ERROR = (
@@ -60,7 +60,10 @@ TRANSIENT = ("friction_coefficient", "indentation_depth")
 
 @dataclass(frozen=True)
 class _Found:
-    """Dimensionless outputs of some cases and their errors. Friction is divided by h / L, and depth by h."""
+    """The dimensionless outputs of several cases, and the errors of these outputs.
+
+    Friction is divided by h / L, and depth by h.
+    """
 
     values: dict[str, FloatArray]
     errors: dict[str, FloatArray]
@@ -93,7 +96,8 @@ def compute(block: Block[VelocityJump]) -> Result:
 def _groups(block: Block[VelocityJump], problems: SlidingProblems) -> Iterator[_Group]:
     """Yield groups of cases.
 
-    All jumps of a plane Kelvin body on the same line and grid form a group. Every other case is a group by itself.
+    If jumps of a plane Kelvin body have the same line and grid, they form a group. Every other case is a group by
+    itself.
     """
     protocols, which = each(block, "protocol")
     is_jump = np.array([protocol.shape == "jump" for protocol in protocols])[which]
@@ -171,10 +175,12 @@ class _Group:
         yield from beyond_tested(self.setting, self.largest_loads, found.contact).items()
 
     def _floor(self, found: _Found, name: str) -> FloatArray:
-        """Return the floor of an output for every case: errors of smaller values are relative to the floor.
+        """Return the floor of an output for every case.
 
-        If friction is zero within its error, as for a body at rest, the floor is the largest friction of the case.
-        Otherwise the floor is 0, and the error is relative to the output itself.
+        If a value is smaller than its floor, the relative error is the error divided by the floor.
+
+        If friction is zero within its error, as for a body at rest, the floor is the largest friction of the case. In
+        all other cases the floor is 0: the relative error is the error divided by the value.
         """
         cases = found.outcome.size
         if name == "indentation_depth":
@@ -212,7 +218,7 @@ class _Marched(_Group):
 
     @cached_property
     def different(self) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Loads and Deborah numbers of the different cases, and for every case its index among them.
+        """Loads and Deborah numbers of the different cases, and for every case the index of its numbers among them.
 
         The different cases are sorted by velocity, because the solver shares work among neighbours with equal Deborah
         numbers.
@@ -241,7 +247,7 @@ class _Followed(_Group):
             values = [friction[None], np.array([found.after]), found.depth[None], np.array([found.contact])]
             return Solution(values, np.array([found.outcome], np.int8))
 
-        # if a depth is smaller than the rms height (1 here), its error is relative to the rms height
+        # the error of a depth below the rms height (1 here) is divided by the rms height, not by the depth
         refined = refine(solve, 1, grids, 0.0, HISTORY_ORDER, floors=[0.0, 0.0, 1.0, 0.0], shared=False)
         friction, after, depth, contact = refined.values
         error, after_error, depth_error, _ = refined.errors[:, 0]
@@ -258,7 +264,7 @@ class _Followed(_Group):
         return self.problems.loads[self.members] * (case.largest_force() / case.normal_force)
 
     def _trace(self, waves: Waves, every: int) -> Trace:
-        """Compute the case on a coarser grid; the number of nodes is divided by `every`."""
+        """Compute the case on a grid that is coarser by the factor `every`: it keeps one node out of `every` nodes."""
         case = self.block.case(int(self.members[0]))
         height, length = (float(column[self.members[0]]) for column in (self.problems.height, self.problems.length))
         solid, unit = case.solid(), case.time_unit()
@@ -283,7 +289,7 @@ def _check_rough(roughness: Roughness) -> None:
 
 
 def distinct(block: Block[VelocityJump]) -> int:
-    """Return the number of different cases in a block, over all realisations."""
+    """Return the number of solutions of a block: the number of different cases times the number of realisations."""
     different = 0
     for group in _groups(block, sliding_problems(block)):
         different += group.different[0].size if isinstance(group, _Marched) else 1
@@ -291,7 +297,7 @@ def distinct(block: Block[VelocityJump]) -> int:
 
 
 def operations(block: Block[VelocityJump]) -> float:
-    """Return the approximate number of operations of a block, from the numbers of nodes."""
+    """Return the approximate number of operations of a block, estimated from the nodes of its cases."""
     total = 1e6
     for group in _groups(block, sliding_problems(block)):
         nodes = group.setting.roughness.points * group.oversampling
