@@ -50,7 +50,7 @@ class Commands(click.Group):
             formatter.write_text(f"{', '.join(others)}; each with --help")
 
     def invoke(self, context: click.Context) -> Any:
-        """Run a command. If a program such as ``head`` stops reading the output, this is no error."""
+        """Run a command; it is not an error if a program such as ``head`` stops reading the output."""
         try:
             result = super().invoke(context)
             sys.stdout.flush()
@@ -134,10 +134,10 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _open_streams() -> None:
-    """Replace missing standard streams; characters that the encoding of a stream lacks are printed as ASCII escapes."""
+    """Replace missing standard streams, and print characters that the encoding of a stream lacks as ASCII escapes."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
-        if stream is None:  # a service manager or >&- has closed the stream
+        if stream is None:  # closed by a service manager, or by `>&-` in a shell
             setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
         elif isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from mdr_dask.questions.table import Table
 
-#: Largest number of rows of a printed table; longer tables are printed in parts.
+#: Without a limit, an aligned table is printed in pieces of about this number of rows.
 AT_ONCE = 2**16
 FILES = (".csv", ".json", ".jsonl", ".parquet", ".nc", ".zarr")
 
@@ -34,7 +34,7 @@ FILES = (".csv", ".json", ".jsonl", ".parquet", ".nc", ".zarr")
 def print_answer(answer: Table, form: str, limit: int, join: bool) -> None:
     """Print a table in aligned columns, as CSV, as JSON, or as one JSON object per line.
 
-    Aligned columns have at most `limit` rows, the other forms all rows.
+    A table in aligned columns has at most `limit` rows (0 for all rows). The other forms contain all rows.
 
     If `join` is true, each mean and its errors are printed in one column.
     """
@@ -67,7 +67,8 @@ def write_answer(answer: Table, path: Path) -> int:
 def check_target(path: Path) -> None:
     """Raise an error if a table cannot be written to a path.
 
-    The reason is an unknown suffix, the store of a study at this path, or Parquet without pyarrow.
+    A table cannot be written if the suffix of the path is unknown, if there is the store of a study at the path, or if
+    the suffix is ``.parquet`` and pyarrow is not installed.
     """
     from mdr_dask.store import is_study
 
@@ -111,10 +112,12 @@ def _print_frame(frame: pd.DataFrame, answer: Table, join: bool) -> None:
 
 
 def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
-    """Join each mean and its errors, ``0.1234 +- 0.0005 +- 0.0001``, or its interval, ``0.1234 (0.1220, 0.1240)``.
+    """Join the columns of each mean and its errors or interval to one column of texts.
 
-    An error is left out if it is unknown in all rows, or if it is zero or a rounding error in all rows. The returned
-    text names the errors that are printed.
+    Examples are ``0.1234 +- 0.0005 +- 0.0001`` for errors and ``0.1234 (0.1220, 0.1240)`` for an interval.
+
+    The column of an error is left out if the error is unknown in all rows, or if the error is zero or a rounding error
+    in all rows. The returned text names the errors that are printed.
     """
     known = {name for name, values in columns.items() if any(map(_is_known, values))}
     joined: dict[str, list[Any]] = {}
@@ -140,7 +143,7 @@ def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
 
 
 def _meaning(kinds: dict[str, tuple[str, ...]]) -> str:
-    """Return a text that names the printed errors of each output, or of all outputs together if they are the same."""
+    """Return a text that names the printed errors: once if they agree for all outputs, else for each output."""
     longest = max(kinds.values(), key=len, default=())
     if all(longest[: len(kind)] == kind for kind in kinds.values()):
         return f"mean{''.join(longest)}" if longest else ""

@@ -173,7 +173,7 @@ def check(campaigns: tuple[Path, ...], form: str | None) -> None:
 
 
 def ask(campaign: Campaign) -> None:
-    """Print the questions about numbers without a unit."""
+    """Print the remarks of a campaign: questions about numbers without a unit, and ignored columns of tables."""
     for question in campaign.remarks:
         say(question, err=True)
 

@@ -28,10 +28,10 @@ COMMAND = "mdr_dask.command"
 
 
 class Drawing(click.Command):
-    """A command that draws figures, and writes the data of each figure, with the command line, to a table."""
+    """A command that draws figures; the table with the data of a figure also contains the command line."""
 
     def parse_args(self, context: click.Context, arguments: list[str]) -> list[str]:
-        """Store the command line as it was typed, then parse it."""
+        """Keep the command line as it was typed, then parse it."""
         context.meta[COMMAND] = shlex.join(["mdr-dask", str(self.name), *arguments])
         return super().parse_args(context, arguments)
 
@@ -136,7 +136,7 @@ def _require_quantities(units: Mapping[str, str], groups: Mapping[str, xr.Datase
 
 
 def _with_notes(figure: Plot, where: str, warnings: list[str]) -> Plot:
-    """Return a figure with notes: the condition `where` for its cases, and the warnings about the results."""
+    """Return a figure with two kinds of notes: cases left out by the condition `where`, and `warnings`."""
 
     def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
         drawn = replace(figure.draw(groups), warnings=warnings)
@@ -243,7 +243,10 @@ def _of_output(name: str, groups: Mapping[str, xr.Dataset], axes: Mapping[str, A
 
 
 def _groups(url: str, urls: Sequence[str], series: Sequence[str]) -> dict[str, xr.Dataset]:
-    """Return the groups of a store. If several stores are drawn, their names begin with the name of the store."""
+    """Return the groups of a store.
+
+    If several stores are drawn, the name of each group begins with the name of its store.
+    """
     from mdr_dask import store as stores
     from mdr_dask.questions import selection
 
@@ -253,7 +256,10 @@ def _groups(url: str, urls: Sequence[str], series: Sequence[str]) -> dict[str, x
 
 
 def _name_of(url: str, urls: Sequence[str], series: str) -> str:
-    """Return the name of a group in a legend: its series, after the name of its store if there are several stores."""
+    """Return the name of a group in a legend: the name of its series.
+
+    If several stores are drawn, the name of the store precedes the name of the series.
+    """
     if len(urls) == 1:
         return series
     stems = [Path(each).stem for each in urls]
@@ -266,7 +272,8 @@ def _draw(
 ) -> list[str]:
     """Draw a figure to a file, with its data in a table next to it; return notes that the picture does not show.
 
-    If the figure cannot be drawn, raise an error, or only print it if this is one of several figures (`one_of`).
+    If the figure cannot be drawn, raise the error. If `one_of` is true, several figures are drawn, and the error is
+    only printed.
     """
     from mdr_dask.errors import DataError, FitError
 
@@ -306,7 +313,7 @@ def _save(description: Figure, path: Path, origin: Mapping[str, str]) -> list[st
 
 
 def _tell_notes(notes: Mapping[str, Sequence[str]]) -> None:
-    """Print each note once, after the names of the figures to which it applies."""
+    """Print each note once, after the names of the figures to which the note applies."""
     for note in dict.fromkeys(chain.from_iterable(notes.values())):
         about = [name for name, own in notes.items() if note in own]
         tell(f"{'all figures' if len(about) == len(notes) > 1 else ', '.join(about)}: {note}")

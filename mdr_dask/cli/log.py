@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 def telling(quiet: bool, log: Path | None, **about: Any) -> Iterator[Tell]:
     """Yield the function that writes the events of a run to its log, and their messages to stderr unless `quiet`.
 
-    The events are appended to the file `log`. With None, no log is written. `about` is the content of the first line.
+    The events are appended to the file `log`; if `log` is None, no file is written. `about` contains facts about the
+    run for the first line.
     """
     if log is None:
         yield _printer(quiet)
@@ -58,7 +59,7 @@ def _printer(quiet: bool) -> Callable[[Event], None]:
 
 
 def _writer(stream: TextIO) -> Callable[[str, dict[str, Any]], None]:
-    """Return a function that writes one complete line to the log; any thread may call it."""
+    """Return a function that writes one complete line to the log; any thread may call this function."""
     lock = threading.Lock()
 
     def write(name: str, facts: dict[str, Any]) -> None:

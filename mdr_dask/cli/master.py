@@ -1,4 +1,4 @@
-"""The command master-curve: compute shift factors and a merged curve from a store, a table or a kept result."""
+"""The command `master-curve`: merge the curves of a store or a table, or change the reference of a kept result."""
 
 from __future__ import annotations
 
@@ -83,10 +83,10 @@ def master_curve(
 ) -> None:
     """Shift the curves of a store or a table into one master curve; print factors, errors and the laws they follow.
 
-    SOURCE is a store, a table (CSV with a row of names and perhaps a row of units; - for standard input), or a result
-    that --keep has written; for such a result, only the reference can be changed. If a source varies in velocity and in
-    temperature, there are shift factors for each of them. The storage and loss modulus of a test are shifted together,
-    unless --of names only one of them.
+    SOURCE is a store, a table, or a result that --keep has written. A table is a CSV file with a row of names and, if
+    wanted, a row of units; - means standard input. For a result of --keep, only the reference can be changed. If the
+    curves differ in both velocity and temperature, there is a shift factor for every velocity and one for every
+    temperature. The storage and loss modulus of a test are shifted together, unless --of names only one of them.
 
     \b
     mdr-dask master-curve results/force_master_curve.zarr --plot master.png
@@ -161,7 +161,7 @@ def _rows(frame: pd.DataFrame, selections: tuple[str, ...]) -> pd.DataFrame:
 
 
 def _kept(source: str) -> xr.Dataset | None:
-    """Return the result in a file that --keep wrote, or None if the source is no such file."""
+    """Return the result in a file that `--keep` wrote, or None if the source is a store or a table."""
     path = Path(source)
     if not path.is_file():
         return None
@@ -180,7 +180,7 @@ def _kept(source: str) -> xr.Dataset | None:
 
 
 def _print_table(curve: xr.Dataset, part: str, form: str) -> None:
-    """Print a part of the result. If curves are shifted by two variables, there are two tables of factors."""
+    """Print a part of the result. If curves differ in two quantities, there is a table of factors for each quantity."""
     shown = []
     if part != "factors":
         dims = (part.removesuffix("s"),)

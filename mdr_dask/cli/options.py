@@ -71,7 +71,7 @@ def _figure(_: click.Context, __: click.Parameter, path: Path | None) -> Path | 
 
 
 def look_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options for the look of figures; the command gets them as a dictionary `look`."""
+    """Add the options for the look of figures; the command gets these options as a dictionary `look`."""
 
     @wraps(command)
     def wrapped(*given: Any, size: str | None, title: str | None, style: str | None, **rest: Any) -> Any:
@@ -83,9 +83,10 @@ def look_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def figure_options(*names: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Add an option for the file of a figure, with all its spellings `names`, and the options for its look.
+    """Add an option for the file of a figure, and the options for the look of the figure.
 
-    The command gets the file as `figure`, and the look as `look`.
+    `names` are the spellings of the option for the file. The command gets the file as the argument `figure`, and the
+    options for the look as the argument `look`.
     """
 
     def add(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -40,7 +40,7 @@ def terminal_width() -> int:
 
 
 def say(text: str, err: bool = False) -> None:
-    """Print a text without control characters; on a terminal its lines are wrapped between words."""
+    """Print a text with control characters escaped; on a terminal, long lines are wrapped between words."""
     stream = sys.stderr if err else sys.stdout
     lines = printable(text).split("\n")
     if stream is not None and (stream.isatty() or "COLUMNS" in os.environ):
@@ -84,9 +84,10 @@ def titled(name: str, unit: str) -> str:
 def print_aligned(titles: Sequence[str], columns: Sequence[Sequence[Any]], keys: int = 1, note: str = "") -> None:
     """Print columns side by side, within the width of the terminal.
 
-    The text `note` is printed above the table. The note is followed by the columns that have the same value in all
-    rows, and by the names of columns without values. If a table is too wide, it is printed in parts. Each part begins
-    with the first `keys` columns, which identify a row. A single row that is too wide is printed as a list.
+    The text `note` is printed above the table. The note also gives the columns that have the same value in all rows,
+    each with this value, and the names of the columns without values. If a table is too wide, it is printed in parts.
+    Each part begins with the first `keys` columns, which identify a row. A single row that is too wide is printed as a
+    list.
     """
     rows = len(columns[0]) if columns else 0
     cells = [[short(value) for value in column] for column in columns]
@@ -154,12 +155,12 @@ def _print_block(heads: Sequence[Sequence[str]], cells: Sequence[Sequence[str]],
 
 
 def _is_text(column: Sequence[str]) -> bool:
-    """Return whether a column contains words, so that it is aligned to the left."""
+    """Return whether a column contains words; such a column is aligned to the left."""
     return any(re.search(r"[a-df-zA-Z]{2}", cell) for cell in column)
 
 
 def hanging(before: str, text: str) -> str:
-    """Join two texts. If the line is too long, it is wrapped below the first character of the second text."""
+    """Join two texts. If the line is too long, its other lines begin below the first character of the second text."""
     width = max(terminal_width() - len(before), NARROWEST // 2)
     if len(before) + len(text) <= terminal_width() or width <= NARROWEST // 2:
         return (before + text).rstrip()
@@ -189,7 +190,7 @@ def _unit(title: str) -> str:
 
 
 def print_left(count: int | None) -> None:
-    """Print on stderr how many rows a limit left out; `count` is None if their number is unknown."""
+    """Print on stderr how many rows a limit left out; `count` is None if the number of these rows is unknown."""
     if count != 0:
         click.echo(f"... {'' if count is None else f'{count} '}more rows (--limit 0 prints all)", err=True)
 

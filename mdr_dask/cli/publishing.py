@@ -18,8 +18,9 @@ from mdr_dask.cli.writing import require_suffix, writing
 def report(stores: tuple[str, ...], output: Path) -> None:
     """Write a page about studies: one HTML file that any browser opens, without a network.
 
-    The page holds the campaign, the progress, every figure with its numbers, laws with intervals, errors, method and
-    limits, and how to run the study again. The page can also be written during a run.
+    The page contains the campaign, the progress and all figures with their numbers. The page gives fitted laws with
+    intervals, the errors of the results, and the method with its limits. The page also states how to run the study
+    again. The page can also be written during a run.
 
     \b
     mdr-dask report results/quickstart.zarr -o report.html

@@ -22,7 +22,7 @@ class Reading(click.Command):
     """A command whose first argument is a store."""
 
     def invoke(self, context: click.Context) -> Any:
-        """Run the command; if a chunk cannot be read, report this in one sentence."""
+        """Run the command; if a chunk of the store cannot be read, raise an error that states this in one sentence."""
         from mdr_dask.store import readable
 
         with readable(context.params[str(self.params[0].name)]):
@@ -42,7 +42,7 @@ store_argument = click.argument("store")
 @click.option("--messages", is_flag=True, help="List also the warnings of finished results.")
 @json_option
 def status(store: str, failures: bool, messages: bool, form: str | None) -> None:
-    """Show the progress of a study and its active runs, also during a run.
+    """Show the progress of a study, and the runs that are computing it now.
 
     \b
     mdr-dask status results/quickstart.zarr
@@ -92,9 +92,9 @@ def _print_counts(study: dict[str, Any], rows: list[dict[str, Any]], at_work: li
 def show(store: str, outputs: tuple[str, ...], statistic: tuple[str, ...], raw: bool, **asked: Any) -> None:
     """Show results as a table: means with their errors, or every realisation.
 
-    A mean is followed by the standard error of the realisations and the discretisation error. `status` is done, or it
-    states how many realisations are missing, failed or not_converged. A column with the same value in all rows is
-    printed above the table.
+    A mean is followed by the standard error of the realisations and the discretisation error. The column `status` is
+    done, or states how many realisations are missing, failed or not_converged. A column with the same value in all rows
+    is printed above the table.
 
     \b
     mdr-dask show results/quickstart.zarr friction_coefficient
@@ -116,7 +116,8 @@ def show(store: str, outputs: tuple[str, ...], statistic: tuple[str, ...], raw: 
 def aggregate(store: str, outputs: tuple[str, ...], statistic: tuple[str, ...], **asked: Any) -> None:
     """Reduce outputs over realisations: mean, scatter, standard error, quantiles, bootstrap interval.
 
-    Without --statistic, the printed table has mean, standard deviation and interval; files have all statistics.
+    Without --statistic, the printed table contains mean, standard deviation and interval; a file contains all
+    statistics.
 
     \b
     mdr-dask aggregate results/quickstart.zarr -o quickstart-means.nc

@@ -49,11 +49,11 @@ if TYPE_CHECKING:
 @click.option("--quiet", is_flag=True, help="Print no progress.")
 @click.option("--json", "form", flag_value="json", help="Print the outcome as one JSON document.")
 def run(campaign: Path, dry_run: bool, log: Path | None, quiet: bool, form: str | None, **options: Any) -> int:
-    """Run a campaign into its store: everything, or what is missing.
+    """Run a campaign: compute all results that the store does not contain yet.
 
-    After an interruption, run it again: finished results are kept, and only the rest is computed. Exit code 0: all
-    results are done; 1: some results have failed, in this run or in an earlier one; 2: the run was refused or could not
-    go on.
+    After an interruption, give the same command again: finished results are kept, and only the others are computed.
+    Exit code 0: all results are done; 1: some results have failed, in this run or in an earlier one; 2: the run was
+    refused or could not go on.
 
     \b
     mdr-dask run campaigns/quickstart.yaml
@@ -112,7 +112,7 @@ def _print_plan(study: Campaign, url: str, form: str | None) -> None:
 
 
 def _counted(study: Campaign, to_do: int) -> str:
-    """Return a text that states which results are counted; it is empty if the run adds no further results."""
+    """Return a text that names the counted results, or an empty text if all results of the study are counted."""
     if study.replication.goes_on:
         return "first round"
     is_adaptive = any(axis.refinement is not None for series in study.series for axis in series.axes)
@@ -180,6 +180,6 @@ def _print_failed(url: str, progress: Progress) -> None:
 
 
 def _shared(progress: Progress) -> str:
-    """Return a text with the fraction of results that used the solution of another result; empty if there are none."""
+    """Return a text with the fraction of results that used the solution of another result, or an empty text."""
     share = 1 - progress.solves / max(progress.done, 1)
     return f" ({share:.1%} of the results needed none of their own)" if progress.solves and share > 0 else ""

@@ -50,9 +50,9 @@ def surface(
     """Print height parameters, slopes, Hurst exponent and resolution of a measured surface.
 
     FILES are maps, scans, or tables of a spectrum, all of the same surface. Sq and Sa (maps) and Pq (scans) are
-    computed from the levelled heights. Gradient, slopes and Hurst exponent are computed from the windowed spectrum.
-    Intervals are 95 % intervals. Rolloff and cutoff are the wavelengths at which the power law ends. Rolloff and cutoff
-    are empty if the power law does not end within the data.
+    computed from the levelled heights. Gradient, slopes and Hurst exponent are computed from the windowed spectrum. All
+    intervals are 95 % confidence intervals. Rolloff is the longest and cutoff is the shortest wavelength of the fitted
+    power law. Each of them is empty if the power law continues to the end of the data.
 
     \b
     mdr-dask surface road.npy --spacing 2um --unit um --plot road.png -o c2d.csv
@@ -127,7 +127,7 @@ def _option(name: str) -> str:
 def _kind(file: str, options: dict[str, Any]) -> str:
     """Return whether a file contains a map, a scan or a spectrum.
 
-    A spectrum is recognised by the names of its columns, maps and scans by their number of dimensions.
+    A spectrum is recognised by the names of its columns. A map has two dimensions, a scan has one.
     """
     from mdr_dask.models.data_file import DataFile
     from mdr_dask.models.parts.height_file import TEXT, dimensions

@@ -18,7 +18,10 @@ format_option = click.option(
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Make the folder of a new file. If writing fails, remove file and folder, and name the file in the error."""
+    """Make the folder of a new file.
+
+    If writing fails, remove the file and the folders made for it, and name the file in the error.
+    """
     require_outside(path)
     there = path.exists()
     missing = [folder for folder in path.parents if not folder.exists()]
@@ -38,7 +41,7 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def require_outside(path: Path) -> None:
-    """Raise UsageError for a file inside a store, because the store would then count as damaged."""
+    """Raise UsageError for a file inside a store; a store with such a file would count as damaged."""
     groups = [folder for folder in path.absolute().parents if (folder / "zarr.json").is_file()]
     if groups:
         from mdr_dask.store import is_study  # imported here, because this module imports Zarr

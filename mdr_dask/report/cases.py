@@ -1,4 +1,4 @@
-"""Means and errors of all cases of a study. The page uses them for figures whose axes the reader chooses."""
+"""Means and errors of all cases of a study. The page uses these numbers for figures whose axes the reader chooses."""
 
 from __future__ import annotations
 
@@ -14,13 +14,15 @@ from mdr_dask.plots import curves, labels
 from mdr_dask.report.figures import Json, numbers
 from mdr_dask.report.words import markup, plain
 
-#: Largest number of cases of one series on the page. If a series has more cases, values of its longest axes are left
-#: out.
+#: Largest number of cases of one series on the page. If a series has more cases, some values of its longest axes are
+#: left out.
 MOST_CASES = 4000
 
 
 def thinned(data: xr.Dataset) -> tuple[xr.Dataset, list[str]]:
-    """Load at most `MOST_CASES` cases; if there are more, load evenly spread values of the longest axes.
+    """Load the cases of a series, but at most `MOST_CASES`.
+
+    If the series has more cases, only evenly spread values of its longest axes are loaded.
 
     Return the loaded cases, and texts about the omitted values.
     """
@@ -35,7 +37,7 @@ def thinned(data: xr.Dataset) -> tuple[xr.Dataset, list[str]]:
 
 
 def cases_of(groups: Mapping[str, xr.Dataset], left_out: Mapping[str, list[str]]) -> list[Json]:
-    """Return the cases of every series that has an output without further dimensions.
+    """Return the cases of each series that has a varied parameter and an output with one value per case or realisation.
 
     `groups` and `left_out` hold, for each series, the two results of `thinned`.
 
@@ -43,9 +45,10 @@ def cases_of(groups: Mapping[str, xr.Dataset], left_out: Mapping[str, list[str]]
     -------
     list of dict
         For each series: ``axes`` and ``outputs`` with their labels, and ``reduced``, a list of texts about omitted
-        values of axes. There are also columns with a number for each case: ``at`` has a column for each varied
-        parameter, in the unit of the figures; each output has the columns ``value``, ``low``, ``high``, ``lines``
-        (standard error) and ``grid`` (grid error).
+        values of axes. The other entries contain columns with one value for each case; numbers are in the units of the
+        figures. ``at`` has a column for each varied parameter. ``values`` has columns for each output: ``value``,
+        ``low``, ``high``, ``lines`` (standard error) and ``grid`` (grid error). ``states`` is a column with the state
+        of each case.
     """
     found = [_series(name, data, left_out[name]) for name, data in groups.items()]
     return [series for series in found if series["outputs"] and series["axes"]]
@@ -69,7 +72,7 @@ def _series(name: str, data: xr.Dataset, left_out: list[str]) -> Json:
 
 
 def main_outputs(data: xr.Dataset) -> list[str]:
-    """Return the names of the outputs of a study, without companions (`<output>_error`)."""
+    """Return the names of the outputs of a series, without the errors of outputs (`<output>_error`)."""
     names = [str(name) for name in data.data_vars if name != "status"]
     errors = {str(data[name].attrs.get("ancillary_variables")) for name in names}
     return [name for name in names if name not in errors]
@@ -81,7 +84,7 @@ def _named(name: str, values: xr.DataArray) -> Json:
 
 
 def _column(values: Any, dims: tuple[Any, ...], shape: xr.DataArray) -> list[Any]:
-    """Repeat values along some dimensions so that every case has a value, and return them as a list."""
+    """Return a list with one value for each case; values are repeated along the dimensions that they lack."""
     along = xr.DataArray(np.asarray(values), dims=dims)
     return numbers(along.broadcast_like(shape).transpose(*shape.dims).to_numpy().ravel())
 

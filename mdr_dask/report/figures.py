@@ -16,7 +16,8 @@ from mdr_dask.plots.figure import LAST, Axis, Bar, Figure, Panel, Trace, edges
 from mdr_dask.plots.labels import plain
 from mdr_dask.report.words import markup
 
-#: Largest number of points of one figure on the page; longer curves are thinned out.
+#: Largest number of points of one figure on the page. If a figure has more points, only every n-th point is on the
+#: page.
 MOST_POINTS = 20_000
 #: `DIGITS`: number of significant digits on the page. `SHADES`: number of colours of a colour bar.
 DIGITS, SHADES = 9, 17
@@ -27,7 +28,7 @@ Json = dict[str, Any]
 def drawn_of(
     figures: Mapping[str, Plot], groups: Mapping[str, xr.Dataset], provenance: Any
 ) -> Iterator[Json | tuple[str, str]]:
-    """Yield every figure as data; if a study lacks the results for a figure, yield its name and the reason instead."""
+    """Yield each figure as data, or the name of the figure and the reason why it cannot be drawn."""
     for name, each in figures.items():
         try:
             figure = each.describe(groups)
@@ -84,7 +85,7 @@ def _axis(axis: Axis) -> Json:
 
 
 def _trace(trace: Trace, panel: int, of: Panel, bars: list[Bar], step: int) -> Json:
-    """Return one curve, law or map as data: every `step`-th point, in the order in which points are joined."""
+    """Return one curve, law or map as data: every `step`-th point, in the order in which a curve joins the points."""
     columns = {str(name): trace.column(str(name)) for name in trace.data.data_vars}
     x, drawn = columns["x"], columns.get("value", columns.get("y", columns["x"]))
     order = np.argsort(x, kind="stable") if trace.kind == "curve" and trace.line else np.arange(x.size)
@@ -133,7 +134,7 @@ def numbers(values: NDArray[Any]) -> list[Any]:
 
 
 def _shades(bar: Bar) -> Json:
-    """Return the ends of a colour bar, and its colours."""
+    """Return the two values at the ends of a colour bar, and the colours between the ends."""
     between = np.geomspace if bar.log else np.linspace
     shades = [colours.shade(bar, value) for value in between(bar.low, bar.high, SHADES)]
     return {"low": bar.low, "high": bar.high, "log": bar.log, "colours": shades}

@@ -1,8 +1,8 @@
 """The page: one HTML file that contains all data and scripts, with a content security policy.
 
-The template escapes text from a store. Data are stored as a block of JSON that browsers do not run. The content
-security policy allows only the scripts of this package and identifies them by their digests. Therefore nothing in a
-store can run as a script.
+The template escapes text from a store. Data are written as a block of JSON, which browsers do not run. The content
+security policy contains the digests of the scripts of this package, and browsers run no other script. Therefore nothing
+in a store can run as a script.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def page(studies: Sequence[Study]) -> str:
 
 
 def policy() -> str:
-    """Return the content security policy; it allows the scripts of the page by their digests, and no network."""
+    """Return the content security policy, which allows no network and only scripts with the digests of `SCRIPTS`."""
     digests = [base64.b64encode(hashlib.sha256(asset(name).encode()).digest()).decode() for name in SCRIPTS]
     scripts = " ".join(f"'sha256-{digest}'" for digest in digests)
     return "; ".join(
@@ -73,7 +73,7 @@ def policy() -> str:
 
 
 def harmless(data: Any) -> str:
-    """Return data as JSON in a form that cannot end the HTML script element around it."""
+    """Return data as JSON that cannot end the HTML element ``script`` in which the data are written."""
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026").replace("\u2028", "\\u2028")
 

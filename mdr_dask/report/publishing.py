@@ -25,7 +25,7 @@ TEXTS = (".json", ".jsonl", ".html", ".txt", ".yaml", ".csv", ".sha256")
 
 
 def publish(url: str, target: Path) -> int:
-    """Write a study, its campaign, data files and page into one zip, and return the number of files.
+    """Write a study with its campaign, data files and page to one zip, and return the number of files in the zip.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def publish(url: str, target: Path) -> int:
     Raises
     ------
     StoreError
-        If the store is damaged or in use, or if a data file of its campaign was changed or removed.
+        If the store is damaged or in use, or if a data file of the campaign was changed or removed after the run.
     """
     found = store.verify(url)
     if found.findings:
@@ -77,7 +77,8 @@ def _put(packed: zipfile.ZipFile, name: str, content: bytes) -> None:
 def _campaign(url: str, study: Study) -> tuple[bytes, dict[str, bytes]]:
     """Return the campaign and the files that it names.
 
-    Files from other folders get new names, and the campaign refers to them by these names.
+    A file outside the folder of the campaign gets a new name, and the returned campaign refers to the file by this
+    name.
     """
     text, found = study.campaign, {}
     for file in _named_files(url):
@@ -90,7 +91,7 @@ def _campaign(url: str, study: Study) -> tuple[bytes, dict[str, bytes]]:
 
 
 def _read(file: Mapping[str, str]) -> bytes:
-    """Return the content of a file that a campaign names; raise StoreError if it has changed since the run."""
+    """Return the content of a file that a campaign names; raise StoreError if the content has changed since the run."""
     path = Path(file["path"])
     content = path.read_bytes() if path.is_file() else b""
     if hashlib.sha256(content).hexdigest() != file["sha256"]:
@@ -100,7 +101,7 @@ def _read(file: Mapping[str, str]) -> bytes:
 
 
 def _named_files(url: str) -> list[dict[str, str]]:
-    """Return the files that a campaign names: every entry of its parameters with a path and a digest."""
+    """Return the files that a campaign names: all entries of the parameters that have a name, a path and a digest."""
     held: dict[str, dict[str, str]] = {}
 
     def look(part: Any) -> None:
@@ -120,7 +121,10 @@ def _named_files(url: str) -> list[dict[str, str]]:
 
 
 def _environment() -> str:
-    """Return a requirements file for pip with the installed packages; comments give Python and the machine."""
+    """Return a requirements file for pip with the installed packages.
+
+    Comments in this file give the version of Python, the platform and the number of processors.
+    """
     lines = [f"# Python {platform.python_version()}, {platform.platform()}, {os.cpu_count()} processors"]
     lines.append(f"# {datetime.now(UTC).isoformat(timespec='seconds')}; versions of each block: status/records")
     found = {str(one.metadata["Name"]): str(one.version) for one in distributions() if one.metadata["Name"]}

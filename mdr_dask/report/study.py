@@ -30,7 +30,7 @@ from mdr_dask.units import seconds
 
 #: Largest number of rows of a table on the page. If there are more, a note gives the command that prints all rows.
 MOST_ROWS = 60
-#: At most this many values of an axis are listed.
+#: Largest number of values of an axis that are listed.
 LISTED = 6
 
 
@@ -56,12 +56,13 @@ class Study:
     campaign, source : str
         Text of the campaign file, and name of the file.
     understood, counts, machines, laws, errors : lists of Table
-        Tables, in this order, of axes and fixed parameters, of the numbers of results in each state, of computers and
-        versions, of fits, and of the sources of errors.
+        ``understood``: axes, fixed parameters and outputs. ``counts``: number of results in each state. ``machines``:
+        computers, versions and history. ``laws``: fitted laws. ``errors``: standard error and grid error of the
+        outputs.
     failures : list of Group
-        Groups of equal messages of failed results, and of warnings.
+        Groups of failures and warnings whose messages differ only in their numbers.
     not_fitted, not_drawn : list of (name, reason)
-        Laws and figures for which the study does not contain the data.
+        Laws and figures for which data are missing in the study.
     figures, cases : list of dict
         Data from `mdr_dask.report.figures` and `mdr_dask.report.cases`.
     subject : Subject or None
@@ -69,7 +70,7 @@ class Study:
     digests, rerun : dict of str to str, list of str
         Digests of the campaign and of the results, and commands that compute the study again.
     at_work : str
-        Text about the processes that are working on the study.
+        Text about the runs that are computing the study now.
     """
 
     url: str
@@ -172,7 +173,7 @@ def _study(
 
 
 def _shows_no_errors(figure: Json) -> bool:
-    """Return whether a figure shows no errors; the page shows figures without errors last."""
+    """Return whether a figure shows no errors; on the page, such figures come last."""
     return not any("y_low" in trace or "value_low" in trace for trace in figure["traces"])
 
 
@@ -212,7 +213,7 @@ def _count_table(counted: list[Json]) -> Table:
 
 
 def _understood(name: str, data: xr.Dataset) -> Iterator[Table]:
-    """Yield tables with the axes and with the fixed parameters of a series."""
+    """Yield three tables of a series: its axes, its fixed parameters, and its outputs."""
     of = f" of {name}" if name else ""
     dims = [str(dim) for dim in data["status"].dims if dim != "realisation"]
     varied = [axis for dim in dims for axis in curves.parameters_along(data, dim) if axis in data.coords]
@@ -270,7 +271,10 @@ def _machines(records: list[Json], held: Mapping[str, Any]) -> list[Table]:
 
 
 def _laws(url: str, model: str, groups: Mapping[str, xr.Dataset]) -> tuple[list[Table], list[tuple[str, str]]]:
-    """Return tables of the fits with intervals and verdicts; and the fits for which data are missing, with reasons."""
+    """Return tables of the fitted laws, and the laws that cannot be fitted, with reasons.
+
+    The tables contain intervals of the constants and verdicts.
+    """
     found: list[Table] = []
     missing: list[tuple[str, str]] = []
     for name, law in fits.available(model).items():
@@ -331,7 +335,7 @@ def _cell(value: xr.DataArray) -> str:
 
 
 def _errors(name: str, data: xr.Dataset) -> Iterator[Table]:
-    """Yield a table of the errors of means: the error due to scatter of the realisations, and the grid error."""
+    """Yield a table with the errors of means: the standard error over realisations, and the grid error."""
     rows = []
     for output in main_outputs(data):
         if "realisation" not in data[output].dims or set(data[output].dims) > set(data["status"].dims):

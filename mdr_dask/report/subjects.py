@@ -72,7 +72,7 @@ _ROUGH = (
     "Trends with load, velocity, modulus and spectrum, and the exponents of laws of friction.",
 )
 _NOT_ROUGH = (
-    "Area in contact, pressure in contact, separation and gaps of a surface: the length in contact of the line is "
+    "Area in contact, pressure in contact, separation and gaps of a surface: the length of the line in contact is "
     "proportional to the contact stiffness and does not give the area.",
     "Friction of a surface in partial contact to better than a factor of about two: the lines had 0.60 to 2.17 times "
     "the friction of a sliding half-space.",
@@ -83,10 +83,11 @@ _NOT_ROUGH = (
 SUBJECTS: dict[str, Subject] = {
     "sliding_friction": Subject(
         "A viscoelastic body slides steadily over a rigid rough line. The method of dimensionality reduction replaces "
-        "the half-space by independent elements. An element that is not in contact relaxes, so its displacement is "
-        "the largest of all earlier indentations after their relaxation. One pass along the line, which consists of "
-        "cubic pieces, finds the steady displacement. The indentation depth follows from the normal force. The lines "
-        "are self-affine with random phases, or measured, and the results are means over the lines.",
+        "the half-space by independent elements. Every indentation of an element relaxes exponentially. The "
+        "displacement of the element is the largest of its earlier indentations after this relaxation. The line "
+        "consists of cubic pieces, and one pass along the line finds the steady displacements. The indentation depth "
+        "follows from the normal force. The lines are self-affine with random phases, or measured, and the results "
+        "are means over the lines.",
         (
             Equation(r"f = 4 G \, \mathrm{d}x \, (u + \tau \dot{u}) \geq 0", "force of an element of a Kelvin solid"),
             Equation(
@@ -107,10 +108,11 @@ SUBJECTS: dict[str, Subject] = {
         "docs/friction.md",
     ),
     "velocity_jump": Subject(
-        "A body slides steadily over a rough line under a constant load until its velocity jumps. Friction before the "
-        "jump and long after it follows from steady solutions. The indentation depth between them is computed in time "
-        "steps. In each step, one pass along the line finds the patches in contact; their forces have closed "
-        "forms. Every line has its own steady friction after the jump.",
+        "A body slides steadily over a rough line under a constant load until its velocity jumps. The friction before "
+        "the jump and the friction long after the jump follow from steady solutions. In the transient, the "
+        "indentation depth is computed in time steps. In each step, one pass along the line finds the patches in "
+        "contact, and the forces of these patches have closed forms. The steady friction after the jump is computed "
+        "for every line separately.",
         (
             Equation(
                 r"u(x, t) = \max_{t' \leq t} \left( d(t') + p(x') \right) e^{-(t - t')}, \quad x' = x - V (t - t')",
@@ -118,7 +120,7 @@ SUBJECTS: dict[str, Subject] = {
             ),
             Equation(
                 r"\Delta\mu_0 = \mu(t_0 + 0) - \mu_1",
-                "the jump of friction at the time of the velocity jump, when depth and displacements are continuous",
+                "jump of friction at the time of the velocity jump; depth and displacements do not jump",
             ),
             Equation(
                 r"\mu(t) - \mu_2 \propto e^{-b (t - t_0) / \tau}",
@@ -132,10 +134,10 @@ SUBJECTS: dict[str, Subject] = {
     ),
     "mixed_lubrication": Subject(
         "Two rough rollers are pressed together with an oil film between them. Film and asperities share the load as "
-        "in the theory of Johnson, Greenwood and Poon. The film is the film of a line contact, and the asperities are "
-        "springs of the method of dimensionality reduction. Where the lines overlap by more than the film thickness, "
-        "clusters of points are in contact. A cluster breaks through the boundary layer if it squeezes the layer to "
-        "less than the smallest thickness of the layer.",
+        "in the theory of Johnson, Greenwood and Poon. The film is that of a smooth line contact, and the asperities "
+        "are springs of the method of dimensionality reduction. Where the sum of the heights of both lines exceeds "
+        "the film thickness, clusters of points are in contact. A cluster breaks through the boundary layer if it "
+        "squeezes the layer to less than a critical thickness.",
         (
             Equation(
                 r"F_a(h) + \gamma F = F",

@@ -34,13 +34,13 @@ _INDEX = re.compile(r"([_^])(?:\{([^{}]*)\}|(.))")
 
 
 def markup(label: str) -> str:
-    """Return a label as HTML: for ``$F_N$``, N becomes a subscript; characters outside mathtext are unchanged.
+    """Return a label as HTML: in ``$F_N$``, N becomes a subscript.
 
-    Only the parts between two dollars are read as mathtext. The only HTML elements in the result are ``sub`` and
-    ``sup``.
+    Only text between two dollar signs is read as mathtext; all other text is unchanged. The only HTML elements in the
+    result are ``sub`` and ``sup``.
     """
     parts = label.split("$")
-    if len(parts) % 2 == 0:  # an unmatched dollar
+    if len(parts) % 2 == 0:  # one dollar sign has no partner
         return escape(label)
     return "".join(_formula(part) if k % 2 else escape(part) for k, part in enumerate(parts))
 

@@ -5,7 +5,7 @@ is one connected interval of overlap, with the length ``D`` and the force ``F = 
 cluster breaks the layer if ``pi tau0 D^3/(12 F) < h_c`` (eq. 5.6), that is, if ``int (z - h0) dx > s D^3`` with the
 layer strength ``s = pi tau0/(12 E* h_c)``. The shear strength tau0 of the layer, the contact modulus E* and the
 critical thickness h_c enter only through s. Lines are closed (periodic) cubic splines, for which these integrals are
-exact. The contact zone is a window of given width; one window begins at each node.
+exact. The contact zone is an interval of given width, called the window; a window is placed at every node.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def layer_strength(shear_strength: ArrayLike, E_star: ArrayLike, thickness: Arra
 
 @jit
 def _counted(length: float) -> int:
-    """Convert a length in spacings to a whole number of parts (a spacing has `PARTS` parts), at least 1."""
+    """Convert a length in spacings to a whole number of parts, at least 1; a spacing has `PARTS` parts."""
     return max(1, int(length * PARTS + 0.5))
 
 
@@ -72,9 +72,9 @@ def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> Non
 
 @jit
 def _add(jumps: NDArray[np.int32], at: int, number: int) -> None:
-    """Add `number` to one entry of the trace, like `_block`.
+    """Add `number` to one entry of the trace; `jumps` is described in `_block`.
 
-    The index `at` of the entry may lie outside the trace by at most the length of the trace.
+    The index `at` may be negative or beyond the last entry; the length of the trace is then added or subtracted once.
     """
     points = jumps.size - 1
     at = at + points if at < 0 else at - points if at >= points else at
@@ -86,15 +86,16 @@ def _add(jumps: NDArray[np.int32], at: int, number: int) -> None:
 def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: float, jumps: NDArray[np.int32]) -> None:
     """Add the contribution of a cluster to the windows that contain only its head or only its tail.
 
-    If `judged`, a part is counted if this part breaks the layer by itself. Otherwise, it is counted if the whole
-    cluster breaks the layer. A part longer than `reach` cannot break the layer, whatever its shape.
+    The head or tail in a window is counted under one condition. If `judged` is true, the head or tail has to break the
+    layer by itself. If `judged` is false, the whole cluster has to break the layer. A part longer than `reach` cannot
+    break the layer, whatever its shape.
     """
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
     start, end, total = clusters.start[c], clusters.end[c], clusters.total[c]
     always = total > limit * (end - start) ** 3
     longest = min(window, reach) if judged else window
     width = int(window)
-    beyond = window - width  # distance of the window's right edge from the node before it
+    beyond = window - width  # from the last node in the window to its right edge
     first, second, third, fourth = shares(beyond)
     node = int(start)
     until_node = -integral(piece(overlap, node), start - node)
@@ -114,7 +115,7 @@ def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: fl
 
 @jit
 def _add_middles(clusters: Clusters, c: int, window: float, judged: bool, jumps: NDArray[np.int32]) -> None:
-    """Add the contribution of a cluster to the windows that lie within it, so that both edges of a window cut it."""
+    """Add the contribution of a cluster to all windows that lie entirely within this cluster."""
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
     start, end = clusters.start[c], clusters.end[c]
     always = clusters.total[c] > limit * (end - start) ** 3
@@ -134,7 +135,7 @@ def _add_middles(clusters: Clusters, c: int, window: float, judged: bool, jumps:
 
 @jit
 def _collect(clusters: Clusters, window: float, rule: int, jumps: NDArray[np.int32]) -> None:
-    """Add the contributions of all clusters to `jumps`, then replace `jumps` by its cumulative sum, the trace."""
+    """Add the contributions of all clusters to `jumps`, then replace `jumps` by the trace, its cumulative sum."""
     points = jumps.size - 1
     reach = np.sqrt(clusters.overlap.max() / clusters.limit) if clusters.limit > 0 else np.inf
     for c in range(clusters.start.size):
@@ -177,7 +178,7 @@ def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> ND
     -------
     int array, shape (points,)
         Lengths in whole parts of a spacing (a spacing has `PARTS` parts), so that sums are exact. An entry is above
-        zero if its window is in intimate contact. The fraction of these entries is the breakthrough probability.
+        zero if its window is in intimate contact. The fraction of entries above zero is the breakthrough probability.
     """
     trace = np.zeros(clusters.points + 1, dtype=np.int32)
     if clusters.start.size:
@@ -217,9 +218,10 @@ def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
 
 @jit
 def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work: FloatArray) -> tuple[float, float]:
-    """Return the length and the force of the part of a cluster beyond an edge of the window.
+    """Return the length of the part of a cluster beyond an edge of the window, and the integral of the overlap over it.
 
-    The cluster is followed over at most the distance `most`: to the right if `most` is positive, else to the left.
+    The cluster is followed to the right if `most` is positive, else to the left. The cluster is cut off at the distance
+    ``|most|`` from the edge.
     """
     overlap, found = work[:4], work[4:]
     direction = 1 if most > 0 else -1
@@ -247,7 +249,8 @@ def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work
 def _judge(pair: Pair, position: tuple[int, int], window: float, rule: int, work: FloatArray) -> int:
     """Return the length in intimate contact of one window.
 
-    `work` is workspace for the overlap of the lines in the window and the crossings of this overlap.
+    `work` is workspace for the overlap of the lines in the window, and for the positions where the overlap changes
+    sign.
     """
     points, pieces = pair.line_1.size, int(np.ceil(window))
     overlap, found, beyond = work[: pieces + 3], work[pieces + 3 : 4 * pieces + 3], work[4 * pieces + 3 :]
@@ -297,7 +300,7 @@ def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray
     window : float
         Width of the window in spacings, at most the length of the line.
     positions : tuple of two int arrays, shape (n,)
-        Node of each line at the left edge of the window; see `creep_positions`.
+        For each window, the node of line 1 and the node of line 2 at the left edge; see `creep_positions`.
     rule : str
         One of `EDGE_RULES`.
 
@@ -314,13 +317,13 @@ def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray
 
 
 def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> tuple[IntArray, IntArray]:
-    """Return the first node of the window on each line, for given distances that the contact has travelled.
+    """Return the node of each line at the left edge of the window, for given distances of travel.
 
     Parameters
     ----------
     travel : array_like, shape (n,)
-        Distance that the contact has travelled at the mean velocity of the surfaces, measured in spacings of the nodes.
-        For mean values, steps of an eighth of the window are small enough.
+        Distances that the contact has travelled at the mean velocity of the surfaces, in spacings. If results are
+        averaged over the travel, steps of an eighth of the window are small enough.
     points : int
         Number of points of each line.
     slide_roll_ratio : float
@@ -329,7 +332,7 @@ def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> 
     Returns
     -------
     two int arrays, shape (n,)
-        First node of the window on line 1 and on line 2.
+        Node of line 1 and node of line 2 at the left edge of the window.
     """
     steps = np.asarray(travel, dtype=np.float64)
     first, second = (np.round(steps * (1 + sign * slide_roll_ratio / 2)).astype(np.int64) % points for sign in (1, -1))
@@ -337,7 +340,7 @@ def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> 
 
 
 def contact_resistance(resistivity: ArrayLike, contact_length: ArrayLike) -> FloatArray:
-    """Return the resistance ``R_c = rho/L_cont`` in ohm of parallel spots (thesis eq. 5.1); infinite without contact.
+    """Return the resistance ``R_c = rho/L_cont`` of parallel spots in ohm (thesis eq. 5.1); infinite without contact.
 
     Parameters
     ----------

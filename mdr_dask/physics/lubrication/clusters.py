@@ -12,15 +12,15 @@ from mdr_dask.physics.surfaces.splines import integral, piece, zeros
 
 
 class Clusters(NamedTuple):
-    """Clusters of a closed line, in the order of their beginnings.
+    """The clusters of a closed line, in the order in which they begin.
 
     Parameters
     ----------
     start, end : array, shape (n,)
         Beginning and end of each cluster in spacings. If a cluster continues from the last node of the closed line to
-        the first, its end lies beyond the last node.
+        the first node, the end of the cluster lies beyond the last node.
     total : array, shape (n,)
-        Integral of ``z - h0`` over each cluster, in m times spacings.
+        Integral of ``z - h0`` over each cluster, in m times the spacing of the nodes.
     overlap : array, shape (points + 3,)
         Spline of ``z - h0`` in m, extended periodically: the last coefficient, all coefficients, and the first two
         coefficients.
@@ -28,7 +28,7 @@ class Clusters(NamedTuple):
         The number ``s dx^2`` in m, with the layer strength s and the distance dx between nodes. A cluster breaks the
         layer if ``total > limit (end - start)^3`` (thesis eq. 5.6).
     closed : bool
-        Whether one cluster covers the whole closed line, so that it has no end.
+        Whether a single cluster covers the whole closed line; such a cluster has no end.
     """
 
     start: FloatArray
@@ -46,7 +46,7 @@ class Clusters(NamedTuple):
 
 @jit
 def whole_piece(overlap: FloatArray, k: int) -> float:
-    """Return the integral of a spline from node k to the next."""
+    """Return the integral of a spline from node k to node k + 1."""
     found: float = (overlap[k] + 11 * overlap[k + 1] + 11 * overlap[k + 2] + overlap[k + 3]) / 24
     return found
 
@@ -55,7 +55,7 @@ def whole_piece(overlap: FloatArray, k: int) -> float:
 def total(overlap: FloatArray, start: float, end: float) -> float:
     """Return the integral from `start` to `end` of a closed spline with ``overlap.size - 3`` nodes.
 
-    `start` lies on the line; `end` may lie beyond the last node of the line.
+    `end` may lie beyond the last node; the integral then continues at the first node.
     """
     points = overlap.size - 3
     first, last = int(start), int(end)
@@ -76,7 +76,7 @@ def crossings(overlap: FloatArray, found: FloatArray) -> int:
     count = 0
     above = 4 * (overlap[0] > 0) + 2 * (overlap[1] > 0) + (overlap[2] > 0)
     for k in range(overlap.size - 3):
-        above = (above << 1 | (overlap[k + 3] > 0)) & 15  # signs of the four coefficients of this piece, as bits
+        above = (above << 1 | (overlap[k + 3] > 0)) & 15  # one bit for the sign of each of the four coefficients
         if above != 0 and above != 15:
             count = zeros(overlap, k, found, count)
     return count

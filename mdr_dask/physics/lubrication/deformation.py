@@ -22,7 +22,7 @@ def _second_integral(x: float) -> float:
 
 @jit
 def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
-    """Replace the second integrals of ``ln|x|`` at the nodes by the integrals of ``ln|x|`` times the hat functions.
+    """Replace second integrals of ``ln|x|`` at the nodes by the integral of ``ln|x|`` times each hat function.
 
     The hat function of a node is 1 at this node, 0 at all others, and linear in between. The entries of both end nodes
     become zero.
@@ -39,7 +39,7 @@ def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
 
 @jit
 def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
-    """Write the integral of ``ln|point - X|`` times the hat function of node j to ``row[j]``; zero at both ends."""
+    """Write the integral of ``ln|point - X|`` times the hat function of node j to ``row[j]``; the end entries are 0."""
     for j in range(nodes.size):
         row[j] = _second_integral(point - nodes[j])
     _over_hats(nodes, row)
@@ -47,7 +47,7 @@ def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
 
 @jit
 def influence_matrix(nodes: FloatArray) -> FloatArray:
-    """Return the matrix that converts nodal pressures to deformations at the nodes, relative to ``X = 0``.
+    """Return the matrix that converts nodal pressures to the nodal deformations minus the deformation at ``X = 0``.
 
     Parameters
     ----------
@@ -83,7 +83,8 @@ def film(points: FloatArray, nodes: FloatArray, pressure: FloatArray, central_fi
     points : array, shape (m,)
         Positions in half widths.
     nodes, pressure : array, shape (n,)
-        Ascending nodes in half widths, and the pressures at the nodes in units of p0; zero at both ends.
+        Ascending nodes in half widths, and the pressures at the nodes in units of p0. The first and the last pressure
+        are zero.
     central_film : float
         Film at ``X = 0`` in units of ``a^2/R``.
 
@@ -97,7 +98,7 @@ def film(points: FloatArray, nodes: FloatArray, pressure: FloatArray, central_fi
     result = np.empty(points.size)
     for i in range(points.size):
         _influence_row(points[i], nodes, row)
-        total = 0.0  # without BLAS, whose last bits depend on the number of threads
+        total = 0.0  # BLAS is not used, because its last bits depend on the number of threads
         for j in range(nodes.size):
             total += (origin[j] - row[j]) * pressure[j]
         result[i] = central_film + 0.5 * points[i] ** 2 + total / pi

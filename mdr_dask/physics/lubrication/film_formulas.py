@@ -72,15 +72,16 @@ def fluid_friction(
     log_viscosity : callable
         Returns the natural logarithm of the viscosity (in Pa s) at pressures in Pa.
     eyring_stress : float
-        Stress tau_E in Pa of ``tau = tau_E asinh(eta v/(h tau_E))``; for large values the liquid is Newtonian.
+        Eyring stress tau_E in Pa. The shear stress is ``tau_E asinh(eta v/(h tau_E))`` for the viscosity eta, the
+        sliding velocity v and the film h. If tau_E is large, the liquid is Newtonian.
     film_share : float
         Fraction of the load, and therefore of the Hertzian pressure, that the film carries.
 
     Returns
     -------
     float
-        Mean shear stress divided by the mean pressure of the whole load, without rolling friction. The integral uses 64
-        Gauss points in the angle of ``x = a sin(angle)``.
+        Mean shear stress, divided by the mean of the Hertzian pressure under the whole load. Rolling friction is not
+        included. With ``x = a sin(angle)``, the integral over the angle uses 64 Gauss points.
     """
     if sliding_velocity == 0:
         return 0.0
@@ -96,7 +97,7 @@ def fluid_friction(
     return float(np.sum(weights * stress * cosine) / (contact.pressure * np.sum(weights * cosine**2)))
 
 
-#: Ratio of film thickness and radius above which a roller differs from a parabola by more than a few per cent.
+#: If the film divided by the radius exceeds this ratio, a roller differs from a parabola by more than a few per cent.
 THICKEST_FILM = 0.1
 
 
@@ -150,7 +151,7 @@ def dimensionless_groups(
 
 @dataclass(frozen=True)
 class FilmFormula:
-    """A regression ``h/R = factor W^load U^speed G^material``, and the ranges of W, U and G in which it was fitted.
+    """A regression ``h/R = factor W^load U^speed G^material``, and the ranges of W, U and G of the fitted data.
 
     Parameters
     ----------
@@ -159,7 +160,7 @@ class FilmFormula:
     factor, load, speed, material : float
         Factor and exponents.
     load_range, speed_range, material_range : tuple of float
-        Lowest and highest W, U and G in the fit. Outside these ranges, the formula is an extrapolation.
+        Lowest and highest W, U and G in the fitted data. Outside these ranges, the formula is an extrapolation.
     """
 
     name: str
@@ -181,7 +182,7 @@ class FilmFormula:
         )
 
     def outside(self, W: float, U: float, G: float) -> str:
-        """Return a message that names the numbers outside the range of the formula, or an empty string."""
+        """Return a message that names which of W, U and G lie outside the fitted ranges, or an empty string."""
         ranges = (("W", W, self.load_range), ("U", U, self.speed_range), ("G", G, self.material_range))
         outside = [
             f"{symbol} lies outside {low:g} to {high:g}"
@@ -212,7 +213,7 @@ FORMULAS: dict[str, FilmFormula] = {
 
 
 def square_of_half_width(W: float) -> float:
-    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact, which converts films from units of ``a^2/R`` to units of R."""
+    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact. This factor converts films from units of ``a^2/R`` to ``h/R``."""
     return 8 * W / np.pi
 
 
@@ -257,8 +258,8 @@ def limiting_films(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:
     Returns
     -------
     array, shape (4, *shape)
-        The films in the order of `REGIMES`. The last row is the Dowson-Higginson formula, as in Johnson's map of the
-        regimes.
+        The films in the order of `REGIMES`. The film of the last regime is the Dowson-Higginson formula, as in
+        Johnson's map of the regimes.
     """
     W, U, G = np.broadcast_arrays(np.asarray(W, float), np.asarray(U, float), np.asarray(G, float))
     M = moes_parameters(W, U, G).M
@@ -279,7 +280,7 @@ def expected_film(M: float, L: float) -> float:
 
 
 def regime(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> NDArray[np.intp]:
-    """Return the index in `REGIMES` of the regime of each case.
+    """Return the regime of each case as an index of `REGIMES`.
 
     Elastic flattening makes an isoviscous film thicker and a piezoviscous film thinner. So the isoviscous film is the
     thicker of its two limits, and the piezoviscous film is the thinner of its two limits. The limit that gives the

@@ -16,10 +16,10 @@ from mdr_dask.physics.lubrication.grids import adapted_density
 
 #: A second pressure maximum is a spike if it exceeds the minimum before it by this fraction of the maximum pressure.
 _SPIKE = 0.01
-#: Number of nodes on either side of a position that the interpolating polynomial uses. The minimum film on coarse grids
-#: needs three nodes on either side.
+#: The interpolating polynomial at a position uses this number of nodes on either side of the position. For the minimum
+#: film on coarse grids, three nodes on either side are needed.
 _CUBIC, _QUINTIC = 2, 3
-#: Distance, as a fraction of a cell, by which the computed pressure ends too far upstream if the film ends at a node.
+#: If the film ends at a node, the computed pressure ends too far upstream by this fraction of a cell.
 _TOO_EARLY = 0.035
 
 
@@ -27,9 +27,10 @@ _TOO_EARLY = 0.035
 class GridSolution:
     """Pressure in units of p0, and film in units of ``a^2/R``, at the nodes of one grid.
 
-    `central` is the film at ``X = 0``. `spacing` is the distance between two nodes times the density of nodes; it is
-    about halved on each finer grid. The numerical method uses a pressure that is linear between two nodes, so that its
-    film is slightly too thin between the nodes. Therefore :meth:`film_between` uses a polynomial through the nodes.
+    `central` is the film at ``X = 0``. `spacing` is the distance between two nodes times the density of nodes; each
+    finer grid has about half the spacing of the grid before. The numerical method uses a pressure that is linear
+    between two nodes. The film computed from this pressure is slightly too thin between the nodes, so
+    :meth:`film_between` uses a polynomial through the nodal films.
     """
 
     nodes: FloatArray
@@ -39,7 +40,7 @@ class GridSolution:
     spacing: float = np.nan
 
     def film_between(self, positions: FloatArray) -> FloatArray:
-        """Return the film in units of ``a^2/R`` at positions in half widths; NaN upstream of the oil."""
+        """Return the film in units of ``a^2/R`` at positions in half widths; NaN upstream of the first node."""
         film = _between(self.nodes, self.film, positions, _CUBIC)
         behind = positions > self.nodes[-1]
         film[behind] = film_at(positions[behind], self.nodes, self.pressure, self.central)
@@ -51,11 +52,11 @@ class GridSolution:
         return np.where(inside, np.maximum(_between(self.nodes, self.pressure, positions, _CUBIC), 0.0), 0.0)
 
     def pressure_carried(self, nodes: FloatArray, front: float) -> FloatArray:
-        """Interpolate the pressure at the nodes of another grid, and move its front to the position `front`.
+        """Return the pressure interpolated at the nodes of another grid, with its front moved to `front`.
 
-        The front is the steep fall of the pressure behind the spike (see :attr:`front`). The nodes on either side of
-        the new front get the pressures that this grid has at half a cell from its own front. On a finer grid, the
-        pressures at half a cell from the front are nearly the same.
+        The front is the steep fall of the pressure behind the spike (see :attr:`front`). This grid has certain
+        pressures half a cell before and half a cell behind its own front. The two nodes next to the new front get these
+        pressures, because the pressures half a cell from the front are nearly the same on a finer grid.
         """
         if np.isnan(front + self.front):
             return self.pressure_between(nodes)
@@ -79,7 +80,7 @@ class GridSolution:
     def minimum(self) -> tuple[float, float]:
         """Position and height of the minimum film, interpolated between the nodes around the lowest node.
 
-        The polynomial is quintic, because the interpolation error of a cubic exceeds the other errors of the solution.
+        The polynomial is of fifth order, because the interpolation error of a cubic would exceed the other errors.
         """
         i = int(np.clip(np.argmin(self.film), 1, self.film.size - 2))
         low, high = float(self.nodes[i - 1]), float(self.nodes[i + 1])
@@ -98,7 +99,7 @@ class GridSolution:
 
     @property
     def resolves_spike(self) -> bool:
-        """Whether the pressure behind the spike needs at least two cells to fall by half of the spike's height."""
+        """Whether the pressure behind the spike needs at least two cells to fall by half of the height of the spike."""
         peak, lowest = self._spike
         behind = self.pressure[peak:]
         return peak > 0 and int(np.argmax(behind <= 0.5 * (lowest + behind[0]))) > 1
@@ -107,8 +108,8 @@ class GridSolution:
     def front(self) -> float:
         """Position at which the pressure behind the spike equals the minimum before it; NaN if there is no spike.
 
-        On any grid, the pressure falls within one or two cells around this position; only the height of the spike
-        depends on the nodes.
+        On any grid, the pressure falls within one or two cells around this position. The position hardly depends on the
+        nodes, but the height of the spike does.
         """
         peak, lowest = self._spike
         if not peak:
@@ -118,7 +119,10 @@ class GridSolution:
 
     @cached_property
     def _spike(self) -> tuple[int, float]:
-        """The node of the spike and the lowest pressure between both maxima; node 0 if there is no spike."""
+        """The node of the spike, and the lowest pressure before it; the node is 0 if there is no spike.
+
+        The lowest pressure is taken between the spike and the maximum before the spike.
+        """
         P = self.pressure
         peaks = np.flatnonzero((P[1:-1] > P[:-2]) & (P[1:-1] >= P[2:])) + 1
         if peaks.size < 2:
@@ -151,10 +155,12 @@ def _cell_around(nodes: FloatArray, position: float) -> FloatArray:
 def expected(
     before: Sequence[GridSolution], reading: Callable[[GridSolution], float | FloatArray], spacing: float
 ) -> FloatArray:
-    """Return the expected value of a quantity on a grid of another spacing; `reading` evaluates it on a known grid.
+    """Return the expected value of a quantity on a grid of another spacing.
 
-    If there are two earlier grids or more, the value is extrapolated from the last two, assuming an error of second
-    order in the spacing. If there is only one earlier grid, the value on this grid is returned.
+    `reading` evaluates the quantity on a solved grid.
+
+    If `before` has two grids or more, the value is extrapolated from the last two grids, assuming an error of second
+    order in the spacing. If `before` has only one grid, the value on this grid is returned.
     """
     last = np.asarray(reading(before[-1]))
     if len(before) == 1:
@@ -168,7 +174,7 @@ def _between(nodes: FloatArray, values: FloatArray, positions: FloatArray, sides
     """Interpolate at each position by the polynomial through the `sides` nodes on either side of this position."""
     result = np.empty(positions.size)
     for k in range(positions.size):
-        low, high = sides, nodes.size - sides  # bounds for the first node that is not before the position
+        low, high = sides, nodes.size - sides  # bisection for the first node at or behind the position
         while low < high:
             middle = (low + high) // 2
             if nodes[middle] < positions[k]:

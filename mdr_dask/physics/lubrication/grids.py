@@ -1,9 +1,9 @@
 """Graded grids for a lubricated line contact.
 
-The first grid follows from the expected film, all others from a solution on an earlier grid.
+The first grid follows from the expected film. Every other grid follows from the solution on an earlier grid.
 
-A grid is sampled from a density of nodes along the contact. Grids of different size are therefore similar, and their
-errors can be compared (Richardson extrapolation). Positions are in half widths, films in ``a^2/R``.
+A grid is sampled from a density of nodes along the contact. Grids with different numbers of nodes are therefore
+similar, so that Richardson extrapolation can compare their errors. Positions are in half widths, films in ``a^2/R``.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def _cells(positions: FloatArray, density: FloatArray) -> FloatArray:
 
 
 def _placed(positions: FloatArray, density: FloatArray, number: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Return the positions before which there are `wanted` cells; the density is constant beyond the last position."""
+    """Return the positions that have `wanted` cells before them; beyond the last position, the density is constant."""
     width = np.diff(positions)
     cell = np.clip(np.searchsorted(number, wanted, side="right") - 1, 0, width.size - 1)
     rest = wanted - number[cell]
@@ -71,11 +71,11 @@ def aligned(
 ) -> tuple[FloatArray, float]:
     """Return nodes with a given density; the film ends at a node, and the front lies near the middle of a cell.
 
-    Without alignment, the film would end somewhere inside a cell. The error of the film varies by up to a tenth with
-    the position of this end in the cell, and is least if the film ends at a node. Errors on different grids can
-    therefore be compared only if the film ends at a node on every grid. Behind a sharp spike, the pressure falls within
-    one or two cells, and the minimum film depends on the position of these cells. Therefore the cells are made slightly
-    wider or narrower, so that the front lies near the middle of a cell.
+    Without alignment, the film would end somewhere inside a cell. The error of the film is least if the film ends at a
+    node, and up to a tenth larger if the film ends elsewhere in a cell. Errors on different grids can therefore be
+    compared only if the film ends at a node on every grid. Behind a sharp spike, the pressure falls within one or two
+    cells, and the minimum film depends on the position of these cells. Therefore the cells are made slightly wider or
+    narrower, so that the front lies near the middle of a cell.
 
     Parameters
     ----------
@@ -86,13 +86,13 @@ def aligned(
     rupture : float
         Position of the end of the film, estimated from coarser grids.
     front : float
-        Position where the pressure falls behind its spike, before the film ends; NaN if there is no spike.
+        Position of the steep fall of the pressure between the spike and the end of the film; NaN if there is no spike.
 
     Returns
     -------
     tuple of array and float
-        Ascending nodes, of which the last lies at or behind the last position; and the spacing of the nodes divided by
-        the spacing that the density gives.
+        Ascending nodes; and the distance between neighbouring nodes times the density, which is the same for all cells.
+        The last node lies at or behind the last position.
     """
     number = _cells(positions, density)
     reached = _cells_before(rupture, positions, density, number)
@@ -105,8 +105,11 @@ def aligned(
 
 
 def _halved_by(share: float, cells: int) -> int:
-    """Return the number n near `cells` for which n times `share` is closest to a whole number plus one half."""
-    far = int(0.5 / max(1 - share, 4 / cells))  # the position in its cell repeats after 1 / (1 - share) cells
+    """Return a number n near `cells` for which n times `share` is closest to a whole number plus one half.
+
+    `share` is the number of cells before the front, divided by the number of cells before the end of the film.
+    """
+    far = int(0.5 / max(1 - share, 4 / cells))  # n * share % 1 repeats if n grows by 1 / (1 - share)
     near = cells + np.arange(-far, far + 1)
     return int(near[np.argmin(np.abs(near * share % 1 - 0.5))])
 
@@ -114,7 +117,7 @@ def _halved_by(share: float, cells: int) -> int:
 def _cells_before(position: float, positions: FloatArray, density: FloatArray, number: FloatArray) -> float:
     """Return the number of cells before a position.
 
-    `number` contains the number of cells before each position at which the density is given.
+    `number` contains the number of cells before each of the `positions`, at which the density is given.
     """
     before = int(np.clip(np.searchsorted(positions, position) - 1, 0, positions.size - 2))
     rest = position - positions[before]
@@ -125,7 +128,8 @@ def _cells_before(position: float, positions: FloatArray, density: FloatArray, n
 def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:
     """Return a grid for an expected film.
 
-    The grid is fine at both ends of the dry contact, or, for a thick film, around the minimum of the parabolic gap.
+    For a thin film, the grid is fine at both ends of the dry contact. For a thick film, the grid is fine around the
+    minimum of the parabolic gap.
 
     Parameters
     ----------
@@ -154,7 +158,8 @@ def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:
 def first_pressure(nodes: FloatArray, central: float) -> FloatArray:
     """Return a first guess of the pressure, shaped like half an ellipse.
 
-    This is Hertz' pressure; for a thick film, the ellipse is wider and flatter and lies further upstream.
+    For a thin film, this is Hertz' pressure. For a thick film, the ellipse is wider and flatter, and lies further
+    upstream.
     """
     reach = float(np.sqrt(2 * central))
     width, centre = (1.0, 0.0) if reach < 1 else (max(1.0, 0.8 * reach), -0.4 * reach)
@@ -162,7 +167,10 @@ def first_pressure(nodes: FloatArray, central: float) -> FloatArray:
 
 
 def second_derivative(nodes: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the second derivative at the nodes from divided differences; end nodes have the neighbour's value."""
+    """Return the second derivative at the nodes from divided differences.
+
+    Each end node gets the value of its neighbour.
+    """
     width = np.diff(nodes)
     inner = 2 * np.diff(np.diff(values) / width) / (width[1:] + width[:-1])
     return np.concatenate([inner[:1], inner, inner[-1:]])
@@ -171,10 +179,11 @@ def second_derivative(nodes: FloatArray, values: FloatArray) -> FloatArray:
 def adapted_density(nodes: FloatArray, pressure: FloatArray, film: FloatArray, central_film: float) -> FloatArray:
     """Return the density of nodes that is suitable for a solution, shape (n,).
 
-    Two terms of the density follow from the solution. The error of the flow is of second order; its term is the square
-    root of the curvature of the film divided by the film. The error of the deformation is an integral over an element;
-    its term is the cube root of the curvature of the pressure. A third term, the least density, provides nodes where
-    the other two are small: in the contact and in the inlet. Smoothing makes neighbouring cells similar.
+    Two terms of the density follow from the solution. The error of the flow is of second order in the spacing; the term
+    for the flow is ``sqrt(|H''|/H)``. The error of the deformation is of third order, because it is an integral over a
+    cell; the term for the deformation is proportional to the cube root of ``|P''|``. A third term, the least density,
+    provides nodes where the other two are small: in the contact and in the inlet. Smoothing makes neighbouring cells
+    similar.
     """
     length = max(1.0, float(np.sqrt(2 * central_film)))
     of_film = np.sqrt(np.abs(second_derivative(nodes, film)) / film)

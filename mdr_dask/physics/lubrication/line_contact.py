@@ -2,11 +2,12 @@
 
 Hertz units: ``X = x/a``, ``P = p/p0``, ``H = h R/a^2`` (thesis eq. B.13), with ``a/R = sqrt(8 W/pi)`` and
 ``p0 = E' sqrt(W/(2 pi))``, where ``E' = 2 E*``. The velocity is the mean of the two surface velocities. With Barus' law
-and an incompressible liquid the solution depends on two numbers only, Moes' M and L.
+and an incompressible liquid, the solution depends only on the two numbers M and L of Moes.
 
-The first solution on a coarse grid gives the density of nodes for all other grids. A case is then solved on grids of
-40, 80, 160, ... nodes with this density. The scheme is of second order. Extrapolation from two grids gives a value of
-third order, and the changes of this value from grid to grid give the error (`mdr_dask.physics.refine`).
+The first solutions of a case only serve to find a suitable density of nodes. The case is then solved on grids of 40,
+80, 160, ... nodes with this density. The error on one grid is of second order in the spacing. The error of a value
+extrapolated from two grids is of third order; this error is estimated from the changes of the extrapolated value from
+grid to grid (`mdr_dask.physics.refine`).
 """
 
 from __future__ import annotations
@@ -31,27 +32,27 @@ VISCOSITY_LAWS = ("barus", "roelands")
 
 #: Numbers of nodes of the grids. On the finest grid, a Newton step solves 1281 dense equations in about 0.1 s.
 NODES = (40, 80, 160, 320, 640, 1280)
-#: `ORDER` is the order of convergence of the values extrapolated from two grids. `FACTOR` is the ratio of the stated
-#: error to the last change of these values.
+#: `ORDER` is the order of convergence of the values extrapolated from two grids. The stated error of an extrapolated
+#: value is `FACTOR` times the last change of this value, or times an eighth of the change before if this is larger.
 ORDER = 3.0
 FACTOR = SAFETY / (2.0**ORDER - 1)
-#: Before the grids of `NODES`, up to two grids with this number of nodes are solved. Their solutions only serve to find
-#: the density of nodes of all further grids.
+#: Before the grids of `NODES`, up to two grids with about this number of nodes are solved. These solutions only serve
+#: to find the density of nodes for the grids of `NODES`.
 ADAPTED_NODES = 161
 
 
-#: Attempts at the first solution, in the order in which they are tried: ratio of the guessed film to the film expected
-#: from the limiting regimes; upper limit of the guess, divided by the square of the distance to the inlet; number of
-#: nodes; step limits of Newton's method. The second attempt takes small steps from a thick film on a fine grid; it is
-#: slow but hardly ever fails.
+#: Attempts at the first solution, in the order in which they are tried. Each attempt has four entries. The guessed film
+#: is the first entry times the film expected from the limiting regimes, but at most the second entry times the square
+#: of the position of the inlet. The third entry is the number of nodes, the fourth the step limits of Newton's method.
+#: The second attempt takes small steps from a thick film on a fine grid; it is slow but hardly ever fails.
 ATTEMPTS = ((1.5, 0.2, 121, Pace(0.12, 80)), (2.5, 0.4, 361, Pace(0.05, 200)))
-#: Step limits on further grids. The first limits are used with an extrapolated initial guess. If this fails, the
-#: solution on the previous grid is used as the initial guess, with the second limits.
+#: Step limits on further grids. The first limits are used with an extrapolated initial guess. If Newton's method fails,
+#: the second limits are used, with the solution on the previous grid as the initial guess.
 PACES = (Pace(0.12, 16), Pace(0.03, 250))
 #: The stated error of a position is never smaller than this number of cells.
 PLACED = 0.1
-#: The error of a profile at a position is the largest error within this distance, measured in cells of the coarser
-#: grid. This is necessary, because the position of a steep front differs between the grids.
+#: The stated error of a profile at a position is the largest error within this distance, in cells of the coarser of the
+#: two finest grids. The largest error is used because the position of a steep front differs between the grids.
 REACH = 2.0
 
 
@@ -126,7 +127,8 @@ def line_contact(
     groups : tuple of float
         Load, speed and material parameters W, U and G with ``E' = 2 E*`` and the mean velocity.
     E_star : float
-        Contact modulus in Pa. The pressures in the density law and in Roelands' law follow from it.
+        Contact modulus in Pa. `E_star` and W give p0, with which the density law and Roelands' law are made
+        dimensionless.
     viscosity_law : str
         ``"barus"`` or ``"roelands"``.
     viscosity : float, optional
@@ -175,7 +177,7 @@ class LineSolution:
     reason : str
         The reason, in one sentence, if no film was found; otherwise empty.
     grids : tuple of GridSolution
-        All grids with a solution, the finest last; empty if no film was found.
+        The solutions on all grids, the finest grid last; empty if no film was found.
     central_film, minimum_film : Estimate
         Films in units of ``a^2/R``; NaN if no film was found.
     """
@@ -208,7 +210,7 @@ class LineSolution:
         return Estimate(np.asarray(values[-1]), np.asarray(_error(values)))
 
     def profile(self, read: Callable[[GridSolution, FloatArray], FloatArray], positions: FloatArray) -> Estimate:
-        """Return a profile at positions in half widths, with an error at each of them.
+        """Return a profile at positions in half widths, with an error at each position.
 
         Parameters
         ----------
@@ -219,9 +221,9 @@ class LineSolution:
 
         Notes
         -----
-        The error at a position is the largest difference within `REACH` cells of this position. This is necessary,
-        because the position of a spike or a front differs between the grids, and the difference of two profiles
-        vanishes where they intersect.
+        The error at a position is the largest estimated error within `REACH` cells of this position. The error at the
+        position alone would be too small where the profiles of two grids intersect, and these profiles have the spike
+        or the front at different positions.
         """
         pairs = list(_pairs(self.grids))
         coarse = pairs[-1][0].nodes
@@ -235,7 +237,7 @@ class LineSolution:
         return Estimate(value, np.where(np.isnan(value), np.nan, largest))
 
     def position(self, reading: Reading) -> Estimate:
-        """Return a position in half widths; its stated error is never smaller than a tenth of a cell."""
+        """Return a position in half widths; the stated error of the position is at least a tenth of a cell."""
         found, nodes = self.estimate(reading), self.finest.nodes
         after = np.clip(np.searchsorted(nodes, found.value), 1, nodes.size - 1)
         return found._replace(error=np.maximum(found.error, PLACED * (nodes[after] - nodes[after - 1])))
@@ -243,8 +245,8 @@ class LineSolution:
     def spike(self) -> tuple[Estimate, Estimate]:
         """Return position (in half widths) and pressure (in units of p0) of the spike; NaN if there is no spike.
 
-        Values are from the finest grid. If the pressure behind the spike falls within one cell, the height of the spike
-        depends on the nodes; its error is then infinite.
+        The values are those on the finest grid. If the pressure behind the spike falls within one cell, the height of
+        the spike depends on the nodes, and the error of the height is infinite.
         """
         position, height = (np.array([grid.spike[k] for grid in self.grids[-3:]]) for k in (0, 1))
         grid, changes = self.finest, [np.abs(np.diff(each)) for each in (position, height)]
@@ -267,7 +269,7 @@ def _pairs(solved: Sequence[GridSolution]) -> Sequence[tuple[GridSolution, GridS
 
 
 def _extrapolated(reading: Reading, coarse: GridSolution, fine: GridSolution) -> FloatArray:
-    """Return a quantity extrapolated from two grids, so that its error of second order vanishes."""
+    """Return a quantity extrapolated from two grids; the extrapolation removes the error of second order."""
     value, ratio = np.asarray(reading(fine)), (coarse.spacing / fine.spacing) ** 2
     return np.asarray(value + (value - np.asarray(reading(coarse))) / (ratio - 1))
 
@@ -337,7 +339,7 @@ def _refined(
 
 
 def _source(case: LineContact) -> tuple[Outcome, GridSolution]:
-    """Return the solution whose density of nodes is used for all grids."""
+    """Return the solution whose density of nodes is used for all grids of `NODES`."""
     outcome, state = _first_solution(case)
     for _ in range(2 if outcome == Outcome.CONVERGED else 0):
         adapted_outcome, adapted = _refined(case, [state], state, ADAPTED_NODES)
@@ -356,13 +358,13 @@ def solve_film(
     case : LineContact
         The case; see :func:`line_contact`.
     accuracy : float
-        Allowed relative error of the central film, the minimum film and the readings. Grids are refined until the
-        estimated errors meet it, or up to the finest grid.
+        Allowed relative error of the central film, the minimum film and the `readings`. The grid is refined until no
+        estimated error exceeds `accuracy`, or until the finest grid is reached.
     readings : sequence of callable, GridSolution -> float or array
         Further quantities, or profiles at fixed positions, that must meet the accuracy.
     floors : sequence of float
-        One magnitude for each reading, 0 by default. If the reading is smaller than this magnitude, its error is
-        relative to the magnitude instead of the reading.
+        One magnitude for each reading, 0 by default. The error of a reading is divided by the reading, or by the
+        magnitude if the reading is smaller than the magnitude.
 
     Returns
     -------

@@ -4,11 +4,11 @@ The film carries the fraction gamma of the load w, and the asperities carry the 
 the rollers. Therefore the film thickness equals the film thickness under the load ``gamma w`` between bodies of the
 modulus ``gamma E'``: W stays the same, U becomes ``U/gamma`` and G becomes ``gamma G`` (Wear 19, 91).
 
-The asperities are represented by the springs of the MDR. A line as long as its longest wave represents a square with
-edges of this length; its springs of stiffness ``E* dx`` carry ``E* dx`` times their overlap. The contact consists of
-equal squares, so the mean pressure is ``E*/wavelength`` times the mean overlap of the two lines. The lines approach
-until the mean gap equals the film: ``<(d - z)+> = h``, where d is the distance of the mean lines, z the sum of both
-heights and h the film. If h exceeds two rms heights, d and h are nearly equal.
+The asperities are represented by the springs of the MDR. A line that is as long as its longest wave represents a square
+with edges of the same length. Each spring of the line has the stiffness ``E* dx`` and carries the force ``E* dx`` times
+its overlap. The contact consists of equal squares, so the mean pressure is ``E*/wavelength`` times the mean overlap of
+the two lines. The lines approach until the mean gap equals the film: ``<(d - z)+> = h``. Here d is the distance between
+the mean lines, z is the sum of both heights, and h is the film. If h exceeds two rms heights, d and h are nearly equal.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from typing import NamedTuple
 
 from scipy.optimize import brentq
 
-#: Load share of the asperities below which their load is neglected. A share of this size would change the film
-#: thickness by a quarter of this fraction.
+#: If the load share of the asperities is below this value, the load of the asperities is neglected. The relative error
+#: of the film thickness is then a quarter of this value or less.
 _NEGLIGIBLE = 1e-9
 #: Natural logarithm of the smallest load share of the film that is tried.
 _LEAST_LOGARITHM = -256.0
-#: Largest accepted imbalance of the load, divided by the tolerance.
+#: The film is accepted if the load shares add up to one within the tolerance times this factor.
 _BALANCE = 100.0
 #: Distance between the means of two lines, in rms heights, at which the mean gap is zero in double precision.
 _CLOSED = -37.0
@@ -33,7 +33,7 @@ _APART = 9.0
 
 
 def mean_overlap(distance: float) -> float:
-    """Return the mean overlap ``<(z - d)+>`` of Gaussian heights z at a distance d of the means.
+    """Return the mean overlap ``<(z - d)+>`` of Gaussian heights z at the distance d between the means.
 
     Overlap, heights and distance are in units of the rms height.
     """
@@ -41,12 +41,12 @@ def mean_overlap(distance: float) -> float:
 
 
 def distance_of_means(gap: float) -> float:
-    """Return the distance d of the means at which the mean gap ``<(d - z)+>`` equals `gap`, both in rms heights."""
+    """Return the distance d between the means, in rms heights, at which the mean gap ``<(d - z)+>`` equals `gap`."""
     if gap > _APART:
         return gap
     if mean_overlap(-_CLOSED) >= gap:
         return _CLOSED
-    # the gap at d is the overlap at -d; its logarithm varies slowly with d
+    # The mean gap at d is the mean overlap at -d. The logarithm is used because it varies slowly with d.
     return float(brentq(lambda d: log(max(mean_overlap(-d), 1e-320) / gap), _CLOSED, _APART, xtol=1e-13))
 
 
@@ -56,7 +56,7 @@ class Asperities(NamedTuple):
     Parameters
     ----------
     rms : float
-        Rms height of both lines together, in m.
+        Rms of the sum of the heights of both lines, in m.
     wavelength : float
         Longest wavelength of the lines in m.
     E_star : float
@@ -88,13 +88,13 @@ def share_load(
     Parameters
     ----------
     film_at : callable, float -> float
-        Returns the film thickness for a load share of the film between 0 and 1. The film thickness falls with this
-        share. It may be 0 where the film is too thin to be computed.
+        Returns the film thickness for a load share of the film between 0 and 1. The film thickness falls if this share
+        rises. The returned film thickness may be 0 if the film is too thin to be computed.
     asperity_share : callable, float -> float
-        Returns the load share of the asperities for a film thickness; this share falls with the film thickness.
+        Returns the load share of the asperities for a film thickness; this share falls if the film thickness rises.
     tolerance : float
-        Allowed relative error of the film's load share. The relative error of the film thickness is about a quarter of
-        this error.
+        Allowed relative error of the load share of the film. The relative error of the film thickness is about a
+        quarter of the relative error of this share.
 
     Returns
     -------
@@ -118,5 +118,5 @@ def share_load(
     film = film_at(share)
     carried = asperity_share(film)
     if abs(carried + share - 1.0) > _BALANCE * tolerance:
-        return SharedLoad(0.0, 0.0, 1.0)  # no balance: the root lies where `film_at` jumps to 0
+        return SharedLoad(0.0, 0.0, 1.0)  # the root is a jump of `film_at` to 0, where the load is not in balance
     return SharedLoad(film, share, min(carried, 1.0))

@@ -27,17 +27,17 @@ from mdr_dask.physics.outcome import Outcome
 #: Weight of the quadratic (QUICK) face value in the second-order upwind Couette flux. The other part of the flux is
 #: extrapolated linearly from upstream.
 _QUADRATIC = 1.0 / 3.0
-#: Largest fraction of the film at any node by which one step may reduce the film.
+#: One step may reduce the film at a node by at most this fraction of the film.
 _FILM_SHARE = 0.8
-#: Smallest fraction to which a step is shortened.
+#: If a step would have to be shortened to this fraction or less, the film counts as collapsed.
 _LEAST_SHARE = 1e-9
-#: The factorised Jacobian is reused if the last step was smaller than this fraction of the step before it. The first
-#: step is compared with 1.
+#: The factorised Jacobian is reused if the active nodes are the same and the last step was smaller than this fraction
+#: of the step before. The first step is compared with a step of size 1.
 _SHRINKS = 0.1
 
 
 class Grid(NamedTuple):
-    """Nodes in half widths, their trapezoidal weights, and the influence of nodal pressures on the film at the nodes.
+    """Nodes in half widths, their weights in the trapezoidal rule, and the influence of nodal pressures on nodal films.
 
     The influence is the matrix :func:`mdr_dask.physics.lubrication.deformation.influence_matrix`, shape (n, n).
     """
@@ -65,9 +65,9 @@ class Pace(NamedTuple):
     most : int
         Largest number of steps.
     tolerance : float
-        The iteration ends after a step whose relative size is below this value; the remaining error is about the square
-        of this size. A step with a reused Jacobian leaves a larger error, so that its size has to be a hundred times
-        smaller.
+        The iteration ends after a step whose relative size is below this value. The remaining error is about the square
+        of the size of this step. After a step with a reused Jacobian, the remaining error is larger, so the limit for
+        the size of such a step is a hundred times smaller.
     """
 
     clip: float
@@ -130,9 +130,10 @@ def log_viscosities(pressure: FloatArray, liquid: Liquid) -> FloatArray:
 
 @jit
 def _mobility(left: float, right: float) -> tuple[float, float, float]:
-    """Return the mean of 1/eta between two nodes, and its derivatives with respect to ln(eta) at both nodes.
+    """Return the mean of 1/eta between two nodes, and the derivatives of this mean.
 
-    `left` and `right` are ln(eta) at the nodes. The mean is exact if ln(eta) is linear between the nodes.
+    The derivatives are those with respect to `left` and `right`, the values of ln(eta) at the two nodes. The mean is
+    exact if ln(eta) is linear between the nodes.
     """
     rise = right - left
     if abs(rise) < 1e-3:
@@ -148,7 +149,10 @@ def _mobility(left: float, right: float) -> tuple[float, float, float]:
 
 @jit
 def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
-    """Return the weights of the nodes f-1, f, f+1 in the value at the face between f and f+1 (flow to the right)."""
+    """Return the weights of the nodes f-1, f, f+1 in the value at the face between f and f+1.
+
+    The weights are for a flow from node f to node f+1.
+    """
     if f == 0:
         return 0.0, 0.5, 0.5
     dx = nodes[f + 1] - nodes[f]
@@ -162,7 +166,7 @@ def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
 
 
 class Imbalance(NamedTuple):
-    """Inflow minus outflow of every volume, shape (n,), and its derivatives, shape (n, 4).
+    """Imbalance (inflow minus outflow) of every volume, shape (n,), and the derivatives of the imbalance, shape (n, 4).
 
     Row i contains the derivatives of the imbalance of volume i with respect to pressure and film at the four nodes from
     i - 2 to i + 1.
@@ -196,7 +200,7 @@ def balance(
         density = 0.5 * (rho[f] + rho[g])
         conductance = film**3 / K
         w0, w1, w2 = _couette_weights(nodes, f)
-        e = f - 1 if f > 0 else 0  # w0 is zero at the first face
+        e = f - 1 if f > 0 else 0  # at the first face, the weight w0 is zero, so any index e will do
         couette = w0 * rho[e] * H[e] + w1 * rho[f] * H[f] + w2 * rho[g] * H[g]
         flux = density * conductance * mobility * gradient - couette
         steeper = 1.5 * density * film**2 / K * mobility * gradient
@@ -224,7 +228,7 @@ def _fill_jacobian_row(
 ) -> None:
     """Write the derivatives of the imbalance of volume i with respect to all pressures to `row`.
 
-    They include the effect of the pressures on the film.
+    The derivatives include the effect of the pressures on the film.
     """
     c0, c1, c2, c3 = by_film[i]
     far, near, own, next_ = influence[max(i - 2, 0)], influence[i - 1], influence[i], influence[i + 1]
@@ -258,7 +262,9 @@ def _fill_active(influence: FloatArray, P: FloatArray, found: Imbalance, active:
 def _fill_equations(
     grid: Grid, P: FloatArray, found: Imbalance, active: NDArray[np.int64], A: FloatArray, b: FloatArray
 ) -> None:
-    """Write the matrix `A` and the right side `b` of the Newton equations of the active pressures and the central film.
+    """Write the matrix `A` and the right side `b` of the Newton equations.
+
+    The unknowns of these equations are the active pressures and the central film.
 
     The step sets all other pressures to zero.
     """
@@ -286,7 +292,7 @@ def _fill_equations(
 
 @jit
 def _fill_imbalance(grid: Grid, P: FloatArray, R: FloatArray, active: NDArray[np.int64], b: FloatArray) -> None:
-    """Write the right side `b` of the Newton equations, if the pressures at all inactive nodes are already zero.
+    """Write the right side of the Newton equations to `b`; the pressures at all inactive nodes have to be zero already.
 
     A step with a reused Jacobian needs only this right side.
     """
@@ -328,7 +334,7 @@ def _fill_film(grid: Grid, P: FloatArray, central: float, H: FloatArray) -> None
 
 @jit
 def _step_length(grid: Grid, P: FloatArray, H: FloatArray, step: FloatArray, change: float, clip: float) -> float:
-    """Return the largest fraction of a step that keeps the film open and changes no pressure too much.
+    """Return the largest fraction of a step that keeps the film above zero and does not change any pressure too much.
 
     A pressure may change by at most `clip` times the largest pressure.
     """
@@ -402,7 +408,7 @@ def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: flo
         balance(grid.nodes, liquid, K, P, H, state, found)
         active = listed[: _fill_active(grid.influence, P, found, listed)]
         same = np.array_equal(active, solved)
-        # the first step may be small by chance; later steps shrink quadratically
+        # at least two steps are taken, because the first step may be small by chance
         if steps > 1 and size < last and same:
             return Iterate(Outcome.CONVERGED, P, central, H)
         if steps == pace.most:

@@ -14,11 +14,12 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import distinguishable
 
 _MM2 = 1e-6
-#: Density of water at 15.6 C in kg/m^3, the reference of a specific gravity.
+#: Density of water at 15.6 C in kg/m^3. A specific gravity is a density divided by this density.
 WATER_DENSITY = 999.016
-#: Reference temperature of a specific gravity in K, 60 F.
+#: Reference temperature of specific gravities: 60 F, in K.
 SPECIFIC_GRAVITY_TEMPERATURE = 288.705555
-#: Thermal expansion of lubricating oils at 60 F in 1/K, times the density at 60 F in kg/m^3 (ASTM D1250, table 54D).
+#: Coefficient of thermal expansion (1/K) of lubricating oils at 60 F, times their density (kg/m^3) at 60 F (ASTM D1250,
+#: table 54D).
 _LUBRICANT_EXPANSION = 0.6278
 
 #: Gold's correlation ``alpha = s nu^t 1e-9`` with nu in mm^2/s: the pair (s, t) for each kind of oil, quoted from
@@ -36,12 +37,12 @@ CORRELATIONS: tuple[str, ...] = (*GOLD, "wooster")
 def walther_constants(temperature: ArrayLike, viscosity: ArrayLike) -> tuple[float, float]:
     """Return A and B of ASTM D341, ``log10 log10(nu + 0.7) = A - B log10 T`` with nu in mm^2/s and T in K.
 
-    With more than two viscosities, the constants follow from a least-squares fit of the left side.
+    With more than two viscosities, a least-squares fit to ``log10 log10(nu + 0.7)`` gives the constants.
 
     Parameters
     ----------
     temperature : array_like, shape (n,)
-        Temperatures in K; at least two are different.
+        Temperatures in K; at least two of them have to be different.
     viscosity : array_like, shape (n,)
         Kinematic viscosities in m^2/s at these temperatures.
 

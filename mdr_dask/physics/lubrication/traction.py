@@ -1,8 +1,8 @@
 """Friction of a lubricated line contact from the shear of its film.
 
 The film is computed for pure rolling and a Newtonian liquid of constant temperature; the shear stress follows from this
-film. This is a good approximation for small sliding velocities. Heating and shear thinning are neglected; they would
-make film and traction smaller.
+film. This is a good approximation for small sliding velocities. Heating and shear thinning are neglected; both effects
+would make film and traction smaller.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def shear_stress(
     grid : GridSolution
         Pressure and film of the case.
     W : float
-        Load parameter; ``a/R = sqrt(8 W/pi)`` sets the slope of the surfaces.
+        Load parameter; the shear stress in units of p0 depends on W because of ``a/R = sqrt(8 W/pi)``.
     slide_roll_ratio : float
         ``(u1 - u2)/u`` with the mean velocity u.
     eyring_stress : float or None
@@ -40,8 +40,9 @@ def shear_stress(
     Returns
     -------
     array, shape (n,)
-        Shear stress tau in units of p0 at the nodes. A Newtonian liquid has ``tau = eta (u1 - u2)/h``; Eyring's law
-        gives ``tau_E asinh(tau/tau_E)``. The stress is zero where the film has ended.
+        Shear stress in units of p0 at the nodes. The stress of a Newtonian liquid is ``tau = eta (u1 - u2)/h``. With
+        Eyring's law, the stress is ``tau_E asinh(tau/tau_E)``, where tau is the Newtonian stress. The stress is zero
+        where the film has ended.
     """
     slope = case.film_number * np.sqrt(2 * W / np.pi) / 6 * slide_roll_ratio
     exponent = np.minimum(log_viscosities(grid.pressure, case.liquid), _LARGEST_EXPONENT)
@@ -58,6 +59,6 @@ def sliding_coefficient(
 
 
 def rolling_coefficient(grid: GridSolution, W: float) -> float:
-    """Return the rolling friction of each surface: the integral of ``(h/2) dp/dx``, divided by the load."""
+    """Return the rolling friction of one surface, the integral of ``(h/2) dp/dx``, divided by the load."""
     film = (grid.film[1:] + grid.film[:-1]) / 2
     return float(2 / np.pi * np.sqrt(8 * W / np.pi) * np.sum(film / 2 * np.diff(grid.pressure)))

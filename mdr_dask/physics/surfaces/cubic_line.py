@@ -16,9 +16,10 @@ from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.surfaces import shapes
 
 NONE = 2.0  # result of `summit` if the cell has no maximum
-# largest rise of a cubic above its ends, divided by (upward slope at its start + downward slope at its end)
+# largest rise of a cubic cell above its ends, divided by the sum of its upward slope at the start and its downward
+# slope at the end
 STEEPEST_RISE = 4 / 27
-UNRESOLVED = 0.5  # a line is not resolved if the mean squared slopes at nodes and in cells differ by this fraction
+UNRESOLVED = 0.5  # a line is unresolved if its mean squared slopes at nodes and over cells differ by this fraction
 
 
 class CubicLine(NamedTuple):
@@ -34,10 +35,10 @@ class CubicLine(NamedTuple):
         Slopes at the start and the end of each cell. At a kink of the line, the end slope of a cell differs from the
         start slope of the next cell.
     periodic : bool
-        Whether the line is periodic; if not, elements are undeformed at its first node.
+        Whether the line is periodic; if it is not, every element is undeformed at the first node.
     smooth : bool
-        Whether the line is periodic with continuous slopes. The integral of the squared slope can then be computed with
-        the Euler-Maclaurin formula, which is exact over the whole line if the nodes resolve the line.
+        Whether the line is periodic with continuous slopes. For such a line, the Euler-Maclaurin formula can compute
+        the integrals of the squared slope. The integral over the whole line is exact if the nodes resolve the line.
     """
 
     height: FloatArray
@@ -55,7 +56,7 @@ def periodic_line(height: FloatArray, slope: FloatArray | None) -> CubicLine:
     height : array, shape (n,)
         Heights at equidistant nodes of one period.
     slope : array, shape (n,), or None
-        Derivative of the height with respect to the position divided by the length of the line.
+        Slope of the line at the nodes, if the unit of length is the length of the line.
     """
     height = np.append(height, height[0])
     if slope is None:
@@ -74,8 +75,8 @@ def indented_line(height: FloatArray, slope: FloatArray | None, body: shapes.Sha
     height, slope
         Heights and slopes of the periodic roughness, as in :func:`periodic_line`.
     body : Shape
-        The shape under the roughness, with its tip at node n // 2. The shape has lengths in units of the length of the
-        line, and heights in the unit of the roughness.
+        The shape under the roughness, with its tip at node n // 2. The unit of length of the shape is the length of the
+        line. The unit of height is that of the roughness.
     """
     n = height.size
     smooth, left, right = body.at((np.arange(n + 1) - n // 2) / n)
@@ -101,8 +102,8 @@ class Cells(NamedTuple):
     Parameters
     ----------
     height : array, shape (n + 2,)
-        Heights at the nodes minus the height of the highest point; they are never positive. Under light loads only
-        small distances from the highest point matter, which have no rounding error in this form.
+        Heights at the nodes minus the height of the highest point, never positive. Under light loads, only small
+        distances from the highest point matter. In this form, these distances have no rounding error.
     enter, leave : array, shape (n + 1,)
         Slopes at the start and the end of each cell.
     peak : array, shape (n + 1,)
@@ -110,11 +111,11 @@ class Cells(NamedTuple):
     mean, stretch : array, shape (n + 1,)
         Integrals of the height and of the squared slope over each cell.
     start : float
-        Position in cell 0 (and cell n) at which a period begins and ends: the highest point of the line.
+        Position of the highest point in cell 0 (and in its copy, cell n). A period begins and ends at this point.
     top : float
         Height of the highest point.
     periodic : bool
-        Whether the line is periodic; if not, elements are undeformed at cell 0.
+        Whether the line is periodic; if it is not, every element is undeformed at the start of cell 0.
     """
 
     height: FloatArray
@@ -139,7 +140,7 @@ def cubic(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> t
 
 @jit
 def summit(a: float, b: float, c: float) -> float:
-    """Return the position of the maximum of a cubic between 0 and 1, or `NONE`."""
+    """Return the position between 0 and 1 at which a cubic has a maximum, or `NONE`."""
     discriminant = b * b - 3 * a * c
     if not discriminant > 0:
         return NONE
@@ -154,7 +155,7 @@ def _peak(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> t
     here, after = np.uintp(i), np.uintp(i + 1)
     first, last, begin, end = enter[here], leave[here], height[here], height[after]
     rise, place, peak = end - begin, 0.0 if begin >= end else 1.0, max(begin, end)
-    between = 3 * rise - first - last  # slope at a control point; with one sign of all three slopes there is no extreme
+    between = 3 * rise - first - last  # no extreme if this slope and the slopes at both ends have the same sign
     if not (min(min(first, between), last) >= 0 or max(max(first, between), last) <= 0):
         b, c = 3 * rise - 2 * first - last, first + last - 2 * rise
         inside = summit(first, b, c)
@@ -166,7 +167,10 @@ def _peak(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> t
 
 @jit
 def _highest(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[int, float, float]:
-    """Return the first cell with the highest point of a line, the position in the cell (0 to 1), and the height."""
+    """Return the cell of the highest point of a line, the position in the cell (0 to 1), and the height.
+
+    If several cells are equally high, the first of them is returned.
+    """
     best, place, highest = 0, 0.0, -np.inf
     for i in range(enter.size):
         rise = STEEPEST_RISE * (max(enter[i], 0.0) + max(-leave[i], 0.0))
@@ -183,7 +187,7 @@ def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float]:
     Parameters
     ----------
     height, slope : array, shape (n,)
-        Heights, and their derivatives with respect to the position divided by the length of the line.
+        Heights, and slopes for the length of the line as the unit of length.
     """
     line = periodic_line(height, slope)
     return _highest(line.height, line.enter, line.leave)[:2]
@@ -202,7 +206,7 @@ def cut(line: CubicLine) -> Cells:
 
 @jit
 def running(integrals: FloatArray) -> FloatArray:
-    """Return the cumulative integral at each node from the integrals over the cells, shape (cells + 1,)."""
+    """Return the integral from the first node to each node, given the integrals over the cells; shape (cells + 1,)."""
     summed, total = np.empty(integrals.size + 1), 0.0
     for i in range(integrals.size):
         summed[i] = total
@@ -257,9 +261,9 @@ def _is_resolved(slope: FloatArray, stretch: FloatArray) -> bool:
 def _resum(slope: FloatArray, stretch: FloatArray) -> None:
     """Compute the integrals of the squared slope over cells by the Euler-Maclaurin formula.
 
-    The first cell keeps the integral of its polynomial, because a period begins and ends inside this cell. The
-    formula gives another value for this cell; the difference is distributed over the other cells, so that the total
-    remains exact.
+    In the first cell, the integral of its polynomial is kept, because a period begins and ends inside this cell. The
+    difference between the formula and this integral is distributed over the other cells, so that the total remains
+    exact.
     """
     n, kept = slope.size - 1, stretch[0]
     before, here, after = slope[n - 1] ** 2, slope[0] ** 2, slope[1] ** 2

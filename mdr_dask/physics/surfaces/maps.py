@@ -18,13 +18,13 @@ Order = Literal["none", "mean", "plane", "parabola"]
 
 LEAST_POINTS = 16  # smallest number of points along each axis
 MOST_MISSING = 0.05  # largest fraction of missing points that are filled
-FAR = 19.0  # smallest deviation of an outlier, in robust standard deviations; points of generated surfaces deviate less
+FAR = 19.0  # smallest deviation of an outlier, in standard deviations; points of generated surfaces deviate less
 BAND = 128  # number of rows processed together, so that they fit into the processor's cache
 SIGNIFICANT = 1e-3  # rings below this fraction of the largest contribution may be due to rounded heights
-MOST_SCATTER = 0.02  # largest mean square of the angular harmonics of an octave due to scatter; others are unused
-FLAT = 1e-12  # a map is flat if the range of heights, divided by the largest height, is below this value
+MOST_SCATTER = 0.02  # an octave is used if scatter alone gives its angular harmonics at most this mean square
+FLAT = 1e-12  # a map is flat if its range of heights is at most this fraction of its largest height
 ROUNDING = 1e-20  # rounding error of the Fourier transform, as a fraction of the power in the strongest ring
-HANN_MODES = 0.3  # fraction of the waves of the Fourier transform that are independent with Hann's window
+HANN_MODES = 0.3  # fraction of the waves of the Fourier transform that are independent if Hann's window is used
 
 
 class SurfaceMap(NamedTuple):
@@ -43,9 +43,10 @@ class SurfaceMap(NamedTuple):
 
 
 def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
-    """Return the points that deviate from their neighbours along both axes by more than `FAR` standard deviations.
+    """Return the outliers: points that deviate from their neighbours by more than `FAR` standard deviations.
 
-    The standard deviation is estimated from the median of the deviations.
+    An outlier deviates by so much along x as well as along y. The standard deviation is estimated from the median of
+    the deviations.
     """
     height = surface.height
     away = np.empty((max(height.shape[0] - 2, 0), max(height.shape[1] - 2, 0)))
@@ -60,17 +61,17 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
     for down, right in np.ndindex(3, 3):
         beside = np.clip(row + down - 1, 0, away.shape[0] - 1), np.clip(column + right - 1, 0, away.shape[1] - 1)
         largest = np.fmax(largest, away[beside])
-    # a neighbour of an outlier is itself an outlier only if it deviates at least half as much
+    # a neighbour of an outlier is an outlier only if it deviates more than half as much as this outlier
     deviates = away[row, column] > 0.5 * largest
     found[row[deviates] + 1, column[deviates] + 1] = True
     return found
 
 
 def _off_neighbours(height: FloatArray) -> FloatArray:
-    """Return how far each inner point is from the mean of its two neighbours along x, or along y if that is less.
+    """Return the deviation of each inner point: its distance from the mean of its two neighbours along x or along y.
 
-    The smaller distance is used because a point on a crest is close to its neighbours along the crest, but far from its
-    neighbours across the crest.
+    The smaller of the two distances is used. A point on a crest is close to its neighbours along the crest, but far
+    from its neighbours across the crest.
     """
     middle = height[1:-1, 1:-1]
     along = np.abs(middle - 0.5 * (height[2:, 1:-1] + height[:-2, 1:-1]))
@@ -131,7 +132,7 @@ def _harmonic(height: FloatArray, missing: NDArray[np.bool_]) -> FloatArray:
 
 
 def without_trend(surface: SurfaceMap, order: Order) -> SurfaceMap:
-    """Return a map minus its least-squares polynomial: the mean, a plane, or a paraboloid with a mixed term x y.
+    """Return a map minus a least-squares polynomial: the mean, a plane, or a polynomial of second degree in x and y.
 
     Missing points (NaN) are ignored and stay missing.
     """
@@ -176,12 +177,13 @@ class MapSpectrum:
         q = k dq, k = 1, 2, ..., up to the Nyquist wave number of the wider spacing; dq is 2 pi divided by the shorter
         side.
     density : array, shape (rings,)
-        C2D, m^4: the power of a ring divided by its area, so that rms height and rms gradient are preserved.
+        C2D, m^4: the power of the waves in a ring, divided by the area of the ring in the plane of wave vectors. This
+        preserves rms height and rms gradient.
     count : array, shape (rings,)
         Number of waves in each ring; a wave vector and its negative count as two waves.
     independent : float
-        Fraction of the waves of the Fourier transform that are statistically independent: 1 without a window, less with
-        a window.
+        Fraction of the waves of the Fourier transform that are statistically independent: 1 without a window, less than
+        1 with a window.
     rms_height : float
         rms height of the windowed map, m.
     slopes : tuple of float
@@ -191,9 +193,9 @@ class MapSpectrum:
     cuts : tuple of (array, array)
         Wave numbers and C_cut, m^3, of straight profiles along x and along y.
     axes : tuple of float
-        One number for the x axis and one for the y axis. In every ring, the power of the wave along this axis is
-        divided by the mean power of the ring. The number is the median of these ratios over the rings, divided by
-        ln(2); it is 1 for an isotropic surface.
+        One number for the x axis and one for the y axis. In each ring, the power of the wave along this axis is divided
+        by the mean power of the waves in the ring. The number is the median of these ratios, divided by ln(2). It is 1
+        for an isotropic surface. The lowest rings and rings of insignificant power are left out.
     """
 
     wavenumber: FloatArray
@@ -224,9 +226,9 @@ class MapSpectrum:
         return averaged(*rings)
 
     def along(self, axis: int) -> Spectrum:
-        """Return an isotropic C2D whose MDR line has the same spectrum as the straight profile along an axis.
+        """Return the isotropic C2D whose MDR line has the spectrum of straight profiles along one axis of the map.
 
-        The axis is 0 for x and 1 for y. The result represents a grooved surface that slides along this axis.
+        The number `axis` is 0 for x and 1 for y. Use the result for a grooved surface that slides along this axis.
         """
         q, cut = self.cuts[axis]
         there = cut > ROUNDING * cut.max()
@@ -235,12 +237,13 @@ class MapSpectrum:
     def anisotropy(self) -> float:
         """Return the anisotropy, corrected for scatter: 0 for an isotropic surface, 1 if all waves have one direction.
 
-        The anisotropy is the larger of the second and the fourth angular harmonic of the power. Each harmonic is an rms
-        over octaves of the wave number; octaves with few waves and therefore much scatter are left out.
+        The anisotropy is the larger of the second and the fourth angular harmonic of the power. The rms of each
+        harmonic is taken over octaves of the wave number. Octaves with few waves are left out, because their harmonics
+        have much scatter.
         """
         there = np.flatnonzero(significant(self.wavenumber, self.density))
         octave = np.floor(np.log2(self.wavenumber[there] / self.wavenumber[there[0]] + 1e-9)).astype(int)
-        _, octave = np.unique(octave, return_inverse=True)  # octaves without a ring are not numbered
+        _, octave = np.unique(octave, return_inverse=True)  # numbers without gaps: octaves without a ring are skipped
         power = self.density[there] * self.wavenumber[there]
         weight = np.bincount(octave, power)
         scatter = np.bincount(octave, power**2 * 2 / (self.count[there] * self.independent)) / weight**2
@@ -326,17 +329,17 @@ def _rings(
 
 
 def significant(wavenumber: FloatArray, density: FloatArray) -> NDArray[np.bool_]:
-    """Return the rings whose power cannot be due to the rounding of heights in a file.
+    """Return the significant rings, whose power cannot be due to the rounding of heights in a file.
 
-    These rings contribute more than the fraction `SIGNIFICANT` of the largest contribution to the mean square of the
-    height or of the gradient.
+    Every ring contributes to the mean square of the height and to the mean square of the gradient. A ring is
+    significant if one of these contributions exceeds the fraction `SIGNIFICANT` of the largest contribution of a ring.
     """
     height, gradient = density * wavenumber, density * wavenumber**3
     return np.asarray((height > SIGNIFICANT * height.max()) | (gradient > SIGNIFICANT * gradient.max()))
 
 
 def _cut(power: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-    """Return wave numbers and the two-sided C_cut; `power` is the sum of the power at q and at -q."""
+    """Return the wave numbers and C_cut of straight profiles; C_cut is two-sided, `power` is the sum over q and -q."""
     step = 2 * np.pi / length
     return np.asarray(step * np.arange(1, power.size + 1), dtype=np.float64), power / (2 * step)
 

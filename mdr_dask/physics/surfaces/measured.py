@@ -55,13 +55,13 @@ def measured_line(
     Parameters
     ----------
     position, height : array_like, shape (points,)
-        Positions x and heights z, m. The positions ascend or descend; their spacing may vary. The samples form one
-        period of the length points * spacing.
+        Positions x and heights z, m. The positions ascend or descend; their spacing may vary. The points are taken as
+        one period, whose length is the number of points times the mean spacing.
     detrend : {"none", "mean", "line", "parabola"}
         Least-squares polynomial that is subtracted.
     taper : float
-        Fraction of the line (0 to 1), both ends together, over which a cosine window reduces the heights towards their
-        mean. The periodic line then has no step at its ends.
+        Fraction of the line (0 to 1) over which a cosine window reduces the heights towards their mean: one half at
+        each end of the line. The periodic line then has no step at its ends.
     shortest, longest : float
         Shortest and longest wavelength that are kept, m; 0 for no limit.
 
@@ -124,9 +124,9 @@ def band_limited(height: FloatArray, length: float, shortest: float = 0.0, longe
 
 
 def resampled(height: FloatArray, points: int) -> FloatArray:
-    """Return a periodic line at another number of points, from its Fourier series; the first point stays the same.
+    """Return a periodic line at another number of points, computed from the Fourier series of the line.
 
-    With fewer points, waves shorter than the new Nyquist wavelength are omitted.
+    The first point keeps its position. With fewer points, waves shorter than the new Nyquist wavelength are omitted.
     """
     waves, mean = waves_of(height), height.mean()
     return np.asarray(series(waves.coefficients[: points // 2], points) + mean, dtype=np.float64)

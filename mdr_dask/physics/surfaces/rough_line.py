@@ -10,14 +10,14 @@ from mdr_dask.physics.surfaces.cubic_line import CubicLine, highest_point, inden
 from mdr_dask.physics.surfaces.shapes import Shape
 from mdr_dask.physics.surfaces.waves import Waves
 
-SEEN = 8  # number of nodes per Nyquist point in the grid on which the highest point of a line is searched
+SEEN = 8  # the highest point of a line is searched on a grid with this many nodes per Nyquist point
 
 
 @dataclass(frozen=True)
 class RoughLine:
     """A rough line on a plane or an indenter.
 
-    Positions are in units of the length of the line. Roughness and indenter have the same unit of height.
+    The unit of length is the length of the line. Roughness and indenter have the same unit of height.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class RoughLine:
 
     @cached_property
     def nodes(self) -> tuple[FloatArray, FloatArray]:
-        """Heights and slopes of the roughness at two nodes per Nyquist point."""
+        """Heights and slopes of the roughness on a grid with twice as many nodes as Nyquist points."""
         return self.heights(2 * self.points), self.slopes(2 * self.points)
 
     def through(self, height: FloatArray, slope: FloatArray | None) -> CubicLine:
@@ -61,7 +61,7 @@ class RoughLine:
         return self.through(self.heights(nodes), None)
 
     def from_summit(self) -> RoughLine:
-        """Return a periodic line that begins at its highest point, so that every grid has a node there.
+        """Return a periodic line that begins at its highest point; every grid then has a node at the highest point.
 
         The line of an indenter is not periodic and is returned as it is.
         """

@@ -65,10 +65,10 @@ def spectral_slope(amplitude: FloatArray) -> float:
 
 
 def phases(seed: int, realisation: int, modes: int) -> FloatArray:
-    """Return the phases of a realisation in [0, 2 pi), shape (modes,).
+    """Return the phases of the waves of a realisation, shape (modes,), between 0 and 2 pi.
 
-    The phases depend only on the seed and the index of the realisation. A short spectrum has the same phases as the
-    first waves of a long one. Lines that differ in Hurst exponent, rms height or cut-off therefore have the same phases
+    The phases depend only on the seed and the index of the realisation. The phase of a wave does not depend on the
+    number of waves. Lines that differ only in Hurst exponent, rms height or cut-off therefore have the same phases
     (thesis Fig. 2.6).
     """
     phase: FloatArray = 2 * np.pi * _generator(seed, realisation).random(modes)
@@ -85,7 +85,7 @@ def phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     return _phase_factors(seed, realisation, 1 << max(modes - 1, 0).bit_length())[:modes]
 
 
-@lru_cache(maxsize=8)  # `modes` is a power of two: eight entries suffice for a range of 1 to 128
+@lru_cache(maxsize=8)  # eight entries: `modes` is a power of two, and may vary by a factor of 128
 def _phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     factors: ComplexArray = np.exp(1j * phases(seed, realisation, modes))
     factors.flags.writeable = False

@@ -20,14 +20,14 @@ from mdr_dask.physics.surfaces.measured import MeasuredLine
 from mdr_dask.physics.surfaces.spectrum import Spectrum, quadrature
 
 BINS = 10  # number of bins per decade of the wave number
-BEND = 3.0  # prior standard deviation of the change of d log C2D / d log q from one bin to the next
+BEND = 3.0  # standard deviation of the change of d log C2D / d log q between adjacent bins in the prior
 NOISE_SLOPE = -0.5  # the end of a cut is noise if d log C_cut / d log q is above this; for roughness it is at most -1
 NOISE_TAIL = 0.5  # the last part of the cut, of this many decades, is tested for noise
 STEEPEST = 30.0  # the spectrum ends where -d log C / d log q exceeds this value
 
 
 class Cut(NamedTuple):
-    """The spectrum of straight profiles, averaged over lines and over waves of similar length.
+    """The spectrum of straight profiles, averaged over profiles and over waves of similar length.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def cut_of_lines(lines: Sequence[MeasuredLine], hann: bool = True) -> Cut:
     window = hann_window(points) if hann else np.ones(points)
     power = length / (2 * np.pi) * np.mean(np.abs(np.fft.rfft(height * window) / points) ** 2, axis=0)[1:]
     waves = np.arange(1, power.size + 1)
-    last = (points - 1) // 2  # without the wave of two spacings, whose phase is unknown
+    last = (points - 1) // 2  # leaves out the wave of two spacings, whose phase is unknown
     independent = len(lines) / (1.94 if hann else 1.0)  # 1.94: Hann's window correlates the power of adjacent waves
     return averaged(2 * np.pi / length * waves[:last], power[:last], independent)
 
@@ -105,7 +105,7 @@ def hann_window(points: int) -> FloatArray:
 
 
 def _until_the_end(cut: Cut) -> slice:
-    """Return the slice of the bins up to the first fall steeper than `STEEPEST`; the spectrum is taken to end there."""
+    """Return the slice of the bins before the first fall steeper than `STEEPEST`; the spectrum ends at this fall."""
     with np.errstate(divide="ignore"):
         logs = np.log(cut.density)
     falls = np.flatnonzero(np.diff(logs) < -STEEPEST * np.diff(np.log(cut.wavenumber)))
@@ -115,10 +115,10 @@ def _until_the_end(cut: Cut) -> slice:
 def of_cut(cut: Cut) -> Spectrum:
     """Return the isotropic spectrum of a surface with the given cut (inverse Abel transform).
 
-    The computed C2D is a power law between the wave numbers of the cut, and therefore positive. A least-squares fit
-    finds the logarithms of C2D at these wave numbers; it is weighted with the errors of the cut. The change of the
-    slope d log C2D / d log q from bin to bin has a normal prior with the standard deviation `BEND`. The explicit
-    inverse -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk would amplify noise.
+    Between adjacent wave numbers of the cut, the computed C2D is a power law, and therefore positive. A least-squares
+    fit finds the logarithms of C2D at these wave numbers; the residuals are divided by the relative errors of the cut.
+    The change of the slope d log C2D / d log q from bin to bin has a normal prior with the standard deviation `BEND`.
+    The explicit inverse -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk would amplify noise.
 
     Raises
     ------

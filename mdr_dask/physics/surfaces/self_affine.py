@@ -16,7 +16,7 @@ LOWEST, HIGHEST = -0.1, 1.2  # range of Hurst exponents
 CHI_SQUARED = 3.84  # 95 % quantile of chi squared for one parameter
 # limits of the slope d log C2D / d log q of roughness; the slope is -4 for H = 1 and -2 for H = 0
 STEEPEST, FLATTEST = -6.0, -1.0
-ABOVE_NOISE = 2.0  # smallest ratio of the spectrum to the noise at which roughness is accepted
+ABOVE_NOISE = 2.0  # the spectrum counts as roughness if it exceeds the noise by this factor
 
 
 class Interval(NamedTuple):
@@ -60,7 +60,7 @@ def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> 
 
 
 def steep_limit(bins: Cut) -> float:
-    """Return the wave number beyond which C2D falls too steeply for roughness, or infinity if it never does."""
+    """Return the wave number beyond which C2D falls too steeply for roughness, or infinity if there is no such fall."""
     wavenumber, density = bins.wavenumber, bins.density
     there = density > 0
     x, y = np.log(wavenumber[there]), np.log(density[there])

@@ -26,7 +26,7 @@ def mapped(exponent: float) -> float:
 
 
 class Shape(Protocol):
-    """The line of an indenter, as used by the solvers."""
+    """An indenter: the line that the solvers use, and the body of revolution."""
 
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the height at every x, and the slopes on its left and right side.
@@ -113,7 +113,7 @@ class RoundedCone:
 
     @property
     def breaks(self) -> tuple[float, ...]:
-        """Return the end of the tip, where the curvature jumps."""
+        """Return the radius at which the rounded tip ends, where the curvature jumps."""
         return (self.blend,)
 
     def body(self, r: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -141,7 +141,9 @@ def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatAr
 
 
 class Smooth(NamedTuple):
-    """Steady states of a smooth line, one entry per case. If Newton's method fails, depth and drag are NaN.
+    """Steady states of a smooth line, one entry per case.
+
+    If Newton's method fails for a case, depth and drag of this case are NaN.
 
     Parameters
     ----------
@@ -195,7 +197,8 @@ def _trailing(drop: FloatArray, deborah: FloatArray, exponent: float) -> FloatAr
     """Return the positive solution b of b^n + n deborah b^(n-1) = drop, or 0 if there is none (possible for n = 1)."""
     if exponent == 1:
         return np.maximum(drop - deborah, 0.0)
-    # Newton's method for y = log b, from above: the logarithm of the left side is a convex, increasing function of y
+    # Newton's method for y = log b starts above the solution. It converges from above, because the logarithm of the
+    # left side is a convex, increasing function of y.
     goal = np.log(drop)
     y, active = goal / exponent, np.ones(drop.size, np.bool_)
     for _ in range(ITERATIONS):

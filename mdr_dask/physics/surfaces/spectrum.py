@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 
-ROUNDING = 1e-9  # wave numbers within this relative distance of a limit are merged with the limit
+ROUNDING = 1e-9  # points of the spectrum within this relative distance of a limit are replaced by the limit
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 STEP = 0.1  # longest interval of the quadrature, in log q
 
@@ -110,8 +110,7 @@ class Spectrum:
         """Return the spectrum, continued by power laws up to the wavelength `longest` and down to `shortest`, m.
 
         An end whose wavelength is given as 0 is not continued. Each power law starts at the outermost point. The
-        exponent is the slope of a straight line, which is fitted to the logarithms of the points within `decades` of
-        the end.
+        exponent is fitted to the points that lie within `decades` decades of the outermost point.
         """
         q, density = [self.wavenumber], [self.density]
         for index, end in (

@@ -1,8 +1,8 @@
 """A closed line as a cubic spline with one coefficient per node.
 
-The splines are uniform and cubic. Between two nodes the line is ``a0 + a1 t + a2 t^2 + a3 t^3``, with t from 0 to 1;
-`piece` computes a0 to a3 from four coefficients of the spline. The values of the line in this piece lie between the
-smallest and the largest of these four coefficients (de Boor, *A Practical Guide to Splines*, 1978, chapter IX).
+The nodes are equidistant. Between two nodes the line is ``a0 + a1 t + a2 t^2 + a3 t^3``, with t from 0 to 1; `piece`
+computes a0 to a3 from four coefficients of the spline. The values of the line in this piece lie between the smallest
+and the largest of these four coefficients (de Boor, *A Practical Guide to Splines*, 1978, chapter IX).
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ def closest(waves: NDArray[np.complex128], nodes: int) -> FloatArray:
     Returns
     -------
     array, shape (nodes,)
-        Coefficients in the unit of the waves. The coefficients of each wave are the wave times the Fourier transform of
-        the B-spline, divided by the sum of the squared transform over all aliases (Unser, IEEE Signal Process. Mag. 16
-        (1999) 22).
+        Coefficients in the unit of the waves. Every wave is multiplied by a factor: the Fourier transform of the
+        B-spline, divided by the sum of the squares of this transform over all aliases of the wave (Unser, IEEE Signal
+        Process. Mag. 16 (1999) 22).
     """
     return series(waves * _closest(waves.size, nodes), nodes)
 
@@ -46,7 +46,7 @@ def through(waves: NDArray[np.complex128], nodes: int) -> FloatArray:
 
 
 def through_heights(height: FloatArray) -> FloatArray:
-    """Return the spline, shape (nodes,), that interpolates the heights, shape (nodes,), of a closed line."""
+    """Return the coefficients, shape (nodes,), of the spline through the heights of a closed line, shape (nodes,)."""
     phase = 2 * np.pi * np.arange(height.size // 2 + 1) / height.size
     return np.asarray(fft.irfft(fft.rfft(height) / _at_nodes(phase), height.size), dtype=np.float64)
 
@@ -103,7 +103,7 @@ def integral(of: Piece, t: float) -> float:
 
 @jit
 def shares(t: float) -> Piece:
-    """Return four weights: the integral of a piece from 0 to t is the weighted sum of its four coefficients."""
+    """Return the weights of the four coefficients of a piece in the integral of the piece from 0 to t."""
     square = t * t
     second, third = t * (4 - 2 * square + 0.75 * t * square) / 6, t * (1 + 1.5 * t + square - 0.75 * t * square) / 6
     return (1 - (1 - t) ** 4) / 24, second, third, square * square / 24
@@ -168,6 +168,6 @@ def _zero(of: Piece, low: float, at_low: float, high: float, at_high: float) -> 
     return t
 
 
-#: Newton's method ends with a step shorter than `CLOSE`; the error is then about the square of this step. If Newton's
+#: Newton's method ends with a step of at most `CLOSE`; the error is then about the square of this step. If Newton's
 #: method does not converge, `STEPS` halvings make the interval as short as the rounding error.
 CLOSE, STEPS = 1e-7, 60

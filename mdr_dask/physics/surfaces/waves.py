@@ -35,9 +35,9 @@ class Waves:
         return series(self.coefficients * (2j * np.pi * np.arange(1, self.coefficients.size + 1)), nodes)
 
     def from_place(self, place: float) -> Waves:
-        """Return the line that starts at the position `place`, a fraction 0..1 of the length.
+        """Return the line that starts at the position `place` (0 to 1) of this line.
 
-        After the shift, a grid with only two nodes per shortest wave cannot represent this wave completely.
+        A grid with only two nodes per shortest wave may lose a part of this wave.
         """
         wave = np.arange(1, self.coefficients.size + 1)
         return Waves(self.coefficients * np.exp(2j * np.pi * wave * place), self.points)
