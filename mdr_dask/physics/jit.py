@@ -1,7 +1,7 @@
 """Compilation of numerical kernels by numba: `jit` for kernels, `jit_inline` for small functions inside them.
 
 Numba compiles a kernel again only if the file of the kernel has changed. If you change a function that kernels in other
-files call, empty numba's cache or set NUMBA_CACHE_DIR to a new folder. The tests do this automatically.
+files call, empty numba's cache or set NUMBA_CACHE_DIR to a new folder. The tests set NUMBA_CACHE_DIR automatically.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numba
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
-UNCOUNTED = OPTIONS | {"_nrt": False}  # without its runtime, numba does not count references to arrays
+UNCOUNTED = OPTIONS | {"_nrt": False}  # if `_nrt` is False, numba does not count references to arrays
 
 
 def jit(function: Kernel) -> Kernel:
@@ -42,7 +42,10 @@ def jit_inline(function: Kernel) -> Kernel:
 
 
 def jit_inline_uncounted(function: Kernel) -> Kernel:
-    """Compile a function that creates no arrays into each kernel that calls it, without reference counting."""
+    """Compile a function into each kernel that calls the function, without reference counting.
+
+    The function must not create arrays.
+    """
     return cast(Kernel, numba.njit(forceinline=True, **UNCOUNTED)(function))
 
 
@@ -59,7 +62,11 @@ def _cached(function: Kernel, options: dict[str, Any]) -> Kernel:
 
 
 def _survive_faults(stored: Any) -> None:
-    """Compile again if a file of the cache is incomplete or unreadable; continue if a file cannot be written."""
+    """Replace errors of the cache by warnings.
+
+    If a file of the cache cannot be read, the kernel is compiled again. If a file cannot be written, the kernel is used
+    without being stored.
+    """
     load, save = stored.load_overload, stored.save_overload
 
     def load_overload(signature: Any, context: Any) -> Any:
@@ -86,7 +93,7 @@ def _warn_once(problem: str) -> None:
 
 @jit_inline
 def last_until(values: Any, x: float, low: int, high: int) -> int:
-    """Return the largest index in [low, high) whose value is at most x; the values ascend.
+    """Return the last index in [low, high) at which the value is at most x; the values must ascend.
 
     If all values are above x, return `low`.
     """

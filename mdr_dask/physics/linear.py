@@ -1,6 +1,6 @@
 """Dense linear systems: LU factors from LAPACK, kept for many right-hand sides.
 
-A worker runs LAPACK with one thread, so that results do not depend on the number of threads that a library may use.
+The results of LAPACK can depend on its number of threads. Workers therefore limit LAPACK to one thread.
 """
 
 from __future__ import annotations
@@ -21,14 +21,17 @@ class Factors(NamedTuple):
     pivots: NDArray[np.int32]
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Return the solution x of matrix @ x = right, where `right` is a vector or has one column for each system."""
+        """Return the solution x of matrix @ x = right.
+
+        The right side `right` is a vector, or a matrix with one column for each right side.
+        """
         return np.asarray(dgetrs(self.triangles, self.pivots, right, trans=1)[0])
 
 
 def factorise(matrix: FloatArray) -> Factors | None:
-    """Return the factors of a square matrix in C order, or None if it is singular or not finite.
+    """Return the factors of a square matrix, or None if the matrix is singular or not finite.
 
-    The matrix is overwritten.
+    The matrix must be stored in C order, and is overwritten.
     """
     triangles, pivots, status = dgetrf(matrix.T, overwrite_a=True)
     diagonal = np.diagonal(triangles)

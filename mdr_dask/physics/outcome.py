@@ -6,7 +6,10 @@ from enum import IntEnum
 
 
 class Outcome(IntEnum):
-    """How a solver ended: compiled functions return the number, and messages to users contain the `sentence`."""
+    """How a solver ended.
+
+    Compiled functions return the number of a member. Messages to users contain its `sentence`.
+    """
 
     CONVERGED = 0
     DEPTH_NOT_FOUND = 1
@@ -26,7 +29,7 @@ class Outcome(IntEnum):
 
     @property
     def is_impossible(self) -> bool:
-        """Whether the parameters of the case are the reason for the failure, so that no finer grid can help."""
+        """Whether the case failed because of its parameters, so that a finer grid cannot help."""
         return self in (Outcome.OUTSIDE_LINE, Outcome.INVALID)
 
 

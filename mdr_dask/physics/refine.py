@@ -1,17 +1,17 @@
-"""Grid refinement: solve on a grid and on the next finer one, and estimate the error from the difference.
+"""Grid refinement: solve on a grid and on the next finer grid; the difference gives an estimate of the error.
 
 Sliding, velocity jumps and lubrication use `refine`. The number of cells doubles from one level to the next, so that
-the error of a solver of order p is divided by r = 2^p at each level. Let c be the relative change of the results from
-the second last level to the last, and b the relative change from the third last level to the second last. The relative
-error on the last level is estimated as
+the error of a solver of order p is divided by r = 2^p at each level. Take three successive levels. Let b be the
+relative change of a result from the first level to the second, and c the relative change from the second level to the
+third. The relative error on the third level is estimated as
 
     error = safety max( c / (r - 1),  b / (r (r - 1)) ) + e.
 
 The first term is Richardson's estimate, with the safety factor of the grid convergence index (Roache, J. Fluids Eng.
-116, 405, 1994). The second term is the same estimate with b / r instead of c: this is the last change that is expected
-after the earlier change b. The second term is needed because the results on two grids may agree by chance. It is
-available from the third level on. The last term e is an error that two grids may have in common, so that their
-difference does not show it (`Solution.unseen`).
+116, 405, 1994). The second term is the same estimate with b / r instead of c, because after the change b the next
+change should be b / r. The second term is needed because the results on two grids may agree by chance. If there are
+only two levels, the second term is left out. The last term e (`Solution.unseen`) is an error that may be the same on
+two grids, so that the difference of their results does not contain it.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class Solution(NamedTuple):
     outcome : int8 array, shape (cases,)
         Values of `Outcome`.
     unseen : float or array, shape (outputs, cases)
-        Relative errors that two grids may have in common, so that the difference of their results does not show them.
-        These errors are added to the estimate.
+        Relative errors that may be the same on two grids, so that the difference of the results does not contain these
+        errors. The values of `unseen` are added to the estimate.
     """
 
     values: Sequence[FloatArray] | FloatArray
@@ -90,16 +90,19 @@ def refine(
     Parameters
     ----------
     solve : callable, (level, cases) -> Solution
-        Function that solves the cases with the given indices on the grid of a level. It must not raise an exception for
-        a case that fails. All outputs that it returns have to meet the accuracy.
+        Function that solves the cases with the given indices on the grid of a level. The function must not raise an
+        exception for a case that fails. A case is refined until all outputs that the function returns meet the
+        accuracy.
     cases : int
         Number of cases.
     levels : sequence of int
-        Increasing levels, such as numbers of cells. The cell size is halved from each level to the next. All cases are
-        solved on the first two levels; with only one level the errors are infinite.
+        Increasing levels, such as numbers of cells. The cell size is halved from each level to the next. Every case is
+        solved on at least two levels, unless it fails because of its parameters. If only one level is given, the errors
+        are infinite.
     accuracy : float
-        Allowed error of every output, relative to the largest absolute value of the output, or to its floor if the
-        floor is larger. With infinity every case is solved on the first two levels only.
+        Allowed error of every output, divided by the largest absolute value of the output, or by the floor of the
+        output if the floor is larger. If the accuracy is infinite, a case that is solved on the second level is not
+        refined further.
     order : float
         Order of convergence p of the dominant part of the error of the solver.
     safety : float
@@ -109,17 +112,19 @@ def refine(
         error is divided by the floor instead of the value. Outputs that can be zero, such as a probability, need a
         floor.
     shared : bool
-        Whether all outputs of a case get the relative error of the output with the largest change. One output may agree
-        on two grids by chance, but hardly all outputs. Choose False for outputs that converge at different rates.
+        If True, the largest relative change among the outputs of a case is used for all outputs of this case. The
+        reason: one output may be the same on two grids by chance, but hardly all outputs at once. Choose False for
+        outputs that converge at different rates.
 
     Returns
     -------
     Refined
-        If a case fails on the finest grids, its solution on the finest grid without failure is returned.
+        If a case fails on fine grids but was solved on coarser grids, the result is the solution on the finest of these
+        coarser grids.
 
     Notes
     -----
-    A case that fails for a reason that no finer grid can remove (`Outcome.is_impossible`) is not refined.
+    A case is not refined if it fails because of its parameters (`Outcome.is_impossible`).
 
     Examples
     --------
@@ -152,7 +157,7 @@ def refine(
         change = relative_changes(coarse, fine, floor)
         if shared:
             change = np.broadcast_to(change.max(axis=0, initial=0.0), change.shape)
-        # `before` is infinite where a previous grid had no solution; the second term is then left out
+        # if a case had no solution on a previous grid, `before` is infinite and the second term is left out
         earlier = np.where(np.isfinite(before), before, 0.0) / reduction
         relative = safety / (reduction - 1) * np.maximum(change, earlier) + fine.unseen
         solved = fine.outcome == Outcome.CONVERGED
@@ -171,10 +176,10 @@ def refine(
 
 
 def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> FloatArray:
-    """Return the change of every output from one grid to the next, relative to the output, shape (outputs, cases).
+    """Return the relative change of every output from one grid to the next, shape (outputs, cases).
 
-    For a profile this is the largest change divided by the largest value. The change is infinite where one of the grids
-    has no solution.
+    For a profile the relative change is the largest change divided by the largest value. If a case has no solution on
+    one of the grids, its change is infinite.
     """
     solved = (coarse.outcome == Outcome.CONVERGED) & (fine.outcome == Outcome.CONVERGED)
     changes = np.empty((len(fine.values), solved.size))
@@ -188,12 +193,12 @@ def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> Fl
 
 
 def _sizes(values: Sequence[FloatArray] | FloatArray, floors: FloatArray) -> FloatArray:
-    """Return for each output and case the largest absolute value, or the floor if it is larger."""
+    """Return the largest absolute value of each output in each case, or the floor if the floor is larger."""
     return np.maximum([_largest(np.fmax(np.abs(value), 0.0)) for value in values], floors[:, None])
 
 
 def _largest(sizes: FloatArray) -> FloatArray:
-    """Return, for each case, the largest of its numbers; the numbers are not negative."""
+    """Return the largest number of each case; all numbers must be at least 0."""
     return sizes if sizes.ndim == 1 else sizes.reshape(len(sizes), -1).max(axis=1, initial=0.0)
 
 

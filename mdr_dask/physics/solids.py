@@ -1,8 +1,10 @@
-"""Linear viscoelastic solids: a spring, Prony terms and a dashpot in parallel; their moduli, fits and temperature laws.
+"""Linear viscoelastic solids, which consist of a spring, Prony terms and a dashpot in parallel.
+
+The functions compute moduli, fit Prony series to data, and shift solids to other temperatures.
 
 The stress due to a shear strain u is ``G_inf u + sum G_m (u - a_m) + eta du/dt``. Here a_m is the strain of the dashpot
-of Prony term m; it obeys ``da_m/dt = (u - a_m) / tau_m``. A solid without Prony terms is a Kelvin solid. A solid with
-one Prony term and no dashpot is a standard solid.
+of Prony term m, with ``da_m/dt = (u - a_m) / tau_m``. A solid without Prony terms is a Kelvin solid. A solid with one
+Prony term and no dashpot is a standard solid.
 """
 
 from __future__ import annotations
@@ -59,7 +61,7 @@ def standard_solid(static_modulus: float, glass_modulus: float, relaxation_time:
     Parameters
     ----------
     static_modulus, glass_modulus : float
-        Shear modulus at very slow and at sudden deformation, Pa.
+        Shear modulus in very slow deformation, and shear modulus in sudden deformation, Pa.
     relaxation_time : float
         Relaxation time of the Prony term, s.
 
@@ -76,7 +78,7 @@ def standard_solid(static_modulus: float, glass_modulus: float, relaxation_time:
 def prony(static_modulus: float, moduli: ArrayLike, times: ArrayLike, viscosity: float = 0.0) -> LinearSolid:
     """Return a solid with Prony terms, sorted by relaxation time.
 
-    Terms with equal times are merged, and terms of modulus 0 are left out.
+    Terms with equal relaxation times are merged. Terms with the modulus 0 are left out.
 
     Parameters
     ----------
@@ -91,7 +93,7 @@ def prony(static_modulus: float, moduli: ArrayLike, times: ArrayLike, viscosity:
     Raises
     ------
     ValueError
-        If a number is not finite or has the wrong sign, or the two lists differ in length.
+        If a number is not finite or has the wrong sign, or if `moduli` and `times` differ in length.
 
     Examples
     --------
@@ -127,9 +129,10 @@ def complex_modulus(solid: LinearSolid, angular_frequency: ArrayLike) -> NDArray
 
 
 def relaxation_modulus(solid: LinearSolid, time: ArrayLike) -> FloatArray:
-    """Return the relaxation modulus G(t) in Pa at times t > 0 in s after a step of the strain.
+    """Return the relaxation modulus G(t), Pa, at the times t > 0, s, after a sudden strain.
 
-    G(t) is the stress divided by the strain. A dashpot does not contribute.
+    The relaxation modulus is the stress divided by the constant strain. The parallel dashpot carries no stress at t >
+    0.
     """
     elapsed = np.asarray(time, dtype=np.float64)
     terms = solid.moduli * np.exp(-elapsed[..., None] / solid.times)
@@ -145,11 +148,11 @@ class SeriesFit:
     solid : LinearSolid
         The series.
     storage_error, loss_error : float
-        Root mean square of the relative error of G' and of G''; NaN for a modulus without data.
+        Root mean square of the relative errors of G', and of G''. If there are no data of a modulus, its error is NaN.
     largest_error : float
         Largest relative error of G' or G''.
     worst_frequency : float
-        Angular frequency of the largest error, rad/s.
+        Angular frequency at which the relative error is largest, rad/s.
     range : tuple of float
         Lowest and highest angular frequency of the data, rad/s.
     """
@@ -163,7 +166,7 @@ class SeriesFit:
 
     @property
     def error(self) -> float:
-        """Root mean square of the relative errors of all moduli with data."""
+        """Root mean square of `storage_error` and `loss_error`; an error that is NaN is left out."""
         return _rms(np.array([error for error in (self.storage_error, self.loss_error) if np.isfinite(error)]))
 
 
@@ -187,9 +190,11 @@ def power_law_series(
     exponent : float
         beta, between 0 and 1.
     lowest, highest : float
-        Range of angular frequency of the law, rad/s. The relaxation times extend one decade further on each side.
+        Ends of the range of angular frequency in which the series follows the law, rad/s. The relaxation times extend
+        one decade beyond 1 / `highest` and 1 / `lowest`.
     terms_per_decade : int
-        Number of terms per decade of relaxation time. With two terms, G'' is within 1 % of the law inside the range.
+        Number of terms per decade of relaxation time. With two terms per decade, the error of G'' is below 1 % inside
+        the range of frequency.
 
     Raises
     ------
@@ -227,15 +232,16 @@ def fit_series(
     storage, loss : array_like, shape (points,)
         G' and G'', Pa, positive. Moduli in tension must first be divided by 2 (1 + Poisson's ratio).
     terms_per_decade : float
-        Number of relaxation times per decade. The relaxation times cover the range of 1 / omega plus half a decade on
-        each side.
+        Number of relaxation times per decade. The relaxation times extend from half a decade below the smallest 1 /
+        omega to half a decade above the largest.
     dashpot : bool
-        Whether the solid has a dashpot.
+        Whether a parallel dashpot is fitted as well.
 
     Raises
     ------
     ValueError
-        If the three lists differ in length, a value is not positive, or the fitted static modulus is zero.
+        If the three lists differ in length, have fewer than two values, or contain a value that is not positive and
+        finite; or if the fitted static modulus is zero.
     """
     omega, stored, lost = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (angular_frequency, storage, loss))
     if not omega.size == stored.size == lost.size >= 2:
@@ -328,7 +334,7 @@ def arrhenius_factor(temperature: ArrayLike, reference: float, activation_energy
 
 
 def at_temperature(solid: LinearSolid, factor: float) -> LinearSolid:
-    """Return the solid with all relaxation times and the viscosity of the dashpot multiplied by a_T."""
+    """Multiply all relaxation times, and the viscosity of the dashpot, by a_T; return the new solid."""
     return replace(solid, times=solid.times * factor, viscosity=solid.viscosity * factor)
 
 
@@ -347,7 +353,7 @@ class Recovery:
     stretch : array, shape (terms, terms)
         Element (m, k) is tau_m / (tau_m - lambda_k).
     amplitude : array, shape (terms, terms)
-        Row k gives c_k = amplitude[k] @ (u - a) for a state of zero stress.
+        The strain of mode k is c_k = amplitude[k] @ (u - a) if the stretches u - a belong to a state of zero stress.
     """
 
     times: FloatArray
@@ -367,8 +373,9 @@ def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
 
     Notes
     -----
-    The complex modulus as a function of i omega is zero at -1 / lambda_k, see :func:`recovery_times`. The modes are
-    orthogonal with respect to the weights G_m / tau_m, so that the inverse of `stretch` has a closed form.
+    The times lambda_k are computed by :func:`recovery_times`. If the complex modulus is written as a function of s = i
+    omega, it is zero at s = -1 / lambda_k. The modes are orthogonal with the weights G_m / tau_m. Therefore
+    `amplitude`, the inverse of `stretch`, has a closed form.
     """
     zeros, distance = recovery_times(moduli * times, times)
     stretch = times[:, None] / distance
@@ -390,7 +397,7 @@ def _imbalance(k: int, offset: float, weight: FloatArray, times: FloatArray) -> 
 
 @jit
 def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the times lambda_k of free recovery, the zeros of 1 + sum weight_m / (tau_m - lambda).
+    """Return the decay times lambda_k of free recovery, which are the zeros of 1 + sum weight_m / (tau_m - lambda).
 
     Parameters
     ----------
@@ -404,8 +411,8 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
     times : array, shape (modes,)
         lambda_k, ascending: lambda_k is between tau_k and tau_(k+1), and the largest lambda_k is above the largest tau.
     distance : array, shape (modes, modes)
-        Element (m, k) is tau_m - lambda_k. For each lambda_k, the distance from the nearer of the two neighbouring
-        tau_m is computed, so that the differences are precise even if the times cover many decades.
+        Element (m, k) is tau_m - lambda_k. Each lambda_k is computed as a distance from the nearest tau_m. These
+        differences are therefore precise even if the times cover many decades.
     """
     terms = times.size
     zeros, distance = np.empty(terms), np.empty((terms, terms))
@@ -423,7 +430,7 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
 
 @jit
 def _distance_to_zero(pole: int, sign: float, gap: float, weight: FloatArray, times: FloatArray) -> float:
-    """Return the distance of a zero from the nearest tau.
+    """Return the distance of a zero lambda_k from the nearest tau_m.
 
     The logarithm of the distance is found by Newton's method and bisection.
     """

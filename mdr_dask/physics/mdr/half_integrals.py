@@ -1,4 +1,6 @@
-"""Matrices of both transforms on graded panels, exact for functions that are a polynomial in every panel.
+"""Matrices of both transforms on graded panels.
+
+The matrices are exact for functions that are a polynomial inside each panel.
 
 As functions of z, the square of the radius, both transforms of the MDR are Abel's half-integrals. The substitution
 ``z' = z - t^2`` turns the integrands into polynomials in t, which Gauss's rule integrates exactly. All contacts are
@@ -21,7 +23,7 @@ from mdr_dask.physics.mdr.transforms import gauss
 
 
 class Mesh(NamedTuple):
-    """Panels (intervals) and nodes of a function that is a polynomial in every panel.
+    """The panels (intervals) and nodes on which a function is a piecewise polynomial.
 
     The first panel begins at 0. There is no node at 0, because functions may jump there.
 
@@ -34,7 +36,8 @@ class Mesh(NamedTuple):
     nodes : array, shape (n,)
         Nodes of all panels, increasing.
     barycentric : array, shape (panels, order + 1)
-        Weights of the interpolation inside each panel; the first panel uses only the last `order` weights.
+        Barycentric weights for the interpolation inside each panel. The first panel has no node at its left end, and
+        uses only the last `order` weights.
     """
 
     edges: FloatArray
@@ -54,7 +57,8 @@ class Mesh(NamedTuple):
 class Panels:
     """Nodes on [0, 1], and matrices for functions that are given by their values u at the nodes.
 
-    Multiplied by u, a matrix gives the expression that is stated below, with z at each node. The last node is at 1.
+    The product of a matrix and u contains the expression stated below, with z equal to the position of each node. The
+    last node is at 1.
 
     Parameters
     ----------
@@ -87,12 +91,12 @@ class Panels:
 
 @lru_cache(maxsize=64)
 def graded_panels(left: int, right: int, order: int) -> Panels:
-    """Return panels whose widths are halved repeatedly towards both ends.
+    """Return panels that become narrower towards both ends, by repeated halving of the panel at the end.
 
     Parameters
     ----------
     left, right : int
-        Number of times that the panel at each end is halved.
+        Number of halvings of the panel at the left end, and of the panel at the right end.
     order : int
         Nodes per panel, at least 2.
 
@@ -168,16 +172,19 @@ def _add_panel(
 
 
 def interpolate(mesh: Mesh, values: FloatArray, places: FloatArray) -> FloatArray:
-    """Return the piecewise polynomial through `values`, shape (n,), at the positions `places`; 0 beyond the mesh."""
+    """Return the piecewise polynomial through `values`, shape (n,), at the positions `places`.
+
+    Beyond the mesh the result is 0.
+    """
     result = np.zeros_like(places)
     _interpolate(mesh, values, places, result)
     return result
 
 
 def interpolate_weighted(mesh: Mesh, rows: FloatArray, shares: FloatArray, stretch: FloatArray) -> FloatArray:
-    """Return a weighted sum of piecewise polynomials with stretched arguments, at all nodes.
+    """Return a weighted sum of piecewise polynomials at all nodes.
 
-    The terms of the sum are shares[k] p_k(stretch[k] z) at the node z, where p_k is the piecewise polynomial through
+    At the node z, term k of the sum is shares[k] p_k(stretch[k] z), where p_k is the piecewise polynomial through
     rows[k].
     """
     result = np.zeros(mesh.nodes.size)
@@ -200,7 +207,7 @@ def _interpolate(mesh: Mesh, values: FloatArray, places: FloatArray, result: Flo
 
 @jit_inline
 def value_at(mesh: Mesh, values: FloatArray, place: float) -> float:
-    """Return the piecewise polynomial through `values` at a place; it is zero beyond the mesh."""
+    """Return the piecewise polynomial through `values` at the position `place`; beyond the mesh the result is 0."""
     if place >= mesh.edges[-1]:
         return 0.0
     order = mesh.order

@@ -1,4 +1,4 @@
-"""Closed forms for contacts of power-law bodies of revolution (sphere, cone, other powers), and for the stick radius.
+"""Closed forms for contacts of power-law bodies of revolution, such as spheres and cones.
 
 The profile is f = A r^n, and its image is g = B |x|^n with B = kappa_n A (see `transforms.power_factor`). E_star and
 G_star are the effective moduli of normal and tangential contact. The bodies are assumed to be elastically similar, so
@@ -47,7 +47,7 @@ def radius_from_force(force: ArrayLike, amplitude: ArrayLike, exponent: ArrayLik
 
 
 def stress(r: ArrayLike, radius: float, amplitude: float, exponent: float, E_star: float) -> FloatArray:
-    """Return the pressure p(r) in a contact of radius a; it is zero outside (thesis eq. 2.11)."""
+    """Return the pressure p(r) in a contact of radius a (thesis eq. 2.11); outside the contact the pressure is zero."""
     return E_star * float(power_factor(exponent)) * amplitude * power_pressure(exponent, r, radius)
 
 

@@ -1,7 +1,7 @@
 """Unworn bodies of revolution: the profile f0(r) and its image g0(x), the line of the MDR.
 
-Lengths along the surface are in units of the contact radius a0, heights in units of the depth d0, both before any wear.
-In these units g0(1) = 1. The index 0 means before any wear.
+The index 0 denotes the state before any wear. Lengths along the surface are divided by the contact radius a0, and
+heights are divided by the depth d0. In these units g0(1) = 1.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ class PowerProfile:
 
 @dataclass(frozen=True, eq=False)
 class TableProfile:
-    """A body described by two piecewise cubics, from a table (`from_table`) or from a closed form (`from_body`).
+    """A body described by two piecewise cubics; `from_table` and `from_body` return such a body.
 
     Parameters
     ----------
@@ -151,7 +151,10 @@ class TableProfile:
         return self.image_slope_curve(np.asarray(position))
 
     def rise(self, gap: FloatArray, start: float) -> FloatArray:
-        """Return g0(start + gap) - g0(start). For a short gap, the slope is integrated to avoid cancellation."""
+        """Return g0(start + gap) - g0(start).
+
+        If `gap` is small, the difference is computed as an integral of the slope, to avoid cancellation.
+        """
         gap = np.asarray(gap, dtype=float)
         abscissa, weight = gauss(8)
         short = gap * (self.image_slope_curve(start + gap[..., None] * abscissa) @ weight)
@@ -171,7 +174,7 @@ _ABSCISSA, _WEIGHT = gauss(8)
 
 @jit_inline
 def image_rise(image: Image, start: float, level: float, gap: float) -> float:
-    """Return g0(start + gap) - level without cancellation, where level = g0(start)."""
+    """Return g0(start + gap) - level without cancellation. The argument `level` must be g0(start)."""
     if image.knots.size == 0:
         n = image.exponent
         if n == 2.0:
@@ -180,7 +183,7 @@ def image_rise(image: Image, start: float, level: float, gap: float) -> float:
             return gap
         if gap <= -start:
             return -level
-        if gap > 0.25 * start:  # no cancellation
+        if gap > 0.25 * start:  # here the difference does not suffer from cancellation
             return math.pow(start + gap, n) - level
         return level * math.expm1(n * math.log1p(gap / start))
     if abs(gap) >= 0.02:
@@ -193,7 +196,7 @@ def image_rise(image: Image, start: float, level: float, gap: float) -> float:
 
 @jit
 def _piece(image: Image, place: float, derivative: int) -> float:
-    """Return the value (derivative 0) or the slope (derivative 1) of the piecewise cubic at a place."""
+    """Return the image (if `derivative` is 0) or its slope (if `derivative` is 1) at the position `place`."""
     cell = last_until(image.knots, place, 0, image.coefficients.shape[1])
     local, k = place - image.knots[cell], image.coefficients
     if derivative == 0:
@@ -240,15 +243,15 @@ def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfi
     return TableProfile(_scaled(interpolant, a0, depth), _scaled(image_curve, a0, depth), a0)
 
 
-#: For a body in closed form: largest radius divided by a0, and half the number of knots in each smooth piece.
+#: For `from_body`: largest radius of the profile divided by a0, and half the number of pieces between two breaks.
 FARTHEST, KNOTS = 8.0, 80
 
 
 def from_body(body: Any, depth: float) -> TableProfile:
     """Build the profile of a body that is given in closed form and pressed to a depth.
 
-    The depth is in the unit of length of the body. The profile consists of cubic pieces, which become shorter towards
-    the breaks of the body.
+    The depth is in the unit of length of the body. The profile consists of cubic pieces. The pieces become shorter
+    towards the axis, the contact edge and the radii `breaks` of the body.
 
     Parameters
     ----------
@@ -275,7 +278,7 @@ def from_body(body: Any, depth: float) -> TableProfile:
 
 
 def check_table(radius: FloatArray, height: FloatArray) -> None:
-    """Raise ValueError unless the table of a profile is finite, starts at r = 0 and rises with the radius."""
+    """Raise ValueError if a value is not finite, the first radius is not 0, or radii or heights do not increase."""
     if radius.ndim != 1 or radius.shape != height.shape or radius.size < 4:
         raise ValueError(
             f"a profile needs two columns of at least 4 rows, got shapes {radius.shape!r} and {height.shape!r}"
@@ -319,6 +322,6 @@ def _monotone(x: FloatArray, y: FloatArray) -> CubicSpline | PchipInterpolator:
 
 
 def _refine(radius: FloatArray) -> FloatArray:
-    """Return the radii of the table and seven Chebyshev points in every interval between them."""
+    """Return the radii of the table, and seven Chebyshev points between each pair of neighbouring radii."""
     local = 0.5 * (1.0 + chebyshev.chebpts2(9)[1:])
     return np.concatenate([[0.0], (radius[:-1, None] + np.diff(radius)[:, None] * local).ravel()])

@@ -1,9 +1,10 @@
 """The transforms of the method of dimensionality reduction for bodies of revolution, with an error estimate.
 
 The transforms convert the profile f(r) of a body into its image g(x), the line that represents the body, and back.
-Every integral has a square-root singularity. It disappears if an angle, or a hyperbolic angle, is the variable of
-integration. The integrals are split at the kinks and jumps of the profile and computed by Gauss-Legendre rules. The
-number of nodes is doubled until two successive results agree.
+Every integral has a square-root singularity. The singularity disappears if the variable of integration is replaced by
+an angle t (x = r sin t or r = x sin t) or a hyperbolic angle t (x = r cosh t). The integrals are split at the kinks and
+jumps of the profile and computed by Gauss-Legendre rules. The number of nodes is doubled until two successive results
+agree.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ def inverse_transform(
     Parameters
     ----------
     image : callable, array -> array
-        g(x) for x >= 0; it is evaluated between the breaks, never at a break.
+        g(x) for x >= 0. The function is called with positions between the breaks, never with a break itself.
     radius : array_like, shape (m,)
         Radii r >= 0.
     breaks : sequence of float
@@ -102,14 +103,14 @@ def forward_transform(
     jumps: Sequence[tuple[float, float]] = (),
     tolerance: float = 1e-10,
 ) -> Estimate:
-    """Transform the profile f(r) into its image g(x) (thesis eq. 2.4, plus the height of the apex).
+    """Transform the profile f(r) into its image g(x): thesis eq. 2.4 plus the height f(0) of the apex.
 
     Parameters
     ----------
     slope : callable, array -> array
-        f'(r) for r >= 0. The jumps of f are given in `jumps`.
+        f'(r) for r >= 0, without the jumps of f, which are passed in `jumps`.
     position : array_like, shape (m,)
-        Positions x. They may be negative, because g is even.
+        Positions x. Negative positions are allowed, because g is even.
     apex : float
         f(0).
     breaks : sequence of float
@@ -155,7 +156,7 @@ def pressure(
 ) -> Estimate:
     """Return the contact pressure divided by the effective modulus (thesis eq. 2.11).
 
-    The equation is extended to jumps of the line load q = d - g, with the depth d.
+    Unlike the equation of the thesis, this function allows jumps of the line load q = d - g, where d is the depth.
 
     Parameters
     ----------
@@ -166,7 +167,8 @@ def pressure(
     contact_radius : float
         Half-width a of the one-dimensional contact.
     edge_gap : float
-        Jump of the line load at the edge: the value of d - g just inside the edge. It is not zero under a flat punch.
+        Jump of the line load at the edge, which is the value of d - g just inside the edge. Under a flat punch this
+        jump is not zero.
     breaks : sequence of float
         Places where a derivative of g jumps.
     jumps : sequence of (position, height)
@@ -200,7 +202,10 @@ def pressure(
 
 
 def volume(image: Function, radius: float, *, breaks: Sequence[float] = (), tolerance: float = 1e-10) -> Estimate:
-    """Return the volume under a profile from its image: int_0^R 2 pi r f dr = 4 int_0^R g sqrt(R^2 - x^2) dx."""
+    """Return the volume under a profile f from r = 0 to the radius R, computed from the image g.
+
+    The volume is int_0^R 2 pi r f dr = 4 int_0^R g sqrt(R^2 - x^2) dx.
+    """
     edges = _angles(np.array([radius]), breaks)
 
     def integrand(angle: FloatArray) -> FloatArray:
@@ -235,7 +240,7 @@ def power_pressure(exponent: float, radius: ArrayLike, contact_radius: float) ->
 
 
 def _angles(outer: FloatArray, breaks: Sequence[float]) -> FloatArray:
-    """Return the edges of the pieces as angles t with x = r sin t, shape (m, pieces + 1)."""
+    """Return the angles t at which the integrals over x = r sin t are split, shape (m, pieces + 1)."""
     columns = [np.zeros_like(outer)]
     for place in sorted(b for b in breaks if b > 0.0):
         gap = np.clip(outer - place, 0.0, None) * (outer + place)

@@ -1,11 +1,12 @@
 """The transforms on a uniform grid by product integration.
 
-The functions are piecewise linear, and the singular weights are integrated exactly.
+The functions are taken as piecewise linear. The product of a linear function and the singular weight is integrated
+exactly.
 
-The error of the inverse transform is of second order in the cell width, that of the forward transform of order 1.5. The
-error of the pressure is of first order, and largest at the nodes next to the axis. The contact edge is located inside
-its cell. The convergence is slower than with `half_integrals`, but the method accepts any profile, any history and any
-number of kinks.
+Each error is proportional to a power of the cell width. The exponent is 2 for the inverse transform, 1.5 for the
+forward transform, and 1 for the pressure. The error of the pressure is largest at the nodes next to the axis. The
+contact edge may be anywhere inside a cell. This method converges more slowly than `half_integrals`, but accepts any
+profile, any history and any number of kinks.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ class UniformGrid:
         return float(self.nodes[1])
 
     def edge(self, image: FloatArray, depth: float) -> float:
-        """Return the radius at which the image first reaches the depth, by linear interpolation between nodes."""
+        """Return the smallest radius at which the image reaches the depth, by linear interpolation between nodes."""
         beyond = np.flatnonzero(image >= depth)
         if beyond.size == 0:
             return float(self.nodes[-1])
@@ -56,7 +57,7 @@ class UniformGrid:
         return float(self.nodes[k] - self.spacing * (image[k] - depth) / (image[k] - image[k - 1]))
 
     def pressure(self, image: FloatArray, depth: float) -> FloatArray:
-        """Return p / E* at the nodes; the cell that contains the contact edge is cut at the edge."""
+        """Return p / E* at the nodes; in the last cell, the integral ends at the contact edge."""
         load = np.maximum(depth - image, 0.0)
         k = int(np.argmax(image >= depth))
         result = self.stress @ load
@@ -129,8 +130,9 @@ def uniform_grid(cells: int, length: float) -> UniformGrid:
 def _kernel(low: ArrayLike, high: ArrayLike, radius: ArrayLike) -> FloatArray:
     """Return the integral of 1 / sqrt(x^2 - r^2) from `low` to `high`, for low >= r.
 
-    In the cell next to the axis, with r = low = 0, the integral diverges. In this cell the slope of the line load is
-    therefore not taken as constant but as proportional to x, with the same mean. The result is then 2.
+    For r = low = 0, which is the cell next to the axis, the integral diverges. In this cell the slope of the line load
+    is therefore taken as proportional to x, with the mean value of the constant slope. The integral of the slope
+    divided by x is then twice this mean value, so that the function returns 2.
     """
     low, high, r = np.broadcast_arrays(*(np.asarray(each, dtype=np.float64) for each in (low, high, radius)))
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,4 +1,6 @@
-"""The method of the papers: steady state of a Kelvin foundation by backward Euler, many cases on a line at once.
+"""Steady state of a Kelvin foundation by backward Euler, the method of the papers.
+
+Many cases on one line are solved at once.
 
 The displacement at node i is u_i = max(w_i, lambda u_(i-1)), with the penetration w = depth + height. The decay per
 step is lambda = 1 / (1 + dt / tau), where dt is the time in which the body travels the distance dx between two nodes.
@@ -8,7 +10,8 @@ As u is periodic, the forces are sums over the nodes:
     F_x / (4 G) = sum of (u_i - lambda u_(i-1)) / (1 - lambda) (w_i - w_(i-1))
 
 Blocks of nodes that are entirely in contact or entirely free are summed in closed form. In the other blocks the inner
-loops run over cases, as vector instructions. The results of a case do not depend on the other cases.
+loops run over cases, so that one vector instruction treats several cases. The results of a case do not depend on the
+other cases.
 """
 
 from __future__ import annotations
@@ -24,13 +27,13 @@ from mdr_dask.physics.jit import jit
 from mdr_dask.physics.sliding.cases import Cases
 
 ITERATIONS = 200
-COARSENING = 8  # ratio of the numbers of nodes of successive grids in the search for the depth
-COARSEST = 64  # largest number of nodes of the grid on which the search for the depth starts
-# The search ends if the product of the last two relative steps of the depth is at most CONVERGED.
-# The product is about the error of the extrapolation over the last step.
+COARSENING = 8  # in the search for the depth, each grid has this many times as many nodes as the previous grid
+COARSEST = 64  # the search for the depth starts on a grid with at most this number of nodes
+# The search ends if the product of the last two relative steps of the depth is at most CONVERGED. This product is an
+# estimate of the error that remains after the drag is extrapolated over the last step.
 CONVERGED = 1e-9
-EXACT_STEP = 1e-13  # the search also ends after a relative step of the depth that is as small as rounding errors
-COARSE = 1e-3  # value of CONVERGED on all grids except the finest
+EXACT_STEP = 1e-13  # the search also ends after a relative step of this size, which is a rounding error
+COARSE = 1e-3  # used instead of CONVERGED on all grids except the finest
 
 BLOCK = 256  # number of nodes in a block
 LANES = 8  # number of cases in one vector instruction
@@ -42,8 +45,8 @@ SUMS = 3
 # the block, and the sums of height, rise, height times rise, and rise squared
 PEAK, LOWEST, STEEPEST, BEFORE, HEIGHTS, RISES, WORK, SQUARES = range(8)
 # Indices of the state of a case in a sweep: displacement u (U), the derivative of u with respect to the depth (FADE),
-# the factor by which a free u decays over a block (THROUGH), the sum of the decay factors at the nodes of a block
-# (MEMORY), and three sums over the nodes of a block: of u (LOAD), of FADE (RATE) and of the drag (LOSS)
+# the factor by which u decays over a block out of contact (THROUGH), the sum of the decay factors at the nodes of a
+# block (MEMORY), and three sums over the nodes of a block: of u (LOAD), of FADE (RATE) and of the drag (LOSS)
 U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS = range(7)
 ROWS = 7
 
@@ -54,11 +57,11 @@ class Nodal(NamedTuple):
     Parameters
     ----------
     height, rise : array, shape (n,)
-        Height of each node, and its increase from the previous node.
+        Height of each node, and the rise from the previous node to this node.
     blocks : array, shape (n // BLOCK, 8)
         Bounds and sums of every block, from `_blocks`.
     periodic : bool
-        Whether the line is periodic; it then ends at its highest node.
+        Whether the line is periodic. A periodic line ends at its highest node.
     """
 
     height: FloatArray
@@ -68,7 +71,7 @@ class Nodal(NamedTuple):
 
 
 class Moving(NamedTuple):
-    """Sliding cases: v tau in cells, lambda = 1 / (1 + dt / tau), and the penetration of the highest node."""
+    """Sliding cases: v tau in cells, the decay lambda per step, and the penetration of the highest node."""
 
     deborah: FloatArray
     decay: FloatArray
@@ -84,7 +87,7 @@ class Lanes(NamedTuple):
         State of each case during the sweep. After the sweep, `U` is the displacement u at the end of the line, and
         `FADE` the derivative of u with respect to the depth.
     packed : array, shape (ROWS + 2, cases + LANES)
-        State, decay and depth of the cases in the queue, without gaps between them.
+        State, decay and depth of the cases in the queue, in neighbouring columns.
     queue : array, shape (cases,)
         Cases in which contact begins or ends in the current block.
     sums : array, shape (SUMS, cases)
@@ -107,10 +110,10 @@ def lanes_for(cases: int) -> Lanes:
 
 @jit
 def _step(h: float, t: float, decay: float, depth: float, u: float, fade: float) -> tuple[float, float, float]:
-    """Return u and du/d(depth) at the next node, and the contribution of this node to (1 - lambda) F_x / (4 G).
+    """Return u and du/d(depth) at a node, and the contribution of this node to (1 - lambda) F_x / (4 G).
 
-    The next node has the height `h` and is higher than the node before by `t`. At the node before, the displacement is
-    `u`, and its derivative with respect to the depth is `fade`.
+    The node has the height `h`, and the rise from the previous node is `t`. At the previous node the displacement is
+    `u`, and the derivative of `u` with respect to the depth is `fade`.
     """
     free = decay * u
     w = h + depth
@@ -125,7 +128,7 @@ def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
     h, t = height[:whole].reshape(-1, BLOCK), rise[:whole].reshape(-1, BLOCK)
     before = np.roll(height, 1)[:whole:BLOCK]
     if not periodic:
-        before[:1] = -np.inf  # elements are out of contact before the first node
+        before[:1] = -np.inf  # before the first node of the line, elements are out of contact
     sums = h.sum(1), t.sum(1), (h * t).sum(1), (t * t).sum(1)
     return np.array([h.max(1), h.min(1), t.min(1), before, *sums]).T.copy()
 
@@ -134,7 +137,7 @@ def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
 def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) -> int:
     """Add the sums of a block for every case in which the whole block is in contact or the whole block is free.
 
-    Write the indices of the other cases to the queue, and return their number.
+    The indices of the other cases are written to the queue, and the number of these cases is returned.
     """
     peak, lowest, steepest, before = block[PEAK], block[LOWEST], block[STEEPEST], block[BEFORE]
     heights, rises, work, squares = block[HEIGHTS], block[RISES], block[WORK], block[SQUARES]
@@ -196,7 +199,7 @@ def _walk_some(height: FloatArray, rise: FloatArray, moving: Moving, lanes: Lane
         packed[U, q], packed[FADE, q] = workspace[U, k], workspace[FADE, k]
         packed[ROWS, q], packed[ROWS + 1, q] = decay[k], depth[k]
         packed[LOAD, q] = packed[RATE, q] = packed[LOSS, q] = 0.0
-    # fill the last vector, because full vectors are faster
+    # add zeros until the last vector instruction is full, because full instructions are faster
     full = -(-queued // LANES) * LANES
     packed[:, queued:full] = 0.0
     _walk(height, rise, packed[ROWS, :full], packed[ROWS + 1, :full], packed)
@@ -210,7 +213,7 @@ def _walk_some(height: FloatArray, rise: FloatArray, moving: Moving, lanes: Lane
 
 @jit
 def _sweep(line: Nodal, moving: Moving, lanes: Lanes) -> None:
-    """Move one element of every case along the line and write the sums.
+    """For every case, move one element along the line and write the sums.
 
     On a periodic line the element starts and ends at the highest node. On any other line the element starts undeformed
     at the first node.
@@ -246,10 +249,10 @@ def _newton(
 ) -> None:
     """Find the depth and the drag of every case.
 
-    The guesses in `depths` are replaced by the solutions. If no depth is found, the drag of the case is NaN.
-    The load is a convex, increasing, piecewise linear function of the depth. After its first step Newton's method
-    therefore approaches the solution from above. No sweep follows the last step. Instead, the drag is extrapolated to
-    the last depth along the secant through the last two sweeps.
+    The guesses in `depths` are replaced by the solutions. If no depth is found, the drag of the case is NaN. The load
+    is a convex, increasing, piecewise linear function of the depth. Therefore every depth after the first step of
+    Newton's method is at or above the solution. There is no sweep at the final depth. Instead, the drag is extrapolated
+    linearly from the last two sweeps to the final depth.
     """
     count = depths.size
     active, lanes, before = np.arange(count), lanes_for(count), np.full((2, count), np.nan)
@@ -263,7 +266,7 @@ def _newton(
         kept = 0
         for k in range(count):
             case = active[k]
-            # behind the end of a line that is not periodic, u and the derivative of u decay exponentially
+            # behind the end of a line that is not periodic, both u and du/d(depth) decay exponentially
             carried = sums[CARRIED, k] + ends * deborah[k] * workspace[U, k]
             step = (load[k] - carried) / (sums[STIFFNESS, k] + ends * deborah[k] * workspace[FADE, k])
             drag = sums[DRAG, k] * (1 + deborah[k])
@@ -292,9 +295,10 @@ def contact(
     touched: FloatArray,
     slope: FloatArray,
 ) -> None:
-    """Write for every case the number of nodes in contact (`touched`) and the rms rise at these nodes (`slope`).
+    """For every case, write the number of nodes in contact to `touched`, and their rms rise to `slope`.
 
-    `depths` is a result of :func:`steady_by_steps`, which describes the other parameters.
+    The rise of a node is measured from the previous node. The parameter `depths` is a result of
+    :func:`steady_by_steps`; the other parameters are described there.
     """
     for k in range(depths.size):
         decay, count, square = deborah[k] / (1 + deborah[k]), 0, 0.0
@@ -315,19 +319,20 @@ def contact(
 def steady_by_steps(
     height: FloatArray, periodic: bool, deborah: FloatArray, loads: FloatArray
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Return for every case the depth of the highest node, F_x / (4 G), and whether an end of the line is in contact.
+    """Return three arrays: depth of the highest node, F_x / (4 G), and whether an end of the line is in contact.
 
-    The depth is found on finer and finer grids, each with `COARSENING` times as many nodes as the previous one. The
-    first guess, and therefore the result, does not depend on the other cases.
+    The depth is found on a coarse grid first, then on finer grids, each with `COARSENING` times as many nodes as the
+    previous grid. The first guess of a case does not depend on the other cases, and neither does the result.
 
     Parameters
     ----------
     height : array, shape (n,)
         Heights. A periodic line starts at the node after the highest node and ends at the highest node.
     periodic : bool
-        Whether the line is periodic; if not, elements enter undeformed at the first node.
+        Whether the line is periodic. On any other line, elements enter undeformed at the first node.
     deborah, loads : array, shape (cases,)
-        v tau in cells, and F_N / (4 G dx) in the unit of height; both positive and finite.
+        Deborah numbers v tau / dx, and loads F_N / (4 G dx) in the unit of height. All values must be positive and
+        finite.
     """
     strides = [1]
     while height.size > COARSEST * strides[-1]:

@@ -1,4 +1,7 @@
-"""Cases of steady sliding on one line (the input of every solver), and their steady states (the output)."""
+"""Cases of steady sliding on one line, and their steady states.
+
+The cases are the input of every solver, and the steady states are its output.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ COLUMNS = ("drag", "depth", "contact_fraction", "contact_slope")
 
 
 class Cases(NamedTuple):
-    """Deborah numbers and loads of cases on a line, one entry per case."""
+    """Deborah numbers and loads of cases on one line; entry k of each array belongs to case k."""
 
     deborah: FloatArray
     loads: FloatArray
@@ -30,7 +33,7 @@ class Cases(NamedTuple):
 
 @dataclass(frozen=True)
 class Steady:
-    """Steady states, one entry per case.
+    """Steady states; entry k of each array belongs to case k.
 
     Parameters
     ----------
@@ -59,12 +62,15 @@ class Steady:
 
     @classmethod
     def of(cls, columns: FloatArray, status: NDArray[np.int8]) -> Steady:
-        """Return steady states from the rows of an array; results of cases that have not converged become NaN."""
+        """Return steady states whose results are the rows of an array.
+
+        If a case has not converged, its results become NaN.
+        """
         drag, depth, fraction, slope = np.where(status == Outcome.CONVERGED, columns, np.nan)
         return cls(drag, depth, fraction, slope, status)
 
 
 def valid(deborah: FloatArray, loads: FloatArray) -> NDArray[np.bool_]:
-    """Return a mask of the cases with a positive, finite Deborah number and load."""
+    """Return for each case whether its Deborah number and its load are positive and finite."""
     good: NDArray[np.bool_] = np.isfinite(deborah) & np.isfinite(loads) & (deborah > 0) & (loads > 0)
     return good

@@ -1,12 +1,14 @@
-"""Full contact of any linear solid with a rough plane: the waves of the line are independent of each other.
+"""Full contact of any linear solid with a rough plane.
+
+The problem is linear, so that each wave of the line can be solved separately.
 
 The displacement is u = d + h, with the depth d and the height h. The pressure of wave k is G*(q_k v) c_k, with the
 complex modulus G*, the wavenumber q_k and the amplitude c_k (thesis eq. 3.14 for the Kelvin solid). The drag is
 therefore a sum over the spectrum and does not depend on the phases.
 
-Contact is full if the pressure is positive everywhere. The pressure is computed at m nodes, two per Nyquist point.
-Between the nodes, a sum of waves with up to k periods on the line is at most 1 / cos(pi k / m) times its largest value
-at the nodes (Ehlich and Zeller, Z. Angew. Math. Mech. 44, T22, 1964).
+Contact is full if the pressure is positive everywhere. The pressure is computed at m nodes, two for each Nyquist point.
+The pressure is a sum of waves with at most k periods on the line. Between the nodes, such a sum is at most 1 / cos(pi k
+/ m) times as large as its largest value at the nodes (Ehlich and Zeller, Z. Angew. Math. Mech. 44, T22, 1964).
 """
 
 from __future__ import annotations
@@ -22,7 +24,9 @@ from mdr_dask.physics.surfaces.waves import series
 
 
 def steady_full_contact(line: RoughLine, terms: Sequence[tuple[float, float]], cases: Cases) -> Steady:
-    """Return the steady states of the cases in full contact; the status of all other cases is `Outcome.INVALID`.
+    """Return the steady states of the cases in full contact.
+
+    If the contact of a case is not full, its status is `Outcome.INVALID`.
 
     Parameters
     ----------
@@ -32,7 +36,7 @@ def steady_full_contact(line: RoughLine, terms: Sequence[tuple[float, float]], c
         G_m / G_inf and tau_m v / L of the Prony terms; empty for a Kelvin solid.
     cases : Cases
         Deborah numbers eta v / (G_inf L) of the dashpot, and loads F_N / (4 G_inf L), in the unit of height. In full
-        contact this load is the mean displacement.
+        contact the load in this unit is equal to the mean displacement.
 
     Examples
     --------
@@ -49,10 +53,11 @@ def steady_full_contact(line: RoughLine, terms: Sequence[tuple[float, float]], c
     if terms:
         relaxing = sum((stiffness * (1 - 1 / (1 + wave * time)) for stiffness, time in terms), np.zeros(wave.size))
         pressure = pressure + series(waves * relaxing, nodes)
-    # sums over the nodes equal sums over the spectrum; the product of height and slope has the mean 0
+    # the drag is a mean over the nodes, equal to the sum over the spectrum; the mean of height times slope is 0
     lost, stretch = pressure @ slope / nodes if terms else 0.0, slope @ slope / nodes
     bound = np.cos(np.pi * waves.size / nodes)
-    worst = [np.abs(pressure).argmax(), np.abs(slope).argmax()]  # a test at two nodes excludes most cases
+    # most cases without full contact are found at the nodes of the largest static and the largest viscous pressure
+    worst = [np.abs(pressure).argmax(), np.abs(slope).argmax()]
     with np.errstate(over="ignore", invalid="ignore"):
         drag = lost + deborah * stretch
         pull = np.abs(pressure[worst] + np.multiply.outer(deborah, slope[worst])).max(axis=1)

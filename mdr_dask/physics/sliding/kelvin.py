@@ -3,9 +3,9 @@
 All lengths are in cells: a cell has the length 1, a slope is the rise over one cell, and ``deborah`` is v tau / dx with
 the length dx of a cell. Heights are positive towards the elastomer. Heights are measured from the highest point of the
 line, so that the penetration is w = depth + height with depth > 0. The displacement of an element is u = w in contact;
-after contact ends, u decays as exp(-s / deborah) with the distance s. The derivative of u with respect to the depth is
-1 in contact, and decays like u after contact ends. A change of the depth also shifts the places where contact begins
-and ends; this shift has an effect of second order on the load.
+after contact ends, u decays as exp(-s / deborah) with the distance s. In contact, the derivative of u with respect to
+the depth is 1; after contact ends, this derivative decays exponentially like u. If the depth changes, the places where
+contact begins and ends are shifted, but the effect of this shift on the load is of second order.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, summit
 
-BLOCK = 16  # number of cells in a block; a block that is entirely in contact or entirely free is skipped at once
-TINY = 1e-290  # displacements below this are set to 0
-CLOSE = 1e-8  # Newton's method stops after a step shorter than this, in cells; the next step would be a rounding error
+BLOCK = 16  # number of cells in a block; a block that is entirely in contact or entirely free is passed in one step
+TINY = 1e-290  # smaller displacements are set to 0
+CLOSE = 1e-8  # in cells; after a step of Newton's method shorter than this, the next step would be a rounding error
 ITERATIONS = 80
 
 # Indices of the results of a sweep
@@ -39,7 +39,7 @@ class Blocks(NamedTuple):
 
 @jit_inline
 def _four(column: FloatArray, i: int) -> float:
-    """Return the sum of four entries of a column: of cells i and i + 1, and of the two cells half a block later."""
+    """Return the sum of the entries i, i + 1, i + half and i + half + 1 of a column, where half is BLOCK // 2."""
     half = BLOCK // 2
     here, after = column[np.uintp(i)] + column[np.uintp(i + half)], column[np.uintp(i + 1)]
     return float(here + (after + column[np.uintp(i + 1 + half)]))
@@ -47,7 +47,10 @@ def _four(column: FloatArray, i: int) -> float:
 
 @jit
 def blocks_of(cells: Cells) -> Blocks:
-    """Return the whole blocks of a line; the cells that remain at the end belong to no block."""
+    """Return the complete blocks of a line.
+
+    At the end of the line, cells that do not fill a block belong to no block.
+    """
     blocks = (cells.mean.size - 1) // BLOCK
     peak, mean, stretch = np.empty(blocks), np.empty(blocks), np.empty(blocks)
     for block in range(blocks):
@@ -62,11 +65,11 @@ def blocks_of(cells: Cells) -> Blocks:
 
 
 class Barriers(NamedTuple):
-    """Limits of the depth for cells and blocks at one Deborah number.
+    """Limits of the depth for each cell and each block, at one Deborah number.
 
-    If the depth is above `cell` (or `block`), the force on elements in contact is positive everywhere in the cell (or
-    block). If the depth is at most `idle`, the force is positive nowhere in the cell. The limit of a block is NaN until
-    the limits of its cells are computed.
+    The force is the force on elements in contact. If the depth is above the limit `cell`, the force is positive
+    everywhere in the cell; the limit `block` has the same meaning for a block. If the depth is at most `idle`, the
+    force is positive nowhere in the cell. The limit of a block is NaN until the limits of its cells are computed.
     """
 
     cell: FloatArray
@@ -97,10 +100,10 @@ def places_for(patches: int) -> Places:
 def write_barriers(
     height: FloatArray, enter: FloatArray, leave: FloatArray, deborah: float, block: int, barriers: Barriers
 ) -> None:
-    """Write the barriers of a block and of its cells, which follow from the force w + deborah w'.
+    """Write the barriers of a block and of its cells, computed from the force w + deborah w'.
 
-    The barrier of the block is the largest barrier of its cells. `idle` follows from the Bernstein coefficients of the
-    force, which are bounds of the force in the cell.
+    The barrier of the block is the largest barrier of its cells. The values `idle` are computed from the Bernstein
+    coefficients of the force: in the cell, the force is at most the largest coefficient.
     """
     every, written, idle = -np.inf, barriers.cell, barriers.idle
     for i in range(block * BLOCK, min((block + 1) * BLOCK, written.size)):
@@ -108,7 +111,7 @@ def write_barriers(
         first = -(h0 + deborah * a)
         last = -(height[i + 1] + deborah * leave[i])
         highest = first if first > last else last
-        # the force minus the depth, p + q x + r x^2 + c x^3, may have its minimum inside the cell
+        # force - depth = p + q x + r x^2 + c x^3, which may have its minimum inside the cell
         q, r = a + 2 * deborah * b, b + 3 * deborah * c
         near, far = first - q / 3, last + (q + 2 * r + 3 * c) / 3
         x = summit(-q, -r, -c) if max(near, far) > highest else NONE
@@ -123,21 +126,25 @@ def write_barriers(
 
 @jit
 def _decayed(x: float) -> float:
-    """Return 1 - exp(-x) for x >= 0; for small x by a series, which is faster and exact to rounding."""
+    """Return 1 - exp(-x) for x >= 0.
+
+    For small x a series is used, which is faster and exact to rounding.
+    """
     if x > 1 / 32:
         return -math.expm1(-x)
-    # products with reciprocals, because divisions would make a sweep 10 % slower
+    # multiply by 1 / 5 instead of dividing by 5, because divisions would make a sweep 10 % slower
     rest = 1 - x * (1 / 5) * (1 - x * (1 / 6) * (1 - x * (1 / 7)))
     return x * (1 - x * (1 / 2) * (1 - x * (1 / 3) * (1 - x * (1 / 4) * rest)))
 
 
 @jit
 def contact_end(w0: float, a: float, b: float, c: float, deborah: float, start: float) -> float:
-    """Return the first place from `start` to 1 where the force w + deborah w' falls to 0, or `NONE`.
+    """Return the first place between `start` and 1 where the force falls to 0, or `NONE`.
 
-    The penetration is w = w0 + a x + b x^2 + c x^3. The force must not be negative at `start`.
+    The force is w + deborah w', with the penetration w = w0 + a x + b x^2 + c x^3. The force must not be negative at
+    `start`.
     """
-    # search the monotone pieces of the cubic force; rounding may change the sign of the force at the start
+    # search each monotone piece of the cubic force; because of rounding, the force at `start` may be negative
     p, q, r = w0 + deborah * a, a + 2 * deborah * b, b + 3 * deborah * c
     low, positive = start, True
     discriminant = r * r - 3 * c * q
@@ -175,9 +182,11 @@ def _falling(p: float, q: float, r: float, c: float, low: float, high: float) ->
 
 
 class FreeElement(NamedTuple):
-    """A free element in a cell: its displacement u at the place `start`, and the penetration w of the line.
+    """A free element in a cell.
 
-    In the cell w is w0 + a x + b x^2 + c x^3.
+    The displacement of the element at the place `start` is u.
+
+    In the cell, the penetration of the line is w = w0 + a x + b x^2 + c x^3.
     """
 
     w0: float
@@ -192,7 +201,8 @@ class FreeElement(NamedTuple):
 def _contact_begin_between(element: FreeElement, deborah: float, low: float, high: float) -> float:
     """Return the place x between `low` and `high` where the line reaches a free element.
 
-    At this place w rises to u exp(-(x - start) / deborah). At `high`, w must be larger than this expression.
+    At this place the penetration w is equal to the displacement u exp(-(x - start) / deborah) of the element. At the
+    place `high`, w must be larger than this displacement.
     """
     w0, a, b, c, u, start = element
     if w0 + low * (a + low * (b + low * c)) >= u - u * _decayed((low - start) / deborah):
@@ -215,10 +225,10 @@ def _contact_begin_between(element: FreeElement, deborah: float, low: float, hig
 
 @jit
 def _contact_begin(element: FreeElement, deborah: float, low: float, stop: float) -> float:
-    """Return the first place from `low` to `stop` where contact with a free element begins, or `NONE`.
+    """Return the first place between `low` and `stop` where contact with a free element begins, or `NONE`.
 
-    With the displacement u_free of the free element, the product (w - u_free) exp(x / deborah) increases with x
-    wherever the force w + deborah w' is positive. So contact begins at most once in each interval of positive force.
+    The displacement of the free element is u_free. The product (w - u_free) exp(x / deborah) increases with x wherever
+    the force w + deborah w' is positive. In each interval of positive force, contact therefore begins at most once.
     """
     w0, a, b, c, u, start = element
     for _ in range(3):
@@ -237,7 +247,7 @@ def _contact_begin(element: FreeElement, deborah: float, low: float, stop: float
 
 @jit
 def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) -> tuple[float, float]:
-    """Return the integrals of w and w'^2 from `start` to `end`; Gauss's rule is exact for these polynomials."""
+    """Return two integrals from `start` to `end`: of w and of w'^2. Gauss's rule is exact for these polynomials."""
     half, middle = 0.5 * (end - start), 0.5 * (end + start)
     x, y = middle - half * 0.7745966692414834, middle + half * 0.7745966692414834
     before, centre, after = (
@@ -252,12 +262,12 @@ def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) 
 
 @jit
 def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> tuple[float, float, float, float]:
-    """Return the integral of u over a free recovery, the drag, and their derivatives with respect to the depth.
+    """Return two integrals over a free recovery, and the derivatives of both with respect to the depth.
 
-    The element is free over the length `travelled`. The order of the results is: integral, derivative of the integral,
-    drag, derivative of the drag. The integral of u is deborah times the decrease of u, and the drag is half the
-    decrease of u^2. The derivative of the drag includes the shift of the place where contact begins; `slope` is the
-    slope of the line at this place.
+    The element is free over the length `travelled`. The order of the results is: integral of u, derivative of this
+    integral, drag, derivative of the drag. The integral of u is deborah times the decrease of u, and the drag is half
+    the decrease of u^2. At the place where contact begins again, `slope` is the slope of the line. The derivative of
+    the drag includes the shift of this place.
     """
     lost = _decayed(travelled / deborah) if u > 0 else 1.0
     memory = deborah * lost
@@ -268,7 +278,7 @@ def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> 
 def _skip_free(
     peak: FloatArray, block_peak: FloatArray, depth: float, decay: float, block_decay: float, i: int, free: float
 ) -> tuple[int, float]:
-    """Skip cells in which a free element stays out of contact; return the next cell and u at the start of this cell."""
+    """Skip cells in which a free element stays free; return the next cell, and u at the start of this cell."""
     n, blocks = peak.size - 1, block_peak.size
     while i < n and peak[i] + depth <= free * decay:
         if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_peak[i // BLOCK] + depth <= free * block_decay:
@@ -277,7 +287,7 @@ def _skip_free(
         else:
             free *= decay
             i += 1
-        # arithmetic with subnormal numbers is a hundred times slower
+        # avoid subnormal numbers, because arithmetic with them is a hundred times slower
         free = free if free > TINY else 0.0
     return i, free
 
@@ -293,7 +303,8 @@ def sweep_cells(
     cells, every : Cells, Blocks
         The line, and its blocks.
     barriers : Barriers, input and output
-        Barriers that are still NaN are written for every block that an element in contact reaches.
+        If the element is in contact when it reaches a block whose barriers are still NaN, the barriers of this block
+        are written.
     deborah : float
         v tau in cells.
     depth : float
@@ -303,8 +314,8 @@ def sweep_cells(
         F_x / (4 G); the derivative of F_x / (4 G) with respect to the depth; the length in contact; the integral of
         w'^2 over the length in contact; and 1 if an end of a line that is not periodic is in contact, otherwise 0.
     places : Places, output
-        The positions where each patch begins and ends. If there are more patches than the arrays can hold, the
-        positions of the excess patches are not written.
+        The positions where each patch begins and ends. If the arrays are too short for all patches, the positions of
+        the last patches are not written.
     """
     # local names, because reading an array from a tuple takes more time than computing a cell
     height, enter, leave, peak, mean, stretches = (
@@ -324,9 +335,9 @@ def sweep_cells(
     i, x, contact, patches = 0, start, cells.periodic, 0
     if contact and begins.size > 0:
         begins[0] = start
-    # u: displacement at the end of the last contact; left: place of this end; free: displacement where the cell starts
+    # `left` is the place where the last contact ended, `u` the displacement there, `free` that at the start of the cell
     u = free = left = 0.0
-    # the period ends at the highest point, inside a last cell that repeats the start of the first cell
+    # a period ends at the highest point, inside the last cell, which is a copy of the first cell
     last = n if cells.periodic and start > 0 else n - 1
     while i <= last:
         if contact and x == 0:
@@ -370,7 +381,7 @@ def sweep_cells(
                     ends[patches] = left
                 patches += 1
                 free = u = w0 + place * (c1 + place * (c2 + place * c3))
-            # a cubic force falls through 0 at most twice in a cell
+            # a cubic force changes from positive to negative at most twice in a cell
             low = x + CLOSE if visits > 0 else x
             may_begin = visits < 2 and low < stop
             begin = _contact_begin(FreeElement(w0, c1, c2, c3, free, x), deborah, low, stop) if may_begin else NONE
@@ -409,7 +420,7 @@ def sweep_cells(
 def patches_at(
     cells: Cells, every: Blocks, barriers: Barriers, deborah: float, depth: float, sums: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the positions where each patch of the steady state begins and ends; arguments as in `sweep_cells`."""
+    """Return two arrays: where each patch begins, and where each patch ends; arguments as in `sweep_cells`."""
     n = cells.mean.size - 1
     places = places_for(n // 8 + 2)
     count = sweep_cells(cells, every, barriers, deborah, depth, sums, places)

@@ -1,4 +1,4 @@
-"""Closed-form laws of sliding friction (thesis chapter 3) and their dimensionless numbers.
+"""Laws of sliding friction in closed form (thesis chapter 3), and the dimensionless numbers in these laws.
 
 Arguments may be numbers, numpy arrays or xarray arrays that broadcast. "Slope" means the spectral rms slope of the
 line.
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 INDENTER_EXPONENT = 1.5  # exponent alpha in eq. 3.40
-BETA = 1.6  # beta of eq. 3.11, for all Hurst exponents; computed values: 1.61 to 1.67 (docs/evidence/friction.md, Laws)
+BETA = 1.6  # beta of eq. 3.11 for every Hurst exponent; computed: 1.61 to 1.67 (docs/evidence/friction.md, Laws)
 
 
 def force_number(force: Any, shear_modulus: Any, rms: Any, length: Any) -> Any:
@@ -21,12 +21,15 @@ def force_number(force: Any, shear_modulus: Any, rms: Any, length: Any) -> Any:
 
 
 def velocity_number(velocity: Any, relaxation_time: Any, slope: Any, rms: Any) -> Any:
-    """Return v tau slope / (sqrt 2 h) (eq. 3.19). At values near 1, contact is limited to the front of asperities."""
+    """Return v tau slope / (sqrt 2 h) (eq. 3.19).
+
+    If this number is about 1, only the fronts of the asperities are in contact.
+    """
     return velocity * relaxation_time * slope / (math.sqrt(2) * rms)
 
 
 def alpha(hurst: Any) -> Any:
-    """Return the exponent H / (1 + H) of zone 1 (eq. 3.13)."""
+    """Return the exponent alpha = H / (1 + H) of `zone_one` for the Hurst exponent H (eq. 3.13)."""
     return hurst / (1 + hurst)
 
 
@@ -49,29 +52,29 @@ def full_contact(force: Any, velocity: Any) -> Any:
 
 
 def interpolation(force: Any, velocity: Any, exponent: Any, beta: Any) -> Any:
-    """Return mu / (sqrt 2 slope) in regions I to III and both zones (eq. 3.17, 3.18); arguments as in `zone_one`.
+    """Return mu / (sqrt 2 slope) for all velocities and forces (eq. 3.17, 3.18); arguments as in `zone_one`.
 
-    The result combines three laws, 1 / mu^2 = 1 / mu_1^2 + 1 / mu_2^2 + 1 / mu_3^2. In this formula, mu_1 is the
-    plateau, mu_2 the result of `full_contact`, and mu_3 the result of `zone_one`.
+    Three laws are combined by 1 / mu^2 = 1 / mu_1^2 + 1 / mu_2^2 + 1 / mu_3^2. Here mu_1 = sqrt 2 slope is the plateau,
+    mu_2 follows from `full_contact`, and mu_3 follows from `zone_one`.
     """
     return (1 + (crossover(force, exponent, beta) / velocity) ** 2) ** -0.5
 
 
 def crossover(force: Any, exponent: Any, beta: Any) -> Any:
-    """Return the `velocity_number` at which the law for low velocities reaches the plateau."""
+    """Return the `velocity_number` at which the linear law for low velocities, extrapolated, reaches the plateau."""
     return np.hypot(force / 4, force**exponent / beta)
 
 
 def regions(force: Any, exponent: Any, beta: Any, share: float = 0.9) -> tuple[Any, Any]:
-    """Return the velocity numbers at the end of region I and at the start of region III of eq. 3.18.
+    """Return two velocity numbers for eq. 3.18: at the end of region I, and at the start of region III.
 
     Parameters
     ----------
     force, exponent, beta : array_like
         As in `zone_one`.
     share : float
-        Fraction of mu that defines the ends. Region I ends where mu is this fraction of the linear law; region III
-        begins where mu is this fraction of the plateau.
+        Fraction that defines the two ends. Region I ends where mu is `share` times the value of the linear law. Region
+        III begins where mu is `share` times the value of the plateau.
     """
     width = math.sqrt(share**-2 - 1)
     middle = crossover(force, exponent, beta)
@@ -101,8 +104,9 @@ def indenter(xi: Any, exponent: Any = INDENTER_EXPONENT) -> Any:
 def single_tip(curvature: Any, force: Any, viscosity: Any, velocity: Any) -> Any:
     """Return mu of a viscous foundation at very high velocity, (2/3) sqrt(kappa F_N / (2 eta v)).
 
-    One parabolic tip is in contact from its summit to the distance a = sqrt(F_N / (2 eta v kappa)) ahead of the summit.
-    The rms slope in contact is kappa a / sqrt 3 = mu sqrt(3) / 2. The derivation is in docs/high-speed.md.
+    Only one parabolic tip is in contact. The contact extends from the summit of the tip to the distance a = sqrt(F_N /
+    (2 eta v kappa)) ahead of the summit. The rms slope in contact is kappa a / sqrt 3 = mu sqrt(3) / 2. The derivation
+    is in docs/high-speed.md.
 
     Parameters
     ----------

@@ -1,18 +1,19 @@
-"""Steady sliding of a Kelvin foundation along a periodic line: fast, for many cases at once, but approximate.
+"""Steady sliding of a Kelvin foundation along a periodic line: a fast, approximate solver for many cases at once.
 
-All lengths are in cells: neighbouring nodes have the distance 1, and De = v tau is the Deborah number in cells. Inside
-a cell the penetration w = d + h is a cubic, which follows from heights and slopes at the two nodes (d is the depth, h
-the height of the line). Contact ends where the force w + De w' falls to 0. Contact begins where the line reaches the
-displacement u of the free element. The places where contact begins and ends are computed approximately.
+All lengths are in cells: neighbouring nodes have the distance 1, and De = v tau is the Deborah number in cells. The
+penetration is w = d + h, with the depth d and the height h of the line. Inside a cell, w is a cubic that is computed
+from the heights and slopes at the two nodes of the cell. Contact ends where the force w + De w' falls to 0. Contact
+begins where the line reaches the displacement u of the free element. The places where contact begins and ends are
+computed approximately.
 
 The load is the integral of w in contact and of u out of contact. The drag is the integral of De w'^2 in contact and of
-u^2 / De out of contact. All terms are positive, so that no digits are lost in slow sliding. The integrals over cells
-that are entirely in contact are exact, and so are the results in full contact on any grid.
+u^2 / De out of contact. All terms are positive, so that there is no cancellation in slow sliding. The integrals over
+cells that are entirely in contact are exact. In full contact the results are therefore exact on any grid.
 
-One sweep moves one element of every case along the line, block by block. In cases in which a block is entirely in
-contact or entirely free, its sums have closed forms. In all other cases the element moves from cell to cell. The
-results of a case do not depend on the other cases. Newton's method finds the depth at which the load is carried, first
-on a coarse grid, then on finer grids.
+One sweep moves one element of every case along the line, block by block. If a block is entirely in contact or entirely
+free in a case, the sums over this block have closed forms. Otherwise the element moves from cell to cell. The results
+of a case do not depend on the other cases. Newton's method finds the depth at which the load is carried, first on a
+coarse grid, then on finer grids.
 """
 
 from __future__ import annotations
@@ -34,9 +35,9 @@ from mdr_dask.physics.surfaces.cubic_line import STEEPEST_RISE, highest_point
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 BLOCK = 32  # number of cells in a block
-WING = 4  # the nodes of a finer grid in a cell are interpolated from this number of nodes on each side of the cell
-BEFORE, AFTER = WING + 1, WING + 2  # numbers of nodes of the previous and the next period that `refine` needs
-SUMMIT = 64  # number of fine nodes in the cell of the highest point; the highest of these nodes is used as the summit
+WING = 4  # a node of a finer grid is interpolated from this number of nodes on each side of its cell
+BEFORE, AFTER = WING + 1, WING + 2  # `refine` needs these numbers of nodes before and after the period
+SUMMIT = 64  # number of fine nodes in the cell of the highest point; the highest fine node counts as the summit
 
 NO_ENDS: FloatArray = np.empty((2, 0))
 # Indices of the bounds and sums of a block of cells
@@ -53,18 +54,18 @@ class Nodes(NamedTuple):
     Parameters
     ----------
     height, slope : array, shape (BEFORE + n + AFTER,)
-        Heights relative to the first node, and slopes as rises per cell; the arrays begin with `BEFORE` nodes of the
-        previous period and end with `AFTER` nodes of the next period.
+        Heights relative to the first node, and slopes as rises per cell. The arrays begin with the last `BEFORE` nodes
+        of the previous period, and end with the first `AFTER` nodes of the next period.
     ends : array, shape (2, BEFORE + n + AFTER) or (2, 0)
-        The corrections of the trapezium rule from `ends_of`, with the same additional nodes.
+        The corrections of the trapezium rule from `ends_of`, at the same nodes as `height`.
     blocks : array, shape (n // BLOCK, 5)
-        For every block: upper bound of the height, lowest node, smallest slope, integrals of the height and of the
-        squared slope.
+        For every block: upper bound of the height, height of the lowest node, smallest slope at a node, integral of the
+        height, and integral of the squared slope.
     top : float
         Height of the first node.
     rise : float
         Height of the highest point of the line above the first node. The highest point is in the cell before the first
-        node. On coarse grids `rise` is 0.
+        node. On coarse grids the first node is the highest node, and `rise` is 0.
     """
 
     height: FloatArray
@@ -77,17 +78,17 @@ class Nodes(NamedTuple):
 
 @lru_cache(maxsize=4)
 def _end_factors(n: int) -> NDArray[np.complex128]:
-    """Return the factors with which `ends_of` multiplies the mean and every wave of a line of n nodes."""
+    """Return the factors of `ends_of` for the mean and for every wave of a line of n nodes."""
     wave = 2 * np.pi / n * np.arange(1, n // 2 + 1)
     return np.append(0.0, 1j * (1 / wave - 0.5 / np.tan(wave / 2)))
 
 
 def ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
-    """Return corrections of the trapezium rule for the integrals of the height and of the squared slope, shape (2, n).
+    """Return corrections of the trapezium rule for two integrals: of the height and of the squared slope, shape (2, n).
 
-    The integral from node i to node j is the trapezium sum, plus the correction at node i, minus the correction at node
-    j. This is exact. Slopes are rises per cell. Corrections from local derivatives would miss the shortest waves, which
-    are important for the integrals over small contacts.
+    The integral from node i to node j is exactly the trapezium sum, plus the correction at node i, minus the correction
+    at node j. Slopes are rises per cell. Corrections from local derivatives would miss the shortest waves, which are
+    important for the integrals over small contacts.
     """
     n = height.size
     parts = fft.rfft([height, (slope / n) ** 2])
@@ -105,12 +106,13 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
     first : int
         Index of the first node, whose height is subtracted from all heights.
     stride : int
-        Number of given nodes for each node of the coarser line.
+        Distance of two neighbouring nodes of the coarser line, in cells of the given line.
     resolved : bool
-        Whether the remaining nodes are close enough to use the given slopes. If False, slopes are computed from
-        differences of heights.
+        Whether the coarser line uses the given slopes. If False, its slopes are computed from differences of its
+        heights, because its nodes are too far apart.
     ends : array, shape (2, n) or (2, 0)
-        The corrections of `ends_of`. If the array is empty, integrals over cells are computed from neighbouring nodes.
+        The corrections of `ends_of`. If this array is empty, integrals over cells are computed from heights and slopes
+        at neighbouring nodes.
     """
     n = height.size // stride
 
@@ -136,7 +138,7 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
 
 @jit
 def _write_blocks(h: FloatArray, s: FloatArray, mean: FloatArray, square: FloatArray, blocks: FloatArray) -> None:
-    """Write bounds and sums of every block; all arrays begin at the first cell."""
+    """Write bounds and sums of every block; the first entry of each array belongs to the first cell."""
     for j in range(blocks.shape[0]):
         peak, lowest, steepest, heights, squares = -np.inf, np.inf, np.inf, 0.0, 0.0
         for i in range(j * BLOCK, (j + 1) * BLOCK):
@@ -159,13 +161,14 @@ def _integrals(
     mean: FloatArray,
     square: FloatArray,
 ) -> None:
-    """Write the integrals of the height and of the squared slope over cells.
+    """For each cell, write the integral of the height to `mean` and the integral of the squared slope to `square`.
 
-    `square` has one element more than there are cells.
+    The array `square` has one element more than there are cells.
 
-    The other arrays begin one node before the first cell. The trapezium rule is corrected with `of_height` and
-    `of_square`, which come from `ends_of`. If they are empty, the corrections follow from the Euler-Maclaurin formula,
-    with derivatives computed from heights and slopes at the neighbouring nodes.
+    The input arrays begin one node before the first cell. The trapezium rule is corrected with `of_height` and
+    `of_square`, which are computed by `ends_of`. If `of_height` and `of_square` are empty, the corrections are computed
+    by the Euler-Maclaurin formula. The derivatives in this formula are computed from heights and slopes at neighbouring
+    nodes.
     """
     if of_height.size > 0:
         for k in range(cells):
@@ -191,7 +194,7 @@ def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
         a, b = 3 * rise - 2 * s0 - s1, s0 + s1 - 2 * rise
         inside = a * a - 3 * s0 * b
         root = math.sqrt(inside) if inside > 0 else 0.0
-        above, below = (s0, root - a) if a <= 0 else (a + root, -3 * b)  # the root as a quotient without cancellation
+        above, below = (s0, root - a) if a <= 0 else (a + root, -3 * b)  # root = above / below, without cancellation
         x = above / below if below > 0 else 0.0
         x = x if (x > 0) & (x < 1) else 0.0
         top, ends = h0 + x * (s0 + x * (a + x * b)), max(h0, h1)
@@ -206,16 +209,16 @@ def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatAr
     ----------
     line : Nodes
     first, cells : int
-        Index of the node of the line at which the tile begins, and number of cells of the line in the tile.
+        The tile begins at the node `first` of the line, and covers `cells` cells of the line.
     weights : array, shape (2, refinement, 4 WING)
-        Interpolation weights from :func:`weights`. The refinement is the number of cells of the tile in each cell of
-        the line.
+        Interpolation weights from :func:`weights`. Each cell of the line is divided into `refinement` cells of the
+        tile.
     tile : array, shape (IN_A_TILE, cells refinement + 3), output
-        Heights and slopes, from the node before the tile to the node after the tile; integrals of the height and of the
-        squared slope over each cell; largest height in each cell.
+        At the nodes, including one node before and one node after the tile: height and slope. For each cell: integral
+        of the height, integral of the squared slope, and largest height.
     """
     refinement, h, s = weights.shape[1], tile[HEIGHT], tile[SLOPE]
-    # exact corrections are available only at the nodes of the line
+    # the exact corrections in `ends` are known only at the nodes of the line, not at the nodes of a finer tile
     here = first - 1 if refinement == 1 else line.ends.shape[1]
     if refinement == 1:
         h[: cells + 3] = line.height[first - 1 : first + cells + 2]
@@ -230,12 +233,13 @@ def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatAr
 
 @lru_cache
 def weights(refinement: int) -> FloatArray:
-    """Return interpolation weights for a grid with `refinement` times as many nodes, shape (2, refinement, 4 WING).
+    """Return the weights that interpolate a line to a finer grid, shape (2, refinement, 4 WING).
 
-    The first index is 0 for the interpolated height and 1 for the interpolated slope. The second index is the node of
-    the finer grid in a cell. The third index runs over the heights at the `WING` nodes on each side of the cell, and
-    then over the slopes at these nodes. The Hermite polynomial through these values has degree 15. With two nodes
-    per Nyquist point, the error is below 1e-7 times the amplitude of the shortest wave.
+    Each cell is divided into `refinement` cells. The first index is 0 for the interpolated height and 1 for the
+    interpolated slope. The second index numbers the nodes of the finer grid inside a cell. The third index runs over
+    the heights at the `WING` nodes on each side of the cell, and then over the slopes at these nodes. The Hermite
+    polynomial through these values has degree 15. With two nodes per Nyquist point, the error is below 1e-7 times the
+    amplitude of the shortest wave.
     """
     places, x = np.arange(1.0 - WING, 1.0 + WING), np.arange(refinement) / refinement
     table = np.empty((2, refinement, 4 * WING))
@@ -253,7 +257,7 @@ def weights(refinement: int) -> FloatArray:
 
 @jit
 def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: FloatArray, slope: FloatArray) -> None:
-    """Write heights and slopes on a finer grid, from one fine node before the given cells to one fine node after."""
+    """Write heights and slopes at the nodes of a finer grid in the given cells, and at one fine node on each side."""
     refinement = weights.shape[1]
     h, s = line.height, line.slope
     for place in range(-1, cells * refinement + 2):
@@ -267,7 +271,7 @@ def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: Flo
 
 
 def with_summit(line: Nodes) -> Nodes:
-    """Return the line with its `rise`; the highest point must be in the cell before its first node."""
+    """Return the line with the computed `rise`; the highest point must be in the cell before the first node."""
     table = weights(SUMMIT)
     height, slope = np.empty((2, SUMMIT + 3))
     refine(line, BEFORE - 1, 1, table, height, slope)
@@ -275,25 +279,25 @@ def with_summit(line: Nodes) -> Nodes:
 
 
 LANES = 64  # number of cases that are computed together
-SMALL, LARGE = 1e-300, 1e12  # a positive number that prevents division by zero; largest value of 1 / De
-CLOSED = 1e-9  # largest relative difference of the displacements at the start and at the end of a converged period
-RESOLVED = 10  # a grid resolves the contact if at least this number of cells is in contact
+SMALL, LARGE = 1e-300, 1e12  # SMALL prevents division by zero; LARGE is the largest value of 1 / De
+CLOSED = 1e-9  # in a converged case, largest relative change of the displacement over one period
+RESOLVED = 10  # a grid is fine enough only if at least this number of cells is in contact
 
 ITERATIONS = 25
 COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most COARSENING * COARSEST nodes
-LAST_STEP = 0.03  # largest last step of the search, divided by the depth; results are extrapolated over this step
-SECANT_ERROR = 0.1  # assumed error of an extrapolation over the last step, as a fraction of the extrapolated change
-FIRST_STEP, FIRST_ERROR = 0.1, 0.03  # values of LAST_STEP and the allowed error on grids that only provide a guess
-ROUNDING = 1e-12  # relative step of the depth that is as small as rounding errors
-ORDER = 3.0  # order of convergence: four inside cells, lower where contact begins or ends; measured: 3.3
+LAST_STEP = 0.03  # the search ends after a step of at most this fraction of the depth; results are extrapolated
+SECANT_ERROR = 0.1  # assumed error of the extrapolation over the last step, divided by the extrapolated change
+FIRST_STEP, FIRST_ERROR = 0.1, 0.03  # LAST_STEP and allowed error of the drag on grids for a first guess
+ROUNDING = 1e-12  # smaller relative steps of the depth are rounding errors
+ORDER = 3.0  # order of convergence; measured: 3.3 (four inside cells, lower where contact begins or ends)
 ARITHMETIC = 5e-5  # relative error of the integrals over cells that are partly in contact, on any grid
 
 ROWS = 15
 # Offset of each quantity in the workspace of a sweep. State of a case: displacement (U), derivative of the displacement
-# with respect to the depth (FADE), and 1 in contact, 0 if free (CONTACT). Sums of a case: load, stiffness (RATE), drag
-# (LOSS), length in contact, and integral of the squared slope over this length (STRETCH). Constants of a case: depth,
-# De, exp(-1 / De), 1 / De, decay over a block (THROUGH), and displacement at the start of the period (BEGAN). CALM is 1
-# if the case is entirely in contact or entirely free in the last block.
+# with respect to the depth (FADE), and contact (CONTACT: 1 in contact, 0 if free). Sums of a case: load, stiffness
+# (RATE), drag (LOSS), length in contact, and integral of the squared slope over this length (STRETCH). Constants of a
+# case: depth, De, exp(-1 / De), 1 / De, decay over a block (THROUGH), and displacement at the start of the period
+# (BEGAN). CALM is 1 if the last block is entirely in contact or entirely free in this case.
 U, FADE, CONTACT, LOAD, RATE, LOSS, LENGTH, STRETCH = range(0, 8 * LANES, LANES)
 DEPTH, DEBORAH, DECAY, INVERSE, THROUGH, BEGAN, CALM = range(8 * LANES, ROWS * LANES, LANES)
 # Indices of the results of a case that are extrapolated over the last step of the depth
@@ -313,7 +317,7 @@ def _fading(time: float) -> float:
 
 
 class Cell(NamedTuple):
-    """Penetration w = w0 + s0 x + a x^2 + b x^3 in a cell, for one case; w1 and s1 are w and w' at x = 1."""
+    """Penetration w = w0 + s0 x + a x^2 + b x^3 of one case in a cell; at x = 1, w is w1 and w' is s1."""
 
     w0: float
     s0: float
@@ -347,12 +351,12 @@ def _tilt(cell: Cell, x: float) -> float:
 def _contact_end(
     cell: Cell, r: float, begins: float, force: float, force_end: float, inverse: float
 ) -> tuple[float, float, float]:
-    """Return the place where the force falls to 0 in a cell, w at this place, and the remaining fraction of w.
+    """Return the place in a cell where the force falls to 0, the penetration w there, and the remaining fraction of w.
 
-    The remaining fraction is the ratio of the free element's displacement at the end of the cell to w. The Deborah
-    number is `r`, and `inverse` is 1 / r. The force is `force` at the place `begins`, where it begins to fall, and
-    `force_end` at the end of the cell. Linear interpolation between these two places gives a first estimate, which one
-    Newton step improves.
+    From this place on the element is free. The remaining fraction is the displacement of the element at the end of the
+    cell, divided by w. The Deborah number is `r`, and `inverse` is 1 / r. At the place `begins` the force begins to
+    fall and has the value `force`; at the end of the cell the force has the value `force_end`. Linear interpolation
+    between these two values gives a first estimate of the place. One Newton step improves the estimate.
     """
     fall = (1 - begins) / (force - force_end)
     x = begins + force * fall
@@ -369,11 +373,12 @@ def _contact_end(
 
 @jit_inline
 def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: float) -> tuple[float, float]:
-    """Return the place before `last` where the gap closes, and the fraction of the displacement u that remains there.
+    """Return the place where a free element meets the line, and the remaining fraction of the displacement u.
 
-    The gap is the distance between the free element and the line; it is negative at `last`. `inverse` is one divided by
-    the Deborah number. A parabola through the gap at the start of the cell and at `last` gives a first estimate of the
-    place. One Newton step improves this estimate.
+    The element has the displacement u at the start of the cell, and the remaining fraction of u at the returned place.
+    The gap between element and line is zero at the returned place and negative at the place `last`. The argument
+    `inverse` is one divided by the Deborah number. A parabola through the gaps at the start of the cell and at `last`
+    gives a first estimate of the place. One Newton step improves this estimate.
     """
     gap, closing = u - cell.w0, cell.s0 + u * inverse
     bow = (gap - closing * last - gap_last) / (last * last + SMALL)
@@ -393,18 +398,19 @@ def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: 
 def _contact_in_cell(
     cell: Cell, r: float, u: float, kept: float, inverse: float
 ) -> tuple[bool, float, float, float, float]:
-    """Return whether a free element comes into contact in a cell, and four values about the end of this contact.
+    """Return whether a free element comes into contact in a cell, and four numbers about the end of the contact.
 
-    The displacement of the free element is u at the start of the cell; without contact it would be `kept` at the end of
-    the cell. The four values are: the place where the contact ends; w at this place; the fraction of w that remains at
-    the end of the cell; and the gap between element and line that would exist at the place if there were no contact.
+    The displacement of the free element is u at the start of the cell. Without contact the displacement would be `kept`
+    at the end of the cell. The four numbers are: the place where the contact ends (1 if contact continues in the next
+    cell); the penetration w at this place; the fraction of w that remains at the end of the cell; and the gap between
+    the line and an element without contact at this place.
     """
     force, gap = cell.w1 + r * cell.s1, kept - cell.w1
     if force > 0:
         return gap <= 0, 1.0, cell.w1, 1.0, gap
     begins, falls = 0.0, cell.w0 + r * cell.s0
     if falls <= 0 and cell.s0 > 0 and cell.s1 < 0:
-        # approximate place of the highest point of the line in the cell
+        # approximate place of the highest point in the cell
         begins = cell.s0 / (cell.s0 - cell.s1)
         falls = _at(cell, begins)
     if falls <= 0:
@@ -416,7 +422,7 @@ def _contact_in_cell(
 
 @jit
 def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
-    """Move the element of a case along the cells of a tile, and add the contributions to the sums of the case."""
+    """Move the element of a case along a tile, and add the integrals over the tile to the sums of the case."""
     d, r = workspace[DEPTH + k], workspace[DEBORAH + k]
     decay, inverse = workspace[DECAY + k], workspace[INVERSE + k]
     u, fade = workspace[U + k], workspace[FADE + k]
@@ -484,7 +490,8 @@ def _pass_block(
 ) -> int:
     """Add the sums of a block for every case in which the whole block is in contact or the whole block is free.
 
-    Write the indices of the cases in which the block is partly in contact to the queue, and return their number.
+    The indices of the cases in which the block is partly in contact are written to the queue. The number of these cases
+    is returned.
     """
     peak, lowest, steepest = block[PEAK], block[LOWEST], block[STEEPEST]
     steepest /= refinement
@@ -527,9 +534,10 @@ def sweep(
     queue: NDArray[np.int64],
     count: int,
 ) -> None:
-    """Move one element of every case along one period of the line, which begins and ends at the summit of the line.
+    """For every case, move one element along one period of the line, from the summit to the next summit.
 
-    Blocks in which contact begins or ends are computed on a finer grid, to which `weights` interpolate.
+    Blocks in which contact begins or ends are computed on a finer grid. The heights and slopes of this grid are
+    interpolated with `weights`.
     """
     refinement, blocks = weights.shape[1], line.blocks
     n = line.height.size - BEFORE - AFTER
@@ -538,7 +546,7 @@ def sweep(
         force = w + workspace[DEBORAH + k] / refinement * line.slope[BEFORE - 1]
         workspace[U + k], workspace[FADE + k] = max(w, 0.0), 1.0
         workspace[CONTACT + k] = 1.0 if w > 0 and force > 0 else 0.0
-    # first the cell of the summit, where every case is in contact, then the blocks, then the remaining cells
+    # order: the cell of the summit, where every case is in contact; the blocks; the cells behind the last block
     first, cells = BEFORE - 1, 1
     for j in range(blocks.shape[0] + 2):
         if 0 < j <= blocks.shape[0]:
@@ -563,7 +571,7 @@ def sweep(
 
 @jit
 def load_case(workspace: FloatArray, k: int, depth: float, deborah: float, cells: int) -> None:
-    """Write the constants of a case on a grid; `cells` is the number of cells in a block."""
+    """Write the constants of case k to the workspace; `cells` is the number of cells in a block."""
     workspace[DEPTH + k], workspace[DEBORAH + k] = depth, deborah
     workspace[INVERSE + k] = min(1 / deborah, LARGE)
     workspace[DECAY + k], workspace[THROUGH + k] = math.exp(-1 / deborah), math.exp(-cells / deborah)
@@ -582,7 +590,7 @@ def _search(
 ) -> None:
     """Find the depths of cases on a grid by Newton's method.
 
-    The results are extrapolated over the last step of the depth, without another sweep.
+    After the last step of the depth there is no sweep; the results are extrapolated to the final depth.
 
     Parameters
     ----------
@@ -593,12 +601,12 @@ def _search(
     cases : Cases
         v tau / L, and F_N / (4 G L) in the unit of height.
     last_step, error : float
-        Largest last step of the search, relative to the depth, and largest relative error of the drag due to the
-        extrapolation over this step.
+        The search ends after a step of at most `last_step` times the depth, if the extrapolation over this step changes
+        the drag so little that its estimated relative error is at most `error`.
     depths : array, shape (cases,)
-        Penetration of the summit: first guesses, replaced by the solutions.
+        Penetrations of the summit; the first guesses are replaced by the solutions.
     rates : array, shape (cases, SECANTS), input and output
-        Derivatives of the logarithms of the results with respect to the depth; NaN where unknown.
+        Derivatives of the logarithms of the results with respect to the depth; NaN if a derivative is not known yet.
     results : array, shape (cases, SECANTS), output
         Drag, contact fraction and contact slope. If the depth of a case is not found, its results are not changed.
     """
@@ -650,7 +658,7 @@ def _search(
 
 
 class NodeToNode:
-    """Cases on one line, which are solved on one grid after another.
+    """Cases on one line, for a solution on a sequence of finer and finer grids.
 
     Parameters
     ----------
@@ -661,7 +669,8 @@ class NodeToNode:
     error : float
         Largest relative error of the drag due to the search for the depth.
     contact : bool
-        Whether the errors of contact fraction and contact slope include contact patches that the grids may miss.
+        Whether the errors of contact fraction and contact slope include the effect of contact patches that fall between
+        the nodes.
     """
 
     def __init__(self, line: RoughLine, cases: Cases, error: float, contact: bool) -> None:
@@ -669,14 +678,14 @@ class NodeToNode:
         self._cases, self._error, self._contact = cases, error, contact
         loads = cases.loads
         self._rates = np.full((loads.size, SECANTS), np.nan)
-        self._depth = np.full(loads.size, np.nan)  # depth of the mean line
+        self._depth = np.full(loads.size, np.nan)  # penetration of the mean line
 
     def solve(self, level: int, cases: IntArray) -> Solution:
         """Solve cases on a grid of `level` nodes per Nyquist point.
 
-        Level 1 must come first and solves all cases. The levels 2, 4, 8, ... solve the given cases. Above level 2 only
-        blocks in which contact begins or ends have a finer grid, which is interpolated from heights and slopes at 2
-        nodes per Nyquist point.
+        The first call must be for level 1, and solves all cases. The calls for the levels 2, 4, 8, ... solve the given
+        cases. Above level 2, the grid is finer only in blocks in which contact begins or ends. There, heights and
+        slopes are interpolated from 2 nodes per Nyquist point.
         """
         if level == 1:
             return self._start()
@@ -692,7 +701,10 @@ class NodeToNode:
         return self._solution(results, depths - top, level)
 
     def _start(self) -> Solution:
-        """Solve all cases on finer and finer grids; return the results on one node per Nyquist point."""
+        """Solve all cases on finer and finer grids, and return the results on the finest of these grids.
+
+        The finest grid has one node per Nyquist point.
+        """
         height, loads = self._height, self._cases.loads
         strides = [2]
         while height.size > COARSENING * COARSEST * strides[-1]:
@@ -709,10 +721,11 @@ class NodeToNode:
     def _solution(self, results: FloatArray, depth: FloatArray, level: int) -> Solution:
         """Return the results on a grid.
 
-        Two grids may both miss a small patch of contact. A missed patch is hardly longer than a cell, because a longer
-        patch contains nodes. The patch therefore increases the length in contact by at most one cell. The slope is
-        small near the summit of an asperity, so that the patch reduces the rms slope of the contact. The relative
-        reduction is at most half the relative increase of the length.
+        A small contact patch between two nodes may be missing on two successive grids. The missing patch is at most
+        about one cell long, because a longer patch contains nodes. With this patch, the length in contact would be
+        larger by at most one cell. The slope is small near the summit of an asperity, so that the rms slope of the
+        contact would be smaller. The relative decrease of the rms slope is at most half the relative increase of the
+        length.
         """
         drag, fraction, slope = results.T
         with np.errstate(invalid="ignore", divide="ignore"):

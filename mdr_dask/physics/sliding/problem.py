@@ -1,8 +1,8 @@
-"""Steady sliding in dimensionless quantities: a solid, a line, and cases of speed and load.
+"""Steady sliding of a solid over a line, in dimensionless quantities; a case is a pair of speed and load.
 
-Closed forms are used for a Kelvin solid on a smooth indenter or a smooth plane. If the grid is automatic, a closed form
-is also used for full contact of any solid with a rough plane. All other cases are solved on finer and finer grids by
-:func:`mdr_dask.physics.refine.refine`, which estimates the errors. The solvers are:
+Closed forms are used for a Kelvin solid on a smooth indenter or a smooth plane. If `oversampling` is "auto", a closed
+form is also used for full contact of any solid with a rough plane. All other cases are solved on finer and finer grids
+by :func:`mdr_dask.physics.refine.refine`, which estimates the errors. The solvers are:
 
 * `node_to_node`, the fastest solver, for a Kelvin solid on a rough plane;
 * `steady` (sweeps over cubic cells) for a Kelvin solid under an indenter, and for cases in which `node_to_node` misses
@@ -34,13 +34,13 @@ The floor of the depth is the unit of height, which is the rms height.
 """
 NODE_LEVELS = tuple(
     2**k for k in range(12)
-)  # nodes per Nyquist point; more than 2 are used only where contact begins or ends
+)  # nodes per Nyquist point; grids with more than 2 are used only where contact begins or ends
 CELL_LEVELS = tuple(2**k for k in range(1, 7))
 GENERAL_LEVELS = tuple(2**k for k in range(1, 9))
-ORDER_OF_CELLS = 2.0  # order of convergence of sweeps over cubic cells if contacts are shorter than a cell
+ORDER_OF_CELLS = 2.0  # order of convergence of sweeps over cubic cells if contact patches are shorter than a cell
 ORDER_OF_STEPS = 1.0  # order of convergence of backward Euler
-SEARCH = 0.1  # allowed error due to the search for the depth, as a fraction of the accuracy
-REFERENCE = 0.01  # relative accuracy of the solution with which results of time steps are compared
+SEARCH = 0.1  # allowed error of the drag due to an inexact depth, divided by the accuracy
+REFERENCE = 0.01  # accuracy of the reference solution from which the errors of backward Euler are estimated
 ROUNDING = 1e-12  # relative error of closed forms
 
 
@@ -59,15 +59,15 @@ class Request:
     Parameters
     ----------
     accuracy : float
-        Allowed relative error of drag, contact fraction, contact slope and depth. The error of a depth that is smaller
-        than the rms height is relative to the rms height.
+        Allowed relative error of drag, contact fraction, contact slope and depth. If the depth is smaller than the rms
+        height, the error of the depth is divided by the rms height instead of the depth.
     oversampling : int or "auto"
         Nodes per Nyquist point; "auto" selects the smallest number that meets the accuracy.
     scheme : {"hermite", "backward_euler"}
         Scheme for a Kelvin solid: cubic cells, or the time steps of the papers.
     with_errors : bool
-        Whether to estimate the errors if the solid is a Kelvin solid and the grid is given. In all other cases the
-        errors are always estimated.
+        Only used for a Kelvin solid on a given grid: whether to estimate the errors. In all other cases the errors are
+        always estimated.
     contact : bool
         Whether contact fraction and contact slope are requested. These two results need finer grids than the other
         results.
@@ -96,13 +96,13 @@ def solve(
     loads : array, shape (cases,)
         F_N / (4 G_inf L), in the unit of height.
     request : Request
-        Accuracy or grid. All results of a case have to meet the accuracy, because a single result, such as the drag,
-        may agree on two grids by chance.
+        Accuracy or grid. The grid is refined until all results of a case meet the accuracy. One result alone, such as
+        the drag, may be the same on two grids by chance.
 
     Returns
     -------
     Steady
-        A case that misses the accuracy on the finest grid keeps its results and errors.
+        If a case does not meet the accuracy even on the finest grid, its results and errors are returned nevertheless.
     array, shape (4, cases)
         Estimated absolute discretisation errors of `Steady.columns`. The errors are infinite for a Kelvin solid on a
         given grid if `with_errors` is False.
@@ -121,7 +121,7 @@ def solve(
     found = _on_grid(line, cases, request, grid, None)
     errors = np.full((4, loads.size), np.inf)
     if request.with_errors:
-        # time steps converge too slowly for an estimate from two grids
+        # backward Euler converges too slowly for an error estimate from two grids
         exact, errors = solve(line, None, *cases, Request(REFERENCE, contact=request.contact))
         errors = np.abs(found.columns - exact.columns) + errors
         errors[np.isnan(errors)] = np.inf
@@ -145,7 +145,10 @@ def _to_accuracy(line: RoughLine, cases: Cases, request: Request) -> tuple[Stead
 
 
 def _swept(line: RoughLine, cases: Cases, request: Request, levels: tuple[int, ...], accuracy: float) -> Refined:
-    """Solve cases by sweeps over whole lines. Each search for the depth starts from the depth on the previous grid."""
+    """Solve cases by sweeps over whole lines.
+
+    The search for the depth starts from the depth on the previous grid.
+    """
     depths = np.full(cases.loads.size, np.nan)
 
     def solve(level: int, some: IntArray) -> Solution:
@@ -153,7 +156,7 @@ def _swept(line: RoughLine, cases: Cases, request: Request, levels: tuple[int, .
         depths[some] = found.depth
         return Solution(found.columns, found.status)
 
-    # cubic cells reach their order of convergence only with two or more nodes per Nyquist point
+    # sweeps over cubic cells have the order ORDER_OF_CELLS only from two nodes per Nyquist point on
     order = ORDER_OF_CELLS if request.scheme == "hermite" and levels[0] > 1 else ORDER_OF_STEPS
     return refine(solve, cases.loads.size, levels, accuracy, order, floors=FLOORS)
 
@@ -167,9 +170,10 @@ def _on_grid(line: RoughLine, cases: Cases, request: Request, oversampling: int,
 
 
 def _write(results: tuple[FloatArray, FloatArray, NDArray[np.int8]], cases: IntArray, found: Refined) -> None:
-    """Store new results of cases that have none yet.
+    """Store the results of cases that have no results yet.
 
-    Other results are replaced if the new ones meet the accuracy, or if the new error of the drag is smaller.
+    If a case has results already, the new results replace the old results in two situations: the new results meet the
+    accuracy, or their error of the drag is smaller.
     """
     columns, errors, status = results
     better = (status[cases] != Outcome.CONVERGED) | found.met | (found.errors[0] < errors[0, cases])
@@ -185,7 +189,10 @@ def _steady(found: Refined) -> tuple[Steady, FloatArray]:
 def _in_full_contact(
     line: RoughLine, terms: PronyTerms, cases: Cases
 ) -> tuple[FloatArray, FloatArray, NDArray[np.int8]]:
-    """Return results, errors and status of cases on a plane; the status is `Outcome.INVALID` if contact is not full."""
+    """Return results, errors and status of cases on a plane.
+
+    If the contact of a case is not full, its status is `Outcome.INVALID`.
+    """
     pairs = tuple(zip(terms.moduli, terms.deborah, strict=True))
     full = steady_full_contact(line, pairs, cases)
     errors = ROUNDING * np.abs(full.columns)
@@ -200,7 +207,7 @@ def _unsolved(cases: Cases) -> tuple[FloatArray, FloatArray, NDArray[np.int8]]:
 
 def _general(line: RoughLine, terms: PronyTerms, cases: Cases, request: Request) -> tuple[Steady, FloatArray]:
     """Solve cases of any linear solid."""
-    from mdr_dask.physics.sliding import viscoelastic  # imported here, because few studies need its kernels
+    from mdr_dask.physics.sliding import viscoelastic  # imported here, because few studies need this module
     from mdr_dask.physics.solids import prony
 
     (deborah, loads), is_auto = cases, request.oversampling == "auto"
@@ -211,7 +218,7 @@ def _general(line: RoughLine, terms: PronyTerms, cases: Cases, request: Request)
     solids = [prony(1.0, terms.moduli, terms.deborah, deborah[k]) for k in left]
     searches = [viscoelastic.ViscoelasticCase(solid, load) for solid, load in zip(solids, loads[left], strict=True)]
     line = line.from_summit()
-    # number of cells of the coarsest grid; from the second grid on, results are extrapolated from two successive grids
+    # number of cells of the coarsest grid; on each finer grid, results are extrapolated from this and the previous grid
     coarsest = line.points if request.oversampling == "auto" else -(-line.points * request.oversampling // 4)
 
     def solve(level: int, some: IntArray) -> Solution:
@@ -224,15 +231,16 @@ def _general(line: RoughLine, terms: PronyTerms, cases: Cases, request: Request)
         solve(1, np.arange(left.size))
         levels, accuracy = (GENERAL_LEVELS, request.accuracy) if is_auto else (GENERAL_LEVELS[:2], np.inf)
         _write(results, left, refine(solve, left.size, levels, accuracy, viscoelastic.ORDER, floors=FLOORS))
-    # The relative error of the stresses equals the tolerance of the depth. In very fast or very slow sliding the drag
-    # is a small difference of large stresses, so that its relative error is larger.
+    # The relative error of the stresses is equal to the tolerance of the depth. In very fast or very slow sliding, the
+    # drag is a small difference of large stresses; the relative error of the drag is then larger than that of the
+    # stresses.
     rounding = viscoelastic.TOLERANCE * loads[left] * columns[3, left]
     errors[0, left] += np.where(np.isnan(rounding), 0.0, rounding)
     return Steady.of(columns, status), errors
 
 
 def _closed_form(body: PowerLaw | None, cases: Cases) -> tuple[Steady, FloatArray]:
-    """Return steady states on a smooth body: friction is zero on a plane, and has a closed form for an indenter."""
+    """Return the steady states on a smooth plane, where friction is zero, or on a smooth indenter."""
     (deborah, loads), good = cases, valid(*cases)
     status = np.where(good, np.int8(Outcome.CONVERGED), np.int8(Outcome.INVALID))
     columns = np.full((4, loads.size), np.nan)

@@ -1,4 +1,4 @@
-"""Steady sliding of a Kelvin foundation over a line at a given load: the search for the depth."""
+"""Steady sliding of a Kelvin foundation over a line: the search for the depth at which a given load is carried."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ from mdr_dask.physics.sliding.kelvin import (
 from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 
 ITERATIONS = 200
-PATIENCE = 20  # after this number of sweeps the search bisects the interval that contains the depth
-LOST = 1e-13  # if the line rises less than this fraction of the depth where contact begins, rounding errors dominate
+PATIENCE = 20  # after this number of sweeps, the search halves the interval that contains the depth
+LOST = 1e-13  # rounding errors dominate if the rise in `_is_lost` is below this fraction of the depth
 # A trail describes the depth as a function of the load near the last sweep. Its five entries are: log depth, log load,
 # slope d(log depth) / d(log load), derivative of this slope with respect to the log load, and Deborah number.
 TRAIL = 5
-LATTICE_BITS = 20  # depths are searched on a lattice of relative spacing 2**-LATTICE_BITS: see `_solve`
+LATTICE_BITS = 20  # a lattice depth is a depth with this number of binary digits: only such depths are tried
 
 
 @jit
 def _floor(depth: float) -> float:
-    """Return the largest lattice depth that does not exceed a positive depth."""
+    """Return the largest lattice depth (see `LATTICE_BITS`) that does not exceed a positive depth."""
     mantissa, exponent = math.frexp(depth)
     return math.ldexp(math.floor(math.ldexp(mantissa, LATTICE_BITS)), exponent - LATTICE_BITS)
 
@@ -67,8 +67,8 @@ def _begin(trail: FloatArray, depth: float, load: float) -> None:
 def _follow(sums: FloatArray, depth: float, deborah: float, trail: FloatArray) -> None:
     """Update a `trail` (see `TRAIL`) after a sweep at a depth.
 
-    The derivative of the slope follows from the last two sweeps. At a new Deborah number the old derivative is kept,
-    because it hardly depends on the Deborah number.
+    The derivative of the slope is computed from the last two sweeps. If the Deborah number has changed since the last
+    sweep, the derivative is not changed, because the derivative hardly depends on the Deborah number.
     """
     carried = sums[DISPLACEMENT]
     load, slope = np.log(carried), carried / (sums[STIFFNESS] * depth)
@@ -79,7 +79,7 @@ def _follow(sums: FloatArray, depth: float, deborah: float, trail: FloatArray) -
 
 @jit
 def _guess(trail: FloatArray, load: float) -> float:
-    """Return a guess of the depth for a load, by extrapolation of log depth as a function of log load."""
+    """Return a guess of the depth for a load: extrapolate the logarithm of the depth from the `trail`."""
     ahead = np.log(load) - trail[1]
     bend = 0.5 * trail[3] * ahead
     limit = 0.5 * trail[2]
@@ -87,7 +87,7 @@ def _guess(trail: FloatArray, load: float) -> float:
 
 
 class _Swept(NamedTuple):
-    """A line with its blocks and barriers at one Deborah number, and its mean height relative to the highest point."""
+    """A line: cells, blocks, barriers at one Deborah number, and the mean height relative to the highest point."""
 
     cells: Cells
     blocks: Blocks
@@ -99,15 +99,15 @@ class _Swept(NamedTuple):
 def _solve(
     line: _Swept, deborah: float, load: float, trail: FloatArray, sums: FloatArray, places: Places
 ) -> tuple[float, bool]:
-    """Return the largest lattice depth at which the carried load does not exceed `load`, and whether it was found.
+    """Return the largest lattice depth at which the carried load is at most `load`, and whether the depth was found.
 
     The sums at this depth are written to `sums`.
 
     The carried load is a convex, increasing function of the depth. Therefore the depth at which a tangent of this
     function reaches `load` is an upper bound of the solution. Another upper bound is the depth at which full contact
-    carries the load. The search ends at a lattice depth below the solution if the tangent at this depth reaches `load`
-    before the next lattice depth. Only one lattice depth meets this condition, so that the result does not depend on
-    the guess in `trail`.
+    carries the load. The search may end at a lattice depth if two conditions are met: the carried load is at most
+    `load`, and the tangent reaches `load` before the next lattice depth. The next lattice depth then carries more than
+    `load`. The result is the same for every guess in `trail`, because only one lattice depth is the largest.
     """
     cells, blocks, barriers, mean = line
     low, high = 0.0, np.inf
@@ -120,7 +120,7 @@ def _solve(
         if not (carried > 0 and sums[STIFFNESS] > 0):
             return depth, False
         tangent = depth + (load - carried) / sums[STIFFNESS]
-        if tangent > low:  # the tangent is not finite if the sums overflow
+        if tangent > low:  # if the sums overflow, the tangent is not finite
             most = min(most, tangent)
         _follow(sums, depth, deborah, trail)
         if carried <= load:
@@ -154,11 +154,11 @@ def _states(
     results: FloatArray,
     status: NDArray[np.int8],
 ) -> None:
-    """Solve cases on one line at one Deborah number, in order of load; write results in the order of `cases.COLUMNS`.
+    """Solve cases on one line at one Deborah number, in ascending order of the load.
 
-    The search for the depth of a case starts from the guess for this case. If the guess is NaN, the search starts from
-    the depth of the previous case; the first case starts from the trail `first`. The array `first` is overwritten with
-    the trail of the first solved case.
+    The columns of `results` are in the order of `cases.COLUMNS`. The search for the depth of a case starts from the
+    guess for this case. If the guess is NaN, the search starts from the trail of the previous case; for the first case
+    this is the trail `first`. Afterwards, `first` contains the trail of the first case that was solved.
     """
     (cells, _, _, _), (deborahs, loads) = line, cases
     n, places = cells.mean.size - 1, places_for(0)
@@ -195,13 +195,13 @@ def steady_sliding(
     ----------
     line : CubicLine
         From :func:`~mdr_dask.physics.surfaces.cubic_line.periodic_line` or `indented_line`. An element of the
-        foundation passes the nodes in their order.
+        foundation meets the nodes in ascending order of their index.
     deborah : array, shape (cases,)
         v tau / L.
     loads : array, shape (cases,)
         F_N / (4 G L), the mean displacement, in the unit of height.
     guesses : array, shape (cases,), optional
-        Depths at which the searches start; the results do not depend on them.
+        Depths at which the searches start; the results do not depend on the guesses.
 
     Returns
     -------
@@ -236,16 +236,17 @@ def steady_on_cells(
 
 
 def stepped_sliding(line: CubicLine, deborah: FloatArray, loads: FloatArray, contact: bool = True) -> Steady:
-    """Return the steady states by the time-stepping method of the papers (backward Euler), from heights at nodes.
+    """Return the steady states by backward Euler, the time-stepping method of the papers.
 
-    In each time step the body travels one cell. The method is of first order in the length of a cell.
+    Only the heights of the nodes are used. In each time step the body travels one cell. The method is of first order in
+    the length of a cell.
 
     Parameters
     ----------
     line, deborah, loads
         As in :func:`steady_sliding`.
     contact : bool
-        Whether contact fraction and contact slope are requested; they take extra time.
+        Whether contact fraction and contact slope are computed, which takes extra time.
     """
     return _solved(line, deborah, loads, lambda _, cases: _stepped(line, cases, contact))
 
@@ -256,7 +257,7 @@ def _solved(
     loads: FloatArray,
     solve: Callable[..., tuple[FloatArray, NDArray[np.int8]]],
 ) -> Steady:
-    """Solve the cases whose Deborah number and load are finite and positive, with lengths converted to cells."""
+    """Convert lengths to cells, and solve the cases whose Deborah number and load are finite and positive."""
     n = line.enter.size if isinstance(line, CubicLine) else line.mean.size - 1
     with np.errstate(over="ignore"):
         good = valid(deborah * n, loads * n)
@@ -282,7 +283,7 @@ def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> t
     barriers = barriers_for(n)
     edges = np.flatnonzero(np.diff(deborah, prepend=-1.0, append=-1.0))
     for some in (slice(*ends) for ends in pairwise(edges)):
-        barriers.block.fill(np.nan)  # barriers are valid for one speed only
+        barriers.block.fill(np.nan)  # barriers are valid for one Deborah number only
         line, alike = _Swept(cells, blocks, barriers, mean), Cases(deborah[some], loads[some])
         _states(line, alike, starts[some], first, ordered[some], ordered_status[some])
     results, status = np.empty_like(ordered), np.empty_like(ordered_status)
@@ -294,10 +295,12 @@ def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> t
 
 
 def _is_lost(cases: Cases, near: FloatArray, depth: FloatArray) -> NDArray[np.bool_]:
-    """Return for each case whether the line rises so little where contact begins that rounding errors dominate.
+    """Return for each case whether rounding errors dominate.
 
-    If the dashpots carry the load, this rise is F_N / (4 G dx) divided by v tau / dx. `near` contains the heights of
-    the two nodes next to the highest point, relative to the highest point.
+    Rounding errors dominate if the line rises very little from the place where contact begins to the highest point.
+
+    If the dashpots carry the load, the rise is F_N / (4 G dx) divided by v tau / dx. `near` contains the heights of the
+    two nodes next to the highest point, relative to the highest point.
     """
     fall = -np.min(near)
     with np.errstate(over="ignore"):

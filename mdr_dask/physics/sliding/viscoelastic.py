@@ -1,8 +1,9 @@
 """Steady sliding of any linear viscoelastic foundation along a rough line or under an indenter.
 
-`viscoelastic_sweep` moves an element once along the line. In this module, Newton's method finds the depth. For a
-periodic line, Newton's method also finds the stretches e_m = u - a_m of the Prony terms at the start (u is the
-displacement of the element, a_m that of the dashpot of term m). The stretches must repeat after one period.
+The module `viscoelastic_sweep` moves an element once along the line. This module finds the depth by Newton's method.
+The stretch of Prony term m is e_m = u - a_m, where u is the displacement of the element and a_m the displacement of the
+dashpot of the term. On a periodic line the stretches must repeat after one period. Newton's method then also finds the
+stretches at the start of the line.
 """
 
 from __future__ import annotations
@@ -20,26 +21,26 @@ from mdr_dask.physics.sliding.viscoelastic_sweep import CLOSED, Passage, Travell
 from mdr_dask.physics.solids import LinearSolid, recovery
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
-TOLERANCE = 1e-11  # largest last step of Newton's method, relative to the depth; it is larger than rounding errors
-LINEAR = 1e-10  # allowed relative residual of the linear equations of a step; much smaller than the error of the step
+TOLERANCE = 1e-11  # Newton's method ends after a step of at most this fraction of the depth
+LINEAR = 1e-10  # allowed relative residual of the linear equations of a Newton step; far below the error of the step
 SWEEPS = 80
-DEEPEST_STEP = 0.7  # largest relative decrease of the depth in one step under an indenter: the depth stays positive
-SHORTEST = 1e-9  # cells; the dashpot and all Prony terms with a shorter tau v become one term: see `_travelling`
+DEEPEST_STEP = 0.7  # under an indenter, largest relative decrease of the depth in one step
+SHORTEST = 1e-9  # in cells; the dashpot and all Prony terms with a smaller tau_m v become one term: see `_travelling`
 BALANCE = 1e-3  # largest relative error of the carried load in a converged solution
-ORDER = 2.0  # order of convergence without extrapolation; extrapolation raises it unless few cells are in contact
+ORDER = 2.0  # order of convergence without extrapolation; with extrapolation it is higher if many cells are in contact
 
 DRAG, DEPTH, FRACTION, SLOPE = range(4)
 
 
 @dataclass(frozen=True)
 class ViscoelasticSteady:
-    """A steady state; all values are NaN if the solver did not converge.
+    """A steady state; if the solver did not converge, all values are NaN.
 
     Parameters
     ----------
     values : array, shape (4,)
-        F_x / (4 G_inf), in the unit of height squared; penetration of the mean line (under an indenter: of the height
-        0); fraction of the line in contact; rms slope of the part of the line in contact.
+        F_x / (4 G_inf), in the unit of height squared; penetration of the mean line (for an indenter: of the points of
+        height 0); fraction of the line in contact; rms slope of the part of the line in contact.
     errors : array, shape (4,)
         Estimated absolute discretisation errors of the values.
     status : Outcome
@@ -65,23 +66,25 @@ def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float
     Parameters
     ----------
     line : CubicLine
-        The line. Only its heights at the nodes are used, with straight lines between them. The number of cells must be
-        a multiple of four, because the line is also solved with every second and every fourth node.
+        The line. Only the heights at the nodes are used; neighbouring nodes are connected by straight lines. The number
+        of cells must be a multiple of four, because the case is also solved with only every second and only every
+        fourth node.
     solid : LinearSolid
-        The material. Its relaxation times are in units of L / v: they are the Deborah numbers tau_m v / L.
+        The material. In place of its relaxation times it contains the Deborah numbers tau_m v / L.
     load : float
         F_N / (4 G_inf L), in the unit of height.
 
     Raises
     ------
     ValueError
-        If a height or the load is not valid, or if the number of cells is not allowed.
+        If a height is not finite, the load is not positive and finite, or the number of cells is below 8 or not a
+        multiple of four.
 
     Notes
     -----
-    The sweep along a line with straight cells is exact. The result is extrapolated from the results on all nodes and on
-    every second node. The error is estimated from the change of this extrapolated result when the number of nodes is
-    halved.
+    The sweep along a line with straight cells is exact. The result is extrapolated from two solutions: with all nodes,
+    and with every second node. For the error estimate, another result is extrapolated from the solutions with every
+    second and every fourth node. The error is estimated from the difference of the two extrapolated results.
     """
     cells = line.enter.size
     if not np.all(np.isfinite(line.height)):
@@ -116,18 +119,20 @@ class ViscoelasticCase:
             raise ValueError(f"the load must be positive and finite, got {load!r}")
         self._solid, self._load = solid, load
         self._state: FloatArray | None = (
-            None  # stretches of the Prony terms at the first node, then penetration of the highest node
+            None  # entries: stretches of the Prony terms at the first node, penetration of the highest node
         )
         self._before: FloatArray | None = None  # results on the previous grid
         self.sweeps = 0
 
     def on(self, height: FloatArray, periodic: bool) -> Solution:
-        """Solve the case on the next finer grid, and extrapolate from this grid and the previous grid, if there is one.
+        """Solve the case on the next finer grid.
+
+        On all grids except the first, the result is extrapolated from this grid and the previous grid.
 
         Parameters
         ----------
         height : array, shape (nodes,)
-            Heights. A periodic line begins and ends at its highest node, which all grids share.
+            Heights. A periodic line begins and ends at its highest node, which must be a node of every grid.
         periodic : bool
             Whether the line is periodic.
 
@@ -151,7 +156,7 @@ class ViscoelasticCase:
         result = values.copy()
         if self._before is not None:
             change = values - self._before
-            extrapolated = np.abs(change) <= np.abs(values)  # a larger change might reverse the sign
+            extrapolated = np.abs(change) <= np.abs(values)  # a larger change might reverse the sign of the result
             result[extrapolated] += change[extrapolated] / 3
             result[FRACTION] = min(max(result[FRACTION], 0.0), 1.0)
         self._before = values
@@ -162,8 +167,8 @@ class ViscoelasticCase:
     ) -> tuple[Outcome, FloatArray, FloatArray]:
         """Solve the case on one grid; return the outcome, the state and the four results.
 
-        The search starts from `start`, the state on the previous grid, or from the static contact if `start` is None.
-        The computed depth is the penetration of the highest node.
+        The search starts from the state `start` on the previous grid. If `start` is None, the search starts from the
+        static contact. The computed depth is the penetration of the highest node.
         """
         terms, cells = solid.moduli.size, below.size - 1
         if start is None or start.size != terms + 1:
@@ -183,9 +188,9 @@ class ViscoelasticCase:
 def _travelling(solid: LinearSolid, cell: float) -> Travelling:
     """Return a solid with lengths in cells and stresses divided by the static modulus.
 
-    One Prony term with a very short relaxation time replaces the dashpot and all terms that relax within a very small
-    fraction of a cell. The viscosity of this term is the sum of the viscosities of the dashpot and of the replaced
-    terms.
+    The dashpot, and all Prony terms that relax within a very small fraction of a cell, are replaced by one Prony term
+    with a very short relaxation time. The viscosity of this term is the sum of the viscosities of the dashpot and of
+    the replaced terms.
     """
     static = solid.static_modulus
     fast = solid.times < SHORTEST * cell
@@ -205,10 +210,10 @@ class Swept(NamedTuple):
     Parameters
     ----------
     decayed : array, shape (pieces, terms)
-        1 - exp(-length / decay length). The decay lengths are those of the recovery modes in a free recovery, and those
-        of the Prony terms in a contact.
+        1 - exp(-length / decay length). In a free recovery the decay lengths belong to the recovery modes, and in a
+        contact to the Prony terms.
     lengths : array, shape (pieces,)
-        Lengths of free recoveries and contacts in turn, as in `Passage`.
+        Lengths of the pieces, as in `Passage`: free recoveries and contacts alternate.
     solid : Travelling
         The solid.
     """
@@ -222,10 +227,11 @@ class Swept(NamedTuple):
 def follow(
     direction: FloatArray, swept: Swept, periodic: bool, product: FloatArray, workspace: FloatArray
 ) -> None:  # pragma: no cover
-    """Write how given changes of the unknowns change the integrals of the stretches e_m and of u over the line.
+    """Multiply the matrix of derivatives of a Newton step by given changes of the unknowns.
 
-    The changes are propagated through contacts and free recoveries of fixed lengths, which is a linear problem. The
-    places where contact begins and ends shift as well, but this has an effect of second order only, because u is
+    The product contains the resulting changes of two kinds of integrals over the line: of the stretches e_m, and of u.
+    The changes are propagated through contacts and free recoveries of fixed lengths, which is a linear problem. In fact
+    the places where contact begins and ends shift as well. The effect of this shift is of second order, because u is
     continuous at these places.
 
     Parameters
@@ -272,9 +278,9 @@ def follow(
 
 @jit
 def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: float) -> None:  # pragma: no cover
-    """Change the strain suddenly so that the stress becomes 0, as at the start of free recovery.
+    """Change the strain suddenly to the value at which the stress is 0, as at the start of free recovery.
 
-    The strains of the dashpots stay the same. All quantities are the changes that `follow` propagates.
+    The strains of the dashpots stay the same. Each quantity in this function is a change that `follow` propagates.
     """
     if stretch.size == 0:
         return
@@ -305,15 +311,15 @@ def newton_step(
 ) -> None:  # pragma: no cover
     """Solve the linear system of a Newton step on a periodic line by the method of generalised conjugate residuals.
 
-    The rows of the matrix of derivatives are divided by `scale`. The matrix is then the identity plus an operator that
-    is smooth as a function of the relaxation time. The singular values of such an operator decrease fast, so that four
-    to seven products of the matrix and a vector are enough for any number of terms.
+    Each row of the matrix of derivatives is divided by its entry of `scale`. The matrix is then the identity plus an
+    operator whose entries are smooth functions of the relaxation times. The singular values of such an operator
+    decrease fast, so that four to seven products of the matrix and a vector are enough for any number of terms.
 
     Parameters
     ----------
     residual, scale : array, shape (n,)
-        Required changes of the integrals of e_m and u, and the magnitudes of the derivatives of these integrals; n is
-        terms + 1. The residual is overwritten.
+        `residual` contains the required changes of the integrals of e_m and of u, `scale` the magnitudes of the
+        derivatives of these integrals; n is terms + 1. The residual is overwritten.
     swept : Swept
         Contacts and free recoveries.
     workspace : array, shape (3, n - 1)
@@ -332,7 +338,7 @@ def newton_step(
         direction[:] = residual
         follow(direction, swept, True, product, workspace)
         product /= scale
-        for _ in range(2):  # orthogonalise twice, because of rounding errors
+        for _ in range(2):  # after one orthogonalisation, rounding errors would remain
             for i in range(j):
                 share = _dot(product, products[i]) / norms[i]
                 for k in range(n):
@@ -355,9 +361,10 @@ def _dot(one: FloatArray, other: FloatArray) -> float:  # pragma: no cover
 
 @jit
 def static_depth(profile: FloatArray, strain_area: float) -> float:  # pragma: no cover
-    """Return the depth at which the penetrations of all nodes in contact, depth + profile > 0, add up to `strain_area`.
+    """Return the depth at which the sum of the penetrations of all nodes in contact is `strain_area`.
 
-    Newton's method approaches the depth from above.
+    A node is in contact if its penetration depth + profile is positive. Newton's method approaches the depth from
+    above.
     """
     depth = 0.0
     for value in profile:
@@ -389,27 +396,28 @@ def solve_sliding(
     unknown: FloatArray,
     totals: FloatArray,
 ) -> tuple[bool, int, bool]:  # pragma: no cover
-    """Find the depth for a load and, for a periodic line, the stretches that repeat after one period.
+    """Find the depth at a given load, and on a periodic line also the stretches that repeat after one period.
 
     In the steady state the integral of the stress is equal to the integral of u, so that the load prescribes the
-    integral of u. The displacement is everywhere a convex, increasing function of the unknowns, because it is the
-    larger of two such functions: the penetration and the displacement of a free element. After its first step Newton's
-    method therefore approaches the solution from above.
+    integral of u. At every place the displacement is the larger of two functions of the unknowns: the penetration and
+    the displacement of a free element. Both functions are convex and increasing, and so is the displacement. Therefore,
+    after the first step, Newton's method approaches the solution from above.
 
     Parameters
     ----------
     profile : array, shape (nodes,)
-        Heights, positive towards the elastomer, relative to the highest node. A periodic line starts at the highest
-        node and repeats it at the end.
+        Heights relative to the highest node, positive towards the elastomer. The first and the last node of a periodic
+        line are both the highest node.
     strain_area : float
-        F_N / (4 G_inf dx) with the length dx of a cell; equal to the integral of u, in cells times height.
+        F_N / (4 G_inf dx) with the length dx of a cell. This is the required integral of u over the line, with lengths
+        in cells.
     periodic : bool
         Whether the line is periodic. On any other line, elements enter undeformed and recover behind the end of the
         line, so that the depth is the only unknown.
     solid : Travelling
         The solid.
     tolerance : float
-        Largest last step of the iteration, relative to the depth.
+        The iteration ends after a step of at most `tolerance` times the depth.
     unknown : array, shape (terms + 1,), input and output
         First guess, replaced by the solution: the stretches e_m at the first node, then the depth.
     totals : array, shape (6,), output
@@ -446,14 +454,14 @@ def solve_sliding(
             scale[terms] = totals[3]
             newton_step(residual, scale, swept, workspace, step)
         else:
-            # all stretches change as much as the depth, because the strains of the dashpots do not change
+            # the direction 1 for all unknowns: if the depth changes suddenly, each stretch changes by the same amount
             residual[:] = 1.0
             follow(residual, swept, False, product, workspace)
-            # the load is computed from the stress, because u behind the line may be unknown
+            # the load is the integral of the stress, because the integral of u behind the line may be unknown
             step[terms] = max((strain_area - totals[1]) / product[terms], -DEEPEST_STEP * unknown[terms])
         largest = 0.0
         for j in range(size):
-            weight = min(1.0, moduli[j]) if j < terms else 1.0  # the stretch of a soft Prony term has little influence
+            weight = min(1.0, moduli[j]) if j < terms else 1.0  # soft Prony terms hardly matter
             largest = max(largest, weight * abs(step[j]))
             unknown[j] += step[j]
         if not np.isfinite(largest):

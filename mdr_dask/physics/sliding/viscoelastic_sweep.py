@@ -1,10 +1,9 @@
-"""Sweep of a linear viscoelastic foundation along a line of straight cells, exact inside every cell.
+"""Exact sweep of a linear viscoelastic foundation along a line of straight cells.
 
-Lengths are in cells of the length dx, stresses in units of the static modulus. An element in contact at a node has the
-displacement u = w, the penetration at the node. The stretch of Prony term m is e_m = u - a_m, where a_m is the
-displacement of the dashpot of this term. The stretch obeys de_m/ds = du/ds - e_m / deborah_m, with deborah_m = tau_m v
-/ dx and the travelled distance s. In contact the stretches have closed forms. A free element recovers as a sum of
-exponential modes.
+Lengths are in cells of the length dx, and stresses are divided by the static modulus. In contact, the displacement u of
+an element is equal to the penetration w. The stretch of Prony term m is e_m = u - a_m, where a_m is the displacement of
+the dashpot of this term. The stretch obeys de_m/ds = du/ds - e_m / deborah_m, with deborah_m = tau_m v / dx and the
+travelled distance s. In contact the stretches have closed forms. A free element recovers as a sum of exponential modes.
 Contact can begin and end at any place inside a cell.
 """
 
@@ -21,7 +20,7 @@ CLOSED, OPEN_END = 0, 1
 
 
 class Travelling(NamedTuple):
-    """A solid that slides along a line, and its recovery modes; units are the static modulus and the length of a cell.
+    """A sliding solid and its recovery modes; stresses are divided by the static modulus, lengths by that of a cell.
 
     Parameters
     ----------
@@ -30,9 +29,9 @@ class Travelling(NamedTuple):
     times : array, shape (terms,)
         Decay lengths of the recovery modes, in cells.
     stretch_of, amplitude_of : array, shape (terms, terms)
-        Row k of `stretch_of` contains the stretches of all Prony terms if only recovery mode k is present, with the
-        strain 1. Row m of `amplitude_of` contains the strains of all recovery modes if only Prony term m is stretched,
-        by 1.
+        Row k of `stretch_of` contains the stretches of all Prony terms if recovery mode k has the strain 1 and all
+        other modes are zero. Row m of `amplitude_of` contains the strains of all recovery modes if Prony term m has the
+        stretch 1 and all other stretches are zero.
     """
 
     moduli: FloatArray
@@ -56,10 +55,10 @@ def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> No
 def step_factors(
     length: float, deborah: FloatArray, decay: FloatArray, gain: FloatArray, area: FloatArray
 ) -> None:  # pragma: no cover
-    """For every Prony term, write the factors decay, gain and area of a straight piece of the line.
+    """Write the factors `decay`, `gain` and `area` of every Prony term over a straight piece of the line.
 
-    Over a piece of the given length and a constant slope, the stretch e changes to decay * e + gain * slope, and its
-    integral is gain * e + area * slope.
+    The piece has the given length and a constant slope. If the stretch is e at the start of the piece, it is decay * e
+    + gain * slope at the end. The integral of the stretch over the piece is gain * e + area * slope.
     """
     for m in range(deborah.size):
         x = length / deborah[m]
@@ -78,7 +77,7 @@ def step_factors(
 def _pressure_inside(
     length: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, deborah: FloatArray
 ) -> tuple[float, float]:  # pragma: no cover
-    """Return the stress in a straight piece, and its derivative, at a distance `length` from its start."""
+    """Return the stress and its derivative at the distance `length` from the start of a straight piece."""
     pressure, rate = start + slope * length, slope
     for m in range(moduli.size):
         decayed = -np.expm1(-length / deborah[m])
@@ -91,7 +90,7 @@ def _pressure_inside(
 def separation_point(
     end: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, deborah: FloatArray
 ) -> float:  # pragma: no cover
-    """Return the place in (0, end] where the stress falls to zero, by Newton's method inside a bracket."""
+    """Return the place between 0 and `end` where the stress falls to zero, by Newton's method and bisection."""
     low, high = 0.0, end
     point = min(0.5 * end, deborah[0]) if deborah.size else 0.5 * end  # deborah[0] is the shortest decay length
     for _ in range(200):
@@ -151,13 +150,15 @@ def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[f
 def _next_contact(
     place: float, node: int, modes: FloatArray, times: FloatArray, penetration: FloatArray, last: int
 ) -> float:  # pragma: no cover
-    """Return the place where an element that is free from `place` on meets the line again, or -1 if it never does.
+    """Return the position where a free element meets the line again, or -1 if the element stays free.
 
-    The search begins in the cell that ends at `node`. After a separation this must be the next cell, because a convex
-    strain that separates from a straight cell does not meet the same cell again.
+    The element is free from the position `place` on. The search begins in the cell that ends at `node`. If contact has
+    ended inside a cell, the search must begin in the next cell. The reason: the strain of the element is a convex
+    function, and after its separation from a straight cell it does not meet the same cell again.
 
     The logarithm of a sum of decaying exponentials is convex. An exponential function that is tangent to the sum is
-    therefore a lower bound. Nodes below this bound are skipped without evaluation of the sum.
+    therefore a lower bound of the sum. Nodes whose penetration is below this bound are skipped, and the sum is not
+    evaluated there.
     """
     strain, rate = _strain_of(0.0, modes, times)
     bound = strain
@@ -184,7 +185,8 @@ class Passage(NamedTuple):
     Parameters
     ----------
     lengths : array, shape (>= 2 nodes + 2,)
-        Lengths of free recoveries and contacts in turn. The first entry belongs to a free recovery and may be 0.
+        Lengths of free recoveries and contacts, which alternate. The first entry is the length of a free recovery and
+        may be 0.
     imbalance : array, shape (terms,)
         Integral of e_m over the line.
     totals : array, shape (6,)
@@ -206,14 +208,17 @@ def sweep_line(
     passage: Passage,
     workspace: FloatArray,
 ) -> tuple[int, int]:  # pragma: no cover
-    """Move an element once along the line; write the lengths of contacts and free recoveries, and the integrals.
+    """Move an element once along the line.
+
+    The lengths of contacts and free recoveries, and the integrals, are written to `passage`.
 
     Parameters
     ----------
     penetration : array, shape (nodes,)
-        w at each node; the last node of a periodic line repeats the first node.
+        Penetration w at each node. The last node of a periodic line is the same point as the first node.
     start : array, shape (terms,)
-        Stretches e_m of an element whose displacement is the penetration of the first node; ignored if `undeformed`.
+        Stretches e_m at the first node, for an element whose displacement is the penetration there. Not used if
+        `undeformed` is True.
     solid : Travelling
         The solid.
     undeformed : bool
@@ -224,8 +229,8 @@ def sweep_line(
     Returns
     -------
     pieces, end : int
-        Number of lengths that were written; CLOSED if the element is free at the last node, OPEN_END if it is in
-        contact there.
+        Number of lengths that were written. The value `end` is CLOSED if the element is free at the last node, and
+        OPEN_END if the element is in contact at the last node.
     """
     # local names, because reading an array from a tuple takes more time than computing a cell
     moduli, deborah, times, stretch_of, amplitude_of = solid
@@ -283,9 +288,9 @@ def _contact(
     Returns
     -------
     place, strain, pressure, left
-        The place where the contact or the line ends; strain and remaining stress at this place; whether the contact
-        ends there. The stretches are written to ``workspace[0]``. The number of the node at the end of the next cell in
-        which contact can begin is written to ``workspace[2, 0]``.
+        The place where the contact or the line ends; the strain and the remaining stress at this place; True if the
+        contact ends, False if the line ends. The stretches are written to ``workspace[0]``. The next contact begins in
+        the next cell at the earliest. The index of the node at the end of that cell is ``workspace[2, 0]``.
     """
     terms, last = moduli.size, penetration.size - 1
     e, following = workspace[0], workspace[9]
@@ -331,7 +336,7 @@ def _contact(
 def _stretch(
     strain: float, slope: float, e: FloatArray, following: FloatArray, moduli: FloatArray, factors: FloatArray
 ) -> float:  # pragma: no cover
-    """Write the stretches at the end of a straight piece, where the strain is `strain`, and return the stress there."""
+    """Write the stretches at the end of a straight piece, and return the stress there; the strain there is `strain`."""
     pressure = strain
     for m in range(moduli.size):
         following[m] = factors[0, m] * e[m] + factors[1, m] * slope
@@ -343,7 +348,7 @@ def _stretch(
 def _begin_recovery(
     strain: float, excess: float, e: FloatArray, moduli: FloatArray, modes: FloatArray, amplitude_of: FloatArray
 ) -> None:  # pragma: no cover
-    """Write the recovery modes of an element whose strain has suddenly decreased from `strain` by `excess`.
+    """Write the recovery modes of an element after its strain has suddenly decreased from `strain` by `excess`.
 
     The stretch of the fastest Prony term is adjusted so that the stress is exactly zero.
     """
@@ -367,7 +372,11 @@ def _add_recovery(
     imbalance: FloatArray,
     totals: FloatArray,
 ) -> None:  # pragma: no cover
-    """Reduce the modes over a free recovery, add the integrals of u and e, and write the final stretches to `e`."""
+    """Advance the modes over a free recovery of the given length.
+
+    The integral of u is added to `totals`, the integrals of the stretches are added to `imbalance`, and the final
+    stretches are written to `e`.
+    """
     for m in range(e.size):
         e[m] = 0.0
     for k in range(times.size):

@@ -1,4 +1,4 @@
-"""Solve the normal equations of several splines that share a few offsets, with banded Cholesky factors.
+"""Fit several splines with common offsets by least squares, with banded Cholesky factors.
 
 The unknowns are the spline coefficients m_c of each channel c, followed by the offsets v. The precision matrix of the
 unknowns is
@@ -6,11 +6,12 @@ unknowns is
     [ A_c   B_c ]
     [ B_c^T  D  ],
 
-where A_c is banded (half bandwidth 3) and channels are coupled only by the offsets. The Cholesky factor consists of the
-banded factors L_c of A_c, the borders W_c = L_c^-1 B_c, and the factor of the corner S = D - sum_c W_c^T W_c. A lower
-or symmetric matrix M is stored by diagonals: ``band[i, d]`` is M[i, i - d]. The corner is stored in the same way, with
-all its diagonals, and is therefore processed by the same functions. For one row of parameters (shifts and scales), the
-solution takes O(splines (4 + offsets)^2) operations.
+where A_c is banded (half bandwidth 3). The blocks between two different channels are zero, so that channels are coupled
+only by the offsets. The Cholesky factor consists of the banded factors L_c of A_c, the borders W_c = L_c^-1 B_c, and
+the factor of the corner S = D - sum_c W_c^T W_c. A lower or symmetric matrix M is stored by diagonals: ``band[i, d]``
+is M[i, i - d]. The corner is a full matrix, but all its diagonals are stored in the same way, so that the same
+functions work for band and corner. A row of parameters contains shifts and scales. For each row, the solution takes
+O(splines (4 + offsets)^2) operations.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ EPS = float(np.finfo(np.float64).eps)
 
 
 class Factors(NamedTuple):
-    """Cholesky factors of the precision for rows of parameters.
+    """Cholesky factors of the precision matrix for each row of parameters.
 
     Parameters
     ----------
@@ -47,21 +48,21 @@ class Factors(NamedTuple):
 
 
 class Linear(NamedTuple):
-    """Means and covariances of the unknowns for rows of parameters.
+    """Means and covariances of the unknowns for each row of parameters.
 
     Parameters
     ----------
     mean : array, shape (rows, unknowns)
         Spline coefficients, channel by channel, then the offsets.
     log_determinant : array, shape (rows,)
-        Logarithm of the determinant of the precision.
+        Logarithm of the determinant of the precision matrix.
     fitted, slope : array, shape (rows, channels, points)
-        Mean of the curve minus the offset at each point, and the derivative of the curve with respect to the abscissa,
-        which is measured in cells.
+        At each point: the mean of the curve minus the mean of the offset; and the mean slope of the curve, for an
+        abscissa in cells of the spline.
     variance, tilt : array, shape (rows, channels, points)
         Variance of `fitted`, and covariance of `fitted` and `slope`.
     rough : array, shape (rows, channels, splines - 2)
-        Mean of the square of each second difference of the coefficients.
+        For each second difference of the coefficients: the mean of its square.
     offsets : array, shape (rows, offsets, offsets)
         Covariance of the offsets.
     """
@@ -86,7 +87,7 @@ def solve_rows(
     stiffness: FloatArray,
     tied: FloatArray,
 ) -> tuple[Factors, Linear]:
-    """Return the factors of the precision of the unknowns, and the means and covariances that the density needs.
+    """Return the Cholesky factors of the precision matrix, and the means and covariances that the density requires.
 
     Parameters
     ----------
@@ -99,7 +100,7 @@ def solve_rows(
     y : array, shape (channels, points)
         Ordinates.
     weight : array, shape (rows, channels)
-        Precision of y.
+        Precision of y, which is one divided by the variance of y.
     stiffness : array, shape (rows, channels, splines - 2)
         Prior precision of the second differences.
     tied : array, shape (rows, offsets, offsets)
@@ -128,9 +129,10 @@ def solve_rows(
 
 
 def drawn(factors: Factors, normal: FloatArray) -> FloatArray:
-    """Transform standard normal numbers to random departures of the unknowns from their mean.
+    """Transform standard normal numbers into random departures of the unknowns from the mean of the unknowns.
 
-    The departures have the precision L L^T. Both arrays have the shape (rows, unknowns).
+    The departures have the precision matrix L L^T. The argument `normal` and the result have the shape (rows,
+    unknowns).
     """
     found = normal.copy()
     _back_substitute(*factors, found)
@@ -152,7 +154,7 @@ def _factorise(
     mean: FloatArray,
     log_determinant: FloatArray,
 ) -> None:
-    """Build the precision of each row, factorise it, and solve for the mean."""
+    """For each row, build and factorise the precision matrix, and solve for the mean of the unknowns."""
     rows, channels, splines, offsets = border.shape
     begin = channels * splines
     for r in range(rows):
@@ -180,7 +182,7 @@ def _factorise(
 
 @jit
 def _add_bending(stiffness: FloatArray, band: FloatArray) -> None:
-    """Add the prior precision of the second differences to the band."""
+    """Add the contribution of the prior of the second differences to the band of the precision matrix."""
     second = (1.0, -2.0, 1.0)
     for j in range(stiffness.size):
         for a in range(3):
@@ -192,7 +194,7 @@ def _add_bending(stiffness: FloatArray, band: FloatArray) -> None:
 def _add_points(
     first: IntArray, value: FloatArray, y: FloatArray, weight: float, band: FloatArray, right: FloatArray
 ) -> None:
-    """Add the contributions of the points of a channel to the precision and to the right side."""
+    """Add the contributions of the points of a channel to the band and the right side of the channel."""
     for p in range(first.size):
         at = first[p]
         for a in range(ORDER):
@@ -213,7 +215,7 @@ def _add_ties(
     corner: FloatArray,
     right: FloatArray,
 ) -> None:
-    """Add the contributions of the points of a channel to border, corner and right side of the offsets.
+    """Add the contributions of the points of a channel to the border, the corner and the right side of the offsets.
 
     The offsets are subtracted from the spline; therefore the border and the right side get negative contributions.
     """
@@ -243,7 +245,7 @@ def _select(
     rough: FloatArray,
     covariance: FloatArray,
 ) -> None:
-    """Compute the required entries of the covariance, and from them the results at each point."""
+    """Compute the required entries of the covariance matrix. From these entries, compute the results at each point."""
     rows, channels, splines, offsets = border.shape
     begin = channels * splines
     within = np.empty((splines, ORDER))  # the band of the covariance of a channel
@@ -279,7 +281,7 @@ def _select(
 def _add_border(
     band: FloatArray, border: FloatArray, corner: FloatArray, within: FloatArray, gain: FloatArray, cross: FloatArray
 ) -> None:
-    """Write G and G S^-1 to `gain` and `cross`, and add G S^-1 G^T to the band of the covariance of a channel."""
+    """Write G = A^-1 B to `gain`, and G S^-1 to `cross`; add G S^-1 G^T to the band of the covariance of a channel."""
     splines, offsets = border.shape
     gain[:] = border
     _backward(band, gain)
@@ -304,7 +306,11 @@ def _at_points(
     variance: FloatArray,
     tilt: FloatArray,
 ) -> None:
-    """Add the means of a curve and of its slope, the variance of the curve, and their covariance, at each point."""
+    """Add the results at each point.
+
+    The results are the mean of the curve, the mean of its slope, the variance of the curve, and the covariance of curve
+    and slope.
+    """
     for p in range(first.size):
         at = first[p]
         for a in range(ORDER):
@@ -319,7 +325,7 @@ def _at_points(
 
 @jit
 def _back_substitute(band: FloatArray, border: FloatArray, corner: FloatArray, right: FloatArray) -> None:
-    """Replace each right side by the solution of L^T x = right, shape (rows, unknowns)."""
+    """Replace each row of `right`, shape (rows, unknowns), by the solution x of L^T x = row."""
     rows, channels, splines, offsets = border.shape
     begin = channels * splines
     for r in range(rows):
@@ -333,7 +339,7 @@ def _back_substitute(band: FloatArray, border: FloatArray, corner: FloatArray, r
 
 @jit
 def _cholesky(band: FloatArray) -> float:
-    """Replace a symmetric matrix by its lower factor, and return its log determinant.
+    """Replace a symmetric matrix by its lower factor, and return the log determinant of the matrix.
 
     A pivot that is not positive because of rounding is replaced by the rounding error of the diagonal.
     """
@@ -352,7 +358,7 @@ def _cholesky(band: FloatArray) -> float:
 
 @jit
 def _forward(band: FloatArray, right: FloatArray) -> None:
-    """Replace the columns of the right side by the solutions of L x = right."""
+    """Replace each column of `right` by the solution x of L x = column."""
     (size, width), columns = band.shape, right.shape[1]
     for i in range(size):
         for j in range(max(i - width + 1, 0), i):
@@ -364,7 +370,7 @@ def _forward(band: FloatArray, right: FloatArray) -> None:
 
 @jit
 def _backward(band: FloatArray, right: FloatArray) -> None:
-    """Replace the columns of the right side by the solutions of L^T x = right."""
+    """Replace each column of `right` by the solution x of L^T x = column."""
     (size, width), columns = band.shape, right.shape[1]
     for i in range(size - 1, -1, -1):
         for j in range(i + 1, min(i + width, size)):

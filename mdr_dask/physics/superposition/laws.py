@@ -1,6 +1,6 @@
-"""Laws of shift factors: power of the velocity, Arrhenius, and WLF (Williams, Landel and Ferry).
+"""Laws of shift factors: a power of the velocity, Arrhenius' law, and the WLF law (Williams, Landel and Ferry).
 
-The fits use the covariance of the factors.
+The fits are weighted with the inverse covariance of the factors.
 """
 
 from __future__ import annotations
@@ -31,16 +31,17 @@ class ShiftLaw:
     name : str
         ``power``, ``arrhenius`` or ``wlf``.
     constants : dict of str to (value, low, high)
-        Value of each constant and ends of its 95 % confidence interval. A power law has the constant ``exponent``,
-        Arrhenius' law ``activation_energy`` (J/mol), and the WLF law ``c1`` (dimensionless) and ``c2`` (K), both at the
-        reference temperature.
+        For each constant: its value and the two ends of its 95 % confidence interval. A power law has the constant
+        ``exponent``, Arrhenius' law ``activation_energy`` (J/mol), and the WLF law ``c1`` (dimensionless) and ``c2``
+        (K), both at the reference temperature.
     factors : callable, array -> array
-        Factors according to the law, decades. They are zero at the anchor, the group whose factor is zero by
-        definition.
+        Function that returns the factors according to the law, decades. At the anchor, which is the group whose
+        measured factor is zero by definition, this function is zero.
     departures : array, shape (groups,)
         Measured factors minus factors according to the law, decades.
     chance : float
-        Probability that the errors of the factors alone cause departures at least as large.
+        Probability that the errors of the factors would cause departures at least as large as the measured departures
+        if the law were exact.
     """
 
     name: str
@@ -51,7 +52,7 @@ class ShiftLaw:
 
     @property
     def residual(self) -> float:
-        """Root mean square distance of the factors from the law, decades."""
+        """Root mean square of the departures, decades."""
         return float(np.sqrt(np.mean(self.departures**2)))
 
 
@@ -65,16 +66,16 @@ def fit_power(
     groups : array, shape (groups,)
         Positive numbers, such as velocities.
     factors, covariance : arrays, shapes (groups,) and (groups, groups)
-        Shift factors, decades, zero at the anchor, and their covariance.
+        Shift factors, decades, which are zero at the anchor; and the covariance of the factors.
     anchor : int
         Index of the group at which the factors are zero by definition.
     reference : float
-        Not used, because the exponent does not depend on the reference; `fit_wlf` needs this argument.
+        Not used. The argument exists because all three fits have the same arguments, and `fit_wlf` requires it.
 
     Raises
     ------
     FitError
-        If there are too few factors or the groups are not positive.
+        If there are too few factors, or if a group is not positive.
     """
     if np.any(groups <= 0):
         raise FitError("a power law needs positive groups, such as velocities")
@@ -100,9 +101,9 @@ def fit_wlf(
     """Fit ``log10 a_T = -c1 (T - T_ref) / (c2 + T - T_ref)``; arguments as in `fit_power`, temperatures in K.
 
     The law is first fitted with the anchor as reference. The fitted constants are the slope c1 / c2 and the bend 1 /
-    c2, which both remain finite if the factors are linear in temperature. The constants c1 and c2 at the reference
-    follow from c1 c2 and T_ref - c2, which are the same for every reference. For a reference that is higher by dT:
-    ``c2' = c2 + dT``, ``c1' = c1 c2 / c2'``.
+    c2, which both remain finite if the factors are linear in temperature. From the fitted constants, c1 and c2 at the
+    required reference are computed, because c1 c2 and T_ref - c2 are the same for every reference. For a reference that
+    is higher by dT: ``c2' = c2 + dT``, ``c1' = c1 c2 / c2'``.
     """
     lowest, moved = float(temperature[anchor] - temperature.min()), reference - float(temperature[anchor])
     straight = STRAIGHTEST / float(np.ptp(temperature))
@@ -119,12 +120,12 @@ def fit_wlf(
     slope, bend = fitted.x
     factor, c2 = slope / bend**2, 1 / bend + moved
     c1, half_of_bend = factor / c2, fitted.quantile * float(np.sqrt(fitted.spread[1, 1]))
-    if bend - half_of_bend <= straight:  # if a straight line fits within the errors, the intervals extend to infinity
+    if bend - half_of_bend <= straight:  # a straight line fits: one end of each interval is infinite
         least = 1 / min(bend + half_of_bend, steepest) + moved
         first, last = sorted([slope * (least - moved) ** 2 / least, float(np.copysign(np.inf, slope))])
         constants = {"c1": (c1, first, last), "c2": (c2, least, np.inf)}
     else:
-        gap = 1 / bend - lowest  # lowest measured temperature minus the temperature where the law diverges
+        gap = 1 / bend - lowest  # lowest measured temperature minus the temperature at which the law is infinite
         change = np.array(
             [1 / (bend + bend**2 * moved), -slope * (1 + 2 * bend * moved) / (bend + bend**2 * moved) ** 2]
         )
@@ -147,7 +148,7 @@ def _one_constant(
     factors: FloatArray,
     covariance: FloatArray,
 ) -> ShiftLaw:
-    """Fit the constant of a law that is proportional to a given function of the group."""
+    """Fit a law with one constant: the factor is the constant times `distance`, a function of the group."""
 
     def law(constants: FloatArray, at: FloatArray) -> FloatArray:
         return np.asarray(constants[0] * distance(at), dtype=np.float64)
@@ -181,8 +182,8 @@ def _fit(
 ) -> _Fitted:
     """Fit by generalised least squares.
 
-    If the departures from the law are larger than the errors of the factors explain, an additional scatter is fitted
-    and added to these errors.
+    The departures from the law may be larger than the errors of the factors can explain. In this case an additional
+    scatter is fitted, and its square is added to the variances of the factors.
     """
     known = np.diag(covariance) > 0
     freedom = int(known.sum()) - guess.size
@@ -204,7 +205,7 @@ def _fit(
         return least_squares(misfit, start, bounds=bounds, x_scale="jac", xtol=1e-13, ftol=1e-13, gtol=1e-13)
 
     def excess(log_scatter: float) -> float:
-        """Return by how much chi-squared exceeds its degrees of freedom."""
+        """Return chi-squared divided by the degrees of freedom, minus 1."""
         return float(2 * solved(np.exp(log_scatter)).cost / freedom - 1)
 
     found = solved(0.0)

@@ -1,4 +1,4 @@
-"""Master curves: shift curves of one quantity along logarithmic axes until they form one curve."""
+"""Master curves: curves of one quantity are shifted along logarithmic axes until they form one curve."""
 
 from __future__ import annotations
 
@@ -49,15 +49,16 @@ class Superposition:
     Parameters
     ----------
     groups : array, shape (groups,)
-        Ascending values of the quantity in which the curves differ, such as velocity or temperature.
+        Ascending values of the quantity, such as velocity or temperature, that differs from curve to curve.
     horizontal, vertical : array, shape (groups,)
-        Decades added to log10 x and to log10 y of each curve; zero at the reference.
+        Shift factors: for each curve, the decades added to log10 x and to log10 y. At the reference the factors are
+        zero.
     draws : array, shape (draws, 2 groups)
         Draws of horizontal and vertical factors from their probability density.
     reference : float
-        Value of the groups at which the factors are zero.
+        Group, or value between two groups, at which the factors are zero.
     noise : array, shape (channels,)
-        Standard deviation of log10 y about the curve.
+        Standard deviation of the measured log10 y from the merged curve.
     x : array, shape (points,)
         Abscissae after shifting, ascending.
     y : array, shape (channels, points)
@@ -67,15 +68,15 @@ class Superposition:
     curve_x : array, shape (curve points,)
         Abscissae of the merged curves.
     curve_y, curve_error : array, shape (channels, curve points)
-        The merged curves and their standard errors. The merged curves belong to the reference.
+        The merged curves and their standard errors, at the reference.
     curve_cross : array, shape (channels, curve points, 2 groups)
         Covariance of the curves and the factors.
     measured : tuple of float
-        Range of log10 x of the points measured at the reference. Outside this range the curve depends on the shift
-        factors.
+        Range of log10 x of the points measured at the reference. Outside this range the merged curve is determined by
+        shifted points, and so depends on the shift factors.
     undetermined : tuple of (float, float)
-        Ranges of groups whose curves do not determine the shifts between them, for example on a plateau or across a
-        gap. Each range is given by its first and its last group.
+        First and last group of each range in which the curves do not determine the shifts, for example on a plateau or
+        across a gap.
     """
 
     groups: FloatArray
@@ -96,7 +97,7 @@ class Superposition:
 
     @property
     def covariance(self) -> FloatArray:
-        """Covariance of horizontal and vertical factors together, decades squared, shape (2 groups, 2 groups)."""
+        """Covariance of all factors, horizontal then vertical, decades squared, shape (2 groups, 2 groups)."""
         return np.atleast_2d(np.cov(self.draws, rowvar=False))
 
     @property
@@ -126,24 +127,26 @@ def superpose(
     """Find the shifts for which the curves are parts of one smooth curve, and the uncertainty of these shifts.
 
     The shifts, the smooth curve, the scatter and the vertical offsets have a joint probability density (module
-    `posterior`). Draws are taken from this density. Results are means over the draws. Their intervals include the
-    uncertainty of smoothness, scatter and offsets.
+    `posterior`). Draws are taken from this density, and the results are means over the draws. The confidence intervals
+    of the results include the uncertainty of smoothness, scatter and offsets.
 
     Parameters
     ----------
     groups : array_like, shape (groups,)
-        Distinct values of the quantity in which the curves differ.
+        One distinct value for each curve: the quantity that differs from curve to curve.
     curves : sequence of (x, y)
-        log10 of abscissa and ordinate of each curve, which must have at least two points. Abscissae have the shape
-        (points,). Ordinates have the same shape, or the shape (channels, points) for channels that are shifted
+        log10 of abscissa and ordinate of each curve. A curve must have at least two points. The array x has the shape
+        (points,). The array y has the same shape, or the shape (channels, points) for channels that are shifted
         together, such as storage and loss modulus.
     vertical : {'none', 'modulus', 'compliance', 'free'}
-        Factors along the ordinate. A modulus of a polymer is proportional to density times temperature. For 'modulus'
-        and 'compliance' the factor b_T = rho0 T0 / (rho T), with the density rho from `EXPANSION`, is therefore
-        applied. In addition, each curve may have an unknown offset, common to its channels, with the prior `OFFSET`.
-        Factors that are 'free' differ from curve to curve by unknown steps.
+        Factors along the ordinate. A modulus of a polymer is proportional to density times temperature. With 'modulus'
+        or 'compliance', the known factor b_T = rho0 T0 / (rho T) is therefore applied; the density rho is computed with
+        `EXPANSION`. In addition, each curve has an unknown offset, which is the same for all channels of the curve and
+        has the prior `OFFSET`. With 'free', the factors are unknown and change from curve to curve by steps with the
+        prior `FREE`.
     reference : float, optional
-        Group whose factors are zero; by default the middle group. For a reference between groups see `rereference`.
+        Group, or value between two groups (see `rereference`), at which the factors are zero; by default the middle
+        group.
     seed : int
         Seed of the draws.
     kelvin : array_like, shape (groups,), optional
@@ -183,7 +186,7 @@ def superpose(
 def known_rise(kelvin: FloatArray, vertical: Vertical) -> FloatArray:
     """Return log10 of b_T for a modulus, or of 1 / b_T for a compliance, shape (groups,).
 
-    The reference temperature T0 is the first temperature.
+    For any other value of `vertical`, the result is zero. The reference temperature T0 is the first temperature.
     """
     if vertical not in ("modulus", "compliance"):
         return np.zeros(kelvin.size)
@@ -217,7 +220,7 @@ def _merged(
     width: float,
     generator: np.random.Generator,
 ) -> Superposition:
-    """Return the factors relative to the first group and the merged curves, from draws of the parameters."""
+    """Compute the merged curves and the factors from draws of the parameters; the first group is the reference."""
     count, channels, lines = values.size, problem.y.shape[0], values.size - 1
     shifts = np.concatenate([np.zeros((len(rows), 1)), rows[:, :lines]], axis=1)
     mean = shifts.mean(axis=0)
@@ -230,7 +233,7 @@ def _merged(
     lifted -= offsets[:, None, :1]
     factors = np.hstack([shifts * width, offsets - offsets[:, :1] + rise - rise[0]])
     vertical = factors[:, count:].mean(axis=0)
-    # the curve is fitted to the points at their mean shift: on a plateau, the mean of the drawn curves would miss them
+    # fit the curve to the points shifted by the mean shifts; on a plateau, the mean of the draws would miss the points
     likeliest = solve(problem, rows.mean(axis=0)[None]).mean
     curve = np.concatenate([problem.spline(c, likeliest, mean[None], grid) for c in range(channels)])
     curve -= likeliest[:, -count:][:, :1] if problem.offset else 0.0
@@ -261,14 +264,14 @@ def _merged(
 
 
 def _runs(groups: FloatArray, steps: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
-    """Return the groups before the first and after the last step of each sequence of consecutive marked steps."""
+    """Return the first and the last group of each series of marked steps; step k leads from group k to k + 1."""
     edges = np.diff(np.concatenate([[0], steps.astype(int), [0]]))
     ends = zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
     return tuple((float(groups[first]), float(groups[last])) for first, last in ends)
 
 
 def _gaps(x: FloatArray, member: NDArray[np.intp], shifts: FloatArray) -> NDArray[np.bool_]:
-    """Return, for each row of shifts, which curves begin after a gap in the abscissa."""
+    """Return for each row of shifts and each curve whether there is a gap in the abscissa before this curve."""
     ends = np.array([[x[member == k].min(), x[member == k].max()] for k in range(shifts.shape[1])])
     low, high = ends[:, 0] + shifts, ends[:, 1] + shifts
     order = np.argsort(low, axis=1)
@@ -286,23 +289,24 @@ def rereference(
     at_reference: float = 0.0,
     logarithmic: bool = False,
 ) -> Superposition:
-    """Return the same master curve for another reference, which is a group or a value between two groups.
+    """Return the same master curve for a new reference, which is a group or a value between two groups.
 
-    Between two groups, the horizontal factor is the factor of the law plus the linearly interpolated departure of the
-    measured factors from the law. The error of this interpolation is `dT^2 |h''| / 8` for two groups at a distance dT,
-    where h'' is the second derivative of the departures. This error widens the distribution of the draws: each draw is
-    shifted by a normally distributed number with this standard deviation.
+    The horizontal factor at the new reference is the factor of the law plus a departure. This departure is interpolated
+    linearly between the departures of the measured factors from the law at the two neighbouring groups. The error of
+    this interpolation is `dT^2 |h''| / 8` for two groups at a distance dT, where h'' is the second derivative of the
+    departures. To include this error, a normally distributed number, with this error as standard deviation, is added to
+    each draw.
 
     Parameters
     ----------
     reference : float
-        New reference, in the range of the groups.
+        New reference, between the lowest and the highest group.
     law : array, shape (groups,), optional
-        Factors according to a law that describes the shifts; without a law, the measured factors are interpolated.
+        Factors of the groups according to a law of the shifts. Without a law, the measured factors are interpolated.
     at_reference : float
         The factor of the law at the reference.
     logarithmic : bool
-        Whether the factors are nearly linear in the logarithm of the groups, for example if the groups are velocities.
+        Whether to interpolate over the logarithm of the groups, as is appropriate for velocities.
 
     Raises
     ------
@@ -318,7 +322,7 @@ def rereference(
     known = np.zeros(size) if law is None or reference in groups else law - at_reference
     both = np.kron(np.eye(2), share)
     across, along = float(share @ (result.horizontal - known)), float(share @ result.vertical)
-    zero = both @ result.draws.T  # factors at the reference, subtracted from each draw, shape (2, draws)
+    zero = both @ result.draws.T  # factors at the new reference in each draw, shape (2, draws)
     zero[0] -= share @ known
     bend = interpolation_error(places, result.horizontal - known, float(place))
     zero[0] += bend * ndtri((np.random.default_rng(0).permutation(zero.shape[1]) + 0.5) / zero.shape[1])
@@ -348,10 +352,10 @@ def rereference(
 
 
 def interpolation_error(places: FloatArray, factors: FloatArray, place: float) -> float:
-    """Return the error of a linear interpolation, ``d^2 |h''| / 8`` for neighbours a distance d apart.
+    """Return the error ``d^2 |h''| / 8`` of the linear interpolation between two neighbours at the distance d.
 
-    Here h'' is the second derivative of the factors at one of the two neighbours, where its absolute value is larger.
-    If `place` is one of the `places`, the error is zero.
+    The second derivative h'' of the factors is computed at both neighbours; the larger absolute value is used. If the
+    position `place` is one of the positions `places`, the error is zero.
     """
     if place in places:
         return 0.0

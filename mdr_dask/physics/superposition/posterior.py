@@ -1,4 +1,4 @@
-"""Probability density of shifts, and its gradient, for curves that are pieces of one smooth curve.
+"""Probability density of the shifts of curves that are pieces of one smooth curve, and the gradient of this density.
 
 Each channel c of a curve k (such as storage and loss modulus of one temperature) is
 
@@ -6,8 +6,8 @@ Each channel c of a curve k (such as storage and loss modulus of one temperature
 
 with a horizontal shift h_k and a vertical offset v_k common to all channels. Q_c is a cubic B-spline whose second
 differences are normally distributed (P. H. C. Eilers, B. D. Marx, Stat. Sci. 11 (1996) 89). The offsets are normally
-distributed as well. Spline coefficients and offsets enter linearly and are integrated out, so that the density depends
-only on the shifts and on a few scales.
+distributed as well. The model is linear in the spline coefficients and the offsets, so that the integral of the density
+over these unknowns has a closed form. The remaining density depends only on the shifts and on a few scales.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ NOISE, NOISE_SCATTER = 0.01, 2.0
 """Prior of the relative scatter of each channel: median, and standard deviation of the logarithm of the scatter."""
 
 TREND = 10.0
-"""Ratio of two prior standard deviations of drifting offsets: of the mean step, and of the steps about their mean."""
+"""Prior standard deviation of the mean step of drifting offsets, divided by that of the steps about the mean step."""
 
 FARTHEST = 8.0
 """Largest distance of the logarithm of a scale from its prior median; it prevents overflow."""
@@ -82,11 +82,12 @@ class Curves:
     splines : int
         Number of coefficients of the spline of each channel.
     offset : tuple of float or None
-        Prior of the standard deviation of the vertical offsets: median in decades, and standard deviation of the
-        logarithm. None for curves without vertical offsets.
+        Prior of the standard deviation of the vertical offsets. The two numbers are the median, in decades, and the
+        standard deviation of the natural logarithm. None for curves without vertical offsets.
     drifting : bool
-        Whether offsets change from curve to curve by independent steps. The prior standard deviation of the mean step
-        is `TREND` times that of the steps about their mean. If False, the offsets are independent of each other.
+        If True, the offset changes from curve to curve by steps. Each step is the sum of a mean step and an independent
+        scatter; the prior standard deviation of the mean step is `TREND` times that of the scatter. If False, the
+        offsets are independent of each other.
     """
 
     x: FloatArray
@@ -106,11 +107,17 @@ class Curves:
         )
 
     def begin(self, moved: FloatArray) -> FloatArray:
-        """Return where the spline of each row begins, shape (rows,); the spline is centred on the shifted points."""
+        """Return the abscissa at which the spline of each row begins, shape (rows,).
+
+        The spline is centred on the shifted points.
+        """
         return np.asarray((moved.min(axis=1) + moved.max(axis=1) - (self.splines - 3) / CELLS) / 2, dtype=np.float64)
 
     def spline(self, channel: int, unknowns: FloatArray, shifts: FloatArray, grid: FloatArray) -> FloatArray:
-        """Return the curve of a channel on a grid for each row of unknowns and shifts, shape (rows, grid)."""
+        """Return the spline of a channel at the abscissae `grid`, shape (rows, grid).
+
+        Row k of the result belongs to row k of the unknowns and of the shifts.
+        """
         low = self.begin(self.x + shifts[:, self.member])[:, None]
         first, value, _ = _basis((grid - low) * CELLS, self.splines)
         places = channel * self.splines + first[..., None] + np.arange(4)
@@ -118,7 +125,7 @@ class Curves:
 
     @cached_property
     def tied(self) -> FloatArray:
-        """Prior precision of the vertical offsets, multiplied by the square of their scale."""
+        """Prior precision of the vertical offsets if the standard deviation of the offsets (or of their steps) is 1."""
         if not self.drifting:
             return np.eye(self.count)
         steps = np.eye(self.count) - np.eye(self.count, k=-1)
@@ -145,7 +152,7 @@ class Curves:
 
 
 def _pieces() -> tuple[BSpline, BSpline]:
-    """Return the four cubic B-splines that overlap on a cell of width one, and their derivatives."""
+    """Return the four cubic B-splines that overlap on a cell of width 1, and the derivatives of these splines."""
     knots = np.arange(-3.0, 5.0)
     pieces = BSpline(knots, np.eye(4), 3)
     return pieces, pieces.derivative()
@@ -156,7 +163,7 @@ _VALUES, _SLOPES = _pieces()
 
 @dataclass(frozen=True)
 class Solved:
-    """Density for each row of parameters, and the distribution of the spline coefficients and offsets for this row.
+    """For each row of parameters: the density, and the distribution of the spline coefficients and offsets.
 
     Parameters
     ----------
@@ -183,8 +190,8 @@ class Solved:
 def solve(curves: Curves, rows: FloatArray) -> Solved:
     """Return density, gradient and spline coefficients for each row of parameters, shape (rows, parameters).
 
-    The parameters are described at `Curves.prior`. The knots of the splines follow the shifted curves of each row; the
-    gradient neglects this, because the density hardly depends on the position of the knots.
+    The parameters are described at `Curves.prior`. The knots of the splines move with the shifted curves. The gradient
+    neglects this movement, because the density hardly depends on the position of the knots.
     """
     many, channels, points = rows.shape[0], curves.y.shape[0], curves.x.size
     count, splines, offsets = curves.count, curves.splines, 0 if curves.offset is None else curves.count
@@ -213,7 +220,7 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
     change = share[:, None] * (near[:, :, None] - bend[..., None]) * (apart / REACH**2)[:, None]
     turn = np.einsum("wc,wcp->wp", weight, linear.tilt - left * linear.slope)
     by_place = np.einsum("wcj,wcjk->wk", by_bend, change)
-    # at the mean, the negative exponent is half the sum of weight times residual times ordinate
+    # at the mean coefficients, minus the exponent of the density is half the sum of weight * residual * ordinate
     energy = 0.5 * linear.log_determinant + 0.5 * np.sum(weight * np.sum(left * curves.y, axis=2), axis=1)
     energy += np.sum(bend, axis=(1, 2)) - 0.5 * points * np.sum(np.log(weight), axis=1)
     gradient = np.zeros_like(rows)
@@ -230,8 +237,11 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
 
 
 def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return the index of the first of the four splines at each place (in cells), and values and slopes of all four."""
-    # NaN and infinity from diverged rows must not become indices
+    """Return the first of the four splines that overlap at each place, and the values and slopes of all four.
+
+    The first spline is returned as an index. Places are in cells.
+    """
+    # in a diverged row, places may be NaN or infinite; such values must not become indices
     first = np.clip(np.nan_to_num(np.floor(place)), 0, splines - 4).astype(np.intp)
     inside = np.clip(place - first, 0.0, 1.0)
     slope = _SLOPES(inside)
@@ -239,7 +249,7 @@ def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, Float
 
 
 def step_precision(count: int) -> FloatArray:
-    """Return the prior precision of the shifts of all curves but the first, in widths of a curve."""
+    """Return the prior precision of the shifts, in widths of a curve, of all curves except the first."""
     steps = np.eye(count - 1) - np.eye(count - 1, k=-1)
     covariance = STEP_SCATTER**2 * np.eye(count - 1) + STEP_MEAN**2
     return np.asarray(steps.T @ np.linalg.inv(covariance) @ steps, dtype=np.float64)

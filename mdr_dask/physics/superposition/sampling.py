@@ -47,9 +47,11 @@ With the extreme steps, the gap between the two curves is as wide as a curve.
 
 
 def first_guess(curves: Curves) -> FloatArray:
-    """Return a first guess of the shifts, from each pair of neighbours separately, shape (curves - 1,).
+    """Return a first guess of the shifts, shape (curves - 1,).
 
-    The mean and variance of each step, weighted by the density of the two curves, are combined with the prior.
+    A step is the difference between the shifts of two neighbouring curves. For each pair of neighbours separately, many
+    steps are tried. The mean and the variance of the step are computed with the density of the pair as weight. The
+    means and variances of all steps are then combined with the prior of the shifts.
     """
     steps = np.linspace(-2.0, 2.0, SCAN)
     means, variances = [], []
@@ -66,7 +68,7 @@ def first_guess(curves: Curves) -> FloatArray:
             rows = np.column_stack([steps * width, np.tile(middle[1:], (SCAN, 1))])
             rows[:, 1 : 1 + 2 * curves.y.shape[0]] -= stiffness
             channels = curves.y.shape[0]
-            # the best step may lie between two tried steps: the noise must include the resulting error of the ordinate
+            # the best step may lie between two tried steps; the noise includes the resulting error of the ordinate
             coarse = curves.height * width * (steps[1] - steps[0]) / np.sqrt(12)
             noise = slice(1 + 2 * channels, 1 + 3 * channels)
             rows[:, noise] = np.maximum(rows[:, noise], np.log(coarse))
@@ -82,14 +84,14 @@ def first_guess(curves: Curves) -> FloatArray:
 
 
 def laid_out(curves: Curves, shifts: FloatArray) -> Curves:
-    """Return the same curves with a spline that covers the shifted curves and a margin on both sides."""
+    """Return the same curves with enough spline coefficients for the shifted curves and a margin on both sides."""
     moved = curves.x + np.append(0.0, shifts)[curves.member]
     return replace(curves, splines=int(np.ceil((np.ptp(moved) + 2 * MARGIN) * CELLS)) + 3)
 
 
-@np.errstate(over="ignore", invalid="ignore")  # for moves that diverge, which are rejected
+@np.errstate(over="ignore", invalid="ignore")  # moves that diverge are rejected
 def draws(curves: Curves, generator: np.random.Generator) -> tuple[Curves, FloatArray]:
-    """Return the curves with the spline that was used, and draws of the parameters, shape (draws, parameters)."""
+    """Return the curves with the number of spline coefficients used, and draws, shape (draws, parameters)."""
     shifts = first_guess(curves)
     curves = laid_out(curves, shifts)
     start = _best(curves, np.append(shifts, curves.prior[0][shifts.size :]), shifts.size)
@@ -118,7 +120,8 @@ def _moved(
 ) -> tuple[FloatArray, Solved, float]:
     """Move all chains by one Hamiltonian move and `HOPS` jumps.
 
-    Return the new parameters, their density, and the mean acceptance probability of the Hamiltonian move.
+    The new parameters, the density at these parameters, and the mean acceptance probability of the Hamiltonian move are
+    returned.
     """
     length = PATH / STEPS * generator.uniform(0.7, 1.3, (CHAINS, 1))
     momentum = generator.standard_normal(place.shape)
@@ -143,11 +146,11 @@ def _moved(
 
 
 def _reduction(kept: FloatArray) -> float:
-    """Return the largest potential scale reduction factor of all parameters.
+    """Return the potential scale reduction factor of the parameter for which this factor is largest.
 
-    The array `kept` has the shape (moves, chains, parameters).
-    The factor compares the variance of the means of the chains with the variance within the chains (A. Gelman, D. B.
-    Rubin, Stat. Sci. 7 (1992) 457). It is 1 if all chains represent the same distribution.
+    The array `kept` has the shape (moves, chains, parameters). The factor compares the variance of the means of the
+    chains with the variance within the chains (A. Gelman, D. B. Rubin, Stat. Sci. 7 (1992) 457). The factor is close to
+    1 if all chains represent the same distribution.
     """
     within = kept.var(axis=0, ddof=1).mean(axis=0)
     between = kept.mean(axis=0).var(axis=0, ddof=1)
@@ -163,10 +166,10 @@ def _chosen(taken: NDArray[np.bool_], new: Solved, old: Solved) -> Solved:
 
 
 def _hop(curves: Curves, place: FloatArray, generator: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Draw one step between neighbours again from its prior, and return the new rows and the rise of the prior energy.
+    """In each row, draw one step again from its prior; return the new rows and the rise of the prior energy.
 
-    The prior of this step is conditional on the other steps. By such jumps a chain can pass between the many small
-    maxima of the density along a plateau.
+    A step is the difference between the shifts of two neighbouring curves. Its prior is conditional on the other steps.
+    On a plateau the density has many small maxima; by such jumps a chain can pass from one maximum to another.
     """
     lines, rows = curves.count - 1, np.arange(place.shape[0])
     known = step_precision(curves.count)
