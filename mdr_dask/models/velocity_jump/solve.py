@@ -179,12 +179,13 @@ class _Group:
 
         If a value is smaller than its floor, the relative error is the error divided by the floor.
 
-        If friction is zero within its error, as for a body at rest, the floor is the largest friction of the case. In
-        all other cases the floor is 0: the relative error is the error divided by the value.
+        The floor of a depth is the rms height, which is the unit of the depths here. If friction is zero within its
+        error, as for a body at rest, the floor is the largest friction of the case. In all other cases the floor is 0:
+        the relative error is the error divided by the value.
         """
         cases = found.outcome.size
         if name == "indentation_depth":
-            return np.zeros(cases)
+            return np.ones(cases)
         frictions = [found.values[each].reshape(cases, -1) for each in WITH_ERROR if each != "indentation_depth"]
         largest = np.fmax.reduce(np.abs(np.concatenate(frictions, axis=1)), axis=1)
         size, error = (
