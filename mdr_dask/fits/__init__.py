@@ -25,7 +25,10 @@ GROUP = "mdr_dask.fits"
 
 
 def available(model: str) -> dict[str, Fit]:
-    """Return the fits for stores of a model, by name, including those that other packages offer in `GROUP`."""
+    """Return the fits for stores of a model, indexed by name.
+
+    The fits that other packages offer in `GROUP` are included.
+    """
     subjects = [subject for subject, models in SUBJECTS.items() if model in models or not models]
     own = (import_module(f"mdr_dask.fits.{subject}").FITS for subject in subjects)
     others = (entry.load() for entry in entry_points(group=GROUP))

@@ -1,4 +1,4 @@
-"""Decide whether a fitted constant needs more realisations, and find the cases on which it depends."""
+"""Decide whether a fitted constant needs more realisations, and find the cases on which the constant depends."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from mdr_dask.fits.base import Fit
 STEP = 1e-3
 #: Largest number of groups into which the values along a dimension are divided. One group is shifted at a time.
 GROUPS = 32
-#: A group of cases needs no more realisations if shifting its results by one standard error changes the constant by
-#: less than this fraction of the half width of the constant's interval.
+#: A group of cases needs no more realisations if the constant hardly depends on this group: a shift of the results by
+#: one standard error changes the constant by less than this fraction of the half width of its interval.
 NEGLIGIBLE = 0.01
 #: To extrapolate to zero scatter, the fit is repeated with the scatter changed by this fraction.
 LESS = 0.01
@@ -30,7 +30,7 @@ def require_known(campaign: Campaign) -> None:
     Raises
     ------
     CampaignError
-        If no fit of the model gives such a constant, or if a campaign with an adaptive axis names both outputs and
+        If no fit of the model gives a named constant, or if a campaign with an adaptive axis names both outputs and
         constants. The message has one sentence for each wrong name.
     """
     known = available(campaign.model) if campaign.replication.answers else {}
@@ -71,7 +71,7 @@ def half_widths(
 
 
 def is_wide(value: xr.DataArray, half: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
-    """Return where an interval is wider than the tolerance allows; False where an interval has no finite ends."""
+    """Return where an interval is wider than the tolerance; False where an end of the interval is not finite."""
     return (half > _allowed(value, tolerance)) & np.isfinite(half)
 
 
@@ -81,12 +81,12 @@ def _allowed(value: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
 
 
 def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.DataArray]:
-    """Return, for each series, the half width that the interval would have without scatter of the realisations.
+    """Return, for each series, the half width that the interval of a constant would have without scatter.
 
-    This half width is due to grid errors and to the misfit of the law, and more realisations do not reduce it. The fit
-    is repeated with the scatter multiplied by ``1 - LESS`` and by ``1 + LESS``. From each of these fits, the half width
-    is extrapolated linearly to zero scatter. The smaller of the two results is returned, because the half width jumps
-    if a change of the scatter alters the verdict on the law.
+    This half width is due to grid errors and to the misfit of the law. More realisations do not reduce this half width.
+    The fit is repeated with the scatter multiplied by ``1 - LESS`` and by ``1 + LESS``. From each of these fits, the
+    half width is extrapolated linearly to zero scatter. The smaller of the two results is returned. The two results
+    differ greatly if a change of the scatter alters the verdict on the law, because the half width then jumps.
     """
     now = half_widths(fit, constant, groups)
 
@@ -99,7 +99,7 @@ def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -
 
 
 def _scattered(data: xr.Dataset, scale: float) -> xr.Dataset:
-    """Return a study with the same means over the realisations, and their scatter multiplied by `scale`."""
+    """Return a study in which the scatter of the realisations about their mean is multiplied by `scale`."""
     found = {}
     for name in _results(data):
         mean = data[name].mean("realisation")
@@ -110,10 +110,11 @@ def _scattered(data: xr.Dataset, scale: float) -> xr.Dataset:
 def still_wide(
     fit: Fit, constant: str, groups: Mapping[str, xr.Dataset], tolerance: Tolerance, at_most: int
 ) -> dict[str, xr.DataArray]:
-    """Return, for each series, where an interval is too wide and more realisations are worth while.
+    """Return, for each series, where the interval of a constant is too wide and more realisations are worth while.
 
-    More realisations are not worth while if the half width due to scatter alone is already within the tolerance, but
-    the total half width would exceed the tolerance even with `at_most` realisations.
+    The half width of an interval has a part due to scatter, and a part due to grid errors and misfit. More realisations
+    are not worth while if two conditions are met: the part due to scatter is already within the tolerance, and the
+    total half width would exceed the tolerance even with `at_most` realisations.
 
     Raises
     ------
@@ -139,9 +140,9 @@ def cases_behind(
     """Return the cases of a series that affect a constant whose interval is too wide.
 
     Along each dimension over which the constant is fitted, neighbouring cases form groups. The results of one group at
-    a time are shifted by a small fraction of their standard error, and the fit is repeated. If the constant changes, it
-    depends on this group. A case is chosen if, along each of these dimensions, the constant depends on the group of the
-    case. In this way, all cases that a fit compares get the same number of realisations.
+    a time are shifted by a small fraction of their standard error, and the fit is repeated. If the constant changes,
+    the constant depends on this group. A case is chosen if, along each of these dimensions, the constant depends on the
+    group that contains the case.
 
     Parameters
     ----------
@@ -192,7 +193,10 @@ def cases_behind(
 
 
 def _over(dims: list[str], flags: xr.DataArray) -> xr.DataArray:
-    """Return flags with the dimensions `dims` only: whether any flag is set along the other dimensions."""
+    """Return flags that have the dimensions `dims` only.
+
+    A returned flag is set if any flag along the other dimensions is set.
+    """
     bare = flags.drop_vars(flags.coords)
     return bare.any([dim for dim in bare.dims if dim not in dims])
 
@@ -200,8 +204,8 @@ def _over(dims: list[str], flags: xr.DataArray) -> xr.DataArray:
 def _steps(data: xr.Dataset, inner: list[str]) -> dict[str, xr.DataArray]:
     """Return the shift of each output of every case.
 
-    All realisations of a case are shifted equally. The shifts of different cases have random signs and sizes, because
-    equal shifts would cancel in differences between cases.
+    All realisations of a case are shifted equally. The shifts of different cases have random signs and sizes. Equal
+    shifts would cancel if a fit uses differences between cases.
     """
     generator, shape = np.random.Generator(np.random.Philox(0)), [data.sizes[dim] for dim in inner]
     found = {}
@@ -213,6 +217,6 @@ def _steps(data: xr.Dataset, inner: list[str]) -> dict[str, xr.DataArray]:
 
 
 def _results(data: xr.Dataset) -> list[str]:
-    """Return the names of the outputs that have values for each realisation; their errors are not among them."""
+    """Return the names of the outputs that have a value for each realisation, but not the names of their errors."""
     beside = {"status", *(array.attrs.get("ancillary_variables") for array in data.data_vars.values())}
     return [str(key) for key, array in data.data_vars.items() if key not in beside and "realisation" in array.dims]

@@ -21,11 +21,11 @@ from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.campaign import Campaign
 from mdr_dask.errors import FitError, distinguishable
 
-#: A law holds if the rms of the relative departures is at most this, and the largest of them at most twice this.
+#: A law holds if the rms relative departure is at most this value, and the largest departure at most twice this value.
 WITHIN = 0.05
-#: A law holds approximately if the rms of the relative departures is at most this, and the largest at most twice this.
+#: A law holds approximately if the rms relative departure is at most this value, and the largest at most twice as much.
 APPROXIMATE = 0.15
-#: A departure counts against a law if the probability that scatter and errors alone cause it is below this.
+#: Departures count against a law if scatter and errors alone would cause such departures with a probability below this.
 DOUBTFUL = 0.05
 
 
@@ -42,10 +42,10 @@ class Fit:
     summary : str
         The law, in one line.
     compute : callable, mapping of str to Dataset -> Dataset
-        Takes the groups of a store by the name of the series (``""`` for a store without series). Each group has the
-        dimensions (axes..., realisation, ...). The coordinates of a group are all scalar parameters, varied or fixed.
-        Returns every constant with the ends of its 95 % interval, ``<name>_low`` and ``<name>_high``, measures of the
-        goodness of fit, and ``law_holds``. Units are in the attrs.
+        Takes the groups of a store, indexed by the name of the series (``""`` for a store without series). Each group
+        has the dimensions (axes..., realisation, ...). The coordinates of a group are all scalar parameters, varied or
+        fixed. Returns three kinds of variables: every constant with the ends of its 95 % interval (``<name>_low`` and
+        ``<name>_high``), measures of the goodness of fit, and ``law_holds``. Units are in the attrs.
     apart : bool
         Whether each series of a store is fitted separately. ``compute`` then gets a mapping with one series.
     constants : tuple of str, or callable, Campaign -> tuple of str
@@ -65,7 +65,10 @@ class Fit:
         return self.constants(campaign) if callable(self.constants) else self.constants
 
     def results(self, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
-        """Fit a store, and return one result for each series with the necessary data, or one for all series together.
+        """Fit a store, and return the results, indexed by the name of the series.
+
+        With the option `apart`, there is one result for each series that has the necessary data. Otherwise there is one
+        result for all series together, with the name ``""``.
 
         Raises
         ------
@@ -100,7 +103,7 @@ FITTED_LAW_HOLDS = {"units": "1", "long_name": "whether the law holds with the f
 
 
 def _judged(result: xr.Dataset) -> xr.Dataset:
-    """Return a result with ``law_holds`` as its last variable. It is *not tested* if the fit gives no verdict."""
+    """Return a result with ``law_holds`` as its last variable: *not tested* if the fit gives no verdict."""
     sentence = result.get("law_holds", xr.DataArray("not tested: this fit compares no law with its data"))
     return result.drop_vars("law_holds", errors="ignore").assign(law_holds=sentence.assign_attrs(LAW_HOLDS))
 
@@ -115,9 +118,10 @@ class Fitted:
     Attributes
     ----------
     constants : array, shape (rows, p)
-        Stack of the constants, for `mdr_dask.bootstrap.interval`; NaN for constants that the data do not determine.
+        Stack of the constants; NaN for constants that the data do not determine. `mdr_dask.bootstrap.interval` computes
+        intervals from this stack.
     residuals : array, shape (rows, cases)
-        Stack of data minus law.
+        Stack of the differences between data and law (data minus law).
     count : int
         Number of realisations that were resampled.
     """
@@ -148,7 +152,7 @@ def fitted(
     """Fit a law to a stack of data.
 
     If scatter and errors do not explain the residuals, the law is also fitted to data that are shifted by the
-    residuals, which widens the intervals of the constants.
+    residuals. These additional fits widen the intervals of the constants.
 
     Parameters
     ----------
@@ -162,8 +166,9 @@ def fitted(
     count : int
         Number of realisations that were resampled.
     stated : array, shape (p,), optional
-        Constants that the source of the law states. Whether the data determine a constant is tested at the fitted and,
-        if given, at the stated constants. A constant that fails one of these tests is NaN.
+        Constants that the source of the law states. The fit tests whether the data determine each constant. The test is
+        made at the fitted constants and, if given, at the stated constants. A constant that fails one of these tests is
+        NaN.
     """
     constants = fit(data)
     residuals = left(data, constants)
@@ -181,9 +186,9 @@ def fitted(
 def undetermined(effects: FloatArray) -> BoolArray:
     """Return which constants of a law the data do not determine.
 
-    One constant is changed by 1, and the other constants are fitted again. The constant is undetermined if this changes
-    the law by less than `WITHIN` in every case. A law still holds with such departures, so the fitted value of the
-    constant would be arbitrary.
+    One constant is changed by 1, and the other constants are fitted again. The constant is undetermined if both changes
+    together alter the law by less than `WITHIN` in every case. Departures below `WITHIN` do not count against a law.
+    Therefore very different values of such a constant fit the data equally well.
 
     Parameters
     ----------
@@ -208,7 +213,7 @@ def verdict(
     *,
     excluded: bool = False,
 ) -> str:
-    """Return a sentence on whether a law holds, from a stack of its departures.
+    """Return a sentence on whether a law holds, from a stack of the departures of the data from the law.
 
     Parameters
     ----------
@@ -221,7 +226,7 @@ def verdict(
     where : callable, int -> str, optional
         Describes a case in words. The sentence contains this description of the case with the largest departure.
     excluded : bool
-        Whether the interval of a fitted constant excludes the stated value, so that scatter does not explain the
+        Whether the interval of a fitted constant excludes the stated value. If so, scatter does not explain the
         departures.
     """
     if residuals.shape[1] <= constants:
@@ -249,7 +254,8 @@ def law_holds(
     """Return a sentence on whether a law holds.
 
     If scatter may hide departures larger than `WITHIN`, the verdict is at best *approximately*. If scatter may hide
-    departures larger than `APPROXIMATE`, small departures do not confirm the law, and the verdict is *not tested*.
+    departures larger than `APPROXIMATE`, the verdict is *not tested*, because small departures then do not confirm the
+    law.
 
     Parameters
     ----------
@@ -263,7 +269,8 @@ def law_holds(
     where : str
         Description of the case with the largest departure.
     scatter : float
-        Rms departure that scatter and errors alone exceed with a probability of 5 %; NaN if it is unknown.
+        Rms departure that scatter and errors alone would exceed with a probability of 5 %; NaN if the scatter is
+        unknown.
     """
     if departures.size <= constants:
         return f"not tested: {departures.size} cases for {constants} constants leave nothing to compare"

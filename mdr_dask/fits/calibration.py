@@ -1,7 +1,7 @@
 """Calibration: estimate unknown parameters of a study from measured points.
 
-The unknowns are the axes of the study that are not columns of the table of measured points. The posterior density of
-the unknowns is computed on cells, which divide the ranges of these axes (see `mdr_dask.fits.posterior`).
+The unknowns are the axes of the study that are not columns of the table of measured points. The ranges of these axes
+are divided into cells. The posterior density of the unknowns is computed in each cell (see `mdr_dask.fits.posterior`).
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from mdr_dask.fits.posterior import DEVIATIONS, Noise, Posterior, distance, like
 from mdr_dask.fits.prediction import Prediction, prediction
 from mdr_dask.tables import decoded
 
-#: Smallest error of measurement that is considered possible, divided by the rms residual of the best prediction.
+#: Smallest possible error of measurement, as a fraction of the rms residual of the best prediction.
 LEAST = 0.2
-#: Smallest rms residual, divided by the rms of the measured values; smaller residuals may be due to rounding.
+#: Smallest rms residual, as a fraction of the rms measured value. Smaller residuals may be due to rounding.
 _ROUNDING = 1e-9
 
 
@@ -51,9 +51,9 @@ class Calibration:
     units : dict of str to str
         Units of the unknowns, the conditions and the output.
     contradicted : Residuals or None
-        None if the errors of measurement in the table explain the residuals. Otherwise these are the residuals, and the
-        posterior is computed with errors of measurement that are large enough to explain them. The intervals then
-        include the misfit.
+        None if the errors of measurement in the table explain the residuals. Otherwise the residuals. The posterior is
+        then computed with errors of measurement that are large enough to explain these residuals. Therefore the
+        intervals include the misfit.
     """
 
     measured: Measured
@@ -75,7 +75,7 @@ class Calibration:
 
     @cached_property
     def ends(self) -> list[identifiability.Ends]:
-        """For each unknown, whether the data leave the ends of its axis open (see `identifiability.OPEN`)."""
+        """For each unknown, whether the lower and the upper end of its axis are open (see `identifiability.OPEN`)."""
         return identifiability.open_ends(self.posterior)
 
     @cached_property
@@ -153,14 +153,14 @@ def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
 
     Notes
     -----
-    The likelihood is a normal distribution. The covariance of the measured points has four parts: the errors of
-    measurement; the scatter of the rough lines, which is common to all points; half of the estimated errors of grid and
-    interpolation, as an error that is common to all points; and the other half, as an error that is independent for
-    each point.
+    The likelihood is a normal distribution. The covariance of the measured points has three parts: the
+    errors of measurement; the scatter of the rough lines, which is common to all points; and the estimated errors of
+    grid and interpolation. One half of the errors of grid and interpolation is treated as common to all points. The
+    other half is treated as independent for each point.
 
-    If the table gives no errors of measurement, two kinds are considered: errors that are equal for all points, and
-    errors proportional to the values. The size of these errors is unknown; the logarithm of the size has a uniform
-    prior.
+    If the table gives no errors of measurement, two kinds of errors are considered: errors that are equal for all
+    points, and errors that are proportional to the values. The size of these errors is unknown. The logarithm of the
+    size has a uniform prior.
     """
     predicted = prediction(dataset, measured)
     named = (*predicted.unknowns, *measured.conditions, measured.output)
@@ -185,7 +185,7 @@ def _posterior(predicted: Prediction, measured: Measured, noises: list[Noise]) -
 def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
     """Return possible errors of measurement, which are about as large as the residuals.
 
-    The errors are equal for all points or, if all values are positive, proportional to the values.
+    One kind of error is equal for all points. If all values are positive, another kind is proportional to the values.
     """
     values, count = measured.values, measured.values.size
     unknowns = len(predicted.unknowns)
@@ -215,8 +215,8 @@ def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
 def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
     """Return possible sizes of the error of measurement, from the rms residual of the best prediction.
 
-    The smallest size is `LEAST` times the rms residual. The largest is the size that the error exceeds with a
-    probability of 0.1 %, given these residuals.
+    The smallest size is `LEAST` times the rms residual. The true error exceeds the largest size with a probability of
+    0.1 %, given these residuals.
     """
     spare = max(1, count - unknowns)
     most = min(100.0, float(np.sqrt(count / (2 * gammaincinv(spare / 2, 0.001)))))
@@ -259,7 +259,7 @@ def with_table(groups: Mapping[str, xr.Dataset], table: Any) -> dict[str, xr.Dat
 
 
 def read_file(path: str | Path) -> dict[str, str]:
-    """Return name and text of a table in a file, as a study stores them."""
+    """Return the name of a file and the text of the table in it, in the form in which a study stores both."""
     path = Path(path)
     try:
         return {"name": path.name, "text": decoded(path.read_bytes(), str(path))}
@@ -268,7 +268,7 @@ def read_file(path: str | Path) -> dict[str, str]:
 
 
 def calibration(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    """Return values, intervals and correlations of the unknowns of a series."""
+    """Calibrate a series. Return the values, intervals and correlations of the unknowns."""
     (dataset,) = groups.values()
     return summary(calibrate(dataset, measured_of(dataset)))
 
@@ -323,7 +323,10 @@ def _intervals(values: FloatArray, weights: FloatArray) -> dict[str, float]:
 
 
 def _bound(found: Calibration, k: int) -> dict[str, float]:
-    """Return the one-sided interval of unknown k; empty unless k is the only undetermined one and has one open end."""
+    """Return the one-sided interval of the unknown number `k`.
+
+    The result is empty unless this unknown is the only undetermined one and has exactly one open end.
+    """
     low, high = found.ends[k]
     if found.free != [k] or low == high:
         return {}

@@ -1,7 +1,7 @@
-"""Functions that many fits use: the cases of a series as arrays, laws fitted to them, and results as variables.
+"""Functions that many fits use: arrays of the cases of a series, fits of laws to such arrays, and variables of results.
 
-A *stack* is an array from which intervals are computed: its first row holds the means, and its further rows hold the
-means of resampled realisations and the means shifted by their errors (see `mdr_dask.bootstrap`).
+A *stack* is an array from which intervals are computed. The first row of a stack holds the means. The further rows hold
+the means of resampled realisations, and the means shifted by their errors (see `mdr_dask.bootstrap`).
 """
 
 from __future__ import annotations
@@ -28,19 +28,21 @@ def each(
     fit: Callable[[xr.Dataset], Variables],
     *outputs: str,
 ) -> xr.Dataset:
-    """Fit a law to all cases along some dimensions, separately for each combination of values of the other ones.
+    """Fit a law to the cases along some dimensions.
+
+    The fit is repeated for each combination of values along the other dimensions.
 
     Parameters
     ----------
     series : mapping of str to Dataset
         One series.
     inner : callable
-        Returns the dimensions of the cases that one fit combines, such as those of load and velocity.
+        Returns the dimensions along which one fit combines the cases, such as the dimensions of load and velocity.
     fit : callable
-        Returns the results of the fit for one combination of values of the other dimensions.
+        Returns the results of the fit for one combination of values along the other dimensions.
     *outputs : str
-        Outputs that the fit needs. The first output must have no dimensions other than the axes of the study and the
-        realisation.
+        Outputs that the fit needs. The dimensions of the first output must be axes of the study or the dimension of
+        realisations.
 
     Raises
     ------
@@ -71,7 +73,7 @@ def dimensions(data: xr.Dataset, *names: str) -> list[str]:
 
 
 def one_value(data: xr.Dataset, name: str) -> float:
-    """Return a parameter that is equal in all cases; raise FitError if the study lacks it, or if it varies."""
+    """Return a parameter that is equal in all cases; raise FitError if the parameter is missing or varies."""
     require(data, name)
     values = data[name]
     if values.size != 1:
@@ -82,12 +84,12 @@ def one_value(data: xr.Dataset, name: str) -> float:
 
 
 class Table(NamedTuple):
-    """An output of all cases, divided by a scale.
+    """The values of an output in all cases, divided by a scale such as the rms slope.
 
     Attributes
     ----------
     values, error : array, shape (cases, realisations)
-        The output and its discretisation error, both divided by the scale.
+        The output divided by the scale, and the discretisation error divided by the scale.
     columns : tuple of array, shape (cases,)
         Other numbers of the cases, such as load and velocity.
     """
@@ -110,7 +112,7 @@ class Table(NamedTuple):
         return bootstrap.with_errors(bootstrap.logarithms(means), np.where(np.isinf(relative), 1.0, relative))
 
     def mean_error(self, used: Any = slice(None)) -> FloatArray:
-        """Return the discretisation errors of the means of the `used` cases; 0 where they are unknown."""
+        """Return the discretisation errors of the means of the `used` cases; 0 where an error is unknown."""
         known = ~np.isnan(self.error[used])
         total = np.where(known, np.abs(self.error[used]), 0.0).sum(axis=1)
         mean: FloatArray = total / np.maximum(known.sum(axis=1), 1)
@@ -127,7 +129,10 @@ class Table(NamedTuple):
 
 
 def table_of(data: xr.Dataset, scale: Any, *columns: xr.DataArray, output: str = "friction_coefficient") -> Table:
-    """Return an output of all cases divided by a scale, with other numbers of the cases as columns."""
+    """Return the values of an output in all cases, divided by a scale.
+
+    The arrays `columns` hold other numbers of the cases, such as load and velocity.
+    """
     values = data[output]
     error = companion(data, output)
     arrays = xr.broadcast(values / scale, (0 * values if error is None else error) / scale, *columns)
@@ -144,7 +149,7 @@ def table_of(data: xr.Dataset, scale: Any, *columns: xr.DataArray, output: str =
 
 
 def linear(design: FloatArray, logs: FloatArray, count: int) -> Fitted:
-    """Fit a law that is linear in its constants to a stack of logarithms.
+    """Fit a law to a stack of logarithms. The law must be linear in its constants.
 
     `design` are the derivatives of the law with respect to its constants, shape (constants, cases).
     """
@@ -153,12 +158,12 @@ def linear(design: FloatArray, logs: FloatArray, count: int) -> Fitted:
 
 
 def power_law(x: FloatArray, logs: FloatArray, count: int) -> Fitted:
-    """Fit a straight line to a stack of logarithms against x; the constants are its slope and its value at x = 0."""
+    """Fit a straight line to a stack of logarithms against x. The constants are the slope and the value at x = 0."""
     return linear(np.vstack([x, np.ones(x.size)]), logs, count)
 
 
 def stated_power(x: FloatArray, logs: FloatArray, power: float, count: int, where: Callable[[int], str]) -> str:
-    """Return a sentence on whether data follow a power law with a stated exponent and any factor.
+    """Return a sentence on whether data follow a power law with a stated exponent; the factor is fitted.
 
     `x` are the logarithms of the abscissa, and `logs` is the stack of the logarithms of the data.
     """
@@ -177,7 +182,7 @@ def nonlinear(
     count: int,
     where: Callable[[int], str],
 ) -> tuple[Fitted, Variables]:
-    """Fit a law to a stack of logarithms, and compare the data with its stated and with its fitted constants.
+    """Fit a law to a stack of logarithms. Compare the data with the law for the stated and for the fitted constants.
 
     Parameters
     ----------
@@ -195,7 +200,8 @@ def nonlinear(
     Returns
     -------
     Fitted, Variables
-        The fit; and variables with the rms departure, the largest departure and both verdicts.
+        The fit, and result variables: rms and largest departure and a verdict, each for the stated and for the fitted
+        constants.
     """
     found = fitted(
         lambda rows: _least_squares(model, stated, rows), lambda rows, best: rows - model(best), logs, count, stated
@@ -220,8 +226,8 @@ def rms(left: FloatArray) -> float:
 def _least_squares(model: Callable[[FloatArray], FloatArray], start: FloatArray, data: FloatArray) -> FloatArray:
     """Fit every row of the data, shape (rows, cases), by Levenberg-Marquardt steps.
 
-    Return the constants, shape (rows, constants). Each call of the model evaluates all rows; this is a hundred times
-    faster than one scipy fit for each row.
+    Return the constants, shape (rows, constants). Each call of the model evaluates all rows. This evaluation is a
+    hundred times faster than one scipy fit for each row.
     """
     size = np.eye(start.size)
     constants = np.tile(start, (data.shape[0], 1))
@@ -251,23 +257,23 @@ def _least_squares(model: Callable[[FloatArray], FloatArray], start: FloatArray,
 def constant(
     name: str, stack: FloatArray, count: int, long_name: str, positive: bool = False, unit: str = "1"
 ) -> Variables:
-    """Return a constant and the ends of its interval as variables."""
+    """Return the result variables of a constant: its value and the ends of its interval."""
     low, high = bootstrap.interval(stack, count, positive)
     values = {name: stack[0], f"{name}_low": low, f"{name}_high": high}
     return {key: xr.Variable((), value, {"units": unit, "long_name": long_name}) for key, value in values.items()}
 
 
 def measure(name: str, value: float, long_name: str) -> Variables:
-    """Return a number without an interval as a variable."""
+    """Return the result variable of a number that has no interval."""
     return {name: xr.Variable((), value, {"units": "1", "long_name": long_name})}
 
 
 def text(name: str, sentence: str, long_name: str) -> Variables:
-    """Return a sentence as a variable."""
+    """Return the result variable that holds a sentence, such as a verdict."""
     return {name: xr.Variable((), sentence, {"units": "1", "long_name": long_name})}
 
 
 def holds(stated: str, with_fitted: str = "") -> Variables:
-    """Return ``law_holds`` and, if given, ``fitted_law_holds`` as variables."""
+    """Return the result variable ``law_holds`` and, if `with_fitted` is given, ``fitted_law_holds``."""
     found = {"fitted_law_holds": xr.Variable((), with_fitted, FITTED_LAW_HOLDS)} if with_fitted else {}
     return found | {"law_holds": xr.Variable((), stated, LAW_HOLDS)}

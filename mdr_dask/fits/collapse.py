@@ -16,9 +16,9 @@ from mdr_dask.physics.superposition.laws import ShiftLaw
 from mdr_dask.physics.superposition.master_curve import Superposition
 from mdr_dask.units import conversion
 
-DEGREES = range(1, 7)  # degrees of the polynomials that are fitted to each curve to estimate its scatter
+DEGREES = range(1, 7)  # degrees of the polynomials that are fitted to each curve, in order to estimate the scatter
 HOLDS = {"yes", "approximately"}
-LOG = float(np.log(10.0))  # converts a departure in decades into a relative departure
+LOG = float(np.log(10.0))  # factor that converts a small departure in decades into a relative departure
 
 
 def laws_of(
@@ -32,9 +32,9 @@ def laws_of(
     Returns
     -------
     laws : list of ShiftLaw
-        Laws of log10 a_T for temperatures, of the shift factor itself for velocities.
+        For temperatures, laws of log10 a_T; for velocities, laws of the shift factor in decades.
     verdicts : dict of str to str
-        For each law, a sentence on whether it holds.
+        For each law, a sentence on whether the law holds.
     """
     size, anchor = result.groups.size, result.groups.size // 2
     groups, factors = result.groups, result.horizontal - result.horizontal[anchor]
@@ -62,7 +62,7 @@ def laws_of(
 
 
 def sign_of(over: str) -> int:
-    """Return -1 if the abscissa is a time, otherwise (frequency) 1.
+    """Return -1 if the abscissa is a time; otherwise, as for a frequency, return 1.
 
     A shift factor in decades is log10 a_T times this sign.
     """
@@ -72,7 +72,7 @@ def sign_of(over: str) -> int:
 def kelvins(temperatures: FloatArray, unit: str, groups: FloatArray | None = None) -> FloatArray:
     """Return temperatures in K.
 
-    Temperatures without a unit count as K if their median exceeds 250, otherwise as degC.
+    If the unit is unknown, the temperatures count as K if their median exceeds 250, and otherwise as degC.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def kelvins(temperatures: FloatArray, unit: str, groups: FloatArray | None = Non
     unit : str
         Unit as written in the table; empty if the table has no unit.
     groups : array, optional
-        All temperatures of the table, for the median; by default `temperatures`.
+        The temperatures from which the median is computed: all temperatures of the table. By default `temperatures`.
     """
     if unit in ("", "1", "-"):
         unit = "K" if np.median(temperatures if groups is None else groups) > 250 else "degC"
@@ -89,7 +89,7 @@ def kelvins(temperatures: FloatArray, unit: str, groups: FloatArray | None = Non
 
 
 def constants_of(laws: list[ShiftLaw]) -> dict[str, xr.Variable]:
-    """Return the constants of laws with their intervals, and how far the shift factors lie from each law."""
+    """Return the constants of laws with their intervals, and the rms distance of the shift factors from each law."""
     return {name: value for law in laws for name, value in _constants(law).items()}
 
 
@@ -105,7 +105,7 @@ def _constants(law: shift_laws.ShiftLaw) -> dict[str, xr.Variable]:
 
 
 def with_verdict(curve: xr.Dataset, verdicts: dict[str, str]) -> xr.Dataset:
-    """Add ``law_holds`` to a master curve: whether its curves collapse, and which law its shift factors follow.
+    """Add ``law_holds`` to a master curve: whether the curves collapse, and which law the shift factors follow.
 
     If the curves do not determine all shift factors, neither the collapse nor a law is tested. For example, two
     plateaus of the same height coincide for any shift.
@@ -128,8 +128,8 @@ def with_verdict(curve: xr.Dataset, verdicts: dict[str, str]) -> xr.Dataset:
 def _collapse(curve: xr.Dataset) -> str:
     """Return a sentence on whether the curves collapse.
 
-    The scatter about the merged curve is compared with the scatter of each curve about its own polynomial. If two
-    ordinates were shifted together, the sentence is about the ordinate that collapses less well.
+    The scatter of all points about the merged curve is compared with the scatter of each curve about its own
+    polynomial. If two ordinates were shifted together, the sentence is about the ordinate that collapses less well.
     """
     names = [name for name in ("ordinate", "companion") if f"point_{name}" in curve]
     answers = [_collapse_of(curve, name) for name in names]
@@ -161,13 +161,16 @@ def _collapse_of(curve: xr.Dataset, name: str) -> str:
 
 
 class _Within(NamedTuple):
-    """Squared residuals of each curve about its own polynomial, summed over all curves, and the degrees of freedom."""
+    """The scatter of curves: squared residuals of each curve from its own polynomial, summed over all curves.
+
+    `freedom` is the number of degrees of freedom of this sum.
+    """
 
     squares: float
     freedom: int
 
     def criterion(self, points: int) -> float:
-        """Return Schwarz's criterion; the degree with the smallest value is chosen."""
+        """Return Schwarz's criterion. The degree of the polynomials with the smallest criterion is chosen."""
         mean = max(self.squares, 1e-300) / points
         return float(points * np.log(mean) + (points - self.freedom) * np.log(points))
 

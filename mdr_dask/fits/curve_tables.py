@@ -20,7 +20,8 @@ from mdr_dask.units import conversion, is_unit
 if TYPE_CHECKING:
     from mdr_dask.physics.superposition.master_curve import Vertical
 
-LEAST_JUMP = 3.0  # the gap between two groups of scattered values is at least this many times a gap within a group
+# a gap between two groups of measured values is at least this many times as wide as a gap within a group
+LEAST_JUMP = 3.0
 
 
 def read_table(path: str | Path) -> pd.DataFrame:
@@ -75,9 +76,10 @@ def finite_rows(frame: pd.DataFrame, columns: list[str]) -> tuple[pd.DataFrame, 
 
 
 def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
-    """Return the column with this name, or the first one with a synonym of it.
+    """Return the column with the wanted name, or else the first column whose name is a synonym.
 
-    The result is None if there is no such column, or if several columns have synonyms as names and their values differ.
+    The result is None if there is no such column. It is also None if the names of several columns are synonyms, and the
+    values of these columns differ.
     """
     columns = [str(name) for name in frame.columns]
     if wanted in columns:
@@ -87,7 +89,7 @@ def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
 
 
 def _agree(one: pd.Series, other: pd.Series) -> bool:
-    """Return whether two columns differ only by their units: by a constant factor or a constant difference."""
+    """Return whether two columns differ by a constant factor or a constant difference only, as for different units."""
     first, second = one.to_numpy(dtype=np.float64), other.to_numpy(dtype=np.float64)
     with np.errstate(all="ignore"):
         return any(np.ptp(each) <= AGREE * abs(np.median(each)) for each in (second / first, second - first))
@@ -115,7 +117,7 @@ FAMILIES = (
 def columns_to_use(
     frame: pd.DataFrame, abscissa: str | None, ordinate: str | Sequence[str] | None, group: str | None
 ) -> tuple[str, tuple[str, ...], str]:
-    """Return the columns of abscissa, ordinates and group.
+    """Return the names of the columns of abscissa, ordinates and group.
 
     Columns that are not given are taken from the first of the `FAMILIES` that fits the table.
     """
@@ -150,10 +152,10 @@ def columns_to_use(
 
 
 def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, str]) -> Vertical:
-    """Return the kind of vertical factors for these columns: ``modulus``, ``compliance`` or ``none``.
+    """Return the kind of vertical factors that suit these columns: ``modulus``, ``compliance`` or ``none``.
 
-    Moduli and compliances need a time or frequency as abscissa and a temperature as group. Columns are recognised by
-    their name or by their unit.
+    The kinds ``modulus`` and ``compliance`` need a time or frequency as abscissa, and a temperature as group. Columns
+    are recognised by their name or by their unit.
     """
 
     def is_one(column: str, *names: str, unit: str) -> bool:
@@ -180,7 +182,7 @@ def _has_unit(unit: str, wanted: str) -> bool:
 
 
 def second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
-    """Return a second parameter in which the curves differ (velocity or temperature); None if there is none.
+    """Return a second parameter in which the curves differ, velocity or temperature; None if only one parameter varies.
 
     Raise DataError if the curves differ in the normal force, or in more than one other parameter.
     """
@@ -197,7 +199,7 @@ def second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
 def curves_of(
     frame: pd.DataFrame, over: str, ordinates: Sequence[str], by: str
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
-    """Return for each curve the value of its group, and log10 of abscissas and ordinates of its points.
+    """Return the value of the group of each curve, and the logarithms (log10) of its abscissas and ordinates.
 
     Ordinates have the shape (channels, points).
     """
@@ -215,7 +217,7 @@ def curves_of(
 def pairs_of(
     frame: pd.DataFrame, over: str, ordinates: Sequence[str], by: tuple[str, str]
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
-    """Return the values of both groups of each curve, shape (curves, 2), and its points as in `curves_of`."""
+    """Return the values of both groups, shape (curves, 2), and the points of all curves as in `curves_of`."""
     labels = np.array([clusters(frame[name].to_numpy(dtype=np.float64)) for name in by])
     keys, curves = [], []
     for pair in sorted(set(map(tuple, labels.T))):
@@ -236,10 +238,10 @@ def pairs_of(
 def clusters(values: FloatArray, abscissa: FloatArray | None = None) -> NDArray[np.intp]:
     """Return the index of the group of each value.
 
-    Measured values scatter about a few set values; they are divided into groups at the wide gaps. If the gaps between
-    distinct values are nearly equal, or if most values occur several times, each distinct value is a group of its own.
-    There is one exception: values that alternate within one sweep of the abscissa are rounded readings of one set
-    value, and form one group.
+    Measured values scatter about a few set values. The sorted values are divided into groups at the wide gaps. If the
+    gaps between distinct values are nearly equal, or if most values occur several times, each distinct value is a group
+    of its own. One exception: values that alternate within one sweep of the abscissa are rounded readings of one set
+    value. Such values form one group.
     """
     distinct, place, times = np.unique(values, return_inverse=True, return_counts=True)
     if distinct.size < 3:

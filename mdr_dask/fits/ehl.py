@@ -44,7 +44,7 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     residuals = table[3] - design[:, varied] @ solution
     inverse = np.linalg.pinv(design[:, varied])
     width[varied] = t.ppf(0.975, freedom) * np.sqrt(np.sum(inverse**2, axis=1) * np.sum(residuals**2) / freedom)
-    if np.sqrt(np.mean(residuals**2)) > WITHIN:  # a systematic misfit does not average out like scatter
+    if np.sqrt(np.mean(residuals**2)) > WITHIN:  # unlike scatter, a systematic misfit does not average out
         width[varied] += np.abs(inverse) @ np.abs(residuals)
     constants[varied] = np.where(undetermined(design[:, varied]), np.nan, solution)
     return constants, width, residuals
@@ -53,9 +53,9 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 def _films(data: xr.Dataset) -> Variables:
     """Fit ``h/R = factor W^load U^speed G^material`` to the central and to the minimum film thickness.
 
-    An exponent is NaN if its parameter (W, U or G) does not vary, or varies only together with the other two. Computed
-    films have no scatter, so the intervals follow from the misfit of the formula. ``law_holds`` is about the formula of
-    Pan and Hamrock with its published constants.
+    An exponent is NaN if its parameter (W, U or G) does not vary, or if the parameter varies only in proportion to
+    powers of the other two. Computed films have no scatter. Therefore the intervals follow from the misfit of the
+    formula. ``law_holds`` is about the formula of Pan and Hamrock with its published constants.
     """
     found: Variables = {}
     departures, of_stated = [], []

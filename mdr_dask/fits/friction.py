@@ -1,11 +1,11 @@
 """Fit the laws of steady sliding friction (thesis eqs. 3.11 to 3.18) to a store.
 
-Symbols: mu is the coefficient of friction, F_N the normal force, v the velocity, L the length of the line and h its rms
-height, G the shear modulus and tau the relaxation time.
+Symbols: mu is the coefficient of friction, F_N the normal force, and v the velocity. The line has the length L and the
+rms height h. The body has the shear modulus G and the relaxation time tau.
 
 Friction against velocity has four regions. Friction is proportional to the velocity in region I, grows more slowly in
-region II, is at its plateau in region III, and falls in region IV. The load has two zones: the line is in partial
-contact in zone 1, at low loads, and in full contact in zone 2.
+region II, is at its plateau in region III, and falls in region IV. The load has two zones. In zone 1, at low loads, the
+line is in partial contact. In zone 2, the line is in full contact.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ from mdr_dask.physics.sliding import laws
 
 MODELS = ("sliding_friction",)
 FRICTION = "friction_coefficient"
-# loads F_N / (G h L) that are used in zone 1; with other limits, alpha changes by up to 0.02, and beta by up to 0.14
+# smallest and largest load F_N / (G h L) of the fit in zone 1; other limits change alpha by up to 0.02, beta by 0.14
 ZONE_ONE = (0.01, 0.3)
-LINEAR = 0.05  # velocities are in region I if mu / v differs by less than this fraction between neighbours
+LINEAR = 0.05  # two neighbouring velocities are in region I if the values of mu / v differ by less than this fraction
 NEEDS_SLOPE = "not tested: the study has no output contact_slope"
 
 
 def spectral_slope(data: xr.Dataset) -> xr.DataArray:
-    """Return the rms slope of the line; it is computed from the spectrum if the store does not have it.
+    """Return the rms slope of the line. If the store does not have the slope, compute the slope from the spectrum.
 
     The slope is NaN for a smooth line, for which friction divided by the slope has no meaning.
     """
@@ -57,7 +57,7 @@ def spectral_slope(data: xr.Dataset) -> xr.DataArray:
     if "hurst" not in data:
         raise FitError("expected the output rms_slope in the store of a measured surface, got none")
     require(data, "hurst", "points", "rms_roughness", "length")
-    from mdr_dask.physics.surfaces import roughness  # it imports numba
+    from mdr_dask.physics.surfaces import roughness  # this module imports numba
 
     cutoffs = [data.coords.get(name, xr.DataArray(np.nan)) for name in ("rolloff_wavelength", "longest_wavelength")]
 
@@ -98,10 +98,11 @@ def at_load(force: FloatArray) -> Callable[[int], str]:
 
 
 def _first_linear(friction: FloatArray, velocity: FloatArray) -> int | None:
-    """Return the index of the lowest velocity at which friction is proportional to the velocity, or None.
+    """Return the index of the lowest velocity at which friction is proportional to the velocity; None if there is none.
 
-    Friction at two neighbouring velocities is compared, for the realisations that succeeded at both. The index may
-    exceed 0: with the time stepping of the original papers, friction at low velocities has a spurious lower limit.
+    Friction at two neighbouring velocities is compared. Only realisations that succeeded at both velocities are used.
+    The index may exceed 0, because with the time stepping of the original papers, friction at low velocities does not
+    fall below a spurious limit.
     """
     if velocity.size == 1:
         return 0
@@ -150,7 +151,7 @@ def _zone_one(data: xr.Dataset) -> Variables:
 
 
 def _plateau(data: xr.Dataset) -> Variables:
-    """Compare the largest friction over all velocities with the rms slope of the line, and with that in contact."""
+    """Compare the largest friction over all velocities with two rms slopes: of the whole line, and in contact."""
     require(data, "shear_modulus", "relaxation_time")
     velocities, form = _velocities(data)
     table = table_of(data, spectral_slope(data), velocities)
@@ -181,8 +182,8 @@ def _plateau(data: xr.Dataset) -> Variables:
 def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], count: int, reached: str) -> Variables:
     """Test mu = sqrt 2 times the rms slope, with the slope in contact (eq. 3.15) and with the slope of the line.
 
-    `height` is the stack of the height of the plateau, `flat` are the indices of the cases on the plateau, and
-    `reached` is the sentence on whether friction reaches its maximum.
+    `height` is the stack of the largest mu divided by the rms slope. `flat` are the indices of the cases on the
+    plateau. `reached` is the sentence on whether friction reaches its maximum.
     """
     meaning = "largest mu divided by the rms slope in contact"
     if "contact_slope" in data:
@@ -203,9 +204,9 @@ def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], coun
 
 
 def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str]:
-    """Return the dimensionless velocities, and a format for one of them.
+    """Return the dimensionless velocities, and a text format that describes one dimensionless velocity.
 
-    If the study has no rms height, return v tau, in m.
+    If the study has no rms height, the velocities are v tau in m instead.
     """
     if "rms_roughness" in data:
         return loads_and_velocities(data)[1], "v tau slope / (sqrt 2 h) = {:.2g}"
@@ -215,8 +216,8 @@ def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str]:
 def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: str) -> str:
     """Return a sentence on whether friction reaches a maximum or a constant value within the range of velocities.
 
-    `x` are the logarithms of the velocities, `ends` is the interval of the slope `found.rise`, and `place` is the
-    format for the velocity of the maximum.
+    `x` are the logarithms of the velocities. `ends` is the interval of the slope `found.rise`. The text format `place`
+    describes the velocity of the maximum.
     """
     at, rise = float(found.place[0]), float(found.rise[0])
     change = f"d ln mu / d ln v = {rise:.2g}"
@@ -235,7 +236,10 @@ def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: st
 
 
 def rising(force: FloatArray, velocity: FloatArray, mean: FloatArray, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which of the known cases are in regions I to III: at each load, up to the velocity of largest friction."""
+    """Return which of the `known` cases are in regions I to III.
+
+    At each load, regions I to III extend up to the velocity of the largest friction.
+    """
     used = known & (mean > 0)
     for load in np.unique(force[used]):
         same = np.flatnonzero(used & (force == load))

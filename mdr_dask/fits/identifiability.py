@@ -1,7 +1,7 @@
 """Find the unknowns of a calibration that the data determine.
 
-The data may determine a product of powers of several unknowns, such as ``relaxation_time x rms_roughness^2``, although
-they do not determine the unknowns themselves.
+The data may determine a product of powers of several unknowns, such as ``relaxation_time x rms_roughness^2``, even if
+the data do not determine each unknown.
 """
 
 from __future__ import annotations
@@ -15,19 +15,22 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.posterior import Posterior
 
-#: The data leave an end of an axis open if they hardly exclude this end: the logarithm of the posterior density at the
-#: end is less than `OPEN` below its maximum. If the density is normal, such an end is within two standard errors of the
-#: maximum.
+#: An end of the axis of an unknown is *open* if the data hardly exclude this end. The criterion: at the end, the
+#: logarithm of the posterior density is less than `OPEN` below its maximum. If the density is normal, an open end is
+#: within two standard errors of the maximum.
 OPEN = 2.0
-#: An unknown is also undetermined if the unknowns with an open end explain more than this share of its variance.
+#: An unknown is also undetermined if unknowns with an open end explain more than this share of its variance.
 LINKED = 0.25
-#: A product is determined if the data reduce its spread to less than this fraction of the spread without data.
+#: The data determine a product if the spread of its logarithm is less than this fraction of the spread without data.
 NARROW = 0.25
-#: Exponents of a product are rounded to halves or thirds if its spread grows by at most this factor.
+#: Exponents of a product are rounded to integers, halves or thirds if rounding increases the spread of the product by
+#: at most this factor.
 ROUNDED = 1.15
-#: Probability of each interval, by the suffix of the names of its ends.
+#: Probability of each interval. The keys are endings of names: ``x_low`` and ``x_high`` are the ends of the 95 %
+#: interval of an unknown ``x``, and ``x_low_68`` and ``x_high_68`` are the ends of the 68 % interval.
 LEVELS = {"": 0.95, "_68": 0.6827}
-#: Suffixes of the names of the median and of the ends of the intervals, and the corresponding probabilities.
+#: `ENDS`: suffixes of the names of the median and of the ends of the intervals. `SHARES`: the cumulative probability at
+#: the median and at each of these ends.
 ENDS = ("", *(f"_{end}{kind}" for kind in LEVELS for end in ("low", "high")))
 SHARES = (0.5, *(0.5 + sign * level / 2 for level in LEVELS.values() for sign in (-1, 1)))
 
@@ -40,7 +43,7 @@ class Ends(NamedTuple):
 
 
 def open_ends(found: Posterior) -> list[Ends]:
-    """Return for each unknown whether the data leave the ends of its axis open."""
+    """Return for each unknown whether the lower and the upper end of its axis are open (see `OPEN`)."""
     highest = found.density.max()
     ends = []
     for place in found.places.T:
@@ -52,8 +55,8 @@ def open_ends(found: Posterior) -> list[Ends]:
 def undetermined(found: Posterior, ends: Sequence[Ends]) -> list[int]:
     """Return the indices of the unknowns that the data do not determine.
 
-    Undetermined are the unknowns with an open end (see `OPEN`), and the unknowns that depend strongly on them (see
-    `LINKED`).
+    An unknown with an open end is undetermined (see `OPEN`). An unknown that depends strongly on such unknowns is also
+    undetermined (see `LINKED`).
     """
     free = [k for k, end in enumerate(ends) if any(end)]
     if not free:
@@ -75,7 +78,7 @@ def _explained(centred: FloatArray, weights: FloatArray, k: int, by: list[int]) 
 
 
 class Product(NamedTuple):
-    """A product of powers of unknowns, which the data determine.
+    """A product of powers of unknowns. The data determine the value of the product.
 
     Attributes
     ----------
@@ -92,8 +95,8 @@ class Product(NamedTuple):
 def products(found: Posterior, values: FloatArray, free: Sequence[int]) -> list[Product]:
     """Return products of powers of undetermined unknowns; the data determine each product.
 
-    `values` are the unknowns in SI units at the centre of each cell, shape (cells, unknowns), and `free` are the
-    indices of the undetermined unknowns.
+    `values` are the unknowns in SI units at the centre of each cell, shape (cells, unknowns). `free` are the indices of
+    the undetermined unknowns.
     """
     if len(free) < 2 or np.any(values[:, free] <= 0):
         return []
@@ -124,7 +127,7 @@ def _reduced(rows: FloatArray) -> FloatArray:
 
 
 def _product(found: Posterior, logarithms: FloatArray, free: Sequence[int], row: FloatArray, unknowns: int) -> Product:
-    """Return a product; its exponents are rounded to simple fractions if this hardly increases its spread."""
+    """Return a product. The exponents are rounded to simple fractions if rounding hardly increases the spread."""
     best = _spread(logarithms @ row, found.weights)
     for denominator in (1, 2, 3):
         plain = np.round(row * denominator) / denominator

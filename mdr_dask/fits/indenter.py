@@ -1,7 +1,8 @@
 """Fit the law of friction for rough indenters (thesis eqs. 3.34 to 3.40).
 
-The law is mu / (sqrt 2 s) = (1 + xi^-n)^(-1/n) with the exponent n = 1.5. Here mu is the coefficient of friction, s the
-rms slope of the roughness, and xi is mu at low velocity, by eqs. 3.34 and 3.38, divided by sqrt 2 s.
+The law is mu / (sqrt 2 s) = (1 + xi^-n)^(-1/n) with the exponent n = 1.5. Here mu is the coefficient of friction, and s
+is the rms slope of the roughness. The argument is xi = mu_low / (sqrt 2 s), where mu_low is the coefficient of friction
+at low velocities by eqs. 3.34 and 3.38.
 """
 
 from __future__ import annotations
@@ -18,12 +19,13 @@ from mdr_dask.fits.cases import Variables, constant, each, holds, measure, nonli
 from mdr_dask.fits.friction import FRICTION, KELVIN, MODELS, spectral_slope
 from mdr_dask.physics.sliding import laws
 
-BODY = 0.3  # the law applies if the rms slope of the body in contact is at most this times that of the roughness
+# the law applies if the rms slope of the indenter in contact is at most this fraction of the slope s of the roughness
+BODY = 0.3
 
 
 def _body(data: xr.Dataset) -> tuple[Any, float]:
-    """Return coefficient c and exponent n of the profile c |x|^n that replaces the indenter."""
-    from mdr_dask.physics.surfaces import shapes as indenter  # it imports numba
+    """Return c and n of the profile c |x|^n that replaces the indenter in the method of dimensionality reduction."""
+    from mdr_dask.physics.surfaces import shapes as indenter  # this module imports numba
 
     if "indenter_angle" in data.coords:
         return indenter.mapped(1.0) * np.tan(data["indenter_angle"]), 1.0
@@ -36,7 +38,7 @@ def _body(data: xr.Dataset) -> tuple[Any, float]:
 
 
 def _half_width(data: xr.Dataset) -> Any:
-    """Return the half width of the contact at rest and without roughness, in m."""
+    """Return half the width of the contact of a smooth indenter at rest, in m."""
     coefficient, exponent = _body(data)
     load = data["normal_force"] / (4 * data["shear_modulus"])
     return ((exponent + 1) * load / (2 * exponent * coefficient)) ** (1 / (exponent + 1))
@@ -59,8 +61,8 @@ def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
 def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
     """Return whether the law of rough indenters applies to each case.
 
-    The indenter must be flat compared with the roughness and pressed in by more than the rms height. The velocity must
-    not exceed the velocity of the largest friction.
+    The slope of the indenter must be small compared with the slope of the roughness. The indenter must be pressed in by
+    at least the rms height. The velocity must not exceed the velocity of the largest friction.
     """
     coefficient, exponent = _body(data)
     width = _half_width(data)
@@ -94,7 +96,7 @@ def _indenter(data: xr.Dataset) -> Variables:
     logs = table.logarithms(used)
 
     def model(constants: FloatArray) -> FloatArray:
-        with np.errstate(invalid="ignore"):  # if there is only one realisation, all resamples are NaN
+        with np.errstate(invalid="ignore"):  # with only one realisation, all resampled rows are NaN
             law: FloatArray = np.log(laws.indenter(xi, np.exp(constants)))
         return law
 

@@ -1,4 +1,7 @@
-"""Convert an output of a study to a law: a dense table of the output and its error, for linear interpolation."""
+"""Convert an output of a study to a law.
+
+A law is a dense table of the output and its error, for linear interpolation.
+"""
 
 from __future__ import annotations
 
@@ -17,32 +20,33 @@ from mdr_dask.fits.interpolation import FEWEST, LEFT, Scale, chord_error, cubic,
 from mdr_dask.models.base import Status
 from mdr_dask.questions.selection import written_apart
 
-#: Largest number of values of a table, and largest number of pieces into which an interval between two computed values
-#: is divided.
+#: `LARGEST`: largest number of values of a table. `PIECES`: largest number of pieces into which an interval between two
+#: computed values is divided.
 LARGEST, PIECES = 2_000_000, 16
 
 
 def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
-    """Return an output as a dense table over the axes of its study, with its error.
+    """Return a dense table of an output and its error over the axes of a study.
 
     The mean over realisations is interpolated by monotone cubics (PCHIP), axis by axis. An axis is interpolated on a
     logarithmic scale if its logarithms are more evenly spaced than its values. The output is interpolated on a
-    logarithmic scale if its values differ by more than a factor of ten. The table is dense enough for linear
-    interpolation (``Dataset.interp``).
+    logarithmic scale if all its values are positive and differ by more than a factor of ten. The table is dense enough
+    for linear interpolation (``Dataset.interp``).
 
     Parameters
     ----------
     dataset : Dataset
-        A group of a study that is a grid. An axis with a single value becomes a fixed parameter. An axis of words, or
-        with fewer than four numbers, remains an axis of the table without interpolation.
+        A group of a study that is a grid. An axis with a single value becomes a fixed parameter. Along an axis of
+        words, or an axis with fewer than four numbers, the output is not interpolated; the table keeps this axis
+        unchanged.
     output : str
-        One of its outputs.
+        One of the outputs of the study.
 
     Returns
     -------
     Dataset
-        ``<output>`` and ``<output>_error``. The error is the half width of the 95 % interval of the mean, which
-        includes scatter and discretisation errors, plus the error of interpolation.
+        ``<output>`` and ``<output>_error``. The error is a sum of two terms: the half width of the 95 % interval of the
+        mean, and the error of interpolation. The interval includes scatter and discretisation errors.
 
     Raises
     ------
@@ -95,7 +99,7 @@ def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray
     reduced = aggregate(dataset[kept], ("mean", "interval", "grid_error"))
     mean, ends = reduced[f"{output}_mean"].load(), reduced[f"{output}_interval"].load()
     missing = int(mean.isnull().sum())
-    if missing and "status" in dataset:  # an adaptive axis leaves out cases that it does not need
+    if missing and "status" in dataset:  # cases that an adaptive axis does not need have no value
         missing = int((mean.isnull() & ~(dataset["status"] == Status.NOT_NEEDED).all("realisation")).sum())
     if missing:
         raise FitError(
@@ -108,7 +112,10 @@ def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray
 
 
 def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.DataArray, xr.DataArray]:
-    """Interpolate the cases that an adaptive axis left out; their half widths include the interpolation error."""
+    """Interpolate the cases that an adaptive axis left out.
+
+    The half widths of these cases include the error of interpolation.
+    """
     axes = [k for k, dim in enumerate(mean.dims) if _is_numeric(mean, str(dim))]
     table, error = scale.of_values(mean.to_numpy()).copy(), half.to_numpy().copy()
     for axis in axes * 2:  # twice, because values filled along one axis are used along the other axes
@@ -122,10 +129,10 @@ def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.Da
 
 
 def _between(scale: Scale, places: FloatArray, line: FloatArray, error: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the values along an axis, with missing values interpolated, and the errors of all values."""
+    """Return the values along an axis, in which missing values are interpolated, and the errors of all values."""
     known = np.isfinite(line)
     filled = cubic(places[known], line[known], places, 0, Scale.of(places))
-    # without the factor LEFT: gaps at missing values are as wide as the gaps from which the error is estimated
+    # the factor LEFT is not applied, because a gap at a missing value is as wide as a gap at a value that was left out
     left_out = left_out_error(scale, line[known], places[known], 0) / LEFT
     between = np.interp(places, places[known], error[known] + left_out)
     inside = (places >= places[known][0]) & (places <= places[known][-1])
@@ -151,7 +158,7 @@ def _provenance(dataset: xr.Dataset) -> dict[str, str]:
 
 
 class Law:
-    """A law from a file that ``mdr-dask law`` wrote. A law is called like a function, to evaluate it at many points.
+    """A law from a file that ``mdr-dask law`` wrote. Call the object like a function to evaluate the law.
 
     Parameters
     ----------

@@ -8,10 +8,10 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 
-#: Smallest number of values along an axis: if every second one is left out, enough must remain for a curve.
+#: Smallest number of values along an axis. If every second value is left out, enough values must remain for a curve.
 FEWEST = 4
-#: Error of interpolation from all values, divided by the error of interpolation from every second value. The ratio is
-#: 1/4 for an error of second order; at a kink it would be 1/2.
+#: A ratio of two errors of interpolation: the error if all values are used, divided by the error if only every second
+#: value is used. The ratio is 1/4 for an error of second order. At a kink, the ratio would be 1/2.
 LEFT = 0.25
 
 
@@ -23,10 +23,11 @@ class Scale:
 
     @classmethod
     def of(cls, numbers: FloatArray, spread: bool = False) -> Scale:
-        """Return the scale for some numbers; it is linear unless all numbers are positive.
+        """Return the scale for some numbers. If a number is zero or negative, the scale is linear.
 
-        Without `spread`, the numbers must ascend, and the scale is the one on which they are more evenly spaced. With
-        `spread`, the scale is logarithmic if the numbers span more than a decade.
+        If all numbers are positive, the option `spread` decides. Without `spread`, the numbers must ascend. The scale
+        is then the one, linear or logarithmic, on which the numbers are more evenly spaced. With `spread`, the scale is
+        logarithmic if the numbers span more than a decade.
         """
         if numbers.min() <= 0:
             return cls(False)
@@ -37,16 +38,19 @@ class Scale:
         return cls(bool(even[1] < even[0]))
 
     def of_values(self, values: FloatArray) -> FloatArray:
-        """Return the values of numbers on this scale: their logarithms, or the numbers themselves."""
+        """Return the positions of numbers on this scale: the logarithms of the numbers, or the numbers themselves."""
         return np.log(values) if self.logarithmic else np.asarray(values, dtype=np.float64)
 
     def back(self, values: FloatArray) -> FloatArray:
-        """Return numbers from their values on this scale."""
+        """Return the numbers that have the given positions on this scale."""
         return np.exp(values) if self.logarithmic else values
 
 
 def dense(places: FloatArray, pieces: int) -> FloatArray:
-    """Divide each interval between places into equal pieces on their scale; return all places, old and new."""
+    """Divide each interval between neighbouring places into equal pieces, and return all old and new places.
+
+    The pieces are equal on the scale `Scale.of` the old places.
+    """
     scale = Scale.of(places)
     cut = [np.linspace(a, b, pieces, endpoint=False) for a, b in pairwise(scale.of_values(places))]
     grid = scale.back(np.concatenate([*cut, scale.of_values(places[-1:])]))
@@ -57,7 +61,10 @@ def dense(places: FloatArray, pieces: int) -> FloatArray:
 def cubic(
     places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int, scale: Scale | None = None
 ) -> FloatArray:
-    """Interpolate values along an axis at the wanted places by monotone cubics, by default on `Scale.of` the places."""
+    """Interpolate values along an axis by monotone cubics, and return the values at the places `wanted`.
+
+    Without `scale`, the places are on the scale that `Scale.of` returns for the array `places`.
+    """
     from scipy.interpolate import PchipInterpolator
 
     scale = scale or Scale.of(places)
@@ -68,7 +75,10 @@ def cubic(
 def linear(
     places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int, scale: Scale | None = None
 ) -> FloatArray:
-    """Interpolate values along an axis at the wanted places linearly, by default on `Scale.of` the places."""
+    """Interpolate values linearly along an axis, and return the values at the places `wanted`.
+
+    Without `scale`, the places are on the scale that `Scale.of` returns for the array `places`.
+    """
     from scipy.interpolate import make_interp_spline
 
     scale = scale or Scale.of(places)
@@ -78,8 +88,8 @@ def linear(
 def left_out_error(scale: Scale, table: FloatArray, places: FloatArray, axis: int) -> FloatArray:
     """Estimate the error of interpolation at every place of an axis by leaving out every second value.
 
-    `table` contains values on `scale`, but the returned error is that of the numbers themselves. The error of a place
-    is the largest of the estimates at this place and at its two neighbours.
+    `table` contains positions of the numbers on `scale`. The returned error is the error of the numbers themselves. The
+    error of a place is the largest of the estimates at this place and at its two neighbours.
     """
     values, truth = np.moveaxis(table, axis, -1), np.moveaxis(scale.back(table), axis, -1)
     most = np.zeros_like(truth)
@@ -93,7 +103,7 @@ def left_out_error(scale: Scale, table: FloatArray, places: FloatArray, axis: in
 
 
 def chord_error(table: FloatArray, grid: FloatArray, axis: int) -> FloatArray:
-    """Estimate the error of linear interpolation in a table: the second derivative times spacing^2 / 8."""
+    """Estimate the error of linear interpolation in a table by the second derivative times spacing^2 / 8."""
     values, steps = np.moveaxis(table, axis, -1), np.diff(grid)
     bend = np.abs(np.diff(np.diff(values) / steps)) / (steps[1:] + steps[:-1])
     inside = bend * np.maximum(steps[1:], steps[:-1]) ** 2 / 4
@@ -102,5 +112,5 @@ def chord_error(table: FloatArray, grid: FloatArray, axis: int) -> FloatArray:
 
 
 def _largest(padded: FloatArray) -> FloatArray:
-    """Return, for every three neighbours along the last axis, the largest value."""
+    """Return the largest of every three neighbouring values along the last axis."""
     return np.asarray(np.max([padded[..., :-2], padded[..., 1:-1], padded[..., 2:]], axis=0))

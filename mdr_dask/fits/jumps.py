@@ -1,4 +1,4 @@
-"""The jump of friction that a jump of the velocity causes: its size and its law (thesis eqs. 4.8 to 4.11).
+"""The size and the law of the jump of friction that a jump of the velocity causes (thesis eqs. 4.8 to 4.11).
 
 Symbols: The velocity jumps at the time t_0 from v_1 to v_2 = v_1 + dv. The coefficient of friction mu is mu_1 before
 the jump and mu_2 long after it. The coefficient of friction changes by d_mu_0 at t_0, and then relaxes from mu(t_0+) =
@@ -40,9 +40,10 @@ MODELS = ("velocity_jump",)
 LEVELS = ("friction_coefficient_before", "friction_coefficient_jump", "friction_coefficient_after")
 LEAST = 2  # smallest number of successful realisations of a case
 
-LAW = 0.4  # the constant c by the thesis
-REGION_ONE = 0.1  # below this mu_1 / s, friction counts as in region I; eqs. 4.9 and 4.11 then differ by less than 3 %
-PLATEAU = 1.1  # above this mu_1 / s, friction counts as on its plateau, where mu_1 / s is 1.26 to 1.44
+LAW = 0.4  # the constant c of eq. 4.11, as stated in the thesis
+# a case with mu_1 / s below this value is in region I; there, eqs. 4.9 and 4.11 differ by less than 3 %
+REGION_ONE = 0.1
+PLATEAU = 1.1  # a case with mu_1 / s above this value is on the plateau of friction, where mu_1 / s is 1.26 to 1.44
 
 NUMBERS = {
     "before_over_slope": "mu_1 / rms_slope",
@@ -66,7 +67,7 @@ def is_jump(data: xr.Dataset) -> bool:
 def each_jump(
     series: Series, inner: Callable[[xr.Dataset], list[str]], fit: Callable[[xr.Dataset], Variables], *outputs: str
 ) -> xr.Dataset:
-    """Fit a law as `mdr_dask.fits.cases.each` does, after checking that the series has jumps of the velocity.
+    """Check that a series has jumps of the velocity; then fit a law as `mdr_dask.fits.cases.each` does.
 
     The series needs the outputs `LEVELS`, the output ``rms_slope``, and the given `outputs`.
 
@@ -84,7 +85,7 @@ def each_jump(
 
 
 class Jumps(NamedTuple):
-    """Friction before, at and after the jump, in some cases.
+    """Friction before the jump, its change at the jump, and friction long after the jump, in some cases.
 
     Attributes
     ----------
@@ -108,7 +109,7 @@ class Jumps(NamedTuple):
         return int(self.counts[used].min(initial=np.iinfo(np.intp).max))
 
     def numbers(self) -> dict[str, FloatArray]:
-        """Return the stacks of all `NUMBERS`, by name; zeta and xi are infinite or NaN where mu_1 is 0."""
+        """Return the stacks of all `NUMBERS`, indexed by name; zeta and xi are infinite or NaN where mu_1 is 0."""
         before, jump, after, change, slope, _ = self
         logarithm = np.log1p(change)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -126,10 +127,10 @@ class Jumps(NamedTuple):
 
 
 def jumps_of(data: xr.Dataset) -> Jumps:
-    """Return friction before, at and after the jump in all cases of a series."""
+    """Return the `Jumps` of friction in all cases of a series."""
     tables = [table_of(data, 1.0, data["velocity_change"], output=name) for name in LEVELS]
     values = np.stack([table.values.T for table in tables], axis=1)
-    values = values + 0 * values.sum(axis=1, keepdims=True)  # if one level is NaN, all three become NaN
+    values = values + 0 * values.sum(axis=1, keepdims=True)  # if one of the three `LEVELS` is NaN, all three become NaN
     errors = np.stack([table.mean_error() for table in tables])
     slopes = table_of(data, 1.0, output="rms_slope").values
     known = np.isfinite(slopes) & (slopes > 0)
@@ -140,7 +141,7 @@ def jumps_of(data: xr.Dataset) -> Jumps:
 
 
 def _kinetics(case: xr.Dataset) -> Variables:
-    """Return the `NUMBERS` of a case with their intervals."""
+    """Return the `NUMBERS` of a case, and the interval of each number."""
     jumps = jumps_of(case)
     found: Variables = {}
     for name, stack in jumps.numbers().items():
@@ -155,12 +156,15 @@ def jump_law(before: FloatArray, constant: float | FloatArray) -> FloatArray:
 
 
 def _jump_law(data: xr.Dataset) -> Variables:
-    """Fit the constant of eq. 4.11 to all cases whose friction does not fall with the velocity; test eqs. 4.9, 4.10."""
+    """Fit the constant of eq. 4.11 to all cases in which friction does not fall with the velocity.
+
+    Also test eq. 4.9 in region I, and eq. 4.10 on the plateau of friction.
+    """
     jumps = jumps_of(data)
     numbers = jumps.numbers()
     before, jump, zeta = numbers["before_over_slope"], numbers["jump_over_slope"], numbers["zeta"]
     highest = bootstrap.interval(numbers["xi"], jumps.counts)[1]
-    rising = np.isfinite(highest) & (highest >= 0)  # friction does not fall with the velocity
+    rising = np.isfinite(highest) & (highest >= 0)  # cases in which friction does not fall with the velocity
     known = rising & ~np.any(before <= 0, axis=0) & ~np.any(jump <= 0, axis=0)
     slow, fast = (before[0] < REGION_ONE) & np.isfinite(zeta[0]), (before[0] > PLATEAU) & rising
     if np.count_nonzero(known) < 2 and not slow.any() and not fast.any():
@@ -186,7 +190,8 @@ def _constant(before: FloatArray, jump: FloatArray, count: int) -> Variables:
         return measured | holds(reason, reason)
 
     def model(constants: FloatArray) -> FloatArray:
-        # the fit is repeated for data shifted by their departures from the law; mu_1 is then that of the first row
+        # `fitted` may repeat the fit for shifted data, which have another number of rows; then mu_1 of the first row is
+        # used
         law: FloatArray = np.log(jump_law(before if len(constants) == len(before) else before[:1], np.exp(constants)))
         return law
 
@@ -204,9 +209,9 @@ def _constant(before: FloatArray, jump: FloatArray, count: int) -> Variables:
 def _limit(
     name: str, verdict_name: str, stated: float, stack: FloatArray, count: int, meaning: str, question: str
 ) -> Variables:
-    """Return the mean of a number over some cases, and a sentence on whether the number has its stated value.
+    """Return the mean of a number over some cases, and a sentence on whether the number equals the `stated` value.
 
-    `meaning` and `question` are the descriptions of the mean and of the sentence in the result.
+    In the result, `meaning` describes the mean, and `question` describes the sentence.
     """
     if not stack.shape[1]:
         nothing = constant(name, np.full(1 + bootstrap.RESAMPLES, np.nan), count, meaning)
@@ -224,7 +229,7 @@ TRENDS = {
 
 
 def _jump_linearity(data: xr.Dataset) -> Variables:
-    """Fit straight lines to zeta and xi against dv / v_1; according to eq. 4.8, zeta and xi are constant."""
+    """Fit straight lines to zeta and xi against dv / v_1. By eq. 4.8, zeta and xi do not depend on dv / v_1."""
     if np.unique(data["velocity_change"]).size < 3:
         sizes = np.unique(data["velocity_change"]).size
         raise FitError(f"expected jumps dv / v_1 of three sizes or more, got {sizes}")
@@ -244,9 +249,10 @@ def _jump_linearity(data: xr.Dataset) -> Variables:
         count,
     )
     line = both @ np.linalg.pinv(np.vstack([np.ones(change.size), change]))
-    moved = scale * (flat.constants[len(both) :] - flat.constants[0])  # changes due to departures from the mean
+    # changes of the mean if the data are shifted by their departures
+    moved = scale * (flat.constants[len(both) :] - flat.constants[0])
     level = np.concatenate([line[:, :, 0], line[0, :, 0] + moved])
-    with np.errstate(divide="ignore", invalid="ignore"):  # zeta may be zero within its error
+    with np.errstate(divide="ignore", invalid="ignore"):  # zeta of a resample may be zero
         trend = line[:, :, 1] / line[:, :1, 0]
     found: Variables = {}
     for (name, meaning), stack in zip(

@@ -27,7 +27,7 @@ from mdr_dask.physics.superposition import master_curve as superposition
 from mdr_dask.physics.superposition import two_factors as two_shifts
 from mdr_dask.physics.superposition.master_curve import EXPANSION, OFFSET, Superposition, Vertical
 
-SHARE_OF_BARS = 0.6827  # fraction of the random draws of a shift factor that lie within its error bar ``_error``
+SHARE_OF_BARS = 0.6827  # probability of the interval whose half width is ``_error``
 
 
 def master_curve(
@@ -48,39 +48,42 @@ def master_curve(
     table : Dataset or DataFrame
         A series of a store (realisations are averaged) or columns of numbers.
     abscissa, ordinate, group : str, optional
-        Columns of the abscissa, of the values, and of the parameter in which the curves differ. By default, these are
-        the coefficient of friction against force at different velocities (or temperatures), or the moduli against
-        frequency or time at different temperatures. Storage and loss modulus of one test are two ordinates and are
-        shifted together.
+        Columns of the abscissa, of the values, and of the parameter in which the curves differ. By default, the columns
+        are found by their names: the coefficient of friction against force at different velocities or temperatures, or
+        a modulus or compliance against frequency or time at different temperatures. Storage and loss modulus of one
+        test are two ordinates and are shifted together.
     vertical : {'none', 'modulus', 'compliance', 'free'}, optional
         Kind of the factors along the ordinate, see `superpose`. For moduli or compliances against time or frequency at
         different temperatures, the default is ``modulus`` or ``compliance``; otherwise it is ``none``.
     reference : float, optional
-        Value of the group at which the factors are zero; by default that of the middle group. If the reference lies
-        between two groups, the factor at the reference is that of the best law plus the interpolated departure of the
-        shift factors from this law. The intervals include the error of this interpolation. With two kinds of groups,
-        the reference becomes the nearest value of the first kind.
+        Value of the group at which the factors are zero; by default the value of the middle group. If the reference
+        lies between two groups, the factor at the reference is a sum of two terms: the factor that the best law gives,
+        and the interpolated difference between the shift factors and this law. The intervals include the error of this
+        interpolation. If the curves differ in two parameters, the nearest value of the first parameter becomes the
+        reference.
 
     Returns
     -------
     Dataset
         ``shift_factor`` and ``vertical_factor`` contain, for each group, the decades that are added to the logarithms
         of abscissa and ordinate. Both factors come with ``_error`` (half width of the 68 % interval), and with ``_low``
-        and ``_high`` (ends of the 95 % interval). ``covariance`` and ``draws`` belong to the shift factors,
-        ``vertical_covariance`` and ``vertical_draws`` to the vertical factors. ``point_abscissa``, ``point_ordinate``
-        and ``point_group`` are all points after shifting. ``curve_abscissa``, ``curve_ordinate`` and ``curve_error``
-        are the merged curve and its error in decades; its attrs contain the range that was measured at the reference. A
-        second ordinate has ``point_companion``, ``curve_companion`` and ``curve_companion_error``. The constants of the
-        laws that apply are also included. With two kinds of groups, there are also ``second_factor``, the shift factor
-        of the second kind, and the constants of its laws. The attrs then contain ``second``, ``second_reference``, and
-        ``chi_squared`` and ``probability`` of the test whether each shift is a sum of two factors. The attr
-        ``vertical`` describes the vertical factors that were used.
+        and ``_high`` (ends of the 95 % interval). ``covariance`` and ``draws`` are the covariance and random samples of
+        the shift factors; ``vertical_covariance`` and ``vertical_draws`` are those of the vertical factors.
+        ``point_abscissa``, ``point_ordinate`` and ``point_group`` are all points after shifting. ``curve_abscissa``,
+        ``curve_ordinate`` and ``curve_error`` are the merged curve and its error in decades. The attrs of
+        ``curve_abscissa`` contain the range that was measured at the reference. A second ordinate has
+        ``point_companion``, ``curve_companion`` and ``curve_companion_error``. The constants of the laws that apply are
+        also included. If the curves differ in two parameters, the result also contains ``second_factor``, the shift
+        factor of the second parameter, and the constants of its laws. The attrs then contain the name ``second`` of
+        this parameter and its reference ``second_reference``. The attrs ``chi_squared`` and ``probability`` are the
+        result of a test: whether each shift is a sum of two factors, one for each parameter. The attr ``vertical``
+        describes the vertical factors that were used.
 
     Raises
     ------
     DataError
-        If a column is missing or not positive; if the curves do not overlap; or if vertical factors are requested for
-        two kinds of groups, because such curves do not determine them.
+        If a column is missing or not positive, if the curves do not overlap, or if vertical factors are requested for
+        curves that differ in two parameters, because such curves do not determine vertical factors.
     """
     frame = frame_of(table)
     over, ordinates, by = columns_to_use(frame, abscissa, ordinate, group)
@@ -127,14 +130,14 @@ def _sentence(kind: Vertical) -> str:
 
 
 def _require_no_axis_beside(values: xr.DataArray, used: set[str | None]) -> None:
-    """Raise DataError if the curves of a study differ in a parameter that is not a group."""
+    """Raise DataError if the curves of a study differ in a parameter that is not used as a group."""
     for name in values.dims:
         if name not in used and name in values.coords and values.sizes[name] > 1:
             raise DataError(f"the study varies in {str(name)!r} too: keep one of its values, or group by it")
 
 
 def _undetermined(found: Superposition) -> str:
-    """Return a sentence about undetermined shifts between neighbouring curves; empty if all are determined."""
+    """Return a sentence about undetermined shifts between neighbouring curves; empty if all shifts are determined."""
     if not found.undetermined:
         return ""
     runs = ", ".join(f"between {low:.6g} and {high:.6g}" for low, high in found.undetermined)
@@ -175,9 +178,10 @@ def _of_two_groups(
 
 
 def _inside(groups: FloatArray, reference: float) -> float:
-    """Return the reference, or the nearest group if the reference lies just outside the groups.
+    """Return the reference, or the nearest group if the reference lies just outside the range of the groups.
 
-    The reference may lie outside by a tenth of the mean distance between groups, because measured set points scatter.
+    The reference may lie outside this range by a tenth of the mean distance between groups, because measured set points
+    scatter.
     """
     margin = 0.1 * np.ptp(groups) / max(groups.size - 1, 1)
     if not groups.min() - margin <= reference <= groups.max() + margin:
@@ -299,9 +303,9 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
 def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Return the friction that is due to roughness, as a function of force and velocity.
 
-    The result is the coefficient of friction of the first rough series that varies force and velocity, averaged over
-    realisations. If a series has the same forces and velocities but no roughness, its friction is due to the bulk alone
-    and is subtracted.
+    The result is the coefficient of friction, averaged over realisations, of the first series that has roughness and
+    varies force and velocity. If another series has the same forces and velocities but no roughness, the friction of
+    that series is due to the bulk alone and is subtracted.
 
     Raises
     ------
@@ -328,7 +332,10 @@ def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
 
 
 def _of_store(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    """Return the factors and the constants of their laws, without the merged curve (see ``mdr-dask master-curve``)."""
+    """Return the shift factors and the constants of their laws, but not the merged curve.
+
+    The command ``mdr-dask master-curve`` also gives the merged curve.
+    """
     curve = master_curve(friction_of_roughness(series))
     groups = curve.attrs["group"], curve.attrs.get("second", curve.attrs["group"])
     return curve[

@@ -1,7 +1,7 @@
 """Test a model against measured points.
 
-If the errors of measurement are known, chi squared is used. If these errors are unknown, a trend of the residuals
-counts against the model.
+If the errors of measurement are known, the test uses chi squared. If the errors are unknown, the model fails the test
+if the residuals have a trend.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from scipy.special import chdtrc, fdtrc
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import APPROXIMATE, DOUBTFUL, WITHIN
 
-#: A trend of the residuals counts against the model if chance causes such a trend with a probability below this.
+#: A trend of the residuals counts against the model if the probability that chance causes such a trend is below this.
 TREND = 0.005
 #: Least number of points whose residuals can show a trend.
 FEWEST = 6
@@ -29,13 +29,15 @@ class Residuals(NamedTuple):
     scaled : array, shape (points,)
         Measured minus predicted value, divided by the standard deviation of this difference.
     relative : float
-        Rms of measured minus predicted values, divided by the rms of the measured values.
+        Rms difference between measured and predicted values, divided by the rms measured value.
     chi_squared : float
         Chi squared, including correlations of the errors; NaN if the errors of measurement are unknown.
     freedom : int
-        Degrees of freedom: number of points minus number of combinations of unknowns that the data determine.
+        Degrees of freedom: number of points minus number of determined constants. A determined constant is an unknown,
+        or a product of unknowns, that the data determine.
     errors : float
-        Rms of the standard deviations of measured minus predicted values, divided by the rms of the measured values.
+        Rms of the standard deviations of the differences between measured and predicted values, divided by the rms
+        measured value.
     """
 
     scaled: FloatArray
@@ -79,10 +81,11 @@ def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str
 
 
 def trend(scaled: FloatArray, conditions: Mapping[str, FloatArray]) -> tuple[float, str]:
-    """Return the probability that a trend of the residuals is due to chance, and the condition that shows the trend.
+    """Return the probability that a trend of the residuals is due to chance, and the condition with the trend.
 
     A parabola is fitted to the residuals against the rank of each condition. The condition with the smallest
-    probability is returned. This probability is multiplied by the number of conditions, because several were tried.
+    probability is returned. This probability is multiplied by the number of conditions, because every condition is
+    another chance to find a trend.
     """
     worst, along = 1.0, ""
     for name, values in conditions.items():

@@ -1,7 +1,7 @@
 """The posterior density of a few unknowns.
 
-Each unknown is mapped to the interval from 0 to 1, by its linear or logarithmic axis. The resulting unit cube is
-divided into cells, which are divided further where the density is high.
+The range of each unknown is mapped to the interval from 0 to 1, on the linear or logarithmic scale of its axis. The
+resulting unit cube is divided into cells. Cells are divided further where the density is high.
 """
 
 from __future__ import annotations
@@ -15,33 +15,34 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.prediction import Predicted, Prediction
 
-#: Number of cells along each unknown before refinement, by the number of unknowns.
+#: Number of cells along each unknown before refinement. The keys are the numbers of unknowns.
 START = {1: 64, 2: 24, 3: 12, 4: 8}
-#: `BEST`: smallest number of cells that are divided in a refinement, by the number of unknowns. `MOST`: largest number
-#: of cells after a refinement.
+#: `BEST`: smallest number of cells that are divided in a refinement; the keys are the numbers of unknowns. `MOST`:
+#: largest number of cells after a refinement.
 BEST, MOST = {1: 32, 2: 256, 3: 768, 4: 1536}, 160_000
-#: Cells are left out if their ln(density) is more than this below the maximum. Together, such cells have a probability
-#: below 1e-5.
+#: Cells are left out if ln(density) of a cell is smaller than the maximum by more than this value. All cells that are
+#: left out have a total probability below 1e-5.
 REACH = 14.0
-#: Refinement ends when ln(density) varies by less than this between the parts of a cell, on average over the cells.
+#: Refinement ends when ln(density) varies by less than this value within a divided cell, on average over all cells.
 SMOOTH = 0.6
 #: Largest number of refinements.
 LEVELS = 16
 #: Number of sizes of the error of measurement that are considered if the table states no error.
 DEVIATIONS = 14
-#: The likelihood is evaluated in steps, in order that no array has more elements than this.
+#: The likelihood is evaluated for a part of the cells at a time, so that no array has more elements than this.
 _STEP = 2**21
 
 
 class Noise(NamedTuple):
-    """Errors of measurement: their pattern over the points, and their size, which may be unknown.
+    """Errors of measurement: a pattern of standard deviations, and a factor of this pattern, which may be unknown.
 
     Attributes
     ----------
     sizes : array, shape (sizes,)
-        Possible factors of the pattern; only 1 if the errors are known.
+        Possible factors by which the pattern is multiplied. If the errors are known, the only factor is 1.
     pattern : array, shape (points,), or None
-        Standard deviations of the points for the factor 1; None if these are the absolute predicted values.
+        Standard deviation of each point for the factor 1. None means: the standard deviation of a point is the absolute
+        value of its prediction.
     """
 
     sizes: FloatArray
@@ -60,12 +61,12 @@ def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) 
     Parameters
     ----------
     prediction : Prediction
-        Prediction of the measured values, with errors that are taken into account.
+        Prediction of the measured values. The likelihood includes the errors of the prediction.
     values : array, shape (points,)
         Measured values.
     noises : list of Noise
-        Possible errors of measurement. All items of this list have the same prior probability, and so have all sizes of
-        one item.
+        Possible errors of measurement. All items of this list have the same prior probability. Within one item, all
+        sizes have the same prior probability.
 
     Returns
     -------
@@ -89,10 +90,10 @@ def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) 
 
 
 def distance(values: FloatArray, predicted: Predicted, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return chi squared of the measured values, and the logarithm of the determinant of the covariance; shape (sets,).
+    """Return two arrays of shape (sets,): chi squared, and the logarithm of the determinant of the covariance.
 
-    `noise` are the variances of the errors of measurement. The covariance is diagonal, apart from a few errors that all
-    points share. Woodbury's identity avoids the inversion of a large matrix.
+    `noise` are the variances of the errors of measurement. The covariance is a diagonal matrix plus a few terms for
+    errors that are common to all points. For such a matrix, Woodbury's identity avoids the inversion of a large matrix.
     """
     variance = np.maximum(predicted.alone + noise, np.finfo(float).tiny)
     residual = values - predicted.mean
@@ -163,9 +164,9 @@ def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> 
 
 
 def _kept(density: FloatArray, fewest: int, most: int) -> NDArray[np.intp]:
-    """Return the indices of the cells to divide: all cells of high density, but at least `fewest` cells.
+    """Return the indices of the cells that are divided next: all cells of high density, but at least `fewest` cells.
 
-    If there are more than `most` such cells, a random selection of them is divided.
+    If the number of these cells exceeds `most`, only `most` randomly selected cells are divided.
     """
     order = np.argsort(density)[::-1]
     number = max(int((density > density.max() - REACH).sum()), min(fewest, density.size))

@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 
 #: Largest number of unknowns.
 MOST = 4
-#: Means are interpolated linearly in a dense table: largest number of its values, and largest number of pieces into
-#: which an interval between two computed values is divided.
+#: Means are interpolated linearly in a dense table. `LARGEST`: largest number of values of this table. `PIECES`:
+#: largest number of pieces into which an interval between two computed values is divided.
 LARGEST, PIECES = 4e6, 16
 #: Relative difference up to which a measured and a computed value of a parameter count as equal.
 SAME = 1e-6
-#: The scatter of different cases is correlated, because they use the same rough lines. A few modes represent this
-#: scatter. These are the largest number of modes, and the share of the variance that they must represent.
+#: All cases use the same rough lines. Therefore the scatter of different cases is correlated, and a few modes represent
+#: this scatter. `MODES`: largest number of modes. `SHARE`: share of the variance that the modes must represent.
 MODES, SHARE = 6, 0.999
 
 
@@ -40,8 +40,8 @@ class Predicted(NamedTuple):
     mean : array, shape (sets, points)
         Mean over the realisations.
     together : array, shape (sets, points, modes)
-        Errors that all points share, due to the scatter of the lines, the grid and the interpolation. Each mode is a
-        vector of standard deviations.
+        Errors that are common to all points: modes of the scatter of the rough lines, and one mode for grid and
+        interpolation. A mode contains one standard deviation for each point. The errors of one mode vary together.
     alone : array, shape (sets, points)
         Variance of the errors that are independent for each point.
     """
@@ -53,7 +53,7 @@ class Predicted(NamedTuple):
 
 @dataclass(frozen=True)
 class Prediction:
-    """The output at the measured points and its errors, interpolated over the unknowns of a study.
+    """The output at the measured points and the errors of the output, interpolated over the unknowns of a study.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class Prediction:
         return [Scale.of(values) for values in self.unknowns.values()]
 
     def values(self, places: FloatArray) -> FloatArray:
-        """Return the unknowns at places in the unit cube, where 0 and 1 are the ends of their axes."""
+        """Return the unknowns at places in the unit cube. The values 0 and 1 in the cube are the ends of an axis."""
         found = []
         for scale, axis, place in zip(self.scales, self.unknowns.values(), places.T, strict=True):
             low, high = scale.of_values(axis[[0, -1]])
@@ -100,7 +100,7 @@ def prediction(dataset: xr.Dataset, measured: Measured) -> Prediction:
     Raises
     ------
     FitError
-        If the study is not a grid, has no unknowns or too many of them, has an axis with too few values, or has cases
+        If the study is not a grid, has no unknown or too many unknowns, has an axis with too few values, or has cases
         without a value.
     DataError
         If a measured point lies outside the study.
@@ -131,7 +131,7 @@ def prediction(dataset: xr.Dataset, measured: Measured) -> Prediction:
 
 
 def _at_fixed(dataset: xr.Dataset, measured: Measured) -> xr.Dataset:
-    """Return a study without its axes of a single value; raise DataError if a measured point lies outside the study."""
+    """Remove axes that have a single value from a study; raise DataError if a measured point lies outside the study."""
     array = dataset[measured.output]
     single = [str(dim) for dim in array.dims if dim in array.coords and array.sizes[dim] == 1 and dim != "realisation"]
     dataset = dataset.squeeze(single)
@@ -179,11 +179,11 @@ def _is_computed(axis: FloatArray, wanted: FloatArray) -> bool:
 def _fields(
     dataset: xr.Dataset, output: str, along: Sequence[str], unknowns: Sequence[str], between: Mapping[str, bool]
 ) -> tuple[FloatArray, bool]:
-    """Return the numbers to interpolate for every case, and whether the means are replaced by their logarithms.
+    """Return the numbers of every case that are interpolated, and whether logarithms replace the means.
 
-    The shape is (conditions ..., unknowns ..., numbers). The numbers of a case are its mean, a flag for a missing mean,
-    the part of the scatter that is independent of other cases, the error of grid and interpolation, and the modes of
-    the common scatter.
+    The shape is (conditions ..., unknowns ..., numbers). The numbers of a case are: the mean; a flag, which is 1 if the
+    mean is missing; the part of the scatter that is independent of other cases; the error of grid and interpolation;
+    and the modes of the scatter that is common to all cases.
     """
     order = [*along, *unknowns]
     array = dataset[output]
@@ -215,7 +215,10 @@ def _fields(
 
 
 def _and_neighbours(absent: NDArray[np.bool_], axis: int) -> NDArray[np.bool_]:
-    """Return the missing cases and their neighbours, because a cubic depends on two cases on each side."""
+    """Return the missing cases and their neighbours.
+
+    A cubic at a point depends on the two nearest cases on each side of this point.
+    """
     along = np.moveaxis(absent, axis, 0).copy()
     before = along.copy()
     along[1:] |= before[:-1]
@@ -236,14 +239,16 @@ def _long_enough(dataset: xr.Dataset, axis: str) -> FloatArray:
 def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the part of the standard error that is independent for each case, and the modes of the common scatter.
 
-    The scatter is multiplied by a factor from Student's t, because a few realisations do not determine it well.
+    The scatter is multiplied by a factor from Student's t distribution, because a few realisations do not determine the
+    scatter well.
     """
     count = deviations.shape[-1]
     if count < 2:
         return np.zeros_like(mean), np.zeros((*mean.shape, 0))
     spare = np.maximum(number * (number - 1), 1)
     few = np.maximum(number, 2)
-    widened = bootstrap.widening(few) * np.sqrt((few - 1) / few)  # ratio of quantiles, Student's t to normal
+    # quantile of Student's t divided by that of a normal distribution
+    widened = bootstrap.widening(few) * np.sqrt((few - 1) / few)
     each = np.nan_to_num(deviations) * (widened / np.sqrt(spare))[..., None]
     size = np.where(np.abs(mean) > 0, np.abs(mean), 1.0)
     relative = np.nan_to_num(each / size[..., None]).reshape(-1, count)
@@ -256,7 +261,7 @@ def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray)
 
 
 def _at_point(fields: FloatArray, axes: Sequence[FloatArray], place: Sequence[float]) -> FloatArray:
-    """Interpolate the numbers of the cases (see `_fields`) to a measured point, one condition after the other."""
+    """Interpolate the numbers of the cases (see `_fields`) to a measured point, along one condition after the other."""
     for axis, wanted in zip(axes, place, strict=True):
         nearest = int(np.argmin(np.abs(axis - wanted)))
         if _is_computed(axis, np.array([wanted])):
@@ -275,7 +280,10 @@ def _at_point(fields: FloatArray, axes: Sequence[FloatArray], place: Sequence[fl
 def _interpolators(
     at_points: FloatArray, unknowns: Mapping[str, FloatArray], count: int, logarithmic: bool
 ) -> Prediction:
-    """Return a prediction by linear interpolation, of means in a dense table and of errors at the computed values."""
+    """Return a prediction that is interpolated linearly.
+
+    Means are interpolated in a dense table. Errors are interpolated between the computed values.
+    """
     from scipy.interpolate import RegularGridInterpolator
 
     scales = [Scale.of(values) for values in unknowns.values()]

@@ -1,12 +1,12 @@
-"""Relaxation of friction after a jump of the velocity: one exponential and its rate (thesis eqs. 4.5 to 4.15).
+"""Relaxation of friction after a jump of the velocity: one exponential, and laws of its rate (thesis eqs. 4.5 to 4.15).
 
 Symbols: The velocity jumps at the time t_0 from v_1 to v_2 = v_1 + dv. The coefficient of friction mu is mu_1 before
-the jump and mu_2 long after it; it changes by d_mu_0 at t_0. The rms slope is s. The body has the relaxation time tau,
-and t' = (t - t_0) / tau. The largest wave number of the roughness is q_max.
+the jump and mu_2 long after the jump. At t_0, mu changes by d_mu_0. The rms slope is s. The body has the relaxation
+time tau, and t' = (t - t_0) / tau. The largest wave number of the roughness is q_max.
 
-By eqs. 4.13 to 4.15, mu - mu_2 is proportional to exp(-b t') and begins at mu_1 + d_mu_0 - mu_2, with d_mu_0 by eq.
-4.11. By eq. 4.12, the rate b is a power of v_1 tau q_max. The exponent of this power is 1 if v_1 tau q_max is below 1,
-and otherwise 1 - H, with the Hurst exponent H.
+By eqs. 4.13 to 4.15, mu - mu_2 is proportional to exp(-b t'). At t_0, mu - mu_2 begins at mu_1 + d_mu_0 - mu_2, where
+d_mu_0 follows from eq. 4.11. By eq. 4.12, the rate b is a power of v_1 tau q_max. The exponent of this power is 1 if
+v_1 tau q_max is below 1. Otherwise the exponent is 1 - H, with the Hurst exponent H.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ from mdr_dask.fits.cases import (
 from mdr_dask.fits.jumps import LAW, LEAST, LEVELS, MODELS, each_jump, jump_law, jumps_of
 
 WINDOW = 8.0  # the exponential is fitted up to t' = WINDOW / (rate by eq. 4.12)
-FLOOR = 0.01  # assumed grid error of mu - mu_2 at every time, divided by its largest value (docs/kinetics.md)
+FLOOR = 0.01  # assumed grid error of mu - mu_2, as a fraction of the largest mu - mu_2 (docs/kinetics.md)
 GRID = 400  # number of rates that are tried, evenly spaced on a logarithmic scale
 
-TRUSTED = 0.5  # a rate is used to fit the power law if the half width of the interval of ln(rate) is below this
-SURE = 0.1  # added in quadrature to the error of ln(rate) in the weights, so that no single rate dominates the fit
-INSTANT = 1e-9  # no relaxation is fitted if mu - mu_2 is always smaller than this times the rms slope
+TRUSTED = 0.5  # the fit of the power law uses a rate if the half width of the interval of ln(rate) is below this value
+SURE = 0.1  # the fit has weights 1 / (error of ln(rate)^2 + SURE^2), so that no single rate dominates
+INSTANT = 1e-9  # no relaxation is fitted if mu - mu_2 is smaller than this fraction of the rms slope at all times
 
 TRACE = "friction_coefficient"
 #: Constants of the relaxation of a case, with units and meanings.
@@ -56,17 +56,17 @@ FIELDS = {
 
 
 class Relaxation(NamedTuple):
-    """One exponential fitted to a trace, which is the mean of mu - mu_2 as a function of time.
+    """One exponential fitted to a trace. A trace is the mean of mu - mu_2 over realisations, as a function of time.
 
     Attributes
     ----------
     rate, integral_rate : array, shape (rows,)
-        Stacks of the fitted rate, and of the rate that follows from the integral of the trace (see
-        `mdr_dask.bootstrap`). If scatter and errors do not explain the departures of the trace from one exponential,
-        `rate` has additional rows at its end: rates fitted to the trace shifted by these departures, and the integral
-        rate. These rows widen the interval of the rate.
+        Stacks (see `mdr_dask.bootstrap`) of the fitted rate, and of the rate that follows from the integral of the
+        trace. If scatter and errors do not explain the departures of the trace from one exponential, additional rows at
+        the end of `rate` widen the interval of the rate. These rows contain the integral rate, and the rates that are
+        fitted to the trace after a shift by the departures.
     holds : str
-        Sentence on whether one exponential fits; its departures are relative to the largest value of the trace.
+        Sentence on whether one exponential fits the trace. Departures are divided by the largest value of the trace.
     """
 
     rate: FloatArray
@@ -82,7 +82,7 @@ def widths(time: FloatArray) -> FloatArray:
 
 
 def tried_rates(time: FloatArray) -> FloatArray:
-    """Return the rates that are tried for a trace; its times do not resolve slower or faster rates."""
+    """Return the rates that are tried for a trace. The times of the trace do not resolve slower or faster rates."""
     rates: FloatArray = np.geomspace(0.02 / time[-1], 2 / time[time > 0][0], GRID)
     return rates
 
@@ -90,8 +90,9 @@ def tried_rates(time: FloatArray) -> FloatArray:
 def exponential(time: FloatArray, traces: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Fit one exponential to each of many traces by weighted least squares.
 
-    `GRID` rates are tried, each with its best amplitude. A parabola through the best rate and its two neighbours then
-    gives the rate with a relative error of about 1e-4.
+    The constant `GRID` is the number of rates that are tried, each with the amplitude that fits best. A parabola
+    through the quality of fit at the best rate and its two neighbours refines this rate. The relative error of the
+    refined rate is about 1e-4.
 
     Parameters
     ----------
@@ -119,7 +120,7 @@ def exponential(time: FloatArray, traces: FloatArray, weights: FloatArray) -> tu
 
 
 def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count: int, expected: float) -> Relaxation:
-    """Fit one exponential to the relaxation of friction, up to t' = `WINDOW` / `expected`.
+    """Fit one exponential to the relaxation of friction from t' = 0 to t' = `WINDOW` / `expected`.
 
     Parameters
     ----------
@@ -134,9 +135,10 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
     expected : float
         Rate by eq. 4.12.
     """
-    inside = time <= max(WINDOW / expected, time[min(8, time.size - 1)])  # at least eight times after the first one
+    inside = time <= max(WINDOW / expected, time[min(8, time.size - 1)])  # the fit uses at least nine points in time
     t, y = time[inside], traces[:, inside]
-    # The weight of a time is proportional to the interval around it, because neighbours carry the same information.
+    # The weight of a time is proportional to the interval around this time, because close times carry the same
+    # information.
     weights = widths(t) / (error[inside] ** 2 + (FLOOR * np.abs(y[0]).max()) ** 2)
     weights /= weights.sum()
     rate, amplitude = exponential(t, y, weights)
@@ -148,14 +150,15 @@ def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count
     if not chance >= DOUBTFUL:
         rates, _ = exponential(t, bootstrap.moved(y[0], residuals[0]), weights)
         rate = np.concatenate([rate, rates, integral[:1], rate[:1]])
-    if outside[0] or outside.mean() > bootstrap.TAILS[0]:  # a rate at an end of the tried range is not an estimate
+    # a rate at an end of the range of tried rates is not an estimate
+    if outside[0] or outside.mean() > bootstrap.TAILS[0]:
         rate = np.full_like(rate, np.nan)
     relative = residuals / np.abs(y[0]).max()
     holds = law_holds(relative[0], chance, 2, scatter=bootstrap.scatter(relative, count))
     return Relaxation(rate, integral, holds)
 
 
-# the relaxation of a case, and its laws
+# the relaxation of one case, compared with its laws
 
 
 def law_rate(number: float, hurst: float) -> float:
@@ -164,15 +167,19 @@ def law_rate(number: float, hurst: float) -> float:
 
 
 def _passing_number(case: xr.Dataset) -> float:
-    """Return v_1 tau q_max: the relaxation time divided by the time in which the body slides by 1 / q_max."""
+    """Return v_1 tau q_max.
+
+    This number is the relaxation time divided by the time in which the body slides by 1 / q_max.
+    """
     wavenumber = np.pi * one_value(case, "points") / one_value(case, "length")
     return one_value(case, "velocity") * one_value(case, "relaxation_time") * wavenumber
 
 
 def _outputs(case: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the times t' of a case, beginning with 0; its values, shape (realisations, values); and their grid errors.
+    """Return three arrays of a case: times t', values, and grid errors of the mean values.
 
-    The values are mu_1, d_mu_0, mu_2, and mu at all times except the first. The errors are those of the means.
+    The first time is 0. The values have the shape (realisations, values): mu_1, d_mu_0, mu_2, and mu at all times
+    except the first.
     """
     tables = [table_of(case, 1.0, output=name) for name in (*LEVELS, TRACE)]
     values = np.concatenate([table.values for table in tables]).T
@@ -181,10 +188,10 @@ def _outputs(case: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _fit_case(case: xr.Dataset) -> Relaxation | None:
-    """Fit one exponential to a case; return None if it has too few realisations, or if friction does not relax.
+    """Fit one exponential to a case; return None if the case has too few realisations, or if friction does not relax.
 
-    The discretisation error of mu includes that of mu_2. Therefore the error of mu - mu_2 is the difference between the
-    two errors.
+    The discretisation error of mu includes the discretisation error of mu_2. Therefore the error of mu - mu_2 is the
+    difference between these two errors.
     """
     time, values, error = _outputs(case)
     before, jump, after = values[:, :3].T
@@ -230,7 +237,7 @@ def _relaxation(case: xr.Dataset) -> Variables:
     found, count = _fit_case(case), int(jumps_of(case).counts[0])
     nothing = np.full(1 + bootstrap.RESAMPLES, np.nan)
     rate, integral = (found.rate, found.integral_rate) if found else (nothing, nothing)
-    with np.errstate(divide="ignore"):  # the rate of a trace that does not relax is zero
+    with np.errstate(divide="ignore"):  # if a trace does not relax, its rate is zero
         duration = one_value(case, "relaxation_time") / rate
     length = one_value(case, "velocity") * (1 + one_value(case, "velocity_change")) * duration
     stacks = (rate, integral, duration, length)
@@ -254,7 +261,7 @@ def _relaxation(case: xr.Dataset) -> Variables:
 
 
 def _rate_power(data: xr.Dataset) -> Variables:
-    """Fit the rates to a power of v_1 tau q_max, below and above v_1 tau q_max = 1."""
+    """Fit a power law of v_1 tau q_max to the rates, separately for v_1 tau q_max below 1 and above 1."""
     axes = [str(dim) for dim in data[LEVELS[0]].dims if dim != "realisation"]
     cells = np.ndindex(*(data.sizes[dim] for dim in axes))
     cases = [data.isel(dict(zip(axes, cell, strict=True))) for cell in cells]
@@ -276,7 +283,10 @@ def _rate_power(data: xr.Dataset) -> Variables:
 
 
 def _side_by_side(found: list[Relaxation | None]) -> FloatArray:
-    """Return the stacks of the rates of all cases as columns; shorter columns are filled with their first value."""
+    """Return an array with one column for each case: the stack of the rates of this case.
+
+    If a stack is shorter than the array, its first value is repeated.
+    """
     most = 1 + bootstrap.RESAMPLES + 2 * bootstrap.GROUPS
     stacks = [one.rate[:most] if one else np.full(1, np.nan) for one in found]
     columns = np.empty((max(1 + bootstrap.RESAMPLES, *(stack.size for stack in stacks)), len(stacks)))
@@ -287,10 +297,10 @@ def _side_by_side(found: list[Relaxation | None]) -> FloatArray:
 
 
 def _power(x: FloatArray, rates: FloatArray, error: FloatArray, stated: float, count: int) -> Variables:
-    """Fit the rates to a power of v_1 tau q_max, either below or above v_1 tau q_max = 1.
+    """Fit a power law of v_1 tau q_max to rates for which v_1 tau q_max is either always below 1 or always above 1.
 
-    `x` is ln(v_1 tau q_max), `rates` is the stack of the rates, `error` are the standard errors of their logarithms,
-    and `stated` is the power by eq. 4.12.
+    `x` is ln(v_1 tau q_max). `rates` is the stack of the rates. `error` are the standard errors of the logarithms of
+    the rates. `stated` is the exponent by eq. 4.12.
     """
     power, factor, error_of_fit = np.full(1 + bootstrap.RESAMPLES, np.nan), np.nan, np.nan
     of_fitted = of_stated = f"not tested: {x.size} rates are known to a factor of 1.6, three are needed"

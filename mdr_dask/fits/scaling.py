@@ -1,7 +1,7 @@
-"""Fit contact growth, slope in contact, and the general scaling of sliding friction (thesis eqs. 3.12 to 3.23).
+"""Fit three laws of sliding friction: contact growth, slope in contact, and general scaling (thesis eqs. 3.12 to 3.23).
 
-`mdr_dask.fits.friction` defines the zones and regions of the law of friction. L is the length of the line, L_cont the
-length in contact, and q_max the largest wave number of the roughness.
+`mdr_dask.fits.friction` defines the zones of the load and the regions of the velocity. L is the length of the line,
+L_cont is the length in contact, and q_max is the largest wave number of the roughness.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ SLOPE_FOLLOWED = "whether friction beyond its maximum is proportional to the slo
 
 
 def _contact_growth(data: xr.Dataset) -> Variables:
-    """Fit the power law of the length in contact against the load, in zone 1 and at the lowest velocity."""
+    """Fit a power law to the length in contact against the load, at the lowest velocity of each load in zone 1."""
     table = table_of(data, 1.0, *loads_and_velocities(data), output="contact_fraction")
     force, velocity = table.columns
     used = [int(same[np.argmin(velocity[same])]) for same in loads_of_zone_one(force, table.mean() > 0)]
@@ -71,7 +71,7 @@ def _contact_growth(data: xr.Dataset) -> Variables:
 
 
 def _balance(data: xr.Dataset, used: list[int]) -> Variables:
-    """Return the slope in contact divided by that of the line, and mu divided by mu of eq. 3.12.
+    """Return the slope in contact divided by the slope of the line, and mu divided by mu of eq. 3.12.
 
     The result is empty if the store lacks an output.
     """
@@ -97,7 +97,7 @@ def _balance(data: xr.Dataset, used: list[int]) -> Variables:
 
 
 def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> FloatArray:
-    """Return the slope in contact divided by that of the line, by eq. 3.21.
+    """Return the slope in contact divided by the slope of the line, according to eq. 3.21.
 
     Eq. 3.21 includes only waves that are shorter than the length in contact. The result is NaN if there are no such
     waves.
@@ -107,10 +107,10 @@ def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> Floa
     fraction : array
         Length in contact divided by the length of the line.
     hurst, points : float
-        Hurst exponent, and number of points of the line; the shortest wave has two points.
+        Hurst exponent, and number of points of the line. The shortest wave is two points long.
     """
     power = 2 * (1 - hurst)
-    # wave numbers 2 pi / L_cont and q_max, both in units of 2 pi / L
+    # wave numbers 2 pi / L_cont and q_max, both divided by 2 pi / L
     longest, shortest = 1 / np.clip(fraction, 1e-300, 1.0), points / 2
     if power < 1e-9:
         share = np.log(shortest / longest) / np.log(shortest)
@@ -121,7 +121,7 @@ def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> Floa
 
 
 def _contact_slope(data: xr.Dataset) -> Variables:
-    """Compare the slope in contact with eq. 3.21 times a fitted factor, and friction with the slope in contact."""
+    """Compare the slope in contact with eq. 3.21 times a fitted factor. Compare friction with the slope in contact."""
     hurst, points = one_value(data, "hurst"), one_value(data, "points")
     slopes = table_of(data, spectral_slope(data), output="contact_slope")
     fractions = table_of(data, 1.0, output="contact_fraction")
@@ -133,7 +133,8 @@ def _contact_slope(data: xr.Dataset) -> Variables:
     found = linear(np.ones((1, used.size)), bootstrap.difference(slopes.logarithms(used), law), count)
     fraction = fractions.mean()[used]
     holding = found.holds(lambda k: f"L_cont / L = {fraction[k]:.2g}")
-    if np.ptp(np.log(fraction)) < WITHIN:  # with equal contact lengths, the fitted factor alone explains the slopes
+    # if all contact lengths are equal, any law with a fitted factor explains the slopes
+    if np.ptp(np.log(fraction)) < WITHIN:
         holding = f"not tested: the lengths in contact of these cases differ by less than {WITHIN:.0%}"
     return {
         **constant("factor", np.exp(found.constants[:, 0]), count, "slope in contact divided by eq. 3.21", True),
@@ -145,7 +146,7 @@ def _contact_slope(data: xr.Dataset) -> Variables:
 
 
 def _friction_of_slope(data: xr.Dataset) -> Variables:
-    """Test whether friction beyond its maximum (region IV) falls in proportion to the slope in contact."""
+    """Test whether friction in region IV, beyond its maximum, is proportional to the slope in contact."""
     if not {"friction_coefficient", *KELVIN} <= set(data.variables):
         return {}
     table = table_of(data, 1.0, *loads_and_velocities(data))
@@ -177,14 +178,14 @@ class Collapse(NamedTuple):
     Attributes
     ----------
     shifts : array, shape (rows, 2, curves)
-        Stack of the shifts along ln velocity and ln friction (see `mdr_dask.bootstrap`). The shifts of the reference
-        curve are 0.
+        Stack (see `mdr_dask.bootstrap`) of the shifts along ln(velocity) and along ln(friction). The shifts of the
+        reference curve are 0.
     residuals : array, shape (rows, points)
         Stack of the distances of the points from the common curve.
     constants : int
-        Number of fitted constants: heights of the common curve at its knots, and shifts.
+        Number of fitted constants: the heights of the common curve at its knots, and the shifts.
     vague : array, shape (curves,)
-        Whether the data do not determine a shift of the curve, as for straight curves.
+        For each curve, whether the data leave a shift of this curve undetermined, as for straight curves.
     """
 
     shifts: FloatArray
@@ -196,7 +197,7 @@ class Collapse(NamedTuple):
 def collapse(
     x: FloatArray, rows: FloatArray, curve: NDArray[np.intp], start: FloatArray, reference: int, vertical: bool = True
 ) -> Collapse:
-    """Shift curves onto a common curve by least squares; the common curve is a natural cubic spline.
+    """Shift curves onto a common curve by least squares. The common curve is a natural cubic spline.
 
     The problem is solved for the first row of the stack. The shifts of the other rows follow by linearisation.
 
@@ -209,7 +210,7 @@ def collapse(
     curve : int array, shape (points,)
         Index of the curve to which each point belongs.
     start : array, shape (curves,)
-        Shifts along x from which the search starts. A second search starts from 0, and the better result is used.
+        Shifts along `x` from which a first search starts. A second search starts from 0. The better result is used.
     reference : int
         Index of the curve that is not shifted.
     vertical : bool
@@ -225,7 +226,7 @@ def collapse(
         place = x + begin[curve]
         ends = place.min() - 0.5, place.max() + 0.5
         knots = np.linspace(*ends, 2 + int(np.ceil(KNOTS * (ends[1] - ends[0]) / np.log(10))))
-        # a weak penalty on bends straightens the curve where there are no points
+        # a weak penalty on bends makes the common curve straight where it has no points
         bends = 1e-3 * np.diff(np.eye(knots.size), 2, axis=0)
 
         def residuals(unknown: FloatArray) -> FloatArray:
@@ -254,7 +255,7 @@ def collapse(
 
 
 def _natural(knots: FloatArray, place: FloatArray) -> FloatArray:
-    """Return the matrix that gives a natural cubic spline at some places from its heights at the knots.
+    """Return the matrix that converts heights at the knots to values of a natural cubic spline at the places `place`.
 
     The shape is (places, knots). Outside the range of the knots, the spline continues as a straight line.
     """
@@ -267,7 +268,10 @@ def _natural(knots: FloatArray, place: FloatArray) -> FloatArray:
 
 
 def _collapse(data: xr.Dataset) -> Variables:
-    """Shift the curves of friction against velocity at all loads onto one common curve, each up to its maximum."""
+    """Shift the curves of friction against velocity at all loads onto one common curve.
+
+    Each curve is used up to its largest friction.
+    """
     table = table_of(data, spectral_slope(data), *loads_and_velocities(data))
     force, velocity = table.columns
     known = rising(force, velocity, np.nan_to_num(table.mean()), np.ones(force.size, dtype=bool))
@@ -302,7 +306,7 @@ def _collapse(data: xr.Dataset) -> Variables:
 
 
 def _shifts(forces: FloatArray, loads: FloatArray, found: Collapse, stated: FloatArray, count: int) -> Variables:
-    """Return the shifts of the curves in decades, one for each load; NaN if undetermined or if there is no curve."""
+    """Return the shifts in decades for each load; NaN if a shift is undetermined, or if a load has no curve."""
     decades = np.where(found.vague, np.nan, found.shifts / np.log(10))
     columns = {"horizontal_stated": (stated / np.log(10), "shift along log velocity by eqs. 3.17 and 3.23")}
     for k, name in enumerate(("horizontal", "vertical")):

@@ -1,7 +1,7 @@
 """Sobol indices: the share of the variance of an output that each input of a study explains.
 
-The output is the mean over realisations. Variances are computed from products of the outputs of two cases. Products of
-two results of the same realisation are left out, because they contain the variance of the scatter.
+The output is the mean over realisations. Variances are computed from products of the outputs of two cases. If both
+outputs belong to the same realisation, the product contains the variance of the scatter. Such products are left out.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError, distinguishable
 
-#: There are enough points if the half width of the interval of each index is at most this.
+#: A study has enough points if the half width of the interval of each index is at most this.
 NARROW = 0.1
 #: Smallest number of points from which an index is computed.
 FEWEST = 16
@@ -29,8 +29,9 @@ def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
     """Return the Sobol indices of an output for every varied input of a sampled study.
 
     For Saltelli's design, first-order indices are computed by the formula of Saltelli et al. (2010), and total indices
-    by that of Jansen (1999). Any other sampled design gives first-order indices only: the cases are sorted by an input,
-    and the outputs of neighbours are multiplied (Gamboa et al., 2022, but with several neighbours).
+    by the formula of Jansen (1999). Any other sampled design gives first-order indices only. For such a design, the
+    cases are sorted by an input, and the outputs of neighbouring cases are multiplied (Gamboa et al., 2022, here with
+    several neighbours).
 
     Parameters
     ----------
@@ -42,22 +43,23 @@ def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
     Returns
     -------
     Dataset
-        Along ``parameter``, the indices ``first`` and ``total`` with the ends of their 95 % intervals, ``<index>_low``
-        and ``<index>_high``; NaN for an index that the design does not give. The attributes are ``output``, the numbers
-        of ``cases``, of cases without a value (``left_out``) and of ``realisations``, and ``advice``, a sentence on
-        whether there are enough points.
+        The indices ``first`` and ``total`` of each input, along the dimension ``parameter``. ``<index>_low`` and
+        ``<index>_high`` are the ends of the 95 % intervals. An index that the design does not give is NaN. The
+        attributes are the name ``output``, the number of ``cases``, the number ``left_out`` of cases without a value,
+        the number of ``realisations``, and ``advice``, a sentence on whether the study has enough points.
 
     Raises
     ------
     FitError
-        If the study is a grid or has too few points, or if the output does not vary or has dimensions of its own.
+        If the study is a grid or has too few points, if the output does not vary, or if the output has further
+        dimensions such as time.
 
     Notes
     -----
-    Failed cases are left out. In Saltelli's design, the index of an input needs three cases for each base point; if one
-    of them failed, the base point is left out. The intervals follow from a jackknife over groups of points and over
-    realisations. Points of a Sobol sequence fill space more evenly than random points. Therefore the intervals tend to
-    be too wide.
+    Failed cases are left out. In Saltelli's design, the index of an input needs three cases for each base
+    point. If one of these three cases failed, the base point is left out. The intervals follow from a jackknife over
+    groups of points and over realisations. Points of a Sobol sequence fill space more evenly than random points.
+    Therefore the intervals tend to be too wide.
 
     References
     ----------
@@ -126,9 +128,10 @@ def _values(dataset: xr.Dataset, output: str) -> tuple[FloatArray, int]:
 
 
 def _is_saltelli(columns: FloatArray) -> bool:
-    """Return whether the cases are Saltelli's design.
+    """Return whether the cases are those of Saltelli's design.
 
-    Each group of cases has a point a, a point b, and, for each input, the point a with this input taken from b.
+    In this design, each group of cases has a point a, a point b, and one further point for each input: point a in which
+    this input is replaced by its value at point b.
     """
     inputs, cases = columns.shape
     if cases % (inputs + 2):
@@ -140,9 +143,9 @@ def _is_saltelli(columns: FloatArray) -> bool:
 
 
 def _product(left: FloatArray, right: FloatArray) -> FloatArray:
-    """Return for each point the mean of left times right, over all pairs of different realisations.
+    """Return for each point the mean product of `left` and `right` over all pairs of different realisations.
 
-    If there is only one realisation, it is paired with itself.
+    If the study has only one realisation, this realisation is paired with itself.
     """
     count = len(left)
     if count == 1:
@@ -154,7 +157,7 @@ def _product(left: FloatArray, right: FloatArray) -> FloatArray:
 def _exchanged(values: FloatArray) -> FloatArray:
     """Return the first-order and the total index of one input, from outputs of shape (realisations, points, 3).
 
-    The last dimension holds the outputs at point a, at point b, and at point a with this input taken from b.
+    The last dimension holds the outputs at point a, at point b, and at point a with the input of point b.
     """
     a, b, mixed = np.moveaxis(values[:, np.isfinite(values).all(axis=(0, 2))], 2, 0)
     if a.shape[1] < FEWEST:
@@ -166,12 +169,12 @@ def _exchanged(values: FloatArray) -> FloatArray:
 
 
 def _of_neighbours(values: FloatArray) -> FloatArray:
-    """Return value and interval ends of the first-order index, and NaN for the total index, shape (3, 2).
+    """Return the value and the ends of the interval of both indices, shape (3, 2); the total index is NaN.
 
-    There are two estimates. The first estimate uses products of neighbours only, and is right for random points. The
-    second estimate also uses the product of each point with itself, and is right for points that fill space evenly,
-    such as a Sobol sequence, because neighbours then differ systematically in their other inputs. The index is the mean
-    of both estimates, and its interval contains both.
+    There are two estimates. The first estimate uses products of neighbours only. This estimate is right for random
+    points. The second estimate also uses the product of each point with itself. This estimate is right for points that
+    fill space evenly, such as a Sobol sequence, because neighbouring points then differ systematically in their other
+    inputs. The index is the mean of both estimates, and its interval contains both.
     """
     (without, with_itself), (low, _), (_, high) = _with_interval(values, _neighbours)
     first = [(without + with_itself) / 2, low, high]
@@ -189,7 +192,7 @@ def _neighbours(values: FloatArray) -> FloatArray:
 
 
 def _with_interval(values: FloatArray, indices: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    """Return indices and the ends of their intervals by a jackknife, shape (3, indices).
+    """Return indices and the ends of their intervals, shape (3, indices). The intervals follow from a jackknife.
 
     `indices` computes the indices from outputs of shape (realisations, points, ...).
     """
@@ -202,7 +205,7 @@ def _with_interval(values: FloatArray, indices: Callable[[FloatArray], FloatArra
 
 
 def _jackknife(parts: list[FloatArray]) -> FloatArray:
-    """Return the half width of an interval; each item of `parts` contains the indices without one part of the data."""
+    """Return the half widths of the intervals. Each item of `parts` is the indices without one part of the data."""
     count = len(parts)
     error = np.sqrt((count - 1) / count * np.sum((np.array(parts) - np.mean(parts, axis=0)) ** 2, axis=0))
     half: FloatArray = t.ppf(bootstrap.TAILS[1], count - 1) * error
@@ -210,7 +213,7 @@ def _jackknife(parts: list[FloatArray]) -> FloatArray:
 
 
 def _advice(result: xr.Dataset) -> str:
-    """Return a sentence on whether the intervals are narrow enough, and how many more cases are needed."""
+    """Return a sentence on whether the intervals are narrow enough and, if not, how many more cases are needed."""
     halves = [((result[f"{name}_high"] - result[f"{name}_low"]) / 2).max().item() for name in ("first", "total")]
     widest = np.nanmax(halves)
     cases = result.attrs["cases"]

@@ -10,14 +10,14 @@ from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import DOUBTFUL
 
-#: A parabola is fitted to the points that are below the maximum by at most this fraction. The fractions are tried in
-#: turn until a parabola fits.
+#: A parabola is fitted to the points that are below the maximum by at most a certain fraction. These fractions are
+#: tried one after the other until a parabola fits.
 TOPS = (0.3, 0.2, 0.1, 0.05)
-FLAT = 0.05  # points that are below the maximum by at most this fraction count as plateau
+FLAT = 0.05  # points that are below the maximum by at most this fraction belong to the plateau
 
 
 def smoothed(mean: FloatArray) -> FloatArray:
-    """Return a smoothed curve; it only serves to choose the points to which a parabola is fitted."""
+    """Return a smoothed curve. The smoothed curve is used only to select points, not for the fit of a parabola."""
     smooth = mean.copy()
     for _ in range(2):
         smooth[1:-1] = (smooth[:-2] + 2 * smooth[1:-1] + smooth[2:]) / 4
@@ -33,8 +33,8 @@ class Top(NamedTuple):
         Stack of the maximum, corrected for its bias (see `mdr_dask.bootstrap`). The interval of the maximum includes
         the residuals of the parabola.
     place, rise : array, shape (rows,)
-        Stacks of the logarithm of the velocity at the maximum, and of d ln(friction) / d ln(velocity) there. This slope
-        is 0 unless the maximum is at an end of the range of velocities.
+        Stacks of the logarithm of the velocity at the maximum, and of the slope d ln(friction) / d ln(velocity) at the
+        maximum. This slope is 0 unless the maximum is at an end of the range of velocities.
     """
 
     height: FloatArray
@@ -43,7 +43,7 @@ class Top(NamedTuple):
 
 
 def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
-    """Fit a parabola to the points near the largest friction, to as many of them as possible.
+    """Fit a parabola to as many points near the largest friction as possible.
 
     Points far from the maximum are left out until scatter and errors explain the residuals, or until the last of `TOPS`
     is reached.
@@ -63,17 +63,21 @@ def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
         if left.shape[1] > 3 and not bootstrap.chance(left, count) >= DOUBTFUL:
             continue
         break
-    resamples = top[1 : 1 + bootstrap.RESAMPLES]  # NaN for resamples that contain only failed lines
+    resamples = top[1 : 1 + bootstrap.RESAMPLES]  # a resample that contains only failed lines is NaN
     unbiased = top[0] + np.nanmean(top[0] - resamples) if count > 1 else top[0]
     if left.shape[1] > 3:
         errors = _parabola(x[near], bootstrap.moved(stack[0, near], left[0]))[0]
-    else:  # a parabola through three points has no residuals; the error is its maximum minus the highest point
+    # a parabola through three points has no residuals; the error is the maximum of the parabola minus the highest point
+    else:
         errors = bootstrap.moved(top[:1], top[:1] - stack[0, near].max()).ravel()
     return Top(np.concatenate([top, errors]) + (unbiased - top[0]), at, rise)
 
 
 def _about_the_top(mean: FloatArray, drop: float) -> slice:
-    """Return the points near the maximum that are at most the fraction `drop` below it, but at least three points."""
+    """Return the points near the maximum that are below the maximum by at most the fraction `drop`.
+
+    At least three points are returned.
+    """
     smooth = smoothed(mean)
     at = int(np.argmax(smooth))
     low = np.flatnonzero(smooth[at:] <= (1 - drop) * smooth[at])
@@ -85,7 +89,7 @@ def _about_the_top(mean: FloatArray, drop: float) -> slice:
 
 
 def _parabola(x: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Fit a parabola to every row; return its maximum, the place of the maximum, the slope there, and the residuals."""
+    """Fit a parabola to every row. Return the maximum, its place, the slope at this place, and the residuals."""
     centre, half = x.mean(), np.ptp(x) / 2
     u = (x - centre) / half
     design = np.vstack([np.ones_like(u), u, u**2])

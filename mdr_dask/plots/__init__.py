@@ -1,8 +1,8 @@
 """Figures drawn from a store.
 
-A figure is first described as data (`figure`). `view` makes this description for any output against parameters, from
-the series of a store; `named` makes it for the figures that have a name. The description is then drawn with matplotlib
-(`render`), or in a browser on the page of `mdr_dask.report`.
+A figure is first described as data (module `figure`). The module `view` describes figures of any output against
+parameters. The module `named` describes the figures that have a name. The description is then drawn with matplotlib
+(module `render`), or in a browser on the page of `mdr_dask.report`.
 """
 
 from __future__ import annotations
@@ -25,14 +25,20 @@ GROUP = "mdr_dask.plots"
 
 
 def available(model: str) -> dict[str, Plot]:
-    """Return the figures for stores of a model, by name, including those that other packages offer in `GROUP`."""
+    """Return the figures for stores of a model, indexed by name.
+
+    The figures that other packages offer in `GROUP` are included.
+    """
     own = (import_module(f"mdr_dask.plots.{module}").PLOTS for module in SUBJECTS)
     others = (entry.load() for entry in entry_points(group=GROUP))
     return {plot.name: plot for plots in (*own, *others) for plot in plots if model in plot.models or not plot.models}
 
 
 def figures_of(model: str, groups: Mapping[str, xr.Dataset]) -> dict[str, Plot]:
-    """Return the named figures for a model; if none is made for this model, add a figure of each output of a study."""
+    """Return the figures for the stores of a model, indexed by name.
+
+    If no named figure is made for this model in particular, there is also one figure for each output of the study.
+    """
     from mdr_dask.plots.view import View, figure_of, main_axis, varied
 
     known = available(model)

@@ -33,10 +33,10 @@ class Plot:
     summary : str
         One line: the quantities on both axes.
     draw : callable, mapping of str to Dataset -> Figure
-        Takes the groups of a store by the name of the series, as :class:`mdr_dask.fits.base.Fit` does, and returns a
-        :class:`mdr_dask.plots.figure.Figure`. For outputs against parameters, use `mdr_dask.plots.view.draw`.
+        Takes the groups of a store, indexed by the name of the series, and returns a
+        :class:`mdr_dask.plots.figure.Figure`. To draw outputs against parameters, use `mdr_dask.plots.view.draw`.
     fitted : bool
-        Whether the figure shows a fit. For a large study, a fit takes a long time.
+        Whether the figure shows a fit. If the study is large, such a figure takes a long time.
     """
 
     name: str
@@ -78,14 +78,17 @@ class Plot:
 
 
 def _squeezed(data: xr.Dataset) -> xr.Dataset:
-    """Return a series in which axes with one value are scalar coordinates."""
+    """Return a series in which an axis with a single value becomes a scalar coordinate."""
     if "status" not in data:
         return data
     return data.squeeze([dim for dim in data["status"].dims if dim != "realisation" and data.sizes[dim] == 1])
 
 
 def _without_value(groups: Mapping[str, xr.Dataset]) -> list[str]:
-    """Return a text for each reason why results have no value, such as failure, with the number of these results."""
+    """Return one text for each reason why results have no value, such as failure.
+
+    A text states the reason and the number of these results.
+    """
     states = [data["status"].to_numpy() for data in groups.values() if "status" in data]
     total = sum(state.size for state in states)
     reasons = {Status.FAILED: "failed", Status.NOT_CONVERGED: "did not converge", Status.MISSING: "are missing"}
@@ -94,13 +97,13 @@ def _without_value(groups: Mapping[str, xr.Dataset]) -> list[str]:
 
 
 def provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:
-    """Return the origin of a figure that was drawn by a command; it is written into the table of the figure."""
+    """Return the origin of a figure that a command drew. The table of the figure states this origin."""
     origin = {"mdr_dask": f"{__version__}, figure {name}", "command": command}
     return origin | {f"store {url}": _campaign_of(store.attributes(url)) for url in urls}
 
 
 def origin_of(name: str, groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
-    """Return the origin of a figure that was drawn from Python; it is written into the table of the figure."""
+    """Return the origin of a figure that was drawn from Python. The table of the figure states this origin."""
     campaigns = dict.fromkeys(_campaign_of(data.attrs) for data in groups.values())
     return {"mdr_dask": f"{__version__}, figure {name}", "study": "; ".join(campaigns)}
 

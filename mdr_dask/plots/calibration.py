@@ -1,4 +1,4 @@
-"""The figure of a calibration: measured points with a band, residuals, and the density of each unknown."""
+"""The figure of a calibration: measured points and predictions, residuals, and the density of each unknown."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 from mdr_dask.plots.measured import HALF, conditions
 
-#: `SAMPLES`: number of posterior samples for the band of predictions. `BINS`: number of bins of a density.
+#: `SAMPLES`: number of samples of the posterior for the band of predictions. `BINS`: number of bins of a density.
 SAMPLES, BINS = 400, 60
-#: A density is smoothed: each bin becomes the mean of its neighbours with these weights.
+#: A density is smoothed: the value of each bin becomes the mean of five neighbouring bins with these weights.
 SMOOTH = np.array([0.1, 0.2, 0.4, 0.2, 0.1])
 Points = NDArray[np.intp]
 
 
 def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
-    """Return a figure of measured points with the band of predictions, residuals, and the density of each unknown.
+    """Return a figure of measured points and predictions, of residuals, and of the density of each unknown.
 
-    The bars are 95 % intervals of the errors of measurement; the band is the 95 % interval of the posterior. A density
+    The bars are 95 % intervals of the errors of measurement. The band is the 95 % interval of the prediction. A density
     is grey if the data do not determine the unknown. If the data determine only a product of unknowns, a further panel
     shows this product.
     """
@@ -62,7 +62,10 @@ def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.D
 
 
 def _curves(found: fit.Calibration, main: str, data: xr.Dataset) -> dict[str, Points]:
-    """Return groups of points that differ only in the condition `main`, by label; too many groups become one group."""
+    """Return groups of points, indexed by label. The points of a group differ only in the condition `main`.
+
+    If there are more groups than colours, all points form one group.
+    """
     others = {name: each for name, each in found.measured.conditions.items() if name != main}
     rows = np.stack(list(others.values()), axis=1) if others else np.zeros((found.measured.values.size, 1))
     places, which = np.unique(np.round(rows, 12), axis=0, return_inverse=True)
@@ -130,7 +133,7 @@ def _residuals(found: fit.Calibration, x: Axis, curves: Mapping[str, Points], da
 
 
 def _density(found: fit.Calibration, name: str, values: FloatArray, how: labels.Quantity, is_free: bool) -> Panel:
-    """Return the density of an unknown, or of a product of unknowns, with its 68 % and 95 % intervals."""
+    """Return the panel with the density and the 68 % and 95 % intervals of an unknown or a product of unknowns."""
     shown, weights = how.of(values), found.posterior.weights
     known = name in found.unknowns
     log = bool(np.all(shown > 0)) and (not known or found.prediction.scales[found.unknowns.index(name)].logarithmic)
@@ -166,7 +169,10 @@ def _density(found: fit.Calibration, name: str, values: FloatArray, how: labels.
 
 
 def of_whole_cells(ends: FloatArray, across: FloatArray, place: FloatArray, width: float) -> FloatArray:
-    """Return edges of bins with equal numbers of cells of the posterior; unequal numbers would look like peaks."""
+    """Return edges of bins that contain equal numbers of cells of the posterior.
+
+    With unequal numbers of cells, a smooth density would have false peaks.
+    """
     low, high = int(place.argmin()), int(place.argmax())
     cell = width * (across[high] - across[low]) / (place[high] - place[low])
     start = across[low] - cell / 2

@@ -1,4 +1,4 @@
-"""Colours, lines and markers of curves, and scales of colours."""
+"""Colours, lines and markers of curves, and colour bars."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def most() -> int:
 
 
 def colour(number: int) -> str:
-    """Return the colour of a curve from the requested style, or else from `COLOURS`."""
+    """Return the colour of a curve. The requested style takes precedence over `COLOURS`."""
     from matplotlib.colors import to_hex
 
     colours = _cycle("color") or COLOURS
@@ -40,7 +40,8 @@ def colour(number: int) -> str:
 def line_and_marker(number: int) -> tuple[str, str]:
     """Return line and marker of a curve.
 
-    Lines and markers differ between curves if the style is grey, or if the style defines lines and markers.
+    Lines and markers differ between curves if all colours are grey, or if the requested style defines lines and
+    markers.
     """
     from matplotlib.colors import to_rgb
 
@@ -51,7 +52,10 @@ def line_and_marker(number: int) -> tuple[str, str]:
 
 
 def bar(label: str, values: Any, log: bool | None = None) -> Bar:
-    """Return the colour bar of some values; by default it is logarithmic if a logarithmic axis suits the values."""
+    """Return the colour bar of some values.
+
+    By default, the bar is logarithmic if a logarithmic axis suits the values.
+    """
     values = np.asarray(values, dtype=np.float64)
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
@@ -60,7 +64,7 @@ def bar(label: str, values: Any, log: bool | None = None) -> Bar:
 
 
 def scale(of: Bar) -> tuple[Colormap, Normalize]:
-    """Return colour map and norm of a colour bar."""
+    """Return the colour map of a colour bar, and the scale of the bar as a norm of matplotlib."""
     from matplotlib import colormaps, rcParams
     from matplotlib.colors import LogNorm, Normalize
 

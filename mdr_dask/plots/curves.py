@@ -1,4 +1,4 @@
-"""Curves of a series: parameters that a figure varies, parameters that it fixes, and means with intervals."""
+"""Curves of a series: the parameters that vary in a figure, the fixed parameters, and means with intervals."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mdr_dask.models.base import Status
 from mdr_dask.plots import colours, labels
 from mdr_dask.plots.figure import Bar, Key, Mean
 
-#: Dimensions that belong to an output and are not axes of a study; used for data without the array ``status``.
+#: Dimensions that belong to an output and are not axes of a study. These names are used for data without ``status``.
 OWN = {"relaxation_times", "radius", "position", "angle", "block", "regime"}
 #: Largest number of parameters in a title; the table beside the figure lists all of them.
 MOST_FIXED = 8
@@ -37,7 +37,7 @@ class Family(NamedTuple):
     Attributes
     ----------
     curves : list of Curve
-        The curves. The data of each curve have one dimension besides the realisations.
+        The curves. The data of each curve have one dimension in addition to the dimension of realisations.
     keys : list of Key
         Entries of the legend.
     bar : Bar or None
@@ -45,9 +45,9 @@ class Family(NamedTuple):
     held : dict of str to DataArray
         Parameters that are fixed at one value.
     left_out : list of str
-        Sentences about values that are not drawn, one for each axis.
+        One sentence for each axis that has values which are not drawn.
     varying : tuple of str
-        Other parameters that change from point to point, in a sampled design.
+        In a sampled design, the other parameters that change from point to point.
     """
 
     curves: list[Curve]
@@ -59,7 +59,7 @@ class Family(NamedTuple):
 
 
 def mean(data: xr.Dataset, output: str) -> Mean:
-    """Return the mean of an output over realisations with its 95 % interval, in the unit of the figure."""
+    """Return the mean of an output over realisations and the 95 % interval of the mean, in the unit of the figure."""
     values = data[output]
     if "realisation" not in values.dims:
         values = values.expand_dims("realisation")
@@ -71,7 +71,7 @@ def mean(data: xr.Dataset, output: str) -> Mean:
 
 
 def meaning_of_bars(data: Iterable[xr.Dataset], outputs: Sequence[str]) -> str:
-    """Return a text for the title, which explains bars and bands."""
+    """Return a text that explains bars and bands. The text is a part of the title."""
     groups = [*data]
     most = max((each.sizes.get("realisation", 1) for each in groups), default=1)
     grid = any(aggregation.companion(each, name) is not None for each in groups for name in outputs if name in each)
@@ -98,14 +98,14 @@ def along_dim(data: xr.Dataset, along: str, output: str) -> str | None:
 
 
 def parameters_along(data: xr.Dataset, dim: str) -> list[str]:
-    """Return the parameters that change along a dimension: one for an axis, several for a sampled design."""
+    """Return the parameters that change along a dimension: one parameter for an axis, several for a sampled design."""
     names = [str(name) for name, values in data.coords.items() if values.dims == (dim,)]
     axes = [str(axis["name"]) for axis in data.attrs.get("axes", [])]
     return sorted(names or [dim], key=lambda name: axes.index(name) if name in axes else -1)
 
 
 def hold(data: xr.Dataset, dims: Sequence[str]) -> tuple[xr.Dataset, list[str]]:
-    """Fix axes at their middle values; return the series, and a text for each fixed axis with several values."""
+    """Fix axes at their middle values. Return the series, and one text for each fixed axis that has several values."""
     places = {dim: data.sizes[dim] // 2 for dim in dims}
     sentences = [_only_one(data, dim, place) for dim, place in places.items() if data.sizes[dim] > 1]
     return data.isel(places), sentences
@@ -118,7 +118,7 @@ def _only_one(data: xr.Dataset, dim: str, place: int) -> str:
 
 
 def thin(data: xr.Dataset, dim: str, most: int) -> tuple[xr.Dataset, list[str]]:
-    """Return a series with at most `most` evenly spread values along an axis, and a text about omitted values."""
+    """Return a series with at most `most` evenly spread values along an axis, and a text about the values left out."""
     size = data.sizes[dim]
     if size <= most:
         return data, []
@@ -132,10 +132,11 @@ def thin(data: xr.Dataset, dim: str, most: int) -> tuple[xr.Dataset, list[str]]:
 def family(data: xr.Dataset, output: str, along: str, by: str = "") -> Family:
     """Split a series into curves against a parameter.
 
-    With `by`, the curves differ in this parameter alone, and other axes are fixed at their middle value. Without `by`,
-    all curves are drawn if there are enough colours. Otherwise one axis is shown by colours, another axis with few
-    values by line styles, and the remaining axes are fixed. An axis with more values than colours gets a colour bar.
-    If the values of such an axis are words, some values are left out instead.
+    If the parameter `by` is given, the curves differ in this parameter alone, and other axes are fixed at their middle
+    value. If `by` is empty, all curves are drawn if there are enough colours. If there are too few colours, colours
+    show one axis, line styles show another axis with few values, and the remaining axes are fixed. An axis with more
+    values than colours gets a colour bar. If the values of such an axis are words, some values are left out, and there
+    is no colour bar.
 
     Parameters
     ----------
@@ -181,7 +182,10 @@ def family(data: xr.Dataset, output: str, along: str, by: str = "") -> Family:
 
 
 def with_one_legend(families: Mapping[str, Family]) -> tuple[list[str], list[str]]:
-    """Return the names in the largest set of series with equal legend and colour bar, and a text about other series."""
+    """Return the names of the series that one figure can show, and a list with a text about the other series.
+
+    The series are the largest set with the same legend and the same colour bar.
+    """
     groups: dict[Any, list[str]] = {}
     for name, one in families.items():
         groups.setdefault((tuple(one.keys), one.bar), []).append(name)
@@ -193,7 +197,10 @@ def with_one_legend(families: Mapping[str, Family]) -> tuple[list[str], list[str
 
 
 def _most_shown(data: xr.Dataset, others: list[str]) -> list[str]:
-    """Return the axis for colours, and possibly an axis for line styles, that show as many curves as possible."""
+    """Return the axes with which a figure shows as many curves as possible.
+
+    Colours show the first axis. Line styles show the second axis, if there is one.
+    """
     few = len(colours.LINES)
     pairs = [[one, two] for one in others for two in others if two != one and data.sizes[two] <= few]
     choices = [*([dim] for dim in others), *pairs]
@@ -206,7 +213,7 @@ def _is_numeric(data: xr.Dataset, dim: str) -> bool:
 
 
 def _split(data: xr.Dataset, dims: list[str], joined: bool) -> tuple[list[Curve], list[Key], Bar | None]:
-    """Return a curve for every combination of values of some axes, the entries of the legend, and the colour bar."""
+    """Return one curve for each combination of values of some axes, the entries of the legend, and the colour bar."""
     cells = list(np.ndindex(*(data.sizes[dim] for dim in dims)))
     parts = [needed(data.isel(dict(zip(dims, cell, strict=True)))) for cell in cells]
     named = [", ".join(_names(part, dims)) for part in parts]
@@ -228,7 +235,7 @@ def _split(data: xr.Dataset, dims: list[str], joined: bool) -> tuple[list[Curve]
     curves = []
     for part, label, cell in zip(parts, named, cells, strict=True):
         k = cell[1] if second else 0
-        marker = "." if bar and joined else colours.MARKERS[k]  # a small marker, because there are many curves
+        marker = "." if bar and joined else colours.MARKERS[k]  # many curves get a small marker
         curves.append(Curve(part, label, shades[cell[0]], colours.LINES[k] if joined else "", marker))
     keys = []
     if bar is None:
@@ -243,7 +250,7 @@ def _split(data: xr.Dataset, dims: list[str], joined: bool) -> tuple[list[Curve]
 
 
 def needed(curve: xr.Dataset) -> xr.Dataset:
-    """Return a curve without those values of an adaptive axis that did not need to be computed."""
+    """Return a curve without the values of an adaptive axis at which no result was needed."""
     if "status" not in curve:
         return curve
     spared = (curve["status"] == Status.NOT_NEEDED).all("realisation")
@@ -251,7 +258,10 @@ def needed(curve: xr.Dataset) -> xr.Dataset:
 
 
 def _names(part: xr.Dataset, dims: Sequence[str]) -> list[str]:
-    """Return the labels of one curve, with its values of the parameters that vary along some axes."""
+    """Return one label of a curve for each of some axes.
+
+    A label states the values of the parameters that vary along the axis.
+    """
     axes = part.attrs.get("axes", [])
     found = []
     for dim in dims:
@@ -262,7 +272,7 @@ def _names(part: xr.Dataset, dims: Sequence[str]) -> list[str]:
 
 
 def scalars(data: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Return the parameters of a series that have a single value and have an effect."""
+    """Return the parameters of a series that have a single value. Parameters without an effect are left out."""
     requires = models.load(data.attrs["model"]).parameters.requires if "model" in data.attrs else {}
     idle = {name for name, (other, value) in requires.items() if value not in _given(data, other)}
     kept = {str(name): value for name, value in data.coords.items() if value.ndim == 0 and name != "realisation"}
@@ -290,8 +300,8 @@ def fixed_by_all(held: Sequence[Mapping[str, xr.DataArray]]) -> dict[str, xr.Dat
 def fixed_text(held: Mapping[str, xr.DataArray], data: xr.Dataset) -> str:
     """Return the text of the fixed parameters for a title.
 
-    Axes of the study come first, because the figure or ``--select`` chose one of their values. Fixed parameters that
-    have a symbol follow.
+    The text begins with axes of the study for which the figure or the option ``--select`` chose one value. Fixed
+    parameters that have a symbol follow.
     """
     axes = [str(axis["name"]) for axis in data.attrs.get("axes", [])]
     names = [name for name in axes if name in held]
@@ -304,13 +314,13 @@ def _is_known(value: xr.DataArray) -> bool:
 
 
 def parameters_of(data: xr.Dataset) -> dict[str, Any]:
-    """Return the parameters of a series as stored; they include words, such as names of rules and shapes."""
+    """Return all parameters of a series as stored, including words such as the names of rules and shapes."""
     found: dict[str, Any] = json.loads(data.attrs.get("parameters", "{}"))
     return found
 
 
 def parameters_at(case: xr.Dataset) -> dict[str, Any]:
-    """Return the parameters of one case: those of its series, with the values of the axes for this case."""
+    """Return the parameters of one case: the parameters of the series, with the values of this case on the axes."""
     parameters = parameters_of(case)
     for axis in case.attrs.get("axes", []):
         *above, last = axis["path"].split(".")

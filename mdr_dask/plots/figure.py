@@ -1,6 +1,7 @@
-"""A figure as data: panels and everything that is drawn in them, independent of the drawing library.
+"""A figure as data: panels and all that is drawn in the panels, independent of the drawing library.
 
-`render` draws the figure with matplotlib, `mdr_dask.report` draws it in a browser, and `Figure.table` lists its points.
+`render` draws the figure with matplotlib, `mdr_dask.report` draws the figure in a browser, and `Figure.table` lists all
+points.
 """
 
 from __future__ import annotations
@@ -16,10 +17,11 @@ import xarray as xr
 from mdr_dask.arrays import FloatArray
 from mdr_dask.plots.labels import plain
 
-#: Columns of a table before and after the columns of the parameters.
+#: Columns of the table of a figure: `FIRST` are left of the columns of the parameters, `LAST` are right of these
+#: columns.
 FIRST = ("panel", "curve", "what")
 LAST = tuple(f"{name}{end}" for name in ("x", "y", "value") for end in ("", "_low", "_high"))
-#: Entry of the column ``what`` for results of a study. The entry for a law is the name of the law.
+#: Entry of the column ``what`` for results of a study. For a law, the entry is the name of the law.
 DATA = "data"
 Kind = Literal["curve", "law", "band", "dots", "map", "absent"]
 
@@ -39,13 +41,13 @@ class Axis:
     Parameters
     ----------
     label : str
-        Label with unit. Symbols are mathtext between dollar signs.
+        Label with unit. Symbols in the label are written as mathtext between dollar signs.
     log : bool
         Whether the axis is logarithmic.
     ticks : sequence of (float, str)
         Positions and texts of the ticks, for an axis whose values are words.
     low, high : float, optional
-        Limits of the axis. With None, they follow from the data.
+        Limits of the axis. A limit that is None follows from the data.
     quantity : str
         Name of the parameter or output on the axis; empty if the axis shows a derived quantity.
     reverse : bool
@@ -88,18 +90,18 @@ class Trace:
     Parameters
     ----------
     kind : str
-        ``curve`` and ``law`` (points, joined if there is a line style), ``band`` (from ``y_low`` to ``y_high``),
-        ``dots`` (coloured by ``value``), ``map`` (cells coloured by ``value``), ``absent`` (marks at the lower edge of
-        the panel).
+        ``curve`` and ``law``: points, which are joined if the trace has a line style. ``band``: the area from ``y_low``
+        to ``y_high``. ``dots``: points coloured by ``value``. ``map``: cells coloured by ``value``. ``absent``: marks
+        at the lower edge of the panel.
     data : Dataset
-        ``x``, ``y`` and ``value`` in the units of the axes, with ``_low`` and ``_high`` if their intervals are known.
-        The coordinates are the parameters of each point in SI.
+        The variables ``x``, ``y`` and ``value`` in the units of the axes. If an interval is known, its ends are
+        variables with the endings ``_low`` and ``_high``. The coordinates are the parameters of each point in SI.
     what : str
         ``data``, the name of a law, or the reason why cases have no value.
     label : str
         Name of the curve.
     colour, line, marker : str
-        Names as in matplotlib. With an empty text, there is no line or no marker.
+        Names as in matplotlib. If `line` is empty, no line is drawn. If `marker` is empty, no marker is drawn.
     bars : bool
         Whether intervals are drawn as bars instead of a band.
     """
@@ -135,7 +137,8 @@ class Trace:
 class Panel:
     """One panel: its axes and the traces in it.
 
-    `keys` holds the entries of the legend. If there are no keys and no colour bar, the traces are the entries.
+    `keys` holds the entries of the legend. If a panel has no keys and no colour bar, every trace with a label is an
+    entry.
     """
 
     x: Axis
@@ -159,7 +162,8 @@ class Figure:
     Parameters
     ----------
     panels : list of Panel
-        The panels. Panels fill rows from left to right; with `stack`, panels fill columns from left to right.
+        The panels. If `stack` is 1, panels fill row after row. Otherwise each group of `stack` successive panels is a
+        column.
     subject : str
         Subject of the figure, for the title.
     fixed : str
@@ -195,8 +199,8 @@ class Figure:
     def table(self) -> pd.DataFrame:
         """Return a table of the whole figure with a row for every point.
 
-        Parameters are in SI; ``x``, ``y`` and ``value`` are in the units of the axes. Parameters that are the same for
-        all points are in ``attrs["held"]``, and the units of all parameters are in ``attrs["units"]``.
+        Parameters are in SI. The columns ``x``, ``y`` and ``value`` are in the units of the axes. Parameters that are
+        the same for all points are in ``attrs["held"]``, and the units of all parameters are in ``attrs["units"]``.
         """
         frames = [trace.frame().assign(panel=k + 1) for k, panel in enumerate(self.panels) for trace in panel.traces]
         frames = [frame.dropna(axis=1, how="all") for frame in frames if len(frame)]
@@ -238,16 +242,16 @@ def _number(value: Any) -> str:
 
 
 def columns(of: xr.Dataset | xr.DataArray | None = None, **values: Any) -> xr.Dataset:
-    """Return the data of a trace: arrays of points with the parameters of their case.
+    """Return the data of a trace: arrays with an entry for every point, and the parameters of every point.
 
     Parameters
     ----------
     of : Dataset or DataArray, optional
-        Source of the parameters of the points: its scalar coordinates, and its coordinates along the dimensions of the
-        values.
+        Data with the parameters of the points as coordinates. Scalar coordinates, and coordinates along the dimensions
+        of the values, are used.
     **values
-        ``x``, ``y`` and ``value``. A `Mean` adds the ends of its interval. A plain array gets the dimensions of a
-        labelled array that has the same shape.
+        The arrays ``x``, ``y`` and ``value``. An array that is a `Mean` also gives the ends of its interval. An array
+        without named dimensions gets the dimensions of another one of these arrays that has the same shape.
     """
     parts: dict[str, Any] = {}
     for name, value in values.items():
@@ -271,12 +275,15 @@ def columns(of: xr.Dataset | xr.DataArray | None = None, **values: Any) -> xr.Da
 
 
 def _apart(name: Any) -> str:
-    """Return the name of a parameter for a table; the name is changed if the table has another column of this name."""
+    """Return the name of a parameter in a table. If another column has this name, the word "parameter" is added."""
     return f"parameter {name}" if name in (*FIRST, *LAST) else str(name)
 
 
 def edges(centres: FloatArray, log: bool) -> FloatArray:
-    """Return edges of cells around the values of an axis, halfway between the values or between their logarithms."""
+    """Return the edges of cells around the values of an axis.
+
+    The edges are halfway between the values or, on a logarithmic axis, halfway between their logarithms.
+    """
     if centres.size == 1:
         half = 0.5 * (abs(float(centres[0])) or 1.0)
         return np.array([centres[0] - half, centres[0] + half])

@@ -23,13 +23,16 @@ BEFORE, JUMP, AFTER = (f"friction_coefficient_{name}" for name in ("before", "ju
 FRICTION = "friction_coefficient"
 TIME = "relaxation_times"
 DRIVEN = {"velocity": "m/s", "normal_force": "N"}
-#: Time span that is shown before the history begins, as a fraction of the time span of the history shown.
+#: Time span that is shown before the history begins, divided by the shown time span of the history.
 LEAD = 0.08
 STEADY = "steady state at the end"
 
 
 def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
-    """Return a figure of friction (and velocity and force if they change) against time; a column for each series."""
+    """Return a figure of friction against time, with one column of panels for each series.
+
+    If the velocity or the normal force changes, this quantity has a panel below the panel of friction.
+    """
     needed = (BEFORE, JUMP, FRICTION)
     found = {name: data for name, data in groups.items() if all(output in data for output in needed)}
     found = {name: data for name, data in found.items() if data[FRICTION].notnull().any()}
@@ -83,7 +86,7 @@ def _column(name: str, data: xr.Dataset, one: curves.Family) -> list[Panel]:
 
 
 def _trace(case: xr.Dataset, last: float) -> xr.Dataset:
-    """Return friction before the history, just after its start, and during the history."""
+    """Return friction before the history, just after the start of the history, and during the history."""
     before = curves.mean(case, BEFORE)
     at_once = case.assign({JUMP: (case[BEFORE] + case[JUMP]).assign_attrs(case[JUMP].attrs)})
     errors = [aggregation.companion(case, name) for name in (BEFORE, JUMP)]

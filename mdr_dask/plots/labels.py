@@ -44,15 +44,15 @@ SYMBOLS: Mapping[str, str] = {
 }
 #: Units that are shown instead of an SI unit if the campaign states no unit.
 USUAL = {"rad/s": "rpm", "rad": "deg"}
-#: `PREFIXES`: common prefixes by their power of a thousand. `_PREFIXED`: units that are written with a prefix.
+#: `PREFIXES`: common prefixes; the keys are powers of a thousand. `_PREFIXED`: units that may have a prefix.
 PREFIXES = {-3: "n", -2: "u", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
 _PREFIXED = re.compile(r"(m|Pa|N|s|W|ohm)(?:\^([23]))?")
-#: Symbols in the long names of outputs, as mathtext.
+#: Patterns of symbols in the long names of outputs, and the mathtext that replaces them.
 _MATHTEXT = {r"\bd_mu_(\w+)": r"$\\Delta\\mu_{\1}$", r"\bmu_(\w+)": r"$\\mu_{\1}$", r"\b([A-Za-z])_(\w+)": r"$\1_{\2}$"}
 
 
 class Quantity(NamedTuple):
-    """A symbol and the unit shown in figures; a value in SI becomes ``value * factor + offset`` in this unit."""
+    """The symbol and the shown unit of a quantity. A value in SI is ``value * factor + offset`` in the shown unit."""
 
     symbol: str
     unit: str
@@ -60,16 +60,16 @@ class Quantity(NamedTuple):
     offset: float = 0.0
 
     def of(self, values: Any) -> Any:
-        """Convert values from SI to the unit shown."""
+        """Convert values from SI to the shown unit."""
         return values * self.factor + self.offset
 
 
 def chosen_units(groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
-    """Return the unit in which figures show every quantity of some series.
+    """Return the units in which figures show the quantities of some series.
 
-    A parameter is shown in the unit of the campaign files if all of them use the same unit. Temperatures are otherwise
-    shown in degrees Celsius, other quantities in the SI unit with the prefix that brings the largest value between 1
-    and 1000.
+    A parameter is shown in the unit of the campaign files if all files use the same unit. Otherwise, temperatures are
+    shown in degrees Celsius, and other quantities in the SI unit with a prefix. The prefix is chosen so that the
+    largest value is between 1 and 1000.
     """
     written = [written_units(str(data.attrs.get("campaign", ""))) for data in groups.values()]
     found: dict[str, str] = {}
@@ -121,7 +121,10 @@ def quantity(name: str, values: xr.DataArray) -> Quantity:
 
 
 def meaning(values: xr.DataArray, name: str) -> str:
-    """Return the long name of an output with symbols as mathtext, but without its explanation in brackets."""
+    """Return the long name of an output with symbols as mathtext.
+
+    An explanation in brackets, or after a comma or semicolon, is left out.
+    """
     words = re.split(r"[;,] | \(", str(values.attrs.get("long_name", name.replace("_", " "))))[0]
     for ascii_form, symbol in _MATHTEXT.items():
         words = re.sub(ascii_form, symbol, words)
@@ -147,7 +150,7 @@ def with_unit(symbol: str, unit: str) -> str:
 
 
 def printed_unit(unit: str) -> str:
-    """Return a unit as it is printed: with raised powers, with µm for ``um`` and °C for ``degC``."""
+    """Return a unit as figures show it: with raised powers, with µm for ``um``, and with °C for ``degC``."""
     unit = re.sub(r"\bu(?=(m|s|N|Pa|W|rad)\b)", "µ", unit)
     unit = re.sub(r"\bpercent\b", "%", re.sub(r"\bdeg(?=C?\b)", "°", unit))
     return re.sub(r"\^(-?\d+)", r"$^{\1}$", unit)
@@ -172,7 +175,7 @@ def plain(text: str) -> str:
 
 
 def is_geometric(values: Any) -> bool:
-    """Return whether numbers suit a logarithmic axis: all are positive, and they span more than a factor of ten."""
+    """Return whether numbers suit a logarithmic axis: all numbers are positive and span more than a factor of ten."""
     values = np.asarray(values, dtype=np.float64)
     values = values[np.isfinite(values)]
     return bool(values.size and values.min() > 0 and values.max() > 10 * values.min())

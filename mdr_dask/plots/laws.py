@@ -19,16 +19,16 @@ from mdr_dask.physics.sliding import laws
 #: Names of the outputs that some laws need as input.
 NEEDED = ("rms_slope", LEVELS[0])
 FILMS = {"central_film": PAN_HAMROCK_CENTRAL, "minimum_film": PAN_HAMROCK_MINIMUM}
-#: Name of the output that is the steady coefficient of friction, by model.
+#: Name of the output that is the steady coefficient of friction, for each model.
 STEADY = {"sliding_friction": "friction_coefficient", "velocity_jump": LEVELS[0]}
 #: Parameters of a Kelvin body on a generated line.
 LINE = {"shear_modulus", "relaxation_time", "rms_roughness", "length", "hurst", "points"}
 
 
 class Law(NamedTuple):
-    """A law: its name in the legend, and a function that computes its values in SI.
+    """A law: the name of the law in the legend, and a function that computes the values of the law in SI.
 
-    The arguments of the function are parameters and the outputs `NEEDED`.
+    The function takes a Dataset that contains parameters and the outputs `NEEDED`.
     """
 
     name: str
@@ -36,7 +36,7 @@ class Law(NamedTuple):
 
 
 def law_of(data: xr.Dataset, output: str) -> Law | None:
-    """Return the law for an output that applies to a series; None if there is no such law."""
+    """Return the law that applies to an output of a series; None if no law applies."""
     model = data.attrs.get("model")
     if model == "ehl_line" and output in FILMS and "inlet" not in data.coords:
         return Law("Pan and Hamrock", lambda part: xr.DataArray(FILMS[output](*groups(part.coords.get))))
@@ -52,9 +52,9 @@ def law_of(data: xr.Dataset, output: str) -> Law | None:
 
 
 def along(data: xr.Dataset, name: str, count: int = 200) -> xr.Dataset:
-    """Return the data of a curve at many values of its parameter, so that a law can be drawn as a smooth line.
+    """Return the parameters of a curve at many values of the parameter `name`, so that a law becomes a smooth line.
 
-    If an output that the law needs varies along the curve, the data are returned unchanged.
+    If one of the outputs `NEEDED` varies along the curve, the data of the curve are returned unchanged.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def _rough_indenter(data: xr.Dataset) -> xr.DataArray:
 
 
 def _jump(data: xr.Dataset) -> xr.DataArray:
-    """Return the jump of friction by eq. 4.11, from the stored friction before the jump."""
+    """Compute the jump of friction by eq. 4.11 from the stored friction before the jump."""
     slope = spectral_slope(data)
     before = aggregation.mean(data[LEVELS[0]]) / slope
     law = xr.apply_ufunc(jump_law, before, kwargs={"constant": LAW})

@@ -19,8 +19,8 @@ INSIDE, OUTSIDE = "measured at the reference", "reached by shifting"
 def draw_master_curve(curve: xr.Dataset) -> Figure:
     """Return the figure of a master curve from :func:`mdr_dask.fits.master_curve.master_curve`.
 
-    The figure shows the curves as measured, the merged curve and the shift factors. Bars and band are 68 % intervals.
-    The merged curve is dashed beyond the range that was measured at the reference.
+    The figure shows the curves as measured, the merged curve and the shift factors. The bars and the band are 68 %
+    intervals. The merged curve is dashed beyond the range that was measured at the reference.
     """
     curve = _in_shown_units(curve)
     attrs = curve.attrs
@@ -55,7 +55,7 @@ def _in_shown_units(curve: xr.Dataset) -> xr.Dataset:
 
 
 def _channels(curve: xr.Dataset) -> dict[str, str]:
-    """Return the markers of the ordinates that were shifted together."""
+    """Return the names and markers of the ordinates of a master curve; two ordinates were shifted together."""
     return {name: marker for name, marker in (("ordinate", "."), ("companion", "x")) if f"curve_{name}" in curve}
 
 
@@ -72,7 +72,7 @@ def _text(value: float, values: xr.DataArray) -> str:
 
 
 def _curves(curve: xr.Dataset) -> tuple[Panel, Panel]:
-    """Return the panels with the curves as measured and with the merged curve."""
+    """Return two panels: one with the curves as measured, one with the merged curve."""
     by, across = str(curve.attrs["group"]), _label(curve.attrs["abscissa"], curve["curve_abscissa"])
     channels = _channels(curve)
     names = [_words(curve.attrs[channel]) for channel in channels]
@@ -105,7 +105,10 @@ def _curves(curve: xr.Dataset) -> tuple[Panel, Panel]:
 
 
 def _lines(curve: xr.Dataset, channel: str) -> list[Trace]:
-    """Return a merged curve with its band; it is solid in the range that was measured at the reference."""
+    """Return the traces of a merged curve and its band.
+
+    The line is solid in the range that was measured at the reference.
+    """
     x, y = curve["curve_abscissa"].values, curve[f"curve_{channel}"].values
     error = 10 ** curve["curve_error" if channel == "ordinate" else "curve_companion_error"].values
     ends = curve["curve_abscissa"].attrs

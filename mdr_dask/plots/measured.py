@@ -1,4 +1,4 @@
-"""Add measured points to any figure that shows the measured output against one of the conditions of measurement."""
+"""Add measured points to any figure that shows the measured output against a condition of the measurements."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Figure, Key, Mean, Panel, Trace, columns
 from mdr_dask.units import shown
 
-#: A measured condition and the value of a curve or panel count as equal up to this relative difference.
+#: A measured point belongs to a curve if the relative difference between each measured condition and the parameter of
+#: the curve is at most this.
 SAME = 1e-3
-#: Half width of a 95 % interval, in standard errors.
+#: Half width of a 95 % interval divided by the standard error.
 HALF = 1.96
 NAME = "measured"
 
@@ -26,7 +27,7 @@ NAME = "measured"
 def with_points(
     groups: Mapping[str, xr.Dataset], figures: Mapping[str, Plot], file: str
 ) -> tuple[dict[str, xr.Dataset], dict[str, Plot]]:
-    """Add a table of measurements to the series, and its points to the figures; return both.
+    """Add a table of measurements to the series, and add the measured points to the figures. Return series and figures.
 
     Raises
     ------
@@ -75,7 +76,7 @@ def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
 
 
 def _apart(measured: Measured, data: xr.Dataset) -> list[str]:
-    """Return a sentence if all measured points lie above all results of a study, or all lie below; else nothing."""
+    """Return a warning if all measured values are above all results of a study, or if all are below all results."""
     study = data[measured.output].to_numpy()
     low, high = (
         find(study[np.isfinite(study)], initial=start) for find, start in ((np.min, np.inf), (np.max, -np.inf))
@@ -91,9 +92,9 @@ def _apart(measured: Measured, data: xr.Dataset) -> list[str]:
 
 
 def _add(panel: Panel, measured: Measured, data: xr.Dataset) -> int:
-    """Add the measured points that have the conditions of a panel, and return their number.
+    """Add the measured points that belong to the curves of a panel, and return the number of these points.
 
-    Points have the colours of their curves. Points are black if there is only one curve, or if the table lacks a
+    A point has the colour of its curve. Points are black if the panel has only one curve, or if the table lacks a
     parameter in which the curves differ.
     """
     found, keys = 0, panel.entries()
@@ -124,7 +125,7 @@ def _differing(curves: list[xr.Dataset]) -> set[str]:
 
 
 def _at(curve: xr.Dataset, measured: Measured, along: str) -> np.ndarray:
-    """Return which measured points have the conditions of a curve."""
+    """Return a mask of the measured points whose conditions equal the parameters of a curve."""
     here = np.ones(measured.values.size, dtype=bool)
     for name, values in measured.conditions.items():
         if name != along and name in curve.coords and curve[name].ndim == 0:

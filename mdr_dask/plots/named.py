@@ -1,4 +1,4 @@
-"""The figures that have a name; one or several views (`mdr_dask.plots.view.View`) describe each of them."""
+"""The figures that have a name. One or several views (`mdr_dask.plots.view.View`) describe each figure."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mdr_dask.plots.view import View, draw
 
 
 def described(name: str, model: str, summary: str, *views: View, otherwise: View | None = None) -> Plot:
-    """Return a named figure of outputs of a model.
+    """Return a named figure that shows outputs of a model.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def described(name: str, model: str, summary: str, *views: View, otherwise: View
     *views : View
         Views of the figure, one above the other.
     otherwise : View, optional
-        View that is drawn instead if a store does not contain the data for `views`.
+        View that is drawn if a store does not contain the data for `views`.
     """
 
     def either(groups: Mapping[str, xr.Dataset]) -> Figure:
@@ -39,7 +39,7 @@ def described(name: str, model: str, summary: str, *views: View, otherwise: View
 SLIDING, JUMP, MIXED, EHL, WEAR = (
     *("sliding_friction", "velocity_jump", "mixed_lubrication", "ehl_line", "fretting_wear"),
 )
-#: Limits of the film ratio: the limit of the criterion of breakthrough, and the limits between lubrication regimes.
+#: Limits of the film ratio: below 0.5, a computed breakthrough is an artefact; 1 and 3 separate lubrication regimes.
 FILM_RATIOS = {
     0.5: "film ratio 0.5: below it breakthrough is an artefact",
     1.0: "film ratio 1: boundary below, mixed above",

@@ -13,8 +13,8 @@ from typing import Any
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.units import to_si
 
-#: Sizes of letters and lines, in points, for a figure whose size was requested. Such a figure is printed without
-#: scaling.
+#: Sizes of letters and lines, in points, for a figure whose size the user requested. Such a figure is printed at its
+#: own size, without scaling.
 LETTERS: dict[Any, Any] = {
     "font.size": 8,
     "axes.labelsize": 8,
@@ -28,10 +28,11 @@ LETTERS: dict[Any, Any] = {
 }
 #: Sizes of letters and lines, in points, for a figure on a screen.
 SCREEN: dict[Any, Any] = {"legend.fontsize": 8, "lines.linewidth": 1.2, "lines.markersize": 4}
-#: `INCH`: length of an inch in metres. `LEAST`, `MOST`: smallest and largest width and height of a figure in metres.
+#: `INCH`: length of an inch in metres. `LEAST`, `MOST`: smallest and largest side of a figure in metres.
 INCH = 0.0254
 LEAST, MOST = 0.02, 1.0
-#: Largest height in inches of a figure whose width alone was requested: 230 mm, the height of text on a journal page.
+#: Largest height, in inches, of a figure if the user requested the width alone: 230 mm, as for the text of a journal
+#: page.
 TALLEST = 0.23 / INCH
 
 
@@ -42,14 +43,15 @@ class Page:
     Parameters
     ----------
     width, height : float, optional
-        Size in inches. With None for the height, the height follows from the content.
+        Size in inches. If the height is None, the height follows from the content.
     title : str, optional
-        Title. With None, the figure has a description as its title, or no title if a size was requested.
+        Title. If the title is None, the title is a description of the figure; but with a requested size, the figure has
+        no title.
     style : str, optional
-        A style file of matplotlib, or the name of a style. The settings of the style take precedence over those of the
-        page.
+        A style file of matplotlib, or the name of a style. The settings of the style take precedence over the sizes of
+        letters and lines above.
     units : mapping of str to str
-        Requested units by the name of the quantity.
+        Requested units, indexed by the name of the quantity.
     used : set of str
         Names of the quantities that figures have shown so far.
     cycle : tuple of mappings
@@ -79,14 +81,14 @@ def requested(
     style: str | None = None,
     units: Mapping[str, str] | None = None,
 ) -> Page:
-    """Return the page for the texts of the options of a command; see `sides` for the size, and `Page`."""
+    """Return the `Page` for the options of a command. The function `sides` defines the form of the text `size`."""
     width, height = sides(size) if size else (None, None)
     return Page(width, height, title, style, units or {})
 
 
 @contextmanager
 def drawing_for(page: Page) -> Iterator[None]:
-    """Draw the figures of a ``with`` statement for a page.
+    """Use a page for all figures that are drawn within a ``with`` statement.
 
     Raises
     ------
@@ -112,7 +114,7 @@ def drawing_for(page: Page) -> Iterator[None]:
 
 @contextmanager
 def with_units(units: Mapping[str, str]) -> Iterator[None]:
-    """Within a ``with`` statement, show quantities in these units unless the user requested another unit."""
+    """Within a ``with`` statement, show quantities in the given units unless the user requested another unit."""
     token = _PAGE.set(replace(current(), units={**units, **current().units}))
     try:
         yield
@@ -126,7 +128,7 @@ def current() -> Page:
 
 
 def sides(text: str) -> tuple[float, float | None]:
-    """Return width and height in inches from a text such as ``85x60mm``, or ``85mm`` for the width alone.
+    """Return width and height in inches from a text such as ``85x60mm``. The text ``85mm`` gives the width alone.
 
     Raises
     ------

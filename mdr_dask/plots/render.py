@@ -1,4 +1,4 @@
-"""Draw a figure with matplotlib: panels, legend, colour bars and title, without overlaps at any width.
+"""Draw a figure with matplotlib: panels, legend, colour bars and title, without overlapping texts at any width.
 
 The height follows from the content unless the user requested a height. Legends are below the panels, and colour bars
 are beside the panels. Labels that would overlap are broken into several lines, and ticks that would overlap are thinned
@@ -29,26 +29,28 @@ if TYPE_CHECKING:
 #: Widths in inches. `ALONE`: a single panel on a screen. `BESIDE`: a panel next to another panel. `WIDE`, `NARROW`:
 #: usual and least width of a panel in a figure whose width was requested.
 ALONE, BESIDE, WIDE, NARROW = 6.4, 4.2, 3.0, 1.5
-#: `LEAST_HEIGHT`: least height of a panel in inches. `MOST_COLUMNS`: usual largest number of panels in a row.
+#: `LEAST_HEIGHT`: least height of a panel in inches. `MOST_COLUMNS`: largest number of panels in a row, unless the rows
+#: would not fit on a page.
 LEAST_HEIGHT, MOST_COLUMNS = 1.3, 3
-#: `SLENDER`: largest ratio of height to width of a figure, unless its panels would be lower than `LEAST_HEIGHT`.
+#: Largest height of a figure divided by its width, if the user requested the width. The ratio may be larger if a panel
+#: would otherwise be lower than `LEAST_HEIGHT`.
 SLENDER = 2.0
-#: Largest share of the height that the legend may take; entries that do not fit are left out.
+#: Largest share of the height of the figure that the legend may occupy. Entries that do not fit are left out.
 LEGEND_SHARE = 0.35
 #: Least distance between the texts of two ticks, in points.
 GAP = 3
-#: Largest number of lines of a title; texts that do not fit are left out.
+#: Largest number of lines of a title. Texts that do not fit are left out.
 MOST_LINES = 7
 #: Curves with at least this number of points are drawn without markers.
 MANY_POINTS = 60
-#: Cases without a value are marked at this height above the lower edge, as a fraction of the height of the panel.
+#: Height of the marks of cases without a value above the lower edge of a panel, divided by the height of the panel.
 FOOT = 0.02
-#: Dots per inch of pictures for a screen and for print.
+#: Dots per inch of pictures for a screen (`DPI`) and for print (`PRINTED_DPI`).
 DPI, PRINTED_DPI = 150, 300
 
 
 class Drawn(MplFigure):
-    """A matplotlib figure with its description; it is displayed if it is the last value of a notebook cell."""
+    """A matplotlib figure with its description. A notebook displays the figure if it is the last value of a cell."""
 
     def __init__(self, description: Figure, **options: Any) -> None:
         super().__init__(**options)
@@ -66,7 +68,7 @@ class Drawn(MplFigure):
         return self.description.table()
 
     def save(self, path: str | Path) -> None:
-        """Write the figure and its table to files: ``mu.pdf`` and ``mu.csv``.
+        """Write the figure to a file, and the table of the figure to a file beside it: ``mu.pdf`` and ``mu.csv``.
 
         Raises
         ------
@@ -81,7 +83,7 @@ class Drawn(MplFigure):
 
 
 def table_beside(path: str | Path) -> Path:
-    """Return the path for the table of a figure; raise DataError if another kind of file has this path."""
+    """Return the path for the table of a figure; raise DataError if a file of another kind already has this path."""
     beside = Path(path).with_suffix(".csv")
     if beside.exists() and not beside.read_bytes().startswith(b"# mdr_dask"):
         raise DataError(f"{beside} exists and was not written beside a figure; choose another name for the figure")
@@ -120,7 +122,7 @@ def render(description: Figure) -> Drawn:
 def _grid(description: Figure) -> tuple[int, int]:
     """Return the numbers of rows and columns of panels.
 
-    If a width was requested, panels become narrower where the rows would not fit on a page.
+    If the user requested a width and the rows would not fit on a page, the figure gets more columns of narrower panels.
     """
     width, stack = page.current().width, description.stack
     stacks = -(-len(description.panels) // stack)
@@ -134,7 +136,10 @@ def _grid(description: Figure) -> tuple[int, int]:
 
 
 def _axes(figure: Drawn, description: Figure, rows: int, columns: int) -> list[Axes]:
-    """Return the axes of all panels, arranged as stacks from left to right or as rows of single panels."""
+    """Return the axes of all panels.
+
+    Each stack of panels is a part of one column. The stacks fill rows from left to right.
+    """
     grid, stack = figure.subplots(rows, columns, squeeze=False, sharey=description.share_y), description.stack
     found = []
     for k in range(len(description.panels)):
@@ -147,9 +152,12 @@ def _axes(figure: Drawn, description: Figure, rows: int, columns: int) -> list[A
 
 
 def _share_labels(figure: Drawn, places: list[Axes], panels: list[Panel]) -> None:
-    """Remove an axis label that the panel below (horizontal axes) or on the left (vertical axes) also has.
+    """Remove repeated axis labels.
 
-    If all panels in several rows have the same vertical axis, its label is drawn once.
+    The label of a horizontal axis is removed if the panel below has the same axis. The label of a vertical axis is
+    removed if the panel on the left has the same axis.
+
+    If there are several rows and all panels have the same vertical axis, the label of this axis is drawn once.
     """
     at = {}
     for axes, panel in zip(places, panels, strict=True):
@@ -193,7 +201,10 @@ def _finish_axis(axes: Axes, name: str, axis: Axis) -> None:
 
 
 def _log_ticks(axis: Any) -> None:
-    """On an axis of less than two decades, put ticks with plain numbers at 1, 2 and 5 times powers of ten."""
+    """Set the ticks of a logarithmic axis.
+
+    If the axis has less than two decades, the ticks are plain numbers such as 1, 2, 5, 10 and 20.
+    """
     from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter
 
     low, high = sorted(np.abs(axis.get_view_interval()))
@@ -231,7 +242,7 @@ def _curve(axes: Axes, trace: Trace, _: Panel) -> None:
 
 
 def _lengths(value: Any, low: Any, high: Any) -> Any:
-    """Return the lengths of error bars downwards and upwards; 0 if the error is unknown."""
+    """Return the lengths of error bars below and above the value; 0 if the error is unknown."""
     return np.nan_to_num(np.clip([value - low, high - value], 0, None), nan=0.0, posinf=0.0)
 
 
@@ -271,7 +282,7 @@ _DRAW = {"curve": _curve, "law": _curve, "band": _band, "dots": _dots, "map": _m
 
 
 def _bars(figure: Drawn, places: list[Axes], panels: list[Panel]) -> None:
-    """Draw the colour bars; if all panels have the same colour bar, draw it once."""
+    """Draw the colour bars. A colour bar that several panels have in common is drawn once."""
     from matplotlib.cm import ScalarMappable
 
     beside: dict[Bar, list[Axes]] = {}
@@ -315,7 +326,7 @@ def _height_of_title(figure: Drawn) -> float:
 
 
 def _width_of(figure: Drawn, text: str, size: Any) -> float:
-    """Return the printed width of a line in inches."""
+    """Return the width in inches of a printed line of text."""
     from matplotlib.font_manager import FontProperties
 
     renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
@@ -325,7 +336,7 @@ def _width_of(figure: Drawn, text: str, size: Any) -> float:
 
 
 def _broken(figure: Drawn, text: str, width: float, size: Any) -> str:
-    """Break a text into lines of at most `width` inches, but not between a value and its symbol or its unit."""
+    """Break a text into lines of at most `width` inches, but not at an equals sign and not within mathtext."""
     joined = text.replace(" = ", "\u00a0=\u00a0")
     lines: list[str] = []
     for word in joined.split(" "):
@@ -346,9 +357,9 @@ def _handle(key: Key) -> Any:
 
 
 def _legend(figure: Drawn, keys: list[Key]) -> float:
-    """Draw one legend below all panels, with as many columns as fit, and return its height in inches.
+    """Draw one legend below all panels, with as many columns as fit, and return the height of the legend in inches.
 
-    If a size was requested, entries that do not fit are left out.
+    If the user requested a size, entries that do not fit are left out.
     """
     width, asked = figure.get_figwidth(), page.current()
     most = LEGEND_SHARE * (asked.height or (page.TALLEST if asked.width else np.inf))
@@ -374,7 +385,8 @@ def _legend(figure: Drawn, keys: list[Key]) -> float:
 def _fit(figure: Drawn, places: list[Axes]) -> None:
     """Break labels into lines that are not longer than their axes, and thin out ticks that overlap.
 
-    Each change may move the axes, so both are repeated, four times at most.
+    Each of these two steps may change the size of the axes. Therefore both steps are repeated until nothing changes,
+    but at most four times in total.
     """
     for _ in range(4):
         figure.draw_without_rendering()
@@ -401,7 +413,7 @@ def _fit(figure: Drawn, places: list[Axes]) -> None:
 
 
 def _thin(figure: Drawn, axis: Any, name: str) -> bool:
-    """Remove every second tick of an axis until the texts do not overlap; return whether any tick was removed."""
+    """Keep every second (or third, ...) tick of an axis, so that texts do not overlap; return whether ticks changed."""
     from matplotlib.ticker import FixedLocator, FuncFormatter
 
     renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]

@@ -1,4 +1,4 @@
-"""The figure of a measured surface: its spectrum with a power law, and the spectra of its line and straight cuts."""
+"""The figure of a measured surface: the spectrum of the surface, and spectra of lines."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from mdr_dask.models.parts.surface_report import FileReport
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
-#: `CUTS`: colours and lines of straight cuts in both directions. `METHOD`: label of the spectrum of the line that
-#: replaces a surface.
+#: `CUTS`: colours and line styles for straight cuts in both directions. `METHOD`: label for the spectrum of the line
+#: that represents a surface in the method of dimensionality reduction.
 CUTS = ("#a0a0a0", "-"), ("#505050", ":")
 METHOD = r"line of the method, $\pi q\,C^{2D}$"
 
@@ -24,15 +24,15 @@ METHOD = r"line of the method, $\pi q\,C^{2D}$"
 def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...]) -> Figure:
     """Return the figure of a measured surface.
 
-    One panel shows C2D of every file with a power law. The other panel shows the spectra of the lines that represent
-    the surface in a campaign, and of straight cuts.
+    One panel shows the two-dimensional power spectrum C2D of every file, and a power law. The other panel shows spectra
+    of lines: of straight cuts through the surface, and of the lines that represent the surface in a campaign.
 
     Parameters
     ----------
     reports : tuple of FileReport
         Statistics of each file.
     spectra : tuple of Spectrum
-        Spectrum of each file as a campaign uses it: between the cut-offs and without noise.
+        The spectrum that a campaign uses, for each file: between the cut-offs and without noise.
     """
     q = Axis("wave number $q$ [rad/m]", log=True)
     areal = Panel(q, Axis("$C^{2D}$ [m$^4$]", log=True))
@@ -65,7 +65,7 @@ def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...])
 
 
 def _areal(report: FileReport, used: Spectrum, colour: str, file: xr.Dataset) -> list[Trace]:
-    """Return traces of C2D of a file: all values, means in bins with errors, the part that is used, the power law."""
+    """Return the traces of C2D of a file: all values, means in bins, the part used by a campaign, and the power law."""
     spectrum, bins = report.found.spectrum, report.bins
     raw = columns(file, x=spectrum.wavenumber, y=spectrum.density)
     there = bins.density > 0

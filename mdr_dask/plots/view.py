@@ -1,4 +1,6 @@
-"""Figures of any output of any model against its parameters: curves, maps and main effects.
+"""Figures of any output of any model against parameters: curves, maps and main effects.
+
+A main effect is the mean of an output against one parameter, averaged over all other parameters.
 
 A `View` describes such a figure, and `draw` makes it.
 """
@@ -20,14 +22,14 @@ from mdr_dask.plots import colours, curves, labels, laws
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 
-#: `MOST_PANELS`: largest number of panels of one figure. `LONGEST_WORD`: largest number of characters in one line of
+#: `MOST_PANELS`: largest number of panels for one output. `LONGEST_WORD`: largest number of characters in one line of
 #: the text at a tick.
 MOST_PANELS, LONGEST_WORD = 6, 20
 #: For main effects of a sampled study: `IN_A_BIN` is the smallest number of cases in a bin. `MOST_BINS`, `MOST_EFFECTS`
 #: and `MOST_POINTS` are the largest numbers of bins, of parameters, and of cases that are drawn as points.
 IN_A_BIN, MOST_BINS, MOST_EFFECTS, MOST_POINTS = 8, 10, 12, 5000
-#: Marks for cases without a value, and for cases in which some realisations have no value; the mean of the other
-#: realisations may be biased.
+#: Marks for cases without a value. `SOME`: mark for cases in which only some realisations failed; the mean over the
+#: other realisations may be biased.
 MARKS = {
     Status.FAILED: ("x", "failed"),
     Status.NOT_CONVERGED: ("+", "did not converge"),
@@ -43,23 +45,24 @@ class View:
     Parameters
     ----------
     outputs : str or tuple of str
-        Names of outputs, or of errors of outputs. Several outputs are drawn in panels one above the other.
+        Names of outputs or of their errors. Several outputs are drawn in panels one above the other.
     over : str or tuple of str
-        The parameter on the horizontal axis. With two parameters, the figure is a map; with no parameter, it shows the
-        main effects of all parameters.
+        The parameter on the horizontal axis. If there are two parameters, the figure is a map. If there is no
+        parameter, the figure shows the main effects of all parameters.
     by : str
         The parameter that colours show.
     panels : str
         The parameter in which panels differ.
     log : str, optional
-        Letters of the logarithmic axes, out of ``x``, ``y`` and ``z`` (colours). By default, an axis is logarithmic if
-        its numbers are positive and span more than a factor of ten.
+        Letters of the axes that are logarithmic: ``x``, ``y`` and, for colours, ``z``. By default, an axis is
+        logarithmic if its numbers are positive and span more than a factor of ten.
     single : bool
         Whether the first realisation is drawn instead of the mean over realisations.
     apart : bool
-        Whether every curve has its own panel; this suits curves that would hide each other.
+        Whether every curve has its own panel, so that curves do not hide each other.
     guides : mapping of str to mapping of float to str
-        Horizontal lines for the panels of an output: the value and the name of each line, by the name of the output.
+        Horizontal lines in the panels of outputs. The keys are names of outputs. The value for an output maps the
+        position of each line to the name of this line.
     """
 
     outputs: str | tuple[str, ...]
@@ -89,10 +92,10 @@ class View:
 
 
 def main_axis(groups: Mapping[str, xr.Dataset], output: str, without: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the parameters for `View.over` of an output: the parameter with the most values.
+    """Return the parameter of an output that has the most values, for `View.over`.
 
-    Parameters in `without` are not considered. If the output has a dimension of its own, such as time, the result is
-    this dimension. For a sampled study the result is empty, so that main effects are drawn.
+    Parameters in `without` are not considered. If the output has a further dimension, such as time, the result is this
+    dimension. For a sampled study, the result is empty, so that the figure shows main effects.
     """
     found: dict[str, int] = {}
     for data in (data for data in groups.values() if output in data):
@@ -107,21 +110,21 @@ def main_axis(groups: Mapping[str, xr.Dataset], output: str, without: Sequence[s
 
 
 class _Part(NamedTuple):
-    """The series in one panel by their names, and the title of the panel."""
+    """The title of one panel, and the series in this panel, indexed by name."""
 
     title: str
     series: dict[str, xr.Dataset]
 
 
 def figure_of(view: View) -> Plot:
-    """Return the figure of a view; its name is the name of the output."""
+    """Return the figure of a view. The name of the figure is the name of the first output."""
     over = " and ".join(view.along) or "every parameter that varies"
     summary = f"{view.names[0]} against {over}".replace("_", " ")
     return Plot(view.names[0], (), summary, lambda groups: draw(groups, view))
 
 
 def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
-    """Return the figure of one output, or of several outputs one above the other.
+    """Return the figure that shows the outputs of views. Several outputs are drawn one above the other.
 
     Raises
     ------
@@ -203,7 +206,7 @@ def _unfit(data: xr.Dataset, view: View, output: str) -> str:
 
 
 def varied(data: xr.Dataset, output: str) -> list[str]:
-    """Return the parameters along which an output of a series varies."""
+    """Return the names of the parameters with which an output of a series varies."""
     return [name for dim in curves.axes_of(data, output) for name in curves.parameters_along(data, dim)]
 
 
@@ -220,14 +223,14 @@ def _subject(view: View, output: str, found: Mapping[str, xr.Dataset], more: int
 
 
 def _places(data: xr.Dataset, name: str) -> xr.DataArray:
-    """Return positions along an axis: numbers in the unit shown, or consecutive numbers for words."""
+    """Return the positions of values along an axis: numbers in the shown unit; 0, 1, 2, ... if the values are words."""
     values = data[name]
     shown = labels.shown(name, values) if values.dtype.kind in "fiu" else np.arange(values.size)
     return xr.DataArray(shown, dims=values.dims)
 
 
 def _axis(name: str, arrays: list[xr.DataArray], view: View, which: str) -> Axis:
-    """Return the axis of a parameter: linear, logarithmic, or with words as ticks."""
+    """Return the axis of a parameter: a linear axis, a logarithmic axis, or an axis with words at the ticks."""
     first = arrays[0]
     label = labels.label(name, first)
     if name in curves.OWN:
@@ -252,7 +255,7 @@ def _lines(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
     panels = [_panel(part, each, view, output, x) for part, each in zip(parts, families, strict=True)]
     first = next(iter(found.values()))
     log = view.is_log("y", np.concatenate([_values(panel) for panel in panels]))
-    # by default, the axis of a temperature in degC is not logarithmic
+    # by default, the axis of a temperature in degC is linear
     log &= view.log is not None or not labels.quantity(output, first[output]).offset
     y = Axis(labels.label(output, first[output]), log, quantity=output)
     for panel in panels:
@@ -285,10 +288,11 @@ def _guides(levels: Mapping[float, str], panel: Panel) -> list[Trace]:
 
 
 def _parts(found: Mapping[str, xr.Dataset], view: View, output: str) -> tuple[list[_Part], list[str]]:
-    """Return the contents of the panels.
+    """Return the contents of the panels, and texts about what is left out.
 
-    If the view has a parameter `view.panels`, there is one panel for each of its values. Otherwise there is one panel
-    for all series, or one for each series if a single panel would have too many curves.
+    If the view has the parameter `panels`, each value of this parameter gets a panel. If the view has the option
+    `apart`, each curve gets a panel. Otherwise all series are in one panel; but if this panel would have too many
+    curves, each series gets a panel.
     """
     if view.panels:
         return _by_value(found, view)
@@ -327,7 +331,7 @@ def _by_series(found: Mapping[str, xr.Dataset]) -> tuple[list[_Part], list[str]]
 
 
 def _panel(part: _Part, families: Mapping[str, curves.Family], view: View, output: str, x: Axis) -> Panel:
-    """Draw the curves of all series of a panel with their laws, and mark the cases without a value."""
+    """Draw the curves of all series of a panel and the laws of these curves, and mark the cases without a value."""
     panel = Panel(x, Axis(""), title=part.title)
     along, law_name = view.along[0], ""
     marked: dict[str, str] = {}
@@ -360,7 +364,7 @@ def _panel(part: _Part, families: Mapping[str, curves.Family], view: View, outpu
 
 
 def _coloured(families: Mapping[str, curves.Family]) -> list[tuple[curves.Curve, curves.Family]]:
-    """Return the curves of a panel with their families; curves of several series get new colours and markers."""
+    """Return the curves of a panel, each with its family. If several series share the panel, curves get new colours."""
     every = [(name, curve, one) for name, one in families.items() for curve in one.curves]
     if len(families) == 1:
         return [(curve, one) for _, curve, one in every]
@@ -394,7 +398,7 @@ def _law(curve: curves.Curve, law: laws.Law, along: str, output: str) -> Trace:
 
 
 def _counted(data: xr.Dataset, output: str) -> xr.Dataset:
-    """Return a series with a coordinate ``realisations``: the number of realisations in each mean."""
+    """Return the data of a curve with a new coordinate ``realisations``: the number of realisations in each mean."""
     if "realisation" not in data[output].dims:
         return data
     count = xr.DataArray(aggregation.count(data[output]).variable, attrs={"units": "1"})
@@ -402,7 +406,7 @@ def _counted(data: xr.Dataset, output: str) -> xr.Dataset:
 
 
 def _absent(curve: curves.Curve, x: xr.DataArray, output: str, marked: dict[str, str]) -> list[Trace]:
-    """Return marks at the lower edge of a panel for cases without a value or with failed realisations."""
+    """Return marks at the lower edge of a panel, for cases without a value and for cases with failed realisations."""
     data = curve.data
     if "status" not in data:
         return []
@@ -428,7 +432,7 @@ def _absent(curve: curves.Curve, x: xr.DataArray, output: str, marked: dict[str,
 
 
 def _map(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
-    """Draw an output against two parameters: a grid as cells, or the cases of a sampled study as points."""
+    """Draw an output against two parameters: the cases of a grid as cells, the cases of a sampled study as points."""
     if view.by or (view.panels and len(found) > 1):
         raise DataError("expected a map of one series, without --by, because colours show the values")
     parts, left_out = _by_value(found, view) if view.panels else _by_series(found)
@@ -470,7 +474,7 @@ def _crossed_out(trace: Trace) -> list[Key]:
 
 
 def _effects(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
-    """Draw the mean of an output against each parameter of a series, averaged over all other parameters."""
+    """Draw main effects: in each panel, the output against one parameter, averaged over all other parameters."""
     if len(found) > 1 or view.by or view.panels:
         raise DataError(
             f"expected one series, without --by and --panels, got {', '.join(found)}: main effects need a whole figure"
@@ -503,7 +507,7 @@ def _effects(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure
 
 
 def _means(data: xr.Dataset, output: str, name: str) -> tuple[xr.DataArray, Mean]:
-    """Return the mean for every value of one axis, averaged over all other axes."""
+    """Return the mean of an output for every value of one axis, averaged over all other axes."""
     rest = [dim for dim in curves.axes_of(data, output) if dim != name]
     error = aggregation.companion(data, output)
     pair = data[output].mean(rest), None if error is None else abs(error).mean(rest)
@@ -511,7 +515,7 @@ def _means(data: xr.Dataset, output: str, name: str) -> tuple[xr.DataArray, Mean
 
 
 def _bins(data: xr.Dataset, output: str, name: str, dim: str) -> tuple[xr.DataArray, Mean]:
-    """Sort the cases of a sampled study by one parameter, divide them into groups, and return the group means."""
+    """Sort the cases of a sampled study by one parameter, divide the cases into groups, and return the group means."""
     cases = aggregation.mean(data[output])
     cases = cases.mean([each for each in cases.dims if each != dim]).dropna(dim)
     order = np.argsort(cases[name].values, kind="stable")

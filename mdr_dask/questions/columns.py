@@ -1,4 +1,4 @@
-"""The columns of a study by name: axes, parameters, outputs, dimensionless numbers, and the state of results."""
+"""The columns of a study, found by name: axes, parameters, outputs, dimensionless numbers, and the state of results."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from mdr_dask.errors import DataError, ModelError, did_you_mean
 from mdr_dask.models.base import Number, Status
 from mdr_dask.questions.expression import Value, evaluate, parse
 
-#: Names of two columns: the state of the results of a row, and the number of its finished results.
+#: Names of two columns: the state of the results of a row, and the number of results of the row that are finished.
 STATUS, REALISATIONS = "status", "realisations"
-#: Name of the variable with the number of results in each state. Rows that combine several cases have this variable.
+#: Name of the variable with the number of results in each state. Only rows that are averages over cases have it.
 COUNTS = "state_counts"
 #: States of results that need no further work.
 COMPLETE = (Status.DONE, Status.NOT_NEEDED)
@@ -25,7 +25,7 @@ WORDS = np.array([state.name.lower() for state in Status], dtype=object)
 
 
 def numbers(dataset: xr.Dataset) -> dict[str, Number]:
-    """Return the dimensionless numbers of the model of a study by name.
+    """Return the dimensionless numbers of the model of a study, indexed by name.
 
     If the model cannot be loaded, the result is empty.
     """
@@ -36,7 +36,10 @@ def numbers(dataset: xr.Dataset) -> dict[str, Number]:
 
 
 def fixed_words(dataset: xr.Dataset) -> dict[str, str]:
-    """Return the fixed parameters whose value is a word, by name; nested names are joined by ``_``."""
+    """Return the fixed parameters whose value is a word, indexed by name.
+
+    The parts of the name of a nested parameter are joined by ``_``.
+    """
     import pandas as pd
 
     flat = pd.json_normalize(_parameters(dataset.attrs.get("parameters", "{}")), sep="_")
@@ -56,7 +59,7 @@ class Columns:
     Parameters
     ----------
     dataset : Dataset
-        A group of a study, as a grid or with a dimension ``row``.
+        A group of a study. Its cases are a grid, or are along the dimension ``row``.
     """
 
     def __init__(self, dataset: xr.Dataset) -> None:
@@ -66,14 +69,14 @@ class Columns:
 
     @property
     def known(self) -> list[str]:
-        """Names of all columns, for hints in messages."""
+        """Names of the columns that messages suggest."""
         data = self.dataset
         return [*map(str, data.data_vars), *map(str, data.coords), *self._numbers, REALISATIONS]
 
     def find(self, name: str) -> xr.DataArray | None:
-        """Return a column with its unit, or None if the name is unknown. The column of an output is its mean."""
+        """Return a column with its unit; None if the name is unknown. The column of an output is its mean value."""
         if name not in self._found:
-            self._found[name] = None  # ends the recursion of a formula that refers to itself
+            self._found[name] = None  # prevents an infinite recursion if a formula refers to itself
             self._found[name] = self._make(name)
         return self._found[name]
 
@@ -91,7 +94,7 @@ class Columns:
         return found
 
     def unknown(self, name: str) -> DataError:
-        """Return the error for an unknown column, or for a number whose formula needs a missing quantity."""
+        """Return the error for an unknown column, or for a dimensionless number that needs a missing quantity."""
         if name in self._numbers:
             needed = parse(self._numbers[name].formula).names
             missing = ", ".join(sorted(each for each in needed if self.find(each) is None))
@@ -108,7 +111,7 @@ class Columns:
         return evaluate(expression, self.find, self.known)
 
     def truth(self, condition: str) -> xr.DataArray:
-        """Return the truth values of a condition."""
+        """Return where a condition is true."""
         found = xr.DataArray(self.evaluate(condition).array)
         if found.dtype != bool:
             raise DataError(f"{condition!r}: expected a comparison such as 'hurst < 0.7'")
@@ -135,7 +138,7 @@ class Columns:
 
 
 def needed(dataset: xr.Dataset, names: Iterable[str]) -> list[str]:
-    """Return the outputs that columns need, including the outputs in formulas of dimensionless numbers."""
+    """Return the outputs from which columns are computed, including outputs in formulas of dimensionless numbers."""
     known, found = numbers(dataset), []
     for name in names:
         if name in dataset.data_vars:
@@ -146,7 +149,7 @@ def needed(dataset: xr.Dataset, names: Iterable[str]) -> list[str]:
 
 
 def counts(dataset: xr.Dataset) -> xr.DataArray:
-    """Return for every row the number of results in each state, along the dimension ``state``."""
+    """Return the number of results of every row in each state. The states are along the dimension ``state``."""
     if COUNTS in dataset:
         return dataset[COUNTS]
     status = dataset[STATUS]

@@ -1,8 +1,8 @@
 """Conditions and formulas as a user types them: ``velocity > 3 km/h and contact_fraction < 50 %``.
 
-Python's own parser reads the text, and numpy evaluates it node by node: numbers, quantities, names, words, arithmetic,
-comparisons, ``and``, ``or``, ``not``, ``in`` and the functions in `FUNCTIONS`. Nothing else is allowed, and no text is
-ever executed as code.
+Python's own parser converts the text to a syntax tree. The nodes of the tree are then evaluated with numpy. Allowed are
+numbers, quantities, names, words, arithmetic, comparisons, ``and``, ``or``, ``not``, ``in`` and the functions in
+`FUNCTIONS`. No text is ever executed as code.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
     "log": np.log,
     "log10": np.log10,
 }
-#: Numbers up to this relative difference count as equal, in conditions and in selections, because tables show six
-#: digits.
+#: In conditions and selections, numbers count as equal if their relative difference is at most this, because tables
+#: show six digits.
 SAME = 1e-5
 _LONGEST = 500
 _NUMBER = re.compile(r"(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.])|(?<![\w.])\d+\.?\d*(?=[^\W\d_])")
@@ -52,10 +52,11 @@ Find = Callable[[str], xr.DataArray | None]
 
 
 class Value(NamedTuple):
-    """Numbers in SI with their dimension (of pint), words, or truth values.
+    """The value of an expression: numbers in SI, words, or truth values.
 
-    The dimension is None for words, for truth values, and for a number without a unit. A number without a unit is taken
-    to be in the SI unit of the quantity with which it is combined.
+    `dimension` is the physical dimension of numbers, as an object of the package pint. The dimension is None for words,
+    for truth values, and for a number without a unit. If a number without a unit is combined with a quantity, the
+    number is in the SI unit of this quantity.
     """
 
     array: Any
@@ -63,13 +64,13 @@ class Value(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """Numpy's letter for the data type. A lazy array is not loaded for this."""
+        """The letter of numpy for the data type. A lazy array is not loaded."""
         return str((self.array if hasattr(self.array, "dtype") else np.asarray(self.array)).dtype.kind)
 
 
 @dataclass(frozen=True)
 class Expression:
-    """A parsed text: its syntax tree, and the quantities with units, which are replaced by names in the tree."""
+    """A parsed text. In its syntax tree, names replace quantities with units; `quantities` are these quantities."""
 
     text: str
     tree: ast.expr
@@ -104,8 +105,8 @@ def parse(text: str) -> Expression:
 def evaluate(expression: Expression, find: Find, known: Sequence[str] = ()) -> Value:
     """Return the value of an expression.
 
-    `find` returns the values of a name, or None if there is no such name. The SI unit of the values is in
-    ``attrs["units"]``. `known` are all names; the message about an unknown name suggests one of them.
+    The function `find` returns the values of a name, or None if the name is unknown. The SI unit of the values is in
+    ``attrs["units"]``. `known` are all known names. The message about an unknown name suggests a known name.
 
     Raises
     ------
@@ -117,7 +118,7 @@ def evaluate(expression: Expression, find: Find, known: Sequence[str] = ()) -> V
 
 
 def _without_units(text: str) -> tuple[str, dict[str, Value]]:
-    """Replace every number with a unit by a name, because Python cannot parse units."""
+    """Replace every quantity, which is a number and a unit, by a name, because Python cannot parse units."""
     quantities: dict[str, Value] = {}
     parts, end = [], 0
     for match in _NUMBER.finditer(text):
@@ -133,7 +134,7 @@ def _without_units(text: str) -> tuple[str, dict[str, Value]]:
 
 
 def _unit_at(text: str, start: int) -> str:
-    """Return the longest unit that begins at a position."""
+    """Return the longest unit that begins at the position `start` of a text."""
     longest, end = start, start
     while piece := _PIECE.match(text, end):
         if piece[1] in _KEYWORDS or (end == start and not re.match(r"[^\W\d]|[%°]", piece[1])):
@@ -152,7 +153,7 @@ def _likely_mistake(text: str) -> str:
 
 
 def _name(node: ast.expr) -> str:
-    """Return the name in a node. The dots in names of nested parameters become ``_``."""
+    """Return the name in a node of the syntax tree. Dots in the name of a nested parameter become ``_``."""
     if isinstance(node, ast.Attribute):
         return f"{_name(node.value)}_{node.attr}"
     return node.id if isinstance(node, ast.Name) else ""
@@ -204,7 +205,7 @@ class _Evaluation:
             raise DataError(f"{self.text!r}: no column {name!r}{did_you_mean(name, self.known)}")
         try:
             return Value(found, dimension_of(found.attrs.get("units", "1"))[0] if found.dtype.kind in "fiu" else None)
-        except ValueError:  # a model from outside this package may declare a unit that `mdr_dask.units` does not define
+        except ValueError:  # a model of another package may use a unit that `mdr_dask.units` does not define
             return Value(found)
 
     def _truth(self, node: ast.expr) -> Any:
@@ -233,7 +234,10 @@ class _Evaluation:
         return _OPERATORS[type(op)](first.array, second.array)
 
     def _equal(self, left: ast.expr, right: ast.expr) -> Any:
-        """Compare numbers within `SAME`, or compare words; an unknown name compared with words counts as a word."""
+        """Compare numbers within `SAME`, or compare words.
+
+        An unknown name that is compared with words counts as a word.
+        """
         sides = [None if self._is_unknown(node) else self.value(node) for node in (left, right)]
         if any(side is not None and side.kind in "OUT" for side in sides):
             names = (_name(left), _name(right))

@@ -1,4 +1,4 @@
-"""Averages over cases: one row for each combination of values of some axes."""
+"""Averages over cases. There is one average for each combination of values along some axes."""
 
 from __future__ import annotations
 
@@ -22,14 +22,16 @@ CASES = "cases"
 
 
 def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None = None) -> xr.Dataset:
-    """Average every output over the cases of each group, so that the scatter over realisations is kept.
+    """Average every output over the cases of each group, separately for each realisation.
 
-    A group has C cases. The mean m of the group is the mean of the means m_c of the cases, with the same weight for
-    each case. All cases use the same R realisations, so their results are correlated. Realisation r of a group is
-    therefore ``m + R u_r``, where ``u_r`` is the sum over the cases c of ``(x_cr - m_c) / (n_c C)``. Here x_cr is the
-    result of case c in realisation r, and n_c is the number of realisations of case c. The mean and the standard error
-    of these R numbers are the mean and the standard error of the group, even if the numbers n_c differ. If every case
-    has all R realisations, ``m + R u_r`` is the mean of x_cr over the cases.
+    A group has C cases. The mean m_c of a case is the mean over its realisations. The mean m of the group is the mean
+    of all m_c, with the same weight for each case. All cases use the same R realisations. Therefore the results of
+    different cases are correlated, and the scatter of the group cannot be computed from the scatter of each case.
+    Instead, a result is computed for each realisation r of the group: ``m + R u_r``, where ``u_r`` is the sum over the
+    cases c of ``(x_cr - m_c) / (n_c C)``. Here x_cr is the result of case c in realisation r, and n_c is the number of
+    realisations of case c. The mean and the standard error of these R results are the mean and the standard error of
+    the group, even if n_c differs between cases. If every case has all R realisations, ``m + R u_r`` is the mean of
+    x_cr over the cases.
 
     Parameters
     ----------
@@ -38,13 +40,14 @@ def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None =
     by : sequence of str
         Names of axes, or of columns of a sampled study.
     kept : DataArray of bool, optional
-        The cases to include; all by default.
+        The cases that are included; by default all cases.
 
     Returns
     -------
     Dataset
-        The dimension ``group`` replaces the dimensions of the cases. The axes in `by` are coordinates along it, and the
-        variables ``cases`` and ``state_counts`` are added. The grid error of a group is the mean over its cases.
+        The dimension ``group`` replaces the dimensions of the cases. The axes in `by` are coordinates along ``group``.
+        The variable ``cases`` is the number of cases of each group, and ``state_counts`` is the number of results in
+        each state. The grid error of a group is the mean grid error of its cases.
     """
     import xarray as xr
 
@@ -78,7 +81,10 @@ def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None =
 
 @dataclass(frozen=True)
 class _Members:
-    """The indices of all cases, sorted by group, and the position of the first case of each group in this order."""
+    """The cases of all groups.
+
+    `order` are the indices of the cases, sorted by group. `starts` are the positions in `order` at which groups begin.
+    """
 
     order: NDArray[np.intp]
     starts: NDArray[np.intp]
@@ -89,7 +95,7 @@ class _Members:
         return np.diff(self.starts, append=self.order.size)
 
     def sums(self, values: NDArray[Any], dtype: type = float) -> NDArray[Any]:
-        """Return the sums of values over the cases of every group; the cases are the first dimension of the values."""
+        """Return the sums of values over the cases of every group. The first dimension of `values` is that of cases."""
         if not self.order.size:
             return np.zeros((0, *values.shape[1:]), dtype)
         return np.asarray(np.add.reduceat(values[self.order], self.starts, axis=0, dtype=dtype))
@@ -98,7 +104,7 @@ class _Members:
 def _members(
     dataset: xr.Dataset, by: Sequence[str], dims: Sequence[str], rows: NDArray[np.intp]
 ) -> tuple[list[NDArray[Any]], _Members]:
-    """Return the values of the axes in every group, and the cases of every group."""
+    """Return the values of the axes `by` for every group, and the cases of every group."""
     places = np.unravel_index(rows, [dataset.sizes[dim] for dim in dims])
     labels = [np.unique(dataset[name].to_numpy(), return_inverse=True) for name in by]
     shape = [values.size for values, _ in labels]
@@ -111,7 +117,7 @@ def _members(
 
 
 def _common(values: FloatArray, members: _Members) -> FloatArray:
-    """Return the realisations of every group (see `averaged`); shape (groups, ..., realisations)."""
+    """Return the results of every group for each realisation (see `averaged`), shape (groups, ..., realisations)."""
     there = np.isfinite(values)
     number = there.sum(axis=-1, keepdims=True)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -124,7 +130,7 @@ def _common(values: FloatArray, members: _Members) -> FloatArray:
 
 
 def _errors(values: FloatArray, members: _Members) -> FloatArray:
-    """Return the mean error of every group, repeated for all its realisations."""
+    """Return the mean grid error of every group. All realisations of a group get the same error."""
     each = _common(np.abs(values), members)
     there = np.isfinite(each)
     with np.errstate(invalid="ignore"):

@@ -1,4 +1,4 @@
-"""Answers to a question as labelled arrays, for NetCDF and Zarr."""
+"""Answer a question with labelled arrays, for files in the formats NetCDF and Zarr."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
     from mdr_dask.questions.table import Question
 
 
-#: Size in bytes of the pieces of an array, which are computed on different cores.
+#: Largest size in bytes of one piece of an array. Different pieces are computed on different cores.
 PIECE = 2**20
 
 
 def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn) -> xr.Dataset:
     """Answer a question with lazy arrays; cases that do not meet the condition are NaN.
 
-    The arrays are statistics, with the number of results in each state along ``state``, or single results with their
-    ``status``.
+    If the question requests statistics, the arrays are these statistics, and the number of results in each state along
+    the dimension ``state``. Otherwise the arrays are single results, and the ``status`` of each result.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn
 
 
 def _in_pieces(dataset: xr.Dataset) -> xr.Dataset:
-    """Return lazy arrays in small pieces, each with all realisations."""
+    """Divide arrays into small lazy pieces. Each piece contains all realisations of its cases."""
     import dask
 
     with dask.config.set({"array.chunk-size": PIECE}):

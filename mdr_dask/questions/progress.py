@@ -1,4 +1,4 @@
-"""The progress of a study: the number of results in each state, and messages grouped by text."""
+"""The progress of a study: the number of results in each state, and groups of messages with the same text."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ class Group(NamedTuple):
     Attributes
     ----------
     series, kind, reason : str
-        The series; the state of the results, or ``warning`` for results that are done; and the message.
+        `series` is the name of the series. `kind` is the state of the results; for results that are done, `kind` is
+        ``warning``. `reason` is the message.
     results : int
         Number of results.
     cases : str
@@ -38,7 +39,7 @@ class Group(NamedTuple):
 
 
 def counts(url: str) -> list[dict[str, Any]]:
-    """Return for each series its name, the number of results, and the number of results in each state."""
+    """Return three facts for each series: the name, the number of results, and the number of results in each state."""
     found = []
     for name in store.series_names(url):
         status = store.ledger(url, name)
@@ -50,13 +51,14 @@ def counts(url: str) -> list[dict[str, Any]]:
 def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the current messages of a series.
 
-    For each result, the message of the last attempt is used. If the state of the result has changed since this message,
-    the message is left out.
+    Only the message of the last attempt of each result is current. If the state of the result has changed since this
+    message, the message is left out.
     """
     last: dict[tuple[int, ...], dict[str, Any]] = {}
     telling = [record for record in store.records(url, series) if record["messages"]]
     for record in sorted(telling, key=lambda record: record["attempt"]):
-        for message in (each for each in record["messages"] if "place" in each):  # stores of version 0.2 and later
+        # only stores of version 0.2 and later have the key "place"
+        for message in (each for each in record["messages"] if "place" in each):
             last[tuple(message["place"])] = {"series": series, "attempt": record["attempt"], **message}
     ledger = store.ledger(url, series, dataset["status"].shape)
     inside = [place for place in last if len(place) == ledger.ndim and np.less(place, ledger.shape).all()]
@@ -66,8 +68,9 @@ def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]
 def grouped(found: Sequence[dict[str, Any]], studies: Mapping[str, xr.Dataset]) -> list[Group]:
     """Group messages that differ only in their numbers, in the order of their first appearance.
 
-    If one result has several warnings, they are separate messages. `studies` are the groups of the study by series.
-    Quantities in the messages are converted to the units of the campaign file, which the groups contain.
+    If one result has several warnings, each warning is a message of its own. `studies` are the groups of the study,
+    indexed by the name of the series. Quantities in the messages are converted to the units of the campaign file. The
+    attributes of the groups contain the text of this file.
     """
     wanted = {name: _units(study) for name, study in studies.items()}
     groups: dict[tuple[str, str, str], list[tuple[str, Any]]] = {}
@@ -89,7 +92,10 @@ def grouped(found: Sequence[dict[str, Any]], studies: Mapping[str, xr.Dataset]) 
 
 
 def warnings(found: Sequence[dict[str, Any]]) -> dict[str, int]:
-    """Return the warnings of finished results without the details after a colon, and the number of their results."""
+    """Return the warnings of finished results, and the number of results with each warning.
+
+    The details after a colon are left out.
+    """
     groups: dict[str, list[str]] = {}
     for message in (each for each in found if each["status"] == "done"):
         for text in dict.fromkeys(text.partition(": ")[0] for text in message["message"].split("; ")):
@@ -97,17 +103,17 @@ def warnings(found: Sequence[dict[str, Any]]) -> dict[str, int]:
     return {_merged(alike): len(alike) for alike in groups.values()}
 
 
-#: A number or a range of numbers with a SI unit for which users often prefer another unit.
+#: Pattern of a number, or of a range of numbers, with an SI unit that users often replace by another unit.
 _QUANTITY = re.compile(
     r"(?<![\w.])(-?[\d.]+(?:e[-+]?\d+)?)((?:,? (?:to|and|or) -?[\d.]+(?:e[-+]?\d+)?)?) (K|rad/s|m/s|m|N|Pa)\b(?!\^)"
 )
 
 
 def _units(study: xr.Dataset) -> dict[str, str]:
-    """Return the units of the campaign file of a study by SI unit.
+    """Return the unit that replaces each SI unit in messages: the unit that the campaign file of a study uses.
 
-    A SI unit is left out if the campaign file uses several units for it. Temperatures are in degC unless the file uses
-    another unit.
+    If the campaign file uses several units instead of one SI unit, this SI unit is not replaced. Temperatures are in
+    degC unless the file uses another unit.
     """
     found: dict[str, set[str]] = {"K": {"degC"}}
     written = as_written(study)
@@ -118,7 +124,7 @@ def _units(study: xr.Dataset) -> dict[str, str]:
 
 
 def _converted(text: str, units: Mapping[str, str]) -> str:
-    """Return a message with its quantities converted to the units of a campaign file."""
+    """Return a message in which all quantities are converted to the units of a campaign file."""
 
     def convert(found: re.Match[str]) -> str:
         first, rest, unit = found.groups()
@@ -137,7 +143,7 @@ _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 
 
 def _merged(texts: Sequence[str]) -> str:
-    """Merge texts that differ only in their numbers; each number becomes a range: ``a film ratio of 0.2 to 0.4``."""
+    """Merge texts that differ only in numbers. Different numbers become a range: ``a film ratio of 0.2 to 0.4``."""
     columns = iter(list(zip(*map(_NUMBER.findall, texts), strict=True)))
 
     def ends(_: re.Match[str]) -> str:
@@ -148,7 +154,7 @@ def _merged(texts: Sequence[str]) -> str:
 
 
 def _cases(cases: Sequence[Mapping[str, Any]], study: xr.Dataset | None) -> str:
-    """Return the range of each varied parameter among cases, in the units of the campaign file."""
+    """Return a text with the range of each varied parameter over some cases, in the units of the campaign file."""
     wanted = {} if study is None else as_written(study)
     parts = []
     for path in cases[0]:

@@ -1,4 +1,4 @@
-"""Selections of parts of a study: ``velocity=1 mm/s..1 m/s``, ``hurst=0.3,0.7``, ``wear_rule=exact``."""
+"""Select parts of a study by texts such as ``velocity=1 mm/s..1 m/s``, ``hurst=0.3,0.7``, ``wear_rule=exact``."""
 
 from __future__ import annotations
 
@@ -31,17 +31,18 @@ def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings
     dataset : Dataset
         A group of a study, or a Dataset derived from it.
     selections : sequence of str
-        Each is a name, ``=``, and values or ranges separated by commas: ``velocity=1 mm/s..1 m/s``, ``hurst=0.3,0.7``,
-        ``radius=..2``. The name is an axis, a column of a sampled study, ``case`` or ``realisation``. Both ends of a
-        range are included; numbers without a unit are in SI. A number between two values selects the nearest value.
+        A selection is a name, ``=``, and values or ranges that are separated by commas: ``velocity=1 mm/s..1 m/s``,
+        ``hurst=0.3,0.7``, ``radius=..2``. The name is an axis, a column of a sampled study, ``case`` or
+        ``realisation``. Both ends of a range are included. Numbers without a unit are in SI. If a number is not a value
+        of the axis, the nearest value is selected.
     tell : callable, str -> object
-        Receives a message when the nearest value differs from the given one.
+        Receives a message if the selected value differs from the given number.
 
     Returns
     -------
     Dataset
-        The selected part with all dimensions. A selection by a fixed parameter keeps the whole group if the parameter
-        has the given value.
+        The selected part. No dimension is removed. If the name is a fixed parameter that has the given value, the whole
+        group is selected.
 
     Raises
     ------
@@ -76,7 +77,7 @@ def select_all(
 def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
     """Keep the cases that meet a condition on means over realisations.
 
-    The results of all other cases become NaN, with the state *not needed*.
+    The results of all other cases become NaN and get the state *not needed*.
     """
     truth = Columns(dataset).truth(condition)
     masked = {name: array.where(truth) for name, array in dataset.data_vars.items() if name != "status"}
@@ -85,7 +86,7 @@ def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
 
 
 def where_all(groups: Mapping[str, xr.Dataset], condition: str) -> dict[str, xr.Dataset]:
-    """Keep the cases of all groups that meet a condition; raise DataError if no case meets it."""
+    """Keep the cases of all groups that meet a condition; raise DataError if no case meets the condition."""
     kept = {name: where(dataset, condition) for name, dataset in groups.items()}
     if all((dataset["status"] == Status.NOT_NEEDED.value).all() for dataset in kept.values()):
         raise DataError(f"--where {condition}: no result meets the condition")
@@ -93,7 +94,7 @@ def where_all(groups: Mapping[str, xr.Dataset], condition: str) -> dict[str, xr.
 
 
 def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
-    """Return the group of a series. With None, return the only group."""
+    """Return the group of a series. If `series` is None, return the only group."""
     names = ", ".join(datasets)
     if series is None:
         if len(datasets) > 1:
@@ -105,9 +106,10 @@ def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
 
 
 def outputs(dataset: xr.Dataset, names: Sequence[str], tell: Tell | None = None) -> xr.Dataset:
-    """Keep the named outputs with their errors. Without names, keep all outputs that have one number for each result.
+    """Keep the named outputs and their errors.
 
-    `tell` receives a sentence about the outputs that are left out because they have further dimensions.
+    If `names` is empty, all outputs that have one number for each result are kept. Outputs with further dimensions are
+    then left out, and `tell` receives a sentence about these outputs.
     """
     known = [str(name) for name in dataset.data_vars if name != "status"]
     for name in names:
@@ -124,14 +126,17 @@ def outputs(dataset: xr.Dataset, names: Sequence[str], tell: Tell | None = None)
 
 
 def written(value: Any, unit: str | None, digits: int = 6) -> str:
-    """Return a value with its unit as text, in the form of a selection."""
+    """Return a value and its unit as text, written as in a selection."""
     if not isinstance(value, int | float | np.number):
         return str(value)
     return f"{value:.{digits}g}" if unit in (None, "1", "") else f"{value:.{digits}g} {unit}"
 
 
 def written_apart(unit: str, value: float, *limits: float) -> tuple[str, ...]:
-    """Return a value and its limits as texts with a unit, with enough digits to distinguish them."""
+    """Return a value and limits as texts with a unit.
+
+    The texts have enough digits to distinguish the value from the limits.
+    """
     return distinguishable(value, *limits, digits=6, write=lambda number, digits: written(number, unit, digits))
 
 
@@ -205,7 +210,7 @@ def _words(text: str) -> list[str]:
 
 
 def _nearest(values: NDArray[Any], wanted: float, name: str, unit: str, tell: Tell) -> NDArray[np.bool_]:
-    """Return a mask of the value nearest to a number; it selects no value if the number lies outside the axis."""
+    """Return a mask that selects the value nearest to a number, or no value if the number lies outside the axis."""
     distance = np.abs(values - wanted)
     slack = SAME * max(abs(wanted), np.abs(values).max())
     if not values.min() - slack <= wanted <= values.max() + slack:
@@ -220,7 +225,7 @@ def _nearest(values: NDArray[Any], wanted: float, name: str, unit: str, tell: Te
 
 
 def _intervals(wanted: str, name: str, unit: str) -> Iterator[tuple[float, float]]:
-    """Yield the ends of every range of a selection. For a single value, both ends are equal."""
+    """Yield the two ends of every range of a selection. The two ends of a single value are equal."""
     pieces = [[end.strip() for end in piece.split("..")] for piece in wanted.split(",")]
     numbers = [end for piece in pieces for end in piece if end]
     bare = [_is_bare(end) for end in numbers]
@@ -250,7 +255,7 @@ def _number(text: str, name: str, unit: str) -> float:
 
 
 def _extent(values: NDArray[Any], unit: str) -> str:
-    """Return a text with the range of an axis, for messages."""
+    """Return a text about the values of an axis, for messages."""
     if values.size == 1:
         return f"it is {written(values[0], unit)} everywhere"
     if values.size <= 6:

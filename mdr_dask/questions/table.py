@@ -1,4 +1,4 @@
-"""Answers to a question as rows. A study is read box by box, so that its first rows are available quickly."""
+"""Answer a question with the rows of a table. The study is read box by box: the first rows are available quickly."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MEANS = ("mean", "standard_error", "grid_error")
-#: `ROWS`: number of rows computed at a time. `WHOLE`: size in bytes up to which a study is read at once.
+#: `ROWS`: number of rows that are computed at a time. `WHOLE`: a study of at most this size in bytes is read at once.
 ROWS, WHOLE = 2**16, 2**26
 
 
@@ -37,24 +37,27 @@ class Question:
     Parameters
     ----------
     outputs : tuple of str
-        Names of outputs. If it is empty, all outputs that have one number for each result.
+        Names of outputs. If the tuple is empty, the table has all outputs that have one number for each result.
     selections : tuple of str
         Selections as in `mdr_dask.questions.selection.select`.
     where : str
-        A condition on means over realisations. If `statistics` is None, a condition on single results.
+        A condition. If `statistics` is None, the condition is on single results; otherwise it is on means over
+        realisations.
     group_by : tuple of str
-        Names of axes. There is one row for each combination of their values, averaged over all other axes.
+        Names of axes. The table has one row for each combination of values along these axes. A row is an average over
+        all other axes.
     sort : tuple of str
-        Columns or formulas by which rows are sorted; a leading ``-`` means descending. Missing values come last.
+        Columns or formulas by which rows are sorted. With a leading ``-``, the order is descending. Missing values come
+        last.
     columns : tuple of str
-        Axes, parameters, outputs, dimensionless numbers, ``status`` and ``realisations``. By default, all axes and
-        outputs.
+        Names of axes, parameters, outputs and dimensionless numbers; ``status``; and ``realisations``. By default, all
+        axes and outputs, the number of realisations if there are several, and the status.
     units : mapping of str to str
-        Units of columns; all other columns are in SI.
+        Units, indexed by the name of the column. Columns that are not named are in SI.
     statistics : tuple of str, optional
-        Statistics over realisations. With None, the table has one row for each result.
+        Statistics over realisations. If `statistics` is None, the table has one row for each result.
     written : bool
-        Whether axes and parameters that are not in `units` have the unit that the campaign file uses.
+        Whether axes and parameters that are not in `units` are in the unit of the campaign file instead of SI.
     """
 
     outputs: tuple[str, ...] = ()
@@ -72,8 +75,8 @@ class Question:
 class Table:
     """A table as a sequence of data frames, with the units of its columns.
 
-    `total` is the number of rows, or None if this number is known only after the last frame. `keys` is the number of
-    columns, from the left, that identify a row.
+    `total` is the number of rows, or None if this number is known only after the last frame. The first columns of the
+    table identify a row; `keys` is the number of these columns.
     """
 
     frames: Iterator[pd.DataFrame]
@@ -85,9 +88,9 @@ class Table:
 def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = warnings.warn) -> Table:
     """Answer a question about a group of a study with rows.
 
-    Rows are computed when their frame is read. The memory needed does not grow with the number of rows, unless they are
-    sorted. `limit` is the number of rows that will be read, or 0 if all will be read. `tell` receives messages about
-    the selection.
+    The rows of a data frame are computed when this frame is read. Unless the question sorts rows, the memory needed
+    does not grow with the number of rows. `limit` is the number of rows that the caller will read, or 0 if the caller
+    will read all rows. `tell` receives messages about the selection.
 
     Raises
     ------
@@ -135,7 +138,7 @@ class _Maker:
         self.keys = 0
 
     def units(self) -> dict[str, str]:
-        """Return the units of the columns, found by computing one row; errors in the question are raised here."""
+        """Compute one row, and return the units of the columns. Errors in the question are raised by this method."""
         rows = self._rows(self._data, dict.fromkeys(self._dims, slice(0, 1)))
         self._kept(rows)
         self._keys(rows)
@@ -143,13 +146,13 @@ class _Maker:
         return self._frame(rows)[1]
 
     def frames(self, most: int, whole: bool = True) -> Iterator[pd.DataFrame]:
-        """Yield the rows in the order of the axes, about `most` at a time."""
+        """Yield frames of about `most` rows, in the order of the axes."""
         for _, rows in self._boxes(self._data, most, whole):
             if rows.sizes["row"]:
                 yield self._frame(rows)[0]
 
     def order(self) -> NDArray[np.intp]:
-        """Return the positions of the rows in sorted order."""
+        """Sort the rows. For each row of the sorted order, return its position in the order of the axes."""
         import pandas as pd
 
         question = self._question
@@ -162,7 +165,7 @@ class _Maker:
         return ordered
 
     def picked(self, places: NDArray[np.intp]) -> Iterator[pd.DataFrame]:
-        """Yield the rows at given positions, in the order of the positions."""
+        """Yield frames of the rows at given positions, in the order in which the positions are given."""
         data = self._data.load() if places.size > ROWS else self._data
         for start in range(0, places.size, ROWS):
             along = np.unravel_index(places[start : start + ROWS], tuple(self.sizes.values()))
@@ -170,7 +173,7 @@ class _Maker:
             yield self._frame(data.isel(at) if at else self._rows(data, {}))[0]
 
     def _boxes(self, data: xr.Dataset, most: int, whole: bool) -> Iterator[tuple[NDArray[np.intp], xr.Dataset]]:
-        """Yield the rows that meet the condition, with their positions among all rows."""
+        """Yield, for each box, the rows that meet the condition, and the positions of these rows among all rows."""
         if whole and data.nbytes <= WHOLE:
             data = data.load()
         chunks = next((array.encoding.get("chunks") for array in data.data_vars.values()), None) or ()
@@ -187,7 +190,7 @@ class _Maker:
 
     @property
     def may_leave_out(self) -> bool:
-        """Whether there may be cases without a row, because adaptive axes do not need them."""
+        """Whether some cases may have no row, because an adaptive axis does not need these cases."""
         adaptive = "adaptive:" in str(self._data.attrs.get("campaign", ""))
         return adaptive and not (self._raw or self._question.group_by)
 
@@ -215,7 +218,7 @@ class _Maker:
         return [*axes, *grouped, *self._outputs, *counted, STATUS]
 
     def _frame(self, rows: xr.Dataset) -> tuple[pd.DataFrame, dict[str, str]]:
-        """Return rows as a frame, and the units of its columns."""
+        """Return rows as a data frame, and the units of the columns of the frame."""
         import pandas as pd
         import xarray as xr
 
@@ -237,13 +240,13 @@ class _Maker:
 
 
 def _numbered(dataset: xr.Dataset) -> xr.Dataset:
-    """Assign the numbers 0, 1, 2, ... to dimensions without values, such as the cases of a sampled study."""
+    """Assign the values 0, 1, 2, ... to each dimension that has no values, such as the cases of a sampled study."""
     bare = [dim for dim in dataset.dims if dim not in dataset.coords]
     return dataset.assign_coords({dim: np.arange(dataset.sizes[dim]) for dim in bare})
 
 
 def _flattened(array: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
-    """Return the columns of a statistic. Intervals and quantiles have several columns."""
+    """Return the columns of a statistic. An interval and a set of quantiles have several columns."""
     if "bound" in array.dims:
         return {f"{name.removesuffix('interval')}{end}": array.isel(bound=k) for k, end in enumerate(("low", "high"))}
     if "quantile" in array.dims:
@@ -252,10 +255,10 @@ def _flattened(array: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
 
 
 def boxes(sizes: Mapping[str, int], most: int, chunks: Sequence[int] = ()) -> Iterator[dict[str, slice]]:
-    """Divide a grid into boxes of at most `most` points, in the order of its rows.
+    """Divide a grid into boxes of at most `most` points, in the order of the rows of the table.
 
-    The index of the last dimension in `sizes` varies fastest. `chunks` are the lengths of the chunks of the store.
-    Boxes that are longer than a chunk contain whole chunks.
+    The index of the last dimension in `sizes` varies fastest. `chunks` are the lengths of the chunks of the store. A
+    box that is longer than a chunk ends at the end of a chunk.
     """
     dims, inner = list(sizes), 1
     cut = len(dims)

@@ -12,15 +12,15 @@ from mdr_dask.units import conversion
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Suffixes of statistics that are values of the output itself, such as its mean.
+#: Suffixes of statistics that are values of an output, such as the mean.
 _OF_OUTPUTS = ("mean", "interval", "quantile")
-#: Suffixes of statistics that are differences between values of the output. When a temperature is converted, the zero
-#: point of the scale is not applied to them.
+#: Suffixes of statistics that are differences between values of an output, such as errors. If these statistics are
+#: temperatures, the zero point of the scale is ignored when they are converted.
 _DIFFERENCES = ("error", "standard_deviation", "standard_error", "grid_error")
 
 
 def parse_units(texts: Sequence[str]) -> dict[str, str]:
-    """Return units by name from texts such as ``velocity=km/h,temperature=degC``.
+    """Return units, indexed by the name of the column, from texts such as ``velocity=km/h,temperature=degC``.
 
     Raises
     ------
@@ -43,9 +43,9 @@ def as_written(study: xr.Dataset) -> dict[str, str]:
 
 
 def in_units(dataset: xr.Dataset, wanted: Mapping[str, str]) -> xr.Dataset:
-    """Convert variables and coordinates. An output is converted together with its statistics and errors.
+    """Convert variables and coordinates to other units. The statistics and errors of an output are also converted.
 
-    `wanted` are units by the name of an axis, a parameter or an output. Units may be spelt as in a campaign file.
+    `wanted` are units, indexed by the name of an axis, a parameter or an output, and spelt as in a campaign file.
 
     Raises
     ------
