@@ -177,9 +177,9 @@ def chance(residuals: FloatArray, count: int, draws: int = RESAMPLES) -> float:
     """Return the probability that scatter and errors alone cause an rms residual at least as large as that of the data.
 
     `residuals`, shape (1 + RESAMPLES + 2 groups, ...), is a stack of the differences between data and law; those of the
-    data are in its first row. The next `draws` rows are resamples. If the law holds, the first row differs from zero by
-    about as much as the resamples differ from the first row. `count` is the number of realisations that were resampled.
-    The probability is NaN if there are too few resamples, for example with one realisation.
+    data are in its first row. The next `draws` rows are resamples. If the law holds, the numbers in the first row are
+    about as large as the differences between the resamples and the first row. `count` is the number of realisations
+    that were resampled. The probability is NaN if there are too few resamples, for example with one realisation.
     """
     caused = _caused(residuals, count, draws)
     return float(np.mean(caused >= np.sqrt(np.mean(residuals[0] ** 2)))) if caused.size else np.nan

@@ -31,9 +31,9 @@ CHASED = 0.05
 FINEST = 2.0**-10
 #: Smallest number of values along an axis from which the output is predicted.
 FEWEST = 3
-#: Lowest level of a value at which the comparison of prediction and computed output counts as a test. Level 3 are the
-#: eighths of the axis. The outputs at the quarters (level 2) are predicted from only three values, and such a
-#: prediction may be right by chance. Intervals longer than an eighth of the axis are therefore always halved.
+#: A computed output is compared with its prediction only at values of this level or a higher level. The values of
+#: level 3 are the eighths of the axis. The outputs at the quarters (level 2) are predicted from only three values, and
+#: such a prediction may be right by chance. Intervals longer than an eighth of the axis are therefore always halved.
 TESTED = 3
 #: Positions in an interval at which predictions are compared with the interpolation through all values. A position is
 #: the distance from the newer end as a fraction of the length of the interval.

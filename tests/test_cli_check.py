@@ -76,7 +76,7 @@ REFUSED = {
     "the law ends": (
         lambda _: None,
         ("[0 degC, 20 degC, 50 degC]", "[-90 degC, 20 degC]"),
-        "material: expected a temperature above reference - c2 = -80 degC for wlf, got -90 degC",
+        "material: expected a temperature above -80 degC, where wlf diverges (at reference - c2), got -90 degC",
     ),
 }
 

@@ -264,7 +264,7 @@ def constant(
 
 
 def measure(name: str, value: float, long_name: str) -> Variables:
-    """Return the result variable of a number that has no interval."""
+    """Return a variable of the result for a number without a confidence interval."""
     return {name: xr.Variable((), value, {"units": "1", "long_name": long_name})}
 
 

@@ -19,7 +19,8 @@ from mdr_dask.fits.posterior import Posterior
 #: logarithm of the posterior density is less than `OPEN` below its maximum. If the density is normal, an open end is
 #: within two standard errors of the maximum.
 OPEN = 2.0
-#: An unknown is also undetermined if unknowns with an open end explain more than this share of its variance.
+#: An unknown is also undetermined if other unknowns, whose interval has no finite end, explain more than this share of
+#: the variance of the unknown.
 LINKED = 0.25
 #: The data determine a product if the spread of its logarithm is less than this fraction of the spread without data.
 NARROW = 0.25

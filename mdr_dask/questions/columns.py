@@ -74,7 +74,7 @@ class Columns:
         return [*map(str, data.data_vars), *map(str, data.coords), *self._numbers, REALISATIONS]
 
     def find(self, name: str) -> xr.DataArray | None:
-        """Return a column with its unit; None if the name is unknown. The column of an output is its mean value."""
+        """Return a column with its unit; None if the name is unknown. An output is averaged over the realisations."""
         if name not in self._found:
             self._found[name] = None  # prevents an infinite recursion if a formula refers to itself
             self._found[name] = self._make(name)

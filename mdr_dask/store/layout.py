@@ -383,7 +383,7 @@ def _plain(value: Any) -> Any:
 def group_document(members: Mapping[str, Any], attrs: Mapping[str, Any]) -> bytes:
     """Return the metadata of a group and of its members as the content of one file.
 
-    One write of this file makes a new shape visible.
+    Readers see a new shape as soon as this file has been written.
     """
     held = {
         "zarr_format": 3,

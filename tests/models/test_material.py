@@ -144,7 +144,7 @@ def test_columns_of_a_table_go_by_their_names(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("f [Hz],G' [MPa]\n1,2\n", "expected a column loss modulus or a column tan delta"),
+        ("f [Hz],G' [MPa]\n1,2\n", "expected a column 'loss modulus' or 'tan delta'"),
         ("T [C],f [Hz],G' [MPa],G'' [MPa]\n20,1,2,\n", r"dma.csv:2:8: column loss modulus: expected a number"),
     ],
 )

@@ -297,7 +297,7 @@ def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray,
     if loss is None and "tan delta" in table:
         loss = storage * table["tan delta"]
     if loss is None:
-        raise DataError(f"{name}: expected a column loss modulus or a column tan delta")
+        raise DataError(f"{name}: expected a column 'loss modulus' or 'tan delta'")
     temperature, wanted = table.get("temperature"), chosen.table_temperature
     if temperature is not None and wanted is not None and np.count_nonzero(_near(temperature, wanted)) < 2:
         _, levels = _levels(temperature)

@@ -38,7 +38,7 @@ class Outer(NamedTuple):
 def rising(lines: FloatArray) -> NDArray[np.bool_]:
     """Return, for each line, whether its numbers only rise or only fall.
 
-    Lines of positions and of row numbers only rise or only fall; lines of rough heights do not.
+    The positions in a file and the numbers of its rows only rise or only fall. The heights of a rough surface do not.
     """
     steps = np.diff(lines, axis=1)
     known = np.isfinite(steps)

@@ -161,7 +161,7 @@ def sliding_problems(block: Block[Any]) -> SlidingProblems:
 
 
 def _without_units(body: Shape | None, length: float, height: float) -> Shape | None:
-    """Return the profile of an indenter in units of length and height; its numbers are rounded by `canonical`."""
+    """Return the profile of an indenter, with positions divided by `length` and heights by `height`, and rounded."""
     if body is None:
         return None
     body = body.scaled(float(length), float(height))

@@ -34,7 +34,7 @@ class Wlf(Parameters):
         lowest, end = float(np.min(temperature)), self.reference - self.c2
         if lowest <= end:
             got, limit = shown_apart("K", lowest, end)
-            raise ValueError(f"expected a temperature above reference - c2 = {limit} for wlf, got {got}")
+            raise ValueError(f"expected a temperature above {limit}, where wlf diverges (at reference - c2), got {got}")
         return wlf_factor(temperature, self.reference, self.c1, self.c2)
 
 

@@ -86,7 +86,7 @@ def _add(jumps: NDArray[np.int32], at: int, number: int) -> None:
 def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: float, jumps: NDArray[np.int32]) -> None:
     """Add the contribution of a cluster to the windows that contain only its head or only its tail.
 
-    The head or tail in a window is counted under one condition. If `judged` is true, the head or tail has to break the
+    The head or tail in a window counts if it breaks the layer. If `judged` is true, the head or tail has to break the
     layer by itself. If `judged` is false, the whole cluster has to break the layer. A part longer than `reach` cannot
     break the layer, whatever its shape.
     """

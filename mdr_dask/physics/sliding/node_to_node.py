@@ -723,9 +723,9 @@ class NodeToNode:
 
         A small contact patch between two nodes may be missing on two successive grids. The missing patch is at most
         about one cell long, because a longer patch contains nodes. With this patch, the length in contact would be
-        larger by at most one cell. The slope is small near the summit of an asperity, so that the rms slope of the
-        contact would be smaller. The relative decrease of the rms slope is at most half the relative increase of the
-        length.
+        larger by at most one cell. The patch would decrease the rms slope of the contact, because the slope is small
+        near the summit of an asperity. The relative decrease of the rms slope is at most half the relative increase of
+        the length.
         """
         drag, fraction, slope = results.T
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -249,7 +249,7 @@ def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, Float
 
 
 def step_precision(count: int) -> FloatArray:
-    """Return the prior precision of the shifts, in widths of a curve, of all curves except the first."""
+    """Return the prior precision of the shifts, in widths of a curve. The first curve is not shifted."""
     steps = np.eye(count - 1) - np.eye(count - 1, k=-1)
     covariance = STEP_SCATTER**2 * np.eye(count - 1) + STEP_MEAN**2
     return np.asarray(steps.T @ np.linalg.inv(covariance) @ steps, dtype=np.float64)

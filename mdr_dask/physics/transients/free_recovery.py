@@ -94,7 +94,7 @@ class FreeRecovery(NamedTuple):
     ----------
     earliest, place, farthest : array
         An entry is a place of separation if ``earliest == place``. The force on elements in contact falls to zero at
-        this place now. At earlier instants after the jump, the force fell to zero somewhere from `place` to `farthest`.
+        this place now. Since the jump, the places where the force fell to zero were between `place` and `farthest`.
         All other entries are stretches: the force is positive now, but elements can have separated in the cells from
         `earliest` to `place`.
     barrier : array
@@ -284,7 +284,7 @@ def from_before(now: Instant, x: float, least: float) -> tuple[float, float]:
 
 @jit_inline_uncounted
 def displacement_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float, float]:
-    """Return displacement, slope along the line and derivative with respect to the depth of free elements at x."""
+    """Return the displacement u of free elements at x, the slope du/dx, and the derivative of u by the depth."""
     u, slope, by_depth = 0.0, 0.0, 0.0
     for k in range(recovery.count[0]):
         value, value_slope, value_by_depth = _from_separation(now, recovery, k, x)

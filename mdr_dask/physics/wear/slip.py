@@ -209,7 +209,7 @@ class PartialSlip:
         return SlipMoment(0.0, y, np.zeros(self.size), np.zeros((2, 1)), np.zeros(self.mesh.nodes.size))
 
     def under_force(self) -> tuple[PartialSlip, SlipMoment]:
-        """Return the problem under the constant force of the virgin contact, and its first moment."""
+        """Return this problem with constant force instead of constant depth, and the first moment of that problem."""
         virgin = settled(self)
         forced = replace(self, load=self.slipping_load(virgin.unknowns), border=None, frozen=np.nan)
         return forced, replace(virgin, unknowns=np.append(virgin.unknowns, [0.0, 0.0]))
