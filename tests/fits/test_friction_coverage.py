@@ -199,7 +199,7 @@ def test_a_plateau_that_is_not_reached_has_no_interval(lines, law, end):
 def test_an_indenter_without_a_case_within_the_law_has_no_exponent():
     steep = planted({**CONE, "indenter_angle": 0.5}, 5, 1, **CASES["indenter"].outputs).isel(study=0)
     found = FIT["indenter"].compute({"": steep})
-    assert found["law_holds"].item().startswith("not tested: 0 of 9 cases lie within the law, three are needed")
+    assert found["law_holds"].item().startswith("not tested: the law applies to 0 of 9 cases, three are needed")
     assert np.isnan(found["exponent"])
 
 
