@@ -60,6 +60,7 @@ LAYOUTS = {
     "pandas": ("," + joined([range(NX)], ",") + joined(np.c_[np.arange(NY), ROWS], ","), UNITS, False),
     **{f"missing as {word!r}": (damaged(word), UNITS, True) for word in ("BAD", "***", "-")},
     "missing as nothing": (damaged("", ";"), UNITS, True),
+    "missing as 'BAD', decimal commas": (damaged("BAD", ";").replace(".", ","), UNITS, True),
     **{f"missing as {code:g}": (joined(holed(code)), UNITS, True) for code in (9999, -32767, 1.70141e38)},
     "missing as zero": (joined(np.where(holed(np.nan) > -1e9, ROWS + 500, 0) - 0), UNITS, True),
     "xyz": (joined(xyz()), XYZ, False),

@@ -418,11 +418,12 @@ def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
     start = next((k for k, count in enumerate(width) if count == common), 0)  # skip numbers in the preamble
     odd = next((k for k in range(start, len(width)) if width[k] != common), None)
     first = lines.index(kept[numeric[0] + start]) if kept else 0
+    text = "\n".join((separator or " ").join(line.split(separator)) for line in rows[start:odd])
+    text = text.replace(decimal, ".")  # pandas leaves decimal commas in a column that also contains words
     try:
         table = pd.read_csv(
-            io.StringIO("\n".join((separator or " ").join(line.split(separator)) for line in rows[start:odd])),
+            io.StringIO(text),
             sep=separator or r"\s+",
-            decimal=decimal,
             header=None,
             skipinitialspace=True,
             index_col=False,
