@@ -3,8 +3,10 @@
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import time
 import zipfile
 from pathlib import Path
 
@@ -84,6 +86,21 @@ def test_a_case_that_takes_too_long_has_failed(example, hang):
     assert done.returncode == 1, done.stderr
     assert "36 done, 4 failed" in done.stdout
     assert "took longer than 0.3 s" in example("status", "results/pin.zarr", "--failures").stdout
+
+
+@pytest.mark.slow
+def test_a_second_interrupt_stops_cases_that_do_not_end(example):
+    example("check", "pin.yaml", line="    import time, pathlib; pathlib.Path('begun').touch(); time.sleep(600)")
+    words = [sys.executable, "-m", "mdr_dask", "run", "pin.yaml", "--workers", "1"]
+    run = subprocess.Popen(words, env={**os.environ, "PYTHONPATH": "."}, stderr=subprocess.PIPE, text=True)
+    while not Path("begun").exists():
+        time.sleep(0.1)
+    run.send_signal(signal.SIGINT)
+    while "a second interrupt stops at once" not in run.stderr.readline():
+        pass
+    run.send_signal(signal.SIGINT)
+    assert "interrupted" in run.communicate(timeout=60)[1]
+    assert run.returncode == 130
 
 
 def test_threads_of_blas_are_as_before_a_run(toy, url):

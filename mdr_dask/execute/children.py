@@ -81,17 +81,24 @@ class Child:
 
 @contextmanager
 def children(count: int, model: str) -> Iterator[list[Child]]:
-    """Start child processes for a model. At the end of the context, wait until each child has finished its block."""
+    """Start child processes for a model. At the end of the context, wait until each child has finished its block.
+
+    If an exception ends the context, such as a second Ctrl-C, the child processes are killed.
+    """
     pipes = [Pipe() for _ in range(count)]
     numbers = [theirs.fileno() for _, theirs in pipes]
     path = os.pathsep.join(filter(None, sys.path))
     environment = {**os.environ, **dict.fromkeys(BLAS_THREADS, "1"), "PYTHONPATH": path, KIND: kind()}
     command = [sys.executable, "-c", COMMAND, model, *map(str, numbers)]
-    with subprocess.Popen(command, pass_fds=numbers, env=environment):
+    with subprocess.Popen(command, pass_fds=numbers, env=environment, process_group=0) as process:
         try:
             for _, theirs in pipes:
                 theirs.close()
             yield [Child(ours) for ours, _ in pipes]
+        except BaseException:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            raise
         finally:
             for ours, _ in pipes:
                 ours.close()

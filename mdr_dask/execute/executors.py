@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, ExitStack
 from queue import SimpleQueue
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mdr_dask import models
 from mdr_dask.errors import ModelError
@@ -48,8 +48,8 @@ class Executor(AbstractContextManager["Executor"]):
         self._stack = ExitStack()
         self._window: TaskWindow | None = None
 
-    def __exit__(self, *_: object) -> None:
-        self._stack.close()
+    def __exit__(self, *reason: Any) -> None:
+        self._stack.__exit__(*reason)
 
     def apart(self) -> None:
         """Compute all blocks in child processes, because a case may have crashed the last run."""
