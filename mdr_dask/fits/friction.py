@@ -98,7 +98,7 @@ def at_load(force: FloatArray) -> Callable[[int], str]:
 
 
 def _first_linear(friction: FloatArray, velocity: FloatArray) -> int | None:
-    """Return the index of the lowest velocity at which friction is proportional to the velocity; None if there is none.
+    """Return the index of the lowest velocity at which friction is proportional to the velocity, or None.
 
     Friction at two neighbouring velocities is compared. Only realisations that succeeded at both velocities are used.
     The index may exceed 0, because with the time stepping of the original papers, friction at low velocities does not

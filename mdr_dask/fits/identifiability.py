@@ -128,7 +128,7 @@ def _reduced(rows: FloatArray) -> FloatArray:
 
 
 def _product(found: Posterior, logarithms: FloatArray, free: Sequence[int], row: FloatArray, unknowns: int) -> Product:
-    """Return a product. The exponents are rounded to simple fractions if rounding hardly increases the spread."""
+    """Return the product with exponents rounded to simple fractions, if that hardly increases its spread."""
     best = _spread(logarithms @ row, found.weights)
     for denominator in (1, 2, 3):
         plain = np.round(row * denominator) / denominator

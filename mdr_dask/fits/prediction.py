@@ -261,7 +261,7 @@ def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray)
 
 
 def _at_point(fields: FloatArray, axes: Sequence[FloatArray], place: Sequence[float]) -> FloatArray:
-    """Interpolate the numbers of the cases (see `_fields`) to a measured point, along one condition after the other."""
+    """Interpolate the columns of `_fields` to a measured point, along one condition after the other."""
     for axis, wanted in zip(axes, place, strict=True):
         nearest = int(np.argmin(np.abs(axis - wanted)))
         if _is_computed(axis, np.array([wanted])):

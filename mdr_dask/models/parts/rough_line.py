@@ -102,7 +102,7 @@ def _height(line: OfSurface) -> float:
 
 @dataclass(frozen=True)
 class Measured:
-    """The measured profile of a file; it is the same in every realisation."""
+    """The measured profile of a file, the same line in every realisation."""
 
     profile: ProfileFile
     is_random = False
