@@ -75,26 +75,31 @@ class Executor(AbstractContextManager["Executor"]):
                 self._in_pool(works, settle)
 
     def _in_pool(self, works: Iterable[Work], settle: Settle) -> None:
-        """Compute blocks in threads. After an error, the blocks that have started are still finished."""
+        """Compute blocks in threads. After an error, the blocks that have started are still finished.
+
+        A second interrupt ends this wait, so the pool is not a context, which would wait once more.
+        """
+        pool = ThreadPoolExecutor(self._threads)
         remaining = iter(works)
         running: set[Future[list[tuple[Work, Outcome]]]] = set()
-        with ThreadPoolExecutor(self._threads) as pool:
-            try:
-                while True:
-                    more = itertools.islice(remaining, AHEAD * self._threads - len(running))
-                    running |= {pool.submit(self._compute, work) for work in more}
-                    if not running:
-                        return
-                    ended, running = wait(running, return_when=FIRST_COMPLETED)
-                    for future in ended:
-                        for work, outcome in future.result():
-                            settle(work, outcome)
-            except BaseException as error:
-                begun = sum(not future.cancel() for future in running)
-                if isinstance(error, KeyboardInterrupt) and begun:
-                    what = f"finishing {begun} blocks that have begun; a second interrupt stops at once"
-                    self._tell(Event("stopping", {"blocks": begun}, what))
-                raise
+        try:
+            while True:
+                more = itertools.islice(remaining, AHEAD * self._threads - len(running))
+                running |= {pool.submit(self._compute, work) for work in more}
+                if not running:
+                    break
+                ended, running = wait(running, return_when=FIRST_COMPLETED)
+                for future in ended:
+                    for work, outcome in future.result():
+                        settle(work, outcome)
+        except BaseException as error:
+            begun = sum(not future.cancel() for future in running)
+            if isinstance(error, KeyboardInterrupt) and begun:
+                what = f"finishing {begun} blocks that have begun; a second interrupt stops at once"
+                self._tell(Event("stopping", {"blocks": begun}, what))
+            pool.shutdown()
+            raise
+        pool.shutdown()
 
     def _here(self, work: Work) -> list[tuple[Work, Outcome]]:
         self._tell(of_block("begun", work))
