@@ -28,7 +28,7 @@ COMMAND = "mdr_dask.command"
 
 
 class Drawing(click.Command):
-    """A command that draws figures; the table with the data of a figure also contains the command line."""
+    """A command that draws figures and writes its command line into their tables."""
 
     def parse_args(self, context: click.Context, arguments: list[str]) -> list[str]:
         """Keep the command line as it was typed, then parse it."""
@@ -136,7 +136,7 @@ def _require_quantities(units: Mapping[str, str], groups: Mapping[str, xr.Datase
 
 
 def _with_notes(figure: Plot, where: str, warnings: list[str]) -> Plot:
-    """Return a figure with two kinds of notes: cases left out by the condition `where`, and `warnings`."""
+    """Return a figure that states the condition `where` and `warnings`."""
 
     def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
         drawn = replace(figure.draw(groups), warnings=warnings)
@@ -243,10 +243,7 @@ def _of_output(name: str, groups: Mapping[str, xr.Dataset], axes: Mapping[str, A
 
 
 def _groups(url: str, urls: Sequence[str], series: Sequence[str]) -> dict[str, xr.Dataset]:
-    """Return the groups of a store.
-
-    If several stores are drawn, the name of each group begins with the name of its store.
-    """
+    """Return the groups of a store by name."""
     from mdr_dask import store as stores
     from mdr_dask.questions import selection
 
@@ -256,10 +253,7 @@ def _groups(url: str, urls: Sequence[str], series: Sequence[str]) -> dict[str, x
 
 
 def _name_of(url: str, urls: Sequence[str], series: str) -> str:
-    """Return the name of a group in a legend: the name of its series.
-
-    If several stores are drawn, the name of the store precedes the name of the series.
-    """
+    """Return the name of a group in a legend: the series, after the name of the store if several stores are drawn."""
     if len(urls) == 1:
         return series
     stems = [Path(each).stem for each in urls]
@@ -270,10 +264,9 @@ def _name_of(url: str, urls: Sequence[str], series: str) -> str:
 def _draw(
     figure: Plot, groups: Mapping[str, xr.Dataset], path: Path, origin: dict[str, str], one_of: bool
 ) -> list[str]:
-    """Draw a figure to a file, with its data in a table next to it; return notes that the picture does not show.
+    """Draw a figure and its table to files, and return notes that the picture does not show.
 
-    If the figure cannot be drawn, raise the error. If `one_of` is true, several figures are drawn, and the error is
-    only printed.
+    If it is one of several figures, an error is only printed.
     """
     from mdr_dask.errors import DataError, FitError
 
@@ -290,7 +283,7 @@ def _draw(
 
 
 def save(draw: Callable[[], Figure], path: Path, origin: Mapping[str, str], look: Mapping[str, Any]) -> None:
-    """Draw a single figure to a file, write its data next to it, and print notes that the picture does not show."""
+    """Draw a single figure and its table to files, and print notes that the picture does not show."""
     from mdr_dask.plots import page
 
     with page.drawing_for(page.requested(**look)):
@@ -320,10 +313,7 @@ def _tell_notes(notes: Mapping[str, Sequence[str]]) -> None:
 
 
 def _places(output: Path | None, names: Sequence[str], urls: Sequence[str], suffix: str, alone: bool) -> list[Path]:
-    """Return the path of the file of each figure.
-
-    A single figure may have any path; several figures are written to a folder.
-    """
+    """Return the path of each figure: any path for a single figure, a folder for several figures."""
     folder = output or Path("figures")
     if alone and folder.suffix and not folder.is_dir():
         require_suffix(folder, FIGURES)

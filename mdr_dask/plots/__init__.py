@@ -1,8 +1,7 @@
 """Figures drawn from a store.
 
-A figure is first described as data (module `figure`). The module `view` describes figures of any output against
-parameters. The module `named` describes the figures that have a name. The description is then drawn with matplotlib
-(module `render`), or in a browser on the page of `mdr_dask.report`.
+A figure is first described as data (module `figure`), and then drawn with matplotlib (module `render`) or in a browser
+(`mdr_dask.report`).
 """
 
 from __future__ import annotations
@@ -25,20 +24,14 @@ GROUP = "mdr_dask.plots"
 
 
 def available(model: str) -> dict[str, Plot]:
-    """Return the figures for stores of a model, indexed by name.
-
-    The figures that other packages offer in `GROUP` are included.
-    """
+    """Return the figures for stores of a model, by name, including the figures that other packages offer in `GROUP`."""
     own = (import_module(f"mdr_dask.plots.{module}").PLOTS for module in SUBJECTS)
     others = (entry.load() for entry in entry_points(group=GROUP))
     return {plot.name: plot for plots in (*own, *others) for plot in plots if model in plot.models or not plot.models}
 
 
 def figures_of(model: str, groups: Mapping[str, xr.Dataset]) -> dict[str, Plot]:
-    """Return the figures for the stores of a model, indexed by name.
-
-    If no named figure is made for this model in particular, there is also one figure for each output of the study.
-    """
+    """Return the figures for the stores of a model, by name; for a model without own figures, one for each output."""
     from mdr_dask.plots.view import View, figure_of, main_axis, varied
 
     known = available(model)

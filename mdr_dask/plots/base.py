@@ -22,21 +22,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure that can be drawn from a store.
+    """A named figure of a store: `draw` makes it from the groups of the store, by the name of the series.
 
-    Parameters
-    ----------
-    name : str
-        Name on the command line: ``mdr-dask plot STORE NAME``.
-    models : tuple of str
-        Models from whose stores the figure can be drawn; an empty tuple means all models.
-    summary : str
-        One line: the quantities on both axes.
-    draw : callable, mapping of str to Dataset -> Figure
-        Takes the groups of a store, indexed by the name of the series, and returns a
-        :class:`mdr_dask.plots.figure.Figure`. To draw outputs against parameters, use `mdr_dask.plots.view.draw`.
-    fitted : bool
-        Whether the figure shows a fit. If the study is large, such a figure takes a long time.
+    `models` is empty if the figure suits all models. `summary` names the quantities on both axes. `fitted` marks
+    figures that show a fit: in a large study, they take a long time.
     """
 
     name: str
@@ -46,15 +35,7 @@ class Plot:
     fitted: bool = False
 
     def describe(self, groups: Mapping[str, xr.Dataset]) -> Figure:
-        """Return the figure as data, including texts that state how many results failed or are missing.
-
-        Axes with one value are treated as fixed parameters.
-
-        Raises
-        ------
-        DataError, FitError
-            If the store does not contain the necessary data.
-        """
+        """Return the figure as data, with the numbers of results that failed or are missing."""
         try:
             with page.with_units(labels.chosen_units(groups)):
                 figure = self.draw({name: _squeezed(data) for name, data in groups.items()})
@@ -78,17 +59,14 @@ class Plot:
 
 
 def _squeezed(data: xr.Dataset) -> xr.Dataset:
-    """Return a series in which an axis with a single value becomes a scalar coordinate."""
+    """Turn axes with one value into scalar coordinates."""
     if "status" not in data:
         return data
     return data.squeeze([dim for dim in data["status"].dims if dim != "realisation" and data.sizes[dim] == 1])
 
 
 def _without_value(groups: Mapping[str, xr.Dataset]) -> list[str]:
-    """Return one text for each reason why results have no value, such as failure.
-
-    A text states the reason and the number of these results.
-    """
+    """Return one text for each reason why results have no value, with the number of these results."""
     states = [data["status"].to_numpy() for data in groups.values() if "status" in data]
     total = sum(state.size for state in states)
     reasons = {Status.FAILED: "failed", Status.NOT_CONVERGED: "did not converge", Status.MISSING: "are missing"}
@@ -97,13 +75,13 @@ def _without_value(groups: Mapping[str, xr.Dataset]) -> list[str]:
 
 
 def provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:
-    """Return the origin of a figure that a command drew. The table of the figure states this origin."""
+    """Return the origin of a figure that a command drew, for the table of the figure."""
     origin = {"mdr_dask": f"{__version__}, figure {name}", "command": command}
     return origin | {f"store {url}": _campaign_of(store.attributes(url)) for url in urls}
 
 
 def origin_of(name: str, groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
-    """Return the origin of a figure that was drawn from Python. The table of the figure states this origin."""
+    """Return the origin of a figure that was drawn from Python, for the table of the figure."""
     campaigns = dict.fromkeys(_campaign_of(data.attrs) for data in groups.values())
     return {"mdr_dask": f"{__version__}, figure {name}", "study": "; ".join(campaigns)}
 

@@ -18,19 +18,18 @@ from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 from mdr_dask.plots.measured import HALF, conditions
 
-#: `SAMPLES`: number of samples of the posterior for the band of predictions. `BINS`: number of bins of a density.
+#: Numbers of samples of the posterior for the band of predictions, and of bins of a density.
 SAMPLES, BINS = 400, 60
-#: A density is smoothed: the value of each bin becomes the mean of five neighbouring bins with these weights.
+#: Weights of the moving average that smooths a density.
 SMOOTH = np.array([0.1, 0.2, 0.4, 0.2, 0.1])
 Points = NDArray[np.intp]
 
 
 def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
-    """Return a figure of measured points and predictions, of residuals, and of the density of each unknown.
+    """Draw measured points with the band of predictions, residuals, and the density of each unknown.
 
-    The bars are 95 % intervals of the errors of measurement. The band is the 95 % interval of the prediction. A density
-    is grey if the data do not determine the unknown. If the data determine only a product of unknowns, a further panel
-    shows this product.
+    A density is grey if the data do not determine the unknown. Each product of unknowns that the data determine has a
+    panel.
     """
     found, series, data = _first(groups)
     varied = found.measured.conditions
@@ -62,9 +61,8 @@ def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.D
 
 
 def _curves(found: fit.Calibration, main: str, data: xr.Dataset) -> dict[str, Points]:
-    """Return groups of points, indexed by label. The points of a group differ only in the condition `main`.
-
-    If there are more groups than colours, all points form one group.
+    """Return groups of points that differ only in the condition `main`, by label; one group if colours do not
+    suffice.
     """
     others = {name: each for name, each in found.measured.conditions.items() if name != main}
     rows = np.stack(list(others.values()), axis=1) if others else np.zeros((found.measured.values.size, 1))
@@ -169,10 +167,7 @@ def _density(found: fit.Calibration, name: str, values: FloatArray, how: labels.
 
 
 def of_whole_cells(ends: FloatArray, across: FloatArray, place: FloatArray, width: float) -> FloatArray:
-    """Return edges of bins that contain equal numbers of cells of the posterior.
-
-    With unequal numbers of cells, a smooth density would have false peaks.
-    """
+    """Return edges of bins with equal numbers of cells of the posterior; unequal numbers would give false peaks."""
     low, high = int(place.argmin()), int(place.argmax())
     cell = width * (across[high] - across[low]) / (place[high] - place[low])
     start = across[low] - cell / 2

@@ -13,8 +13,7 @@ from mdr_dask.plots.labels import is_geometric
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap, Normalize
 
-#: Colours of Okabe and Ito, which colour-blind readers can distinguish. A figure with more curves than colours has a
-#: colour bar.
+#: Colours of Okabe and Ito, which colour-blind readers can distinguish.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 LINES = ("-", "--", ":", "-.")
 MARKERS = ("o", "s", "^", "D")
@@ -38,11 +37,7 @@ def colour(number: int) -> str:
 
 
 def line_and_marker(number: int) -> tuple[str, str]:
-    """Return line and marker of a curve.
-
-    Lines and markers differ between curves if all colours are grey, or if the requested style defines lines and
-    markers.
-    """
+    """Return line and marker of a curve. They differ if all colours are grey or the requested style defines them."""
     from matplotlib.colors import to_rgb
 
     greys = all(len(set(to_rgb(each))) == 1 for each in _cycle("color") or COLOURS)
@@ -52,10 +47,7 @@ def line_and_marker(number: int) -> tuple[str, str]:
 
 
 def bar(label: str, values: Any, log: bool | None = None) -> Bar:
-    """Return the colour bar of some values.
-
-    By default, the bar is logarithmic if a logarithmic axis suits the values.
-    """
+    """Return the colour bar of some values; by default logarithmic if a logarithmic axis suits the values."""
     values = np.asarray(values, dtype=np.float64)
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
@@ -64,7 +56,7 @@ def bar(label: str, values: Any, log: bool | None = None) -> Bar:
 
 
 def scale(of: Bar) -> tuple[Colormap, Normalize]:
-    """Return the colour map of a colour bar, and the scale of the bar as a norm of matplotlib."""
+    """Return the colour map of a colour bar and its scale as a norm of matplotlib."""
     from matplotlib import colormaps, rcParams
     from matplotlib.colors import LogNorm, Normalize
 

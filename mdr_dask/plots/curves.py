@@ -32,22 +32,11 @@ class Curve(NamedTuple):
 
 
 class Family(NamedTuple):
-    """Curves against one parameter.
+    """Curves against one parameter, with the entries of their legend.
 
-    Attributes
-    ----------
-    curves : list of Curve
-        The curves. The data of each curve have one dimension in addition to the dimension of realisations.
-    keys : list of Key
-        Entries of the legend.
-    bar : Bar or None
-        The colour bar, if there are more values than colours.
-    held : dict of str to DataArray
-        Parameters that are fixed at one value.
-    left_out : list of str
-        One sentence for each axis that has values which are not drawn.
-    varying : tuple of str
-        In a sampled design, the other parameters that change from point to point.
+    `bar` is the colour bar, if there are more values than colours. `held` are the parameters fixed at one value.
+    `left_out` names the values that are not drawn. `varying` are the other parameters that change from point to point
+    in a sampled study.
     """
 
     curves: list[Curve]
@@ -59,7 +48,7 @@ class Family(NamedTuple):
 
 
 def mean(data: xr.Dataset, output: str) -> Mean:
-    """Return the mean of an output over realisations and the 95 % interval of the mean, in the unit of the figure."""
+    """Return the mean of an output over realisations and its 95 % interval, in the unit of the figure."""
     values = data[output]
     if "realisation" not in values.dims:
         values = values.expand_dims("realisation")
@@ -71,7 +60,7 @@ def mean(data: xr.Dataset, output: str) -> Mean:
 
 
 def meaning_of_bars(data: Iterable[xr.Dataset], outputs: Sequence[str]) -> str:
-    """Return a text that explains bars and bands. The text is a part of the title."""
+    """Return the text that explains bars and bands."""
     groups = [*data]
     most = max((each.sizes.get("realisation", 1) for each in groups), default=1)
     grid = any(aggregation.companion(each, name) is not None for each in groups for name in outputs if name in each)
@@ -80,7 +69,7 @@ def meaning_of_bars(data: Iterable[xr.Dataset], outputs: Sequence[str]) -> str:
 
 
 def axes_of(data: xr.Dataset, output: str) -> list[str]:
-    """Return the dimensions of an output that are axes of the study; the dimension of realisations is not included."""
+    """Return the dimensions of an output that are axes of the study, without the realisations."""
     if "status" in data:
         cases = {str(dim) for dim in data["status"].dims}
     else:
@@ -105,7 +94,7 @@ def parameters_along(data: xr.Dataset, dim: str) -> list[str]:
 
 
 def hold(data: xr.Dataset, dims: Sequence[str]) -> tuple[xr.Dataset, list[str]]:
-    """Fix axes at their middle values. Return the series, and one text for each fixed axis that has several values."""
+    """Fix axes at their middle values. Return the series and a text for each fixed axis that has several values."""
     places = {dim: data.sizes[dim] // 2 for dim in dims}
     sentences = [_only_one(data, dim, place) for dim, place in places.items() if data.sizes[dim] > 1]
     return data.isel(places), sentences
@@ -130,29 +119,11 @@ def thin(data: xr.Dataset, dim: str, most: int) -> tuple[xr.Dataset, list[str]]:
 
 
 def family(data: xr.Dataset, output: str, along: str, by: str = "") -> Family:
-    """Split a series into curves against a parameter.
+    """Split a series into curves against the parameter `along`.
 
-    If the parameter `by` is given, the curves differ in this parameter alone, and other axes are fixed at their middle
-    value. If `by` is empty, all curves are drawn if there are enough colours. If there are too few colours, colours
-    show one axis, line styles show another axis with few values, and the remaining axes are fixed. An axis with more
-    values than colours gets a colour bar. If the values of such an axis are words, some values are left out, and there
-    is no colour bar.
-
-    Parameters
-    ----------
-    data : Dataset
-        A series.
-    output : str
-        The output that is drawn.
-    along : str
-        The parameter on the horizontal axis.
-    by : str
-        The parameter that colours show.
-
-    Raises
-    ------
-    DataError
-        If the series has no such parameter.
+    The curves differ in the parameter `by`. Without `by`, all curves are drawn if there are enough colours; otherwise
+    colours show one axis and line styles show a second axis with few values. All other axes are fixed at their middle
+    value. More numbers than colours get a colour bar; of more words than colours, some are left out.
     """
     if along not in data.coords and along not in data.dims:
         raise DataError(f"expected a series with {along}, got {', '.join(map(str, data.dims))}")
@@ -182,10 +153,7 @@ def family(data: xr.Dataset, output: str, along: str, by: str = "") -> Family:
 
 
 def with_one_legend(families: Mapping[str, Family]) -> tuple[list[str], list[str]]:
-    """Return the names of the series that one figure can show, and a list with a text about the other series.
-
-    The series are the largest set with the same legend and the same colour bar.
-    """
+    """Return the largest set of series with the same legend and colour bar, and a text about the other series."""
     groups: dict[Any, list[str]] = {}
     for name, one in families.items():
         groups.setdefault((tuple(one.keys), one.bar), []).append(name)
@@ -197,10 +165,7 @@ def with_one_legend(families: Mapping[str, Family]) -> tuple[list[str], list[str
 
 
 def _most_shown(data: xr.Dataset, others: list[str]) -> list[str]:
-    """Return the axes with which a figure shows as many curves as possible.
-
-    Colours show the first axis. Line styles show the second axis, if there is one.
-    """
+    """Return the axis for colours, or the axes for colours and line styles, with which most curves are shown."""
     few = len(colours.LINES)
     pairs = [[one, two] for one in others for two in others if two != one and data.sizes[two] <= few]
     choices = [*([dim] for dim in others), *pairs]
@@ -258,10 +223,7 @@ def needed(curve: xr.Dataset) -> xr.Dataset:
 
 
 def _names(part: xr.Dataset, dims: Sequence[str]) -> list[str]:
-    """Return one label of a curve for each of some axes.
-
-    A label states the values of the parameters that vary along the axis.
-    """
+    """Return one label for each of some axes, with the values of the parameters that vary along the axis."""
     axes = part.attrs.get("axes", [])
     found = []
     for dim in dims:
@@ -272,7 +234,7 @@ def _names(part: xr.Dataset, dims: Sequence[str]) -> list[str]:
 
 
 def scalars(data: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Return the parameters of a series that have a single value. Parameters without an effect are left out."""
+    """Return the parameters of a series that have a single value and an effect."""
     requires = models.load(data.attrs["model"]).parameters.requires if "model" in data.attrs else {}
     idle = {name for name, (other, value) in requires.items() if value not in _given(data, other)}
     kept = {str(name): value for name, value in data.coords.items() if value.ndim == 0 and name != "realisation"}
@@ -298,11 +260,7 @@ def fixed_by_all(held: Sequence[Mapping[str, xr.DataArray]]) -> dict[str, xr.Dat
 
 
 def fixed_text(held: Mapping[str, xr.DataArray], data: xr.Dataset) -> str:
-    """Return the text of the fixed parameters for a title.
-
-    The text begins with axes of the study for which the figure or the option ``--select`` chose one value. Fixed
-    parameters that have a symbol follow.
-    """
+    """Return the fixed parameters for a title: first axes of the study, then parameters that have a symbol."""
     axes = [str(axis["name"]) for axis in data.attrs.get("axes", [])]
     names = [name for name in axes if name in held]
     names += [name for name in labels.SYMBOLS if name in held and name not in names and _is_known(held[name])]
@@ -314,13 +272,13 @@ def _is_known(value: xr.DataArray) -> bool:
 
 
 def parameters_of(data: xr.Dataset) -> dict[str, Any]:
-    """Return all parameters of a series as stored, including words such as the names of rules and shapes."""
+    """Return all parameters of a series as stored, including words such as the names of rules."""
     found: dict[str, Any] = json.loads(data.attrs.get("parameters", "{}"))
     return found
 
 
 def parameters_at(case: xr.Dataset) -> dict[str, Any]:
-    """Return the parameters of one case: the parameters of the series, with the values of this case on the axes."""
+    """Return the parameters of one case: those of the series, with the values of this case on the axes."""
     parameters = parameters_of(case)
     for axis in case.attrs.get("axes", []):
         *above, last = axis["path"].split(".")

@@ -1,8 +1,4 @@
-"""A figure as data: panels and all that is drawn in the panels, independent of the drawing library.
-
-`render` draws the figure with matplotlib, `mdr_dask.report` draws the figure in a browser, and `Figure.table` lists all
-points.
-"""
+"""A figure as data: panels and all that is drawn in them, independent of the drawing library."""
 
 from __future__ import annotations
 
@@ -17,17 +13,16 @@ import xarray as xr
 from mdr_dask.arrays import FloatArray
 from mdr_dask.plots.labels import plain
 
-#: Columns of the table of a figure: `FIRST` are left of the columns of the parameters, `LAST` are right of these
-#: columns.
+#: Columns of the table of a figure to the left and to the right of the parameters.
 FIRST = ("panel", "curve", "what")
 LAST = tuple(f"{name}{end}" for name in ("x", "y", "value") for end in ("", "_low", "_high"))
-#: Entry of the column ``what`` for results of a study. For a law, the entry is the name of the law.
+#: Entry of the column ``what`` for results of a study.
 DATA = "data"
 Kind = Literal["curve", "law", "band", "dots", "map", "absent"]
 
 
 class Mean(NamedTuple):
-    """Values with the ends of their 95 % intervals; the ends are NaN if the error is unknown."""
+    """Values with the ends of their 95 % intervals, NaN if the error is unknown."""
 
     value: Any
     low: Any
@@ -36,22 +31,11 @@ class Mean(NamedTuple):
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis of a panel.
+    """An axis of a panel. Symbols in the label are mathtext between dollar signs.
 
-    Parameters
-    ----------
-    label : str
-        Label with unit. Symbols in the label are written as mathtext between dollar signs.
-    log : bool
-        Whether the axis is logarithmic.
-    ticks : sequence of (float, str)
-        Positions and texts of the ticks, for an axis whose values are words.
-    low, high : float, optional
-        Limits of the axis. A limit that is None follows from the data.
-    quantity : str
-        Name of the parameter or output on the axis; empty if the axis shows a derived quantity.
-    reverse : bool
-        Whether values increase in the reverse direction: downwards or to the left.
+    `ticks` are positions and texts, for values that are words. A limit that is None follows from the data. `quantity`
+    is the parameter or output on the axis, empty for a derived quantity. `reverse` means that values increase downwards
+    or to the left.
     """
 
     label: str
@@ -87,23 +71,11 @@ class Key:
 class Trace:
     """One curve, law, band, map or set of points.
 
-    Parameters
-    ----------
-    kind : str
-        ``curve`` and ``law``: points, which are joined if the trace has a line style. ``band``: the area from ``y_low``
-        to ``y_high``. ``dots``: points coloured by ``value``. ``map``: cells coloured by ``value``. ``absent``: marks
-        at the lower edge of the panel.
-    data : Dataset
-        The variables ``x``, ``y`` and ``value`` in the units of the axes. If an interval is known, its ends are
-        variables with the endings ``_low`` and ``_high``. The coordinates are the parameters of each point in SI.
-    what : str
-        ``data``, the name of a law, or the reason why cases have no value.
-    label : str
-        Name of the curve.
-    colour, line, marker : str
-        Names as in matplotlib. If `line` is empty, no line is drawn. If `marker` is empty, no marker is drawn.
-    bars : bool
-        Whether intervals are drawn as bars instead of a band.
+    Kinds: ``curve`` and ``law`` are points, joined if `line` is not empty; ``band`` fills the area from ``y_low`` to
+    ``y_high``; ``dots`` and the cells of a ``map`` are coloured by ``value``; ``absent`` are marks at the lower edge of
+    the panel. `data` holds ``x``, ``y`` and ``value`` in the units of the axes, the ends of known intervals as
+    ``y_low`` and so on, and the parameters of each point in SI as coordinates. `what` is ``data``, the name of a law,
+    or the reason why cases have no value. `bars` draws intervals as bars instead of a band.
     """
 
     kind: Kind
@@ -116,7 +88,7 @@ class Trace:
     bars: bool = False
 
     def column(self, name: str) -> FloatArray:
-        """Return one variable as a flat array with an entry for every point of the trace."""
+        """Return one variable as a flat array with an entry for every point."""
         whole = self.data[name].broadcast_like(self.data[self._widest]).transpose(*self.data[self._widest].dims)
         return np.asarray(whole.values, dtype=np.float64).ravel()
 
@@ -135,11 +107,7 @@ class Trace:
 
 @dataclass
 class Panel:
-    """One panel: its axes and the traces in it.
-
-    `keys` holds the entries of the legend. If a panel has no keys and no colour bar, every trace with a label is an
-    entry.
-    """
+    """One panel. If it has neither `keys` nor a colour bar, every trace with a label is an entry of the legend."""
 
     x: Axis
     y: Axis
@@ -159,27 +127,9 @@ class Panel:
 class Figure:
     """A figure as data.
 
-    Parameters
-    ----------
-    panels : list of Panel
-        The panels. If `stack` is 1, panels fill row after row. Otherwise each group of `stack` successive panels is a
-        column.
-    subject : str
-        Subject of the figure, for the title.
-    fixed : str
-        Text that lists the fixed parameters.
-    bars : str
-        Explanation of bars and bands.
-    left_out : list of str
-        Texts about results that are not drawn.
-    warnings : list of str
-        Warnings about the results of the study.
-    stack : int
-        Number of successive panels that are drawn one above the other in a column.
-    ratio : float
-        Height of a panel divided by its width.
-    share_y : bool
-        Whether all panels have the same vertical axis.
+    Every `stack` successive panels form a column; with 1, panels fill row after row. `fixed` lists the fixed
+    parameters, and `bars` explains bars and bands. `left_out` are texts about results that are not drawn. `ratio` is
+    the height of a panel divided by its width. `share_y` gives all panels the same vertical axis.
     """
 
     panels: list[Panel]
@@ -193,14 +143,15 @@ class Figure:
     share_y: bool = False
 
     def leave_out(self, sentences: Iterable[str]) -> None:
-        """Add texts about results that are not drawn, without duplicates."""
+        """Add texts about results that are not drawn, without empty texts and duplicates."""
         self.left_out = [*dict.fromkeys([*self.left_out, *(sentence for sentence in sentences if sentence)])]
 
     def table(self) -> pd.DataFrame:
-        """Return a table of the whole figure with a row for every point.
+        """Return a table with a row for every point. ``x``, ``y`` and ``value`` are in the units of the axes,
+        parameters in SI.
 
-        Parameters are in SI. The columns ``x``, ``y`` and ``value`` are in the units of the axes. Parameters that are
-        the same for all points are in ``attrs["held"]``, and the units of all parameters are in ``attrs["units"]``.
+        Parameters that are the same for all points are in ``attrs["held"]``, and the units of all parameters in
+        ``attrs["units"]``.
         """
         frames = [trace.frame().assign(panel=k + 1) for k, panel in enumerate(self.panels) for trace in panel.traces]
         frames = [frame.dropna(axis=1, how="all") for frame in frames if len(frame)]
@@ -242,16 +193,10 @@ def _number(value: Any) -> str:
 
 
 def columns(of: xr.Dataset | xr.DataArray | None = None, **values: Any) -> xr.Dataset:
-    """Return the data of a trace: arrays with an entry for every point, and the parameters of every point.
+    """Return the data of a trace: the arrays ``x``, ``y`` and ``value``, and the coordinates of `of` as parameters.
 
-    Parameters
-    ----------
-    of : Dataset or DataArray, optional
-        Data with the parameters of the points as coordinates. Scalar coordinates, and coordinates along the dimensions
-        of the values, are used.
-    **values
-        The arrays ``x``, ``y`` and ``value``. An array that is a `Mean` also gives the ends of its interval. An array
-        without named dimensions gets the dimensions of another one of these arrays that has the same shape.
+    A `Mean` also gives the ends of its interval. An array without named dimensions gets those of another array of the
+    same shape.
     """
     parts: dict[str, Any] = {}
     for name, value in values.items():
@@ -275,14 +220,13 @@ def columns(of: xr.Dataset | xr.DataArray | None = None, **values: Any) -> xr.Da
 
 
 def _apart(name: Any) -> str:
-    """Return the name of a parameter in a table. If another column has this name, the word "parameter" is added."""
+    """Rename a parameter that has the name of another column of the table."""
     return f"parameter {name}" if name in (*FIRST, *LAST) else str(name)
 
 
 def edges(centres: FloatArray, log: bool) -> FloatArray:
-    """Return the edges of cells around the values of an axis.
-
-    The edges are halfway between the values or, on a logarithmic axis, halfway between their logarithms.
+    """Return the edges of cells around the values of an axis: the middles between the values, or between their
+    logarithms.
     """
     if centres.size == 1:
         half = 0.5 * (abs(float(centres[0])) or 1.0)

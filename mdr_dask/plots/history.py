@@ -29,10 +29,7 @@ STEADY = "steady state at the end"
 
 
 def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
-    """Return a figure of friction against time, with one column of panels for each series.
-
-    If the velocity or the normal force changes, this quantity has a panel below the panel of friction.
-    """
+    """Draw friction against time, one column for each series, with panels for a velocity and a force that change."""
     needed = (BEFORE, JUMP, FRICTION)
     found = {name: data for name, data in groups.items() if all(output in data for output in needed)}
     found = {name: data for name, data in found.items() if data[FRICTION].notnull().any()}

@@ -44,7 +44,7 @@ SYMBOLS: Mapping[str, str] = {
 }
 #: Units that are shown instead of an SI unit if the campaign states no unit.
 USUAL = {"rad/s": "rpm", "rad": "deg"}
-#: `PREFIXES`: common prefixes; the keys are powers of a thousand. `_PREFIXED`: units that may have a prefix.
+#: Prefixes by their powers of a thousand, and units that may have a prefix.
 PREFIXES = {-3: "n", -2: "u", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
 _PREFIXED = re.compile(r"(m|Pa|N|s|W|ohm)(?:\^([23]))?")
 #: Patterns of symbols in the long names of outputs, and the mathtext that replaces them.
@@ -52,7 +52,7 @@ _MATHTEXT = {r"\bd_mu_(\w+)": r"$\\Delta\\mu_{\1}$", r"\bmu_(\w+)": r"$\\mu_{\1}
 
 
 class Quantity(NamedTuple):
-    """The symbol and the shown unit of a quantity. A value in SI is ``value * factor + offset`` in the shown unit."""
+    """The symbol and the shown unit of a quantity: shown value = SI value * `factor` + `offset`."""
 
     symbol: str
     unit: str
@@ -67,9 +67,8 @@ class Quantity(NamedTuple):
 def chosen_units(groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
     """Return the units in which figures show the quantities of some series.
 
-    A parameter is shown in the unit of the campaign files if all files use the same unit. Otherwise, temperatures are
-    shown in degrees Celsius, and other quantities in the SI unit with a prefix. The prefix is chosen so that the
-    largest value is between 1 and 1000.
+    These are the units of the campaign files if all files agree; otherwise degrees Celsius for temperatures, and SI
+    units with a prefix for which the largest value is between 1 and 1000.
     """
     written = [written_units(str(data.attrs.get("campaign", ""))) for data in groups.values()]
     found: dict[str, str] = {}
@@ -101,13 +100,7 @@ def _readable(name: str, unit: str, arrays: list[xr.DataArray]) -> str:
 
 
 def quantity(name: str, values: xr.DataArray) -> Quantity:
-    """Return the symbol and the unit in which figures show a parameter or an output.
-
-    Raises
-    ------
-    DataError
-        If the quantity cannot be converted to the requested unit.
-    """
+    """Return the symbol and the shown unit of a parameter or an output."""
     unit = str(values.attrs.get("units", "1"))
     symbol = SYMBOLS.get(name) or (name.replace("_", " ") if name in values.coords else meaning(values, name))
     wanted = page.current().unit(name)
@@ -121,10 +114,7 @@ def quantity(name: str, values: xr.DataArray) -> Quantity:
 
 
 def meaning(values: xr.DataArray, name: str) -> str:
-    """Return the long name of an output with symbols as mathtext.
-
-    An explanation in brackets, or after a comma or semicolon, is left out.
-    """
+    """Return the long name of an output with symbols as mathtext and without explanations."""
     words = re.split(r"[;,] | \(", str(values.attrs.get("long_name", name.replace("_", " "))))[0]
     for ascii_form, symbol in _MATHTEXT.items():
         words = re.sub(ascii_form, symbol, words)
@@ -132,7 +122,7 @@ def meaning(values: xr.DataArray, name: str) -> str:
 
 
 def shown(name: str, values: xr.DataArray) -> Any:
-    """Return values as an array in the unit of the figures; words remain unchanged."""
+    """Return values in the unit of the figures; words remain unchanged."""
     if values.dtype.kind not in "fiu":
         return values.values
     return quantity(name, values).of(np.asarray(values.values, dtype=np.float64))

@@ -26,9 +26,8 @@ LINE = {"shear_modulus", "relaxation_time", "rms_roughness", "length", "hurst", 
 
 
 class Law(NamedTuple):
-    """A law: the name of the law in the legend, and a function that computes the values of the law in SI.
-
-    The function takes a Dataset that contains parameters and the outputs `NEEDED`.
+    """The name of a law in the legend, and a function that computes it in SI from parameters and the outputs
+    `NEEDED`.
     """
 
     name: str
@@ -36,7 +35,7 @@ class Law(NamedTuple):
 
 
 def law_of(data: xr.Dataset, output: str) -> Law | None:
-    """Return the law that applies to an output of a series; None if no law applies."""
+    """Return the law for an output of a series, or None."""
     model = data.attrs.get("model")
     if model == "ehl_line" and output in FILMS and "inlet" not in data.coords:
         return Law("Pan and Hamrock", lambda part: xr.DataArray(FILMS[output](*groups(part.coords.get))))
@@ -52,18 +51,9 @@ def law_of(data: xr.Dataset, output: str) -> Law | None:
 
 
 def along(data: xr.Dataset, name: str, count: int = 200) -> xr.Dataset:
-    """Return the parameters of a curve at many values of the parameter `name`, so that a law becomes a smooth line.
+    """Return the parameters of a curve at many values of `name`, so that a law becomes a smooth line.
 
-    If one of the outputs `NEEDED` varies along the curve, the data of the curve are returned unchanged.
-
-    Parameters
-    ----------
-    data : Dataset
-        Data of one curve, along which only `name` varies.
-    name : str
-        Name of the parameter.
-    count : int
-        Number of values.
+    If one of the outputs `NEEDED` varies along the curve, the data are returned unchanged.
     """
     values = data[name]
     numeric = values.ndim == 1 and values.dtype.kind in "fiu"

@@ -17,10 +17,9 @@ INSIDE, OUTSIDE = "measured at the reference", "reached by shifting"
 
 
 def draw_master_curve(curve: xr.Dataset) -> Figure:
-    """Return the figure of a master curve from :func:`mdr_dask.fits.master_curve.master_curve`.
+    """Draw a master curve: the curves as measured, the merged curve and the shift factors.
 
-    The figure shows the curves as measured, the merged curve and the shift factors. The bars and the band are 68 %
-    intervals. The merged curve is dashed beyond the range that was measured at the reference.
+    Bars and band are 68 % intervals. The merged curve is dashed beyond the range measured at the reference.
     """
     curve = _in_shown_units(curve)
     attrs = curve.attrs
@@ -105,10 +104,7 @@ def _curves(curve: xr.Dataset) -> tuple[Panel, Panel]:
 
 
 def _lines(curve: xr.Dataset, channel: str) -> list[Trace]:
-    """Return the traces of a merged curve and its band.
-
-    The line is solid in the range that was measured at the reference.
-    """
+    """Return the traces of a merged curve, solid in the range measured at the reference, and of its band."""
     x, y = curve["curve_abscissa"].values, curve[f"curve_{channel}"].values
     error = 10 ** curve["curve_error" if channel == "ordinate" else "curve_companion_error"].values
     ends = curve["curve_abscissa"].attrs

@@ -16,8 +16,7 @@ from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Figure, Key, Mean, Panel, Trace, columns
 from mdr_dask.units import shown
 
-#: A measured point belongs to a curve if the relative difference between each measured condition and the parameter of
-#: the curve is at most this.
+#: Largest relative difference between a measured condition and the parameter of a curve to which the point belongs.
 SAME = 1e-3
 #: Half width of a 95 % interval divided by the standard error.
 HALF = 1.96
@@ -27,13 +26,7 @@ NAME = "measured"
 def with_points(
     groups: Mapping[str, xr.Dataset], figures: Mapping[str, Plot], file: str
 ) -> tuple[dict[str, xr.Dataset], dict[str, Plot]]:
-    """Add a table of measurements to the series, and add the measured points to the figures. Return series and figures.
-
-    Raises
-    ------
-    DataError
-        If the table cannot be read, or has no column for an output of the study.
-    """
+    """Add a table of measurements to the series, and its points to the figures. Return series and figures."""
     given = with_table(groups, file)
     return given, {name: _with_points(figure) for name, figure in figures.items()}
 
@@ -49,13 +42,7 @@ def _with_points(figure: Plot) -> Plot:
 
 
 def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
-    """Add the measured points of a study to the panels that show the measured output against a measured condition.
-
-    Raises
-    ------
-    DataError
-        If there is no such panel.
-    """
+    """Add the measured points to the panels of a figure that show the measured output against a measured condition."""
     data = next(iter(groups.values()))
     try:
         measured = measured_of(data)
@@ -76,7 +63,7 @@ def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
 
 
 def _apart(measured: Measured, data: xr.Dataset) -> list[str]:
-    """Return a warning if all measured values are above all results of a study, or if all are below all results."""
+    """Return a warning if all measured values are above, or all are below, all results of a study."""
     study = data[measured.output].to_numpy()
     low, high = (
         find(study[np.isfinite(study)], initial=start) for find, start in ((np.min, np.inf), (np.max, -np.inf))
@@ -92,10 +79,10 @@ def _apart(measured: Measured, data: xr.Dataset) -> list[str]:
 
 
 def _add(panel: Panel, measured: Measured, data: xr.Dataset) -> int:
-    """Add the measured points that belong to the curves of a panel, and return the number of these points.
+    """Add the measured points that belong to the curves of a panel, and return their number.
 
-    A point has the colour of its curve. Points are black if the panel has only one curve, or if the table lacks a
-    parameter in which the curves differ.
+    A point has the colour of its curve. Points are black if there is only one curve, or if the table lacks a parameter
+    in which the curves differ.
     """
     found, keys = 0, panel.entries()
     left = np.ones(measured.values.size, dtype=bool)
@@ -125,7 +112,7 @@ def _differing(curves: list[xr.Dataset]) -> set[str]:
 
 
 def _at(curve: xr.Dataset, measured: Measured, along: str) -> np.ndarray:
-    """Return a mask of the measured points whose conditions equal the parameters of a curve."""
+    """Return a mask of the measured points whose conditions are the parameters of a curve."""
     here = np.ones(measured.values.size, dtype=bool)
     for name, values in measured.conditions.items():
         if name != along and name in curve.coords and curve[name].ndim == 0:

@@ -13,17 +13,7 @@ from mdr_dask.plots.view import View, draw
 
 
 def described(name: str, model: str, summary: str, *views: View, otherwise: View | None = None) -> Plot:
-    """Return a named figure that shows outputs of a model.
-
-    Parameters
-    ----------
-    name, model, summary : str
-        As in `Plot`.
-    *views : View
-        Views of the figure, one above the other.
-    otherwise : View, optional
-        View that is drawn if a store does not contain the data for `views`.
-    """
+    """Return a named figure with the views one above the other, or the view `otherwise` if a store lacks their data."""
 
     def either(groups: Mapping[str, xr.Dataset]) -> Figure:
         try:

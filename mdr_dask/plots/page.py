@@ -13,8 +13,7 @@ from typing import Any
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.units import to_si
 
-#: Sizes of letters and lines, in points, for a figure whose size the user requested. Such a figure is printed at its
-#: own size, without scaling.
+#: Sizes of letters and lines, in points, for a figure that is printed at its requested size, without scaling.
 LETTERS: dict[Any, Any] = {
     "font.size": 8,
     "axes.labelsize": 8,
@@ -28,11 +27,10 @@ LETTERS: dict[Any, Any] = {
 }
 #: Sizes of letters and lines, in points, for a figure on a screen.
 SCREEN: dict[Any, Any] = {"legend.fontsize": 8, "lines.linewidth": 1.2, "lines.markersize": 4}
-#: `INCH`: length of an inch in metres. `LEAST`, `MOST`: smallest and largest side of a figure in metres.
+#: An inch, and the smallest and largest side of a figure, in metres.
 INCH = 0.0254
 LEAST, MOST = 0.02, 1.0
-#: Largest height, in inches, of a figure if the user requested the width alone: 230 mm, as for the text of a journal
-#: page.
+#: Largest height, in inches, of a figure of requested width: 230 mm, as for the text of a journal page.
 TALLEST = 0.23 / INCH
 
 
@@ -40,22 +38,10 @@ TALLEST = 0.23 / INCH
 class Page:
     """The requested appearance of a figure.
 
-    Parameters
-    ----------
-    width, height : float, optional
-        Size in inches. If the height is None, the height follows from the content.
-    title : str, optional
-        Title. If the title is None, the title is a description of the figure; but with a requested size, the figure has
-        no title.
-    style : str, optional
-        A style file of matplotlib, or the name of a style. The settings of the style take precedence over the sizes of
-        letters and lines above.
-    units : mapping of str to str
-        Requested units, indexed by the name of the quantity.
-    used : set of str
-        Names of the quantities that figures have shown so far.
-    cycle : tuple of mappings
-        Colours, lines and markers of successive curves, as the style defines them.
+    `width` and `height` are in inches; without a height, the height follows from the content. `title` None means a
+    description of the figure, but no title if a width is requested. `style` is a style or style file of matplotlib, and
+    `cycle` holds the colours, lines and markers of this style. `units` are requested units by quantity, and `used`
+    collects the quantities that figures have shown.
     """
 
     width: float | None = None
@@ -81,20 +67,14 @@ def requested(
     style: str | None = None,
     units: Mapping[str, str] | None = None,
 ) -> Page:
-    """Return the `Page` for the options of a command. The function `sides` defines the form of the text `size`."""
+    """Return the `Page` for the options of a command; `size` has the form that `sides` reads."""
     width, height = sides(size) if size else (None, None)
     return Page(width, height, title, style, units or {})
 
 
 @contextmanager
 def drawing_for(page: Page) -> Iterator[None]:
-    """Use a page for all figures that are drawn within a ``with`` statement.
-
-    Raises
-    ------
-    DataError
-        If the style of the page does not exist.
-    """
+    """Use a page for all figures that are drawn within a ``with`` statement."""
     from matplotlib import rc_context, rc_params_from_file
     from matplotlib.style import context, library
 
@@ -114,7 +94,7 @@ def drawing_for(page: Page) -> Iterator[None]:
 
 @contextmanager
 def with_units(units: Mapping[str, str]) -> Iterator[None]:
-    """Within a ``with`` statement, show quantities in the given units unless the user requested another unit."""
+    """Within a ``with`` statement, show quantities in these units unless the user requested others."""
     token = _PAGE.set(replace(current(), units={**units, **current().units}))
     try:
         yield
@@ -128,13 +108,7 @@ def current() -> Page:
 
 
 def sides(text: str) -> tuple[float, float | None]:
-    """Return width and height in inches from a text such as ``85x60mm``. The text ``85mm`` gives the width alone.
-
-    Raises
-    ------
-    DataError
-        If the text is not a size, or the size is not between 20 mm and 1 m.
-    """
+    """Return width and height in inches from a text such as ``85x60mm``; ``85mm`` gives the width alone."""
     match = re.fullmatch(r"([\d.]+)\s*([a-z]*)(?:\s*x\s*([\d.]+)\s*([a-z]+))?", text.strip())
     if match is None or not (match[2] or match[4]):
         raise DataError(f"expected a width such as '85mm', or width and height such as '85x60mm', got {text!r}")

@@ -1,9 +1,4 @@
-"""Draw a figure with matplotlib: panels, legend, colour bars and title, without overlapping texts at any width.
-
-The height follows from the content unless the user requested a height. Legends are below the panels, and colour bars
-are beside the panels. Labels that would overlap are broken into several lines, and ticks that would overlap are thinned
-out.
-"""
+"""Draw a figure with matplotlib: panels, legend, colour bars and title, without overlapping texts at any width."""
 
 from __future__ import annotations
 
@@ -29,11 +24,9 @@ if TYPE_CHECKING:
 #: Widths in inches. `ALONE`: a single panel on a screen. `BESIDE`: a panel next to another panel. `WIDE`, `NARROW`:
 #: usual and least width of a panel in a figure whose width was requested.
 ALONE, BESIDE, WIDE, NARROW = 6.4, 4.2, 3.0, 1.5
-#: `LEAST_HEIGHT`: least height of a panel in inches. `MOST_COLUMNS`: largest number of panels in a row, unless the rows
-#: would not fit on a page.
+#: Least height of a panel in inches, and largest number of panels in a row, unless the rows would not fit on a page.
 LEAST_HEIGHT, MOST_COLUMNS = 1.3, 3
-#: Largest height of a figure divided by its width, if the user requested the width. The ratio may be larger if a panel
-#: would otherwise be lower than `LEAST_HEIGHT`.
+#: Largest height of a figure of requested width, divided by its width, unless a panel would be too low.
 SLENDER = 2.0
 #: Largest share of the height of the figure that the legend may occupy. Entries that do not fit are left out.
 LEGEND_SHARE = 0.35
@@ -43,14 +36,14 @@ GAP = 3
 MOST_LINES = 7
 #: Curves with at least this number of points are drawn without markers.
 MANY_POINTS = 60
-#: Height of the marks of cases without a value above the lower edge of a panel, divided by the height of the panel.
+#: Position of the marks of cases without a value above the lower edge of a panel, as a fraction of its height.
 FOOT = 0.02
-#: Dots per inch of pictures for a screen (`DPI`) and for print (`PRINTED_DPI`).
+#: Dots per inch of pictures for a screen and for print.
 DPI, PRINTED_DPI = 150, 300
 
 
 class Drawn(MplFigure):
-    """A matplotlib figure with its description. A notebook displays the figure if it is the last value of a cell."""
+    """A matplotlib figure with its description; a notebook shows it as a picture."""
 
     def __init__(self, description: Figure, **options: Any) -> None:
         super().__init__(**options)
@@ -68,13 +61,7 @@ class Drawn(MplFigure):
         return self.description.table()
 
     def save(self, path: str | Path) -> None:
-        """Write the figure to a file, and the table of the figure to a file beside it: ``mu.pdf`` and ``mu.csv``.
-
-        Raises
-        ------
-        DataError
-            If a file with the name of the table already exists and is not the table of a figure.
-        """
+        """Write the figure to a file, and the table of the figure beside it: ``mu.pdf`` and ``mu.csv``."""
         beside = table_beside(path)
         self.savefig(path, dpi=DPI if page.current().width is None else PRINTED_DPI)
         with beside.open("w", encoding="utf-8", newline="") as stream:
@@ -120,10 +107,7 @@ def render(description: Figure) -> Drawn:
 
 
 def _grid(description: Figure) -> tuple[int, int]:
-    """Return the numbers of rows and columns of panels.
-
-    If the user requested a width and the rows would not fit on a page, the figure gets more columns of narrower panels.
-    """
+    """Return the numbers of rows and columns of panels; at a requested width, the rows must fit on a page."""
     width, stack = page.current().width, description.stack
     stacks = -(-len(description.panels) // stack)
     columns = MOST_COLUMNS if width is None else max(1, min(MOST_COLUMNS, int(width / WIDE)))
@@ -136,10 +120,7 @@ def _grid(description: Figure) -> tuple[int, int]:
 
 
 def _axes(figure: Drawn, description: Figure, rows: int, columns: int) -> list[Axes]:
-    """Return the axes of all panels.
-
-    Each stack of panels is a part of one column. The stacks fill rows from left to right.
-    """
+    """Return the axes of all panels. The stacks of panels fill rows of stacks from left to right."""
     grid, stack = figure.subplots(rows, columns, squeeze=False, sharey=description.share_y), description.stack
     found = []
     for k in range(len(description.panels)):
@@ -152,13 +133,7 @@ def _axes(figure: Drawn, description: Figure, rows: int, columns: int) -> list[A
 
 
 def _share_labels(figure: Drawn, places: list[Axes], panels: list[Panel]) -> None:
-    """Remove repeated axis labels.
-
-    The label of a horizontal axis is removed if the panel below has the same axis. The label of a vertical axis is
-    removed if the panel on the left has the same axis.
-
-    If there are several rows and all panels have the same vertical axis, the label of this axis is drawn once.
-    """
+    """Remove the label of an axis that equals the axis of the panel below or on the left."""
     at = {}
     for axes, panel in zip(places, panels, strict=True):
         place = axes.get_subplotspec()
@@ -201,10 +176,7 @@ def _finish_axis(axes: Axes, name: str, axis: Axis) -> None:
 
 
 def _log_ticks(axis: Any) -> None:
-    """Set the ticks of a logarithmic axis.
-
-    If the axis has less than two decades, the ticks are plain numbers such as 1, 2, 5, 10 and 20.
-    """
+    """Set the ticks of a logarithmic axis; with less than two decades, plain numbers such as 1, 2, 5, 10 and 20."""
     from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter
 
     low, high = sorted(np.abs(axis.get_view_interval()))
@@ -357,10 +329,7 @@ def _handle(key: Key) -> Any:
 
 
 def _legend(figure: Drawn, keys: list[Key]) -> float:
-    """Draw one legend below all panels, with as many columns as fit, and return the height of the legend in inches.
-
-    If the user requested a size, entries that do not fit are left out.
-    """
+    """Draw one legend below all panels and return its height in inches. At a requested size, long legends are cut."""
     width, asked = figure.get_figwidth(), page.current()
     most = LEGEND_SHARE * (asked.height or (page.TALLEST if asked.width else np.inf))
     size = mpl.rcParams["legend.fontsize"]
@@ -383,11 +352,7 @@ def _legend(figure: Drawn, keys: list[Key]) -> float:
 
 
 def _fit(figure: Drawn, places: list[Axes]) -> None:
-    """Break labels into lines that are not longer than their axes, and thin out ticks that overlap.
-
-    Each of these two steps may change the size of the axes. Therefore both steps are repeated until nothing changes,
-    but at most four times in total.
-    """
+    """Break long labels and thin out ticks that overlap, again after each change of the size of the axes."""
     for _ in range(4):
         figure.draw_without_rendering()
         changed = False

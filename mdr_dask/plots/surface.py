@@ -15,24 +15,16 @@ if TYPE_CHECKING:
     from mdr_dask.models.parts.surface_report import FileReport
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
-#: `CUTS`: colours and line styles for straight cuts in both directions. `METHOD`: label for the spectrum of the line
-#: that represents a surface in the method of dimensionality reduction.
+#: Colours and lines of straight cuts in both directions; label of the line that represents a surface in the method.
 CUTS = ("#a0a0a0", "-"), ("#505050", ":")
 METHOD = r"line of the method, $\pi q\,C^{2D}$"
 
 
 def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...]) -> Figure:
-    """Return the figure of a measured surface.
+    """Draw the power spectrum C2D of every file with a power law, and the spectra of lines.
 
-    One panel shows the two-dimensional power spectrum C2D of every file, and a power law. The other panel shows spectra
-    of lines: of straight cuts through the surface, and of the lines that represent the surface in a campaign.
-
-    Parameters
-    ----------
-    reports : tuple of FileReport
-        Statistics of each file.
-    spectra : tuple of Spectrum
-        The spectrum that a campaign uses, for each file: between the cut-offs and without noise.
+    The lines are straight cuts through the surface, and the lines that represent the surface in a campaign. `spectra`
+    are those that a campaign uses: between the cut-offs and without noise.
     """
     q = Axis("wave number $q$ [rad/m]", log=True)
     areal = Panel(q, Axis("$C^{2D}$ [m$^4$]", log=True))

@@ -1,8 +1,6 @@
 """Figures of any output of any model against parameters: curves, maps and main effects.
 
 A main effect is the mean of an output against one parameter, averaged over all other parameters.
-
-A `View` describes such a figure, and `draw` makes it.
 """
 
 from __future__ import annotations
@@ -22,14 +20,11 @@ from mdr_dask.plots import colours, curves, labels, laws
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 
-#: `MOST_PANELS`: largest number of panels for one output. `LONGEST_WORD`: largest number of characters in one line of
-#: the text at a tick.
+#: Largest numbers of panels for one output, and of characters in one line of the text at a tick.
 MOST_PANELS, LONGEST_WORD = 6, 20
-#: For main effects of a sampled study: `IN_A_BIN` is the smallest number of cases in a bin. `MOST_BINS`, `MOST_EFFECTS`
-#: and `MOST_POINTS` are the largest numbers of bins, of parameters, and of cases that are drawn as points.
+#: Main effects: least number of cases in a bin; largest numbers of bins, of parameters, and of cases drawn as points.
 IN_A_BIN, MOST_BINS, MOST_EFFECTS, MOST_POINTS = 8, 10, 12, 5000
-#: Marks for cases without a value. `SOME`: mark for cases in which only some realisations failed; the mean over the
-#: other realisations may be biased.
+#: Marks for cases without a value, and for cases whose mean may be biased because some realisations failed.
 MARKS = {
     Status.FAILED: ("x", "failed"),
     Status.NOT_CONVERGED: ("+", "did not converge"),
@@ -40,29 +35,13 @@ SOME = "v", "mean without realisations that failed"
 
 @dataclass(frozen=True)
 class View:
-    """The description of a figure of outputs.
+    """The description of a figure of outputs; several outputs are drawn one above the other.
 
-    Parameters
-    ----------
-    outputs : str or tuple of str
-        Names of outputs or of their errors. Several outputs are drawn in panels one above the other.
-    over : str or tuple of str
-        The parameter on the horizontal axis. If there are two parameters, the figure is a map. If there is no
-        parameter, the figure shows the main effects of all parameters.
-    by : str
-        The parameter that colours show.
-    panels : str
-        The parameter in which panels differ.
-    log : str, optional
-        Letters of the axes that are logarithmic: ``x``, ``y`` and, for colours, ``z``. By default, an axis is
-        logarithmic if its numbers are positive and span more than a factor of ten.
-    single : bool
-        Whether the first realisation is drawn instead of the mean over realisations.
-    apart : bool
-        Whether every curve has its own panel, so that curves do not hide each other.
-    guides : mapping of str to mapping of float to str
-        Horizontal lines in the panels of outputs. The keys are names of outputs. The value for an output maps the
-        position of each line to the name of this line.
+    `over` is the horizontal axis; two parameters make a map, none makes the main effects of all parameters. `by` is
+    shown by colours, and `panels` differ in one parameter. `log` contains the letters of the logarithmic axes (x, y,
+    and z for colours); by default, an axis is logarithmic if its numbers are positive and span more than a factor of
+    ten. `single` draws the first realisation instead of the mean. `apart` gives every curve its own panel. `guides`
+    maps an output to the positions and names of horizontal lines.
     """
 
     outputs: str | tuple[str, ...]
@@ -92,10 +71,9 @@ class View:
 
 
 def main_axis(groups: Mapping[str, xr.Dataset], output: str, without: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the parameter of an output that has the most values, for `View.over`.
+    """Return the parameter of an output with the most values, or the own dimension of the output, such as time.
 
-    Parameters in `without` are not considered. If the output has a further dimension, such as time, the result is this
-    dimension. For a sampled study, the result is empty, so that the figure shows main effects.
+    A sampled study has no such axis: the result is empty, and the figure shows main effects.
     """
     found: dict[str, int] = {}
     for data in (data for data in groups.values() if output in data):
@@ -117,19 +95,16 @@ class _Part(NamedTuple):
 
 
 def figure_of(view: View) -> Plot:
-    """Return the figure of a view. The name of the figure is the name of the first output."""
+    """Return the figure of a view, with the name of the first output."""
     over = " and ".join(view.along) or "every parameter that varies"
     summary = f"{view.names[0]} against {over}".replace("_", " ")
     return Plot(view.names[0], (), summary, lambda groups: draw(groups, view))
 
 
 def draw(groups: Mapping[str, xr.Dataset], *views: View) -> Figure:
-    """Return the figure that shows the outputs of views. Several outputs are drawn one above the other.
+    """Draw the outputs of views, several outputs one above the other.
 
-    Raises
-    ------
-    DataError
-        If no series can be drawn as requested. The message gives the reason for each series.
+    If nothing can be drawn, DataError gives the reason for each series.
     """
     figures, shown, reasons = [], [], []
     for view, output in [(each, name) for each in views for name in each.names]:
@@ -290,9 +265,8 @@ def _guides(levels: Mapping[float, str], panel: Panel) -> list[Trace]:
 def _parts(found: Mapping[str, xr.Dataset], view: View, output: str) -> tuple[list[_Part], list[str]]:
     """Return the contents of the panels, and texts about what is left out.
 
-    If the view has the parameter `panels`, each value of this parameter gets a panel. If the view has the option
-    `apart`, each curve gets a panel. Otherwise all series are in one panel; but if this panel would have too many
-    curves, each series gets a panel.
+    Panels are the values of `View.panels`, the curves of a view with `apart`, or else all series in one panel. If this
+    panel would have too many curves, each series gets a panel.
     """
     if view.panels:
         return _by_value(found, view)
@@ -331,7 +305,7 @@ def _by_series(found: Mapping[str, xr.Dataset]) -> tuple[list[_Part], list[str]]
 
 
 def _panel(part: _Part, families: Mapping[str, curves.Family], view: View, output: str, x: Axis) -> Panel:
-    """Draw the curves of all series of a panel and the laws of these curves, and mark the cases without a value."""
+    """Draw the curves of all series of a panel and their laws, and mark the cases without a value."""
     panel = Panel(x, Axis(""), title=part.title)
     along, law_name = view.along[0], ""
     marked: dict[str, str] = {}
@@ -398,7 +372,7 @@ def _law(curve: curves.Curve, law: laws.Law, along: str, output: str) -> Trace:
 
 
 def _counted(data: xr.Dataset, output: str) -> xr.Dataset:
-    """Return the data of a curve with a new coordinate ``realisations``: the number of realisations in each mean."""
+    """Add to the data of a curve the number of realisations in each mean, as a coordinate."""
     if "realisation" not in data[output].dims:
         return data
     count = xr.DataArray(aggregation.count(data[output]).variable, attrs={"units": "1"})
@@ -432,7 +406,7 @@ def _absent(curve: curves.Curve, x: xr.DataArray, output: str, marked: dict[str,
 
 
 def _map(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure:
-    """Draw an output against two parameters: the cases of a grid as cells, the cases of a sampled study as points."""
+    """Draw an output against two parameters: cells for the cases of a grid, points for a sampled study."""
     if view.by or (view.panels and len(found) > 1):
         raise DataError("expected a map of one series, without --by, because colours show the values")
     parts, left_out = _by_value(found, view) if view.panels else _by_series(found)
@@ -507,7 +481,7 @@ def _effects(found: Mapping[str, xr.Dataset], view: View, output: str) -> Figure
 
 
 def _means(data: xr.Dataset, output: str, name: str) -> tuple[xr.DataArray, Mean]:
-    """Return the mean of an output for every value of one axis, averaged over all other axes."""
+    """Return the mean of an output for every value of one axis, over all other axes."""
     rest = [dim for dim in curves.axes_of(data, output) if dim != name]
     error = aggregation.companion(data, output)
     pair = data[output].mean(rest), None if error is None else abs(error).mean(rest)
@@ -515,7 +489,7 @@ def _means(data: xr.Dataset, output: str, name: str) -> tuple[xr.DataArray, Mean
 
 
 def _bins(data: xr.Dataset, output: str, name: str, dim: str) -> tuple[xr.DataArray, Mean]:
-    """Sort the cases of a sampled study by one parameter, divide the cases into groups, and return the group means."""
+    """Sort the cases of a sampled study by one parameter, divide them into groups, and return the group means."""
     cases = aggregation.mean(data[output])
     cases = cases.mean([each for each in cases.dims if each != dim]).dropna(dim)
     order = np.argsort(cases[name].values, kind="stable")

@@ -1,4 +1,4 @@
-"""Means and errors of all cases of a study. The page uses these numbers for figures whose axes the reader chooses."""
+"""Means and errors of all cases of a study, for figures whose axes the reader of the page chooses."""
 
 from __future__ import annotations
 
@@ -14,18 +14,12 @@ from mdr_dask.plots import curves, labels
 from mdr_dask.report.figures import Json, numbers
 from mdr_dask.report.words import markup, plain
 
-#: Largest number of cases of one series on the page. If a series has more cases, some values of its longest axes are
-#: left out.
+#: Largest number of cases of one series on the page.
 MOST_CASES = 4000
 
 
 def thinned(data: xr.Dataset) -> tuple[xr.Dataset, list[str]]:
-    """Load the cases of a series, but at most `MOST_CASES`.
-
-    If the series has more cases, only evenly spread values of its longest axes are loaded.
-
-    Return the loaded cases, and texts about the omitted values.
-    """
+    """Load at most `MOST_CASES` cases of a series. Return the cases, and texts about the values that are left out."""
     dims, left_out = [str(dim) for dim in data["status"].dims if dim != "realisation"], []
     while (cases := math.prod(data.sizes[dim] for dim in dims)) > MOST_CASES:
         longest = max(dims, key=lambda dim: data.sizes[dim])
@@ -37,18 +31,11 @@ def thinned(data: xr.Dataset) -> tuple[xr.Dataset, list[str]]:
 
 
 def cases_of(groups: Mapping[str, xr.Dataset], left_out: Mapping[str, list[str]]) -> list[Json]:
-    """Return the cases of each series that has a varied parameter and an output with one value per case or realisation.
+    """Return the cases of each series, with columns that have one entry for each case, in the units of the figures.
 
-    `groups` and `left_out` hold, for each series, the two results of `thinned`.
-
-    Returns
-    -------
-    list of dict
-        For each series: ``axes`` and ``outputs`` with their labels, and ``reduced``, a list of texts about omitted
-        values of axes. The other entries contain columns with one value for each case; numbers are in the units of the
-        figures. ``at`` has a column for each varied parameter. ``values`` has columns for each output: ``value``,
-        ``low``, ``high``, ``lines`` (standard error) and ``grid`` (grid error). ``states`` is a column with the state
-        of each case.
+    ``at`` has a column for each varied parameter, ``states`` is a column of states. ``values`` has for each output:
+    ``value``, ``low``, ``high``, ``lines`` (standard error) and ``grid`` (grid error). ``reduced`` are the texts from
+    `thinned`.
     """
     found = [_series(name, data, left_out[name]) for name, data in groups.items()]
     return [series for series in found if series["outputs"] and series["axes"]]
@@ -72,7 +59,7 @@ def _series(name: str, data: xr.Dataset, left_out: list[str]) -> Json:
 
 
 def main_outputs(data: xr.Dataset) -> list[str]:
-    """Return the names of the outputs of a series, without the errors of outputs (`<output>_error`)."""
+    """Return the outputs of a series without their errors (`<output>_error`)."""
     names = [str(name) for name in data.data_vars if name != "status"]
     errors = {str(data[name].attrs.get("ancillary_variables")) for name in names}
     return [name for name in names if name not in errors]
@@ -84,7 +71,7 @@ def _named(name: str, values: xr.DataArray) -> Json:
 
 
 def _column(values: Any, dims: tuple[Any, ...], shape: xr.DataArray) -> list[Any]:
-    """Return a list with one value for each case; values are repeated along the dimensions that they lack."""
+    """Return a list with one value for each case, repeated along the dimensions that the values lack."""
     along = xr.DataArray(np.asarray(values), dims=dims)
     return numbers(along.broadcast_like(shape).transpose(*shape.dims).to_numpy().ravel())
 

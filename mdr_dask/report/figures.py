@@ -1,4 +1,4 @@
-"""Figures as data for the page: convert a `mdr_dask.plots.figure.Figure` to JSON."""
+"""Figures as data for the page: a `mdr_dask.plots.figure.Figure` as JSON."""
 
 from __future__ import annotations
 
@@ -16,10 +16,9 @@ from mdr_dask.plots.figure import LAST, Axis, Bar, Figure, Panel, Trace, edges
 from mdr_dask.plots.labels import plain
 from mdr_dask.report.words import markup
 
-#: Largest number of points of one figure on the page. If a figure has more points, only every n-th point is on the
-#: page.
+#: Largest number of points of one figure; of more points, only every n-th is on the page.
 MOST_POINTS = 20_000
-#: `DIGITS`: number of significant digits on the page. `SHADES`: number of colours of a colour bar.
+#: Numbers of significant digits, and of colours of a colour bar.
 DIGITS, SHADES = 9, 17
 
 Json = dict[str, Any]
@@ -39,15 +38,7 @@ def drawn_of(
 
 
 def figure_data(name: str, summary: str, figure: Figure, origin: Mapping[str, str]) -> Json:
-    """Return a figure as data for the page.
-
-    Returns
-    -------
-    dict
-        ``panels`` with labels and scales, ``traces`` with the columns of their points, ``scales`` of colours,
-        ``parameters`` with labels and units, and the texts of the figure. Labels are HTML; all other texts are plain
-        text.
-    """
+    """Return a figure as data for the page. Labels are HTML; all other texts are plain text."""
     every = [(k, panel, trace) for k, panel in enumerate(figure.panels) for trace in panel.traces]
     total = sum(trace.column("x").size for *_, trace in every)
     step = max(1, -(-total // MOST_POINTS))

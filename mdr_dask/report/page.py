@@ -1,8 +1,7 @@
-"""The page: one HTML file that contains all data and scripts, with a content security policy.
+"""The page: one HTML file that contains all data and scripts.
 
-The template escapes text from a store. Data are written as a block of JSON, which browsers do not run. The content
-security policy contains the digests of the scripts of this package, and browsers run no other script. Therefore nothing
-in a store can run as a script.
+Nothing in a store can run as a script: the template escapes texts, data are a block of JSON, and the content security
+policy admits only scripts with the digests of this package.
 """
 
 from __future__ import annotations
@@ -25,18 +24,7 @@ SCRIPTS = ("plotly-cartesian.min.js", "look.js", "figure.js", "choose.js", "page
 
 
 def page(studies: Sequence[Study]) -> str:
-    """Return the page of one study or more.
-
-    Parameters
-    ----------
-    studies : sequence of Study
-        Contents as returned by `mdr_dask.report.read_study`.
-
-    Returns
-    -------
-    str
-        HTML that needs no other file and no network.
-    """
+    """Return the page of studies as HTML that needs no other file and no network."""
     scripts = [asset(name) for name in SCRIPTS]
     data = [
         {"key": f"s{k}", "title": study.title, "url": study.url, "figures": study.figures, "cases": study.cases}
@@ -56,7 +44,7 @@ def page(studies: Sequence[Study]) -> str:
 
 
 def policy() -> str:
-    """Return the content security policy, which allows no network and only scripts with the digests of `SCRIPTS`."""
+    """Return the content security policy, which allows no network and only the scripts of this package."""
     digests = [base64.b64encode(hashlib.sha256(asset(name).encode()).digest()).decode() for name in SCRIPTS]
     scripts = " ".join(f"'sha256-{digest}'" for digest in digests)
     return "; ".join(
@@ -73,7 +61,7 @@ def policy() -> str:
 
 
 def harmless(data: Any) -> str:
-    """Return data as JSON that cannot end the HTML element ``script`` in which the data are written."""
+    """Return data as JSON that cannot end the HTML element ``script`` around it."""
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026").replace("\u2028", "\\u2028")
 
@@ -86,7 +74,7 @@ def asset(name: str) -> str:
 
 @lru_cache(maxsize=64)
 def mathml(equation: Equation) -> str:
-    """Return an equation as MathML, for browsers and screen readers, or as LaTeX if latex2mathml is not installed."""
+    """Return an equation as MathML, or as LaTeX if latex2mathml is not installed."""
     try:
         from latex2mathml.converter import convert
     except ModuleNotFoundError:

@@ -27,17 +27,7 @@ TEXTS = (".json", ".jsonl", ".html", ".txt", ".yaml", ".csv", ".sha256")
 def publish(url: str, target: Path) -> int:
     """Write a study with its campaign, data files and page to one zip, and return the number of files in the zip.
 
-    Parameters
-    ----------
-    url : str
-        Path or URL of the store. The store must be undamaged and not in use.
-    target : Path
-        Path of the zip file.
-
-    Raises
-    ------
-    StoreError
-        If the store is damaged or in use, or if a data file of the campaign was changed or removed after the run.
+    StoreError is raised if the store is damaged or in use, or if a data file of the campaign has changed since the run.
     """
     found = store.verify(url)
     if found.findings:
@@ -75,11 +65,7 @@ def _put(packed: zipfile.ZipFile, name: str, content: bytes) -> None:
 
 
 def _campaign(url: str, study: Study) -> tuple[bytes, dict[str, bytes]]:
-    """Return the campaign and the files that it names.
-
-    A file outside the folder of the campaign gets a new name, and the returned campaign refers to the file by this
-    name.
-    """
+    """Return the campaign and the files that it names. Files outside the folder of the campaign get names inside it."""
     text, found = study.campaign, {}
     for file in _named_files(url):
         name = PurePosixPath(str(file["name"]).replace("\\", "/"))
@@ -91,7 +77,7 @@ def _campaign(url: str, study: Study) -> tuple[bytes, dict[str, bytes]]:
 
 
 def _read(file: Mapping[str, str]) -> bytes:
-    """Return the content of a file that a campaign names; raise StoreError if the content has changed since the run."""
+    """Return the content of a file that a campaign names; raise StoreError if it has changed since the run."""
     path = Path(file["path"])
     content = path.read_bytes() if path.is_file() else b""
     if hashlib.sha256(content).hexdigest() != file["sha256"]:
@@ -101,7 +87,7 @@ def _read(file: Mapping[str, str]) -> bytes:
 
 
 def _named_files(url: str) -> list[dict[str, str]]:
-    """Return the files that a campaign names: all entries of the parameters that have a name, a path and a digest."""
+    """Return the files that a campaign names: the entries of the parameters with a name, a path and a digest."""
     held: dict[str, dict[str, str]] = {}
 
     def look(part: Any) -> None:
@@ -121,10 +107,7 @@ def _named_files(url: str) -> list[dict[str, str]]:
 
 
 def _environment() -> str:
-    """Return a requirements file for pip with the installed packages.
-
-    Comments in this file give the version of Python, the platform and the number of processors.
-    """
+    """Return the installed packages as a requirements file for pip, with Python and platform in comments."""
     lines = [f"# Python {platform.python_version()}, {platform.platform()}, {os.cpu_count()} processors"]
     lines.append(f"# {datetime.now(UTC).isoformat(timespec='seconds')}; versions of each block: status/records")
     found = {str(one.metadata["Name"]): str(one.version) for one in distributions() if one.metadata["Name"]}

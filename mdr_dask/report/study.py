@@ -28,7 +28,7 @@ from mdr_dask.report.figures import Json, drawn_of
 from mdr_dask.report.subjects import Subject, subject_of
 from mdr_dask.units import seconds
 
-#: Largest number of rows of a table on the page. If there are more, a note gives the command that prints all rows.
+#: Largest number of rows of a table of a law.
 MOST_ROWS = 60
 #: Largest number of values of an axis that are listed.
 LISTED = 6
@@ -47,30 +47,10 @@ class Table(NamedTuple):
 class Study:
     """The content of a page about one study.
 
-    Parameters
-    ----------
-    url, title, model, summary : str
-        Location of the store, name of the campaign, name of the model, and summary of the model.
-    facts : dict of str to str
-        Main facts about the study, by label.
-    campaign, source : str
-        Text of the campaign file, and name of the file.
-    understood, counts, machines, laws, errors : lists of Table
-        ``understood``: axes, fixed parameters and outputs. ``counts``: number of results in each state. ``machines``:
-        computers, versions and history. ``laws``: fitted laws. ``errors``: standard error and grid error of the
-        outputs.
-    failures : list of Group
-        Groups of failures and warnings whose messages differ only in their numbers.
-    not_fitted, not_drawn : list of (name, reason)
-        Laws and figures for which data are missing in the study.
-    figures, cases : list of dict
-        Data from `mdr_dask.report.figures` and `mdr_dask.report.cases`.
-    subject : Subject or None
-        Description of the method.
-    digests, rerun : dict of str to str, list of str
-        Digests of the campaign and of the results, and commands that compute the study again.
-    at_work : str
-        Text about the runs that are computing the study now.
+    `understood` are the tables of axes, fixed parameters and outputs. `failures` are failures and warnings whose
+    messages differ only in their numbers. `not_fitted` and `not_drawn` are laws and figures without data, with the
+    reasons. `figures` and `cases` come from the modules of these names. `rerun` are commands that compute the study
+    again, and `at_work` names the runs that are computing it now.
     """
 
     url: str
@@ -97,13 +77,7 @@ class Study:
 
 
 def read_study(url: str) -> Study:
-    """Read the content of a page about a study; the study may be unfinished.
-
-    Raises
-    ------
-    StoreError
-        If there is no study at `url`, or the study is damaged.
-    """
+    """Read the content of a page about a study, which may be unfinished."""
     with store.readable(url):
         return _read(url)
 
@@ -173,7 +147,7 @@ def _study(
 
 
 def _shows_no_errors(figure: Json) -> bool:
-    """Return whether a figure shows no errors; on the page, such figures come last."""
+    """Return whether a figure shows no errors: such figures come last on the page."""
     return not any("y_low" in trace or "value_low" in trace for trace in figure["traces"])
 
 
@@ -271,10 +245,7 @@ def _machines(records: list[Json], held: Mapping[str, Any]) -> list[Table]:
 
 
 def _laws(url: str, model: str, groups: Mapping[str, xr.Dataset]) -> tuple[list[Table], list[tuple[str, str]]]:
-    """Return tables of the fitted laws, and the laws that cannot be fitted, with reasons.
-
-    The tables contain intervals of the constants and verdicts.
-    """
+    """Return tables of the fitted laws, and the laws that cannot be fitted, with reasons."""
     found: list[Table] = []
     missing: list[tuple[str, str]] = []
     for name, law in fits.available(model).items():
@@ -335,7 +306,7 @@ def _cell(value: xr.DataArray) -> str:
 
 
 def _errors(name: str, data: xr.Dataset) -> Iterator[Table]:
-    """Yield a table with the errors of means: the standard error over realisations, and the grid error."""
+    """Yield a table with the standard errors over realisations and the grid errors of means."""
     rows = []
     for output in main_outputs(data):
         if "realisation" not in data[output].dims or set(data[output].dims) > set(data["status"].dims):

@@ -13,20 +13,10 @@ class Equation(NamedTuple):
 
 
 class Subject(NamedTuple):
-    """The description of the method of a model.
+    """The description of the method of a model: a paragraph for a paper, the equations, and the papers to cite.
 
-    Attributes
-    ----------
-    method : str
-        A paragraph that can be used in a paper.
-    equations : tuple of Equation
-        The equations that are solved.
-    papers : tuple of str
-        Papers to cite.
-    can, cannot : tuple of str
-        Statements that the results support (`can`) and statements that the results do not support (`cannot`).
-    page : str
-        The page of the documentation that gives more details.
+    `can` and `cannot` are statements that the results support and do not support. `page` is a page of the
+    documentation.
     """
 
     method: str
@@ -232,5 +222,5 @@ SUBJECTS: dict[str, Subject] = {
 
 
 def subject_of(model: str) -> Subject | None:
-    """Return the description of the method of a model; None for a model from outside this package."""
+    """Return the description of the method of a model, or None for a model from outside this package."""
     return SUBJECTS.get(model)

@@ -34,11 +34,7 @@ _INDEX = re.compile(r"([_^])(?:\{([^{}]*)\}|(.))")
 
 
 def markup(label: str) -> str:
-    """Return a label as HTML: in ``$F_N$``, N becomes a subscript.
-
-    Only text between two dollar signs is read as mathtext; all other text is unchanged. The only HTML elements in the
-    result are ``sub`` and ``sup``.
-    """
+    """Return a label as HTML: in ``$F_N$``, N becomes a subscript. The only elements are ``sub`` and ``sup``."""
     parts = label.split("$")
     if len(parts) % 2 == 0:  # one dollar sign has no partner
         return escape(label)
