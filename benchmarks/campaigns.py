@@ -27,16 +27,8 @@ SEED_OF_TRUTH = 99
 class Study:
     """A campaign that is computed with several accuracies.
 
-    Parameters
-    ----------
-    text, output : str
-        The campaign without an accuracy, and the output that is compared.
-    asked : dict
-        For every accuracy, the lines that are added to the campaign.
-    truth : str
-        The lines that are added for the reference.
-    least : float
-        Errors are relative to the reference, or to this number if the reference is smaller.
+    `text` is the campaign without an accuracy. The lines `asked[accuracy]` or, for the reference, `truth` are added to
+    it. Errors of `output` are relative to the reference, or to `least` if the reference is smaller.
     """
 
     text: str

@@ -56,11 +56,7 @@ def _rounded(number: float, digits: int) -> str:
 def distinguishable(
     value: float, *limits: float, digits: int = 3, write: Callable[[float, int], str] = _rounded
 ) -> tuple[str, ...]:
-    """Return a number and its limits as texts.
-
-    The texts have `digits` digits. If the number differs from a limit but both texts would be equal, all texts get more
-    digits.
-    """
+    """Return a number and its limits as texts, with more digits than `digits` if different numbers would look equal."""
     for more in range(digits, _ALL_DIGITS):
         first, *others = (write(number, more) for number in (value, *limits))
         if all(text != first for text, limit in zip(others, limits, strict=True) if limit != value):
@@ -97,7 +93,7 @@ _DIFFERENCES = {"diameter": ", half the diameter", "pressure": ", a load instead
 def did_you_mean(word: Any, known: Sequence[str]) -> str:
     """Return a hint in parentheses, after a space: the nearest known word.
 
-    If no known word is near, the hint lists all known words, or is empty if there are more than 12.
+    Without a near word, the hint lists all known words, or is empty if there are more than 12.
     """
     from difflib import get_close_matches
 

@@ -54,8 +54,7 @@ class Template:
     chunks: Mapping[str, int]
     # The arrays, without ``status``.
     outputs: tuple[Output, ...]
-    # Coordinates of the further dimensions of outputs, by dimension. Cases and realisations are not among these
-    # dimensions.
+    # Coordinates of the further dimensions of outputs, by dimension.
     extra: Mapping[str, Coordinate]
 
     @property
@@ -84,11 +83,7 @@ class Template:
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Notes of the model, and notes of parts of its parameter sets; each note is given once.
-
-        The notes come from several parameter sets of the series. Each set differs from the first one by a value of one
-        axis.
-        """
+        """Notes of the model, and of parameter sets that differ from the first one by a value of one axis."""
         base = self.series.parameters
         sets = [base, *(with_value(base, axis.path, value) for axis in self.series.axes for value in axis.some)]
         of_parts = [note for parameters in sets for note in notes_of(parameters)]
@@ -109,10 +104,7 @@ class Template:
         return blocks * arrays + math.ceil(blocks / RECORDS_TOGETHER) + 2 * (len(coordinates) + 1) + arrays + 1
 
     def block_indices(self) -> Iterator[BlockIndex]:
-        """Yield the indices of all blocks.
-
-        The blocks with the first realisations of all cases come first, so that all cases soon have results.
-        """
+        """Yield the indices of all blocks, those with the first realisations of all cases first."""
         *cases, realisations = (range(count) for count in self.grid)
         for last in realisations:
             for index in itertools.product(*cases):
@@ -132,8 +124,7 @@ class Template:
     def operations(self, index: BlockIndex) -> float:
         """Return the approximate number of operations of a block.
 
-        The operations are counted for another block, which has the same cases and the first realisations. If the given
-        block has fewer realisations, the number is reduced in proportion.
+        The operations are counted for the first realisations of the same cases, and reduced in proportion for fewer.
         """
         *cases, last = index
         chunk, size = self.chunks["realisation"], self.sizes["realisation"]
@@ -145,8 +136,7 @@ class Template:
     def _operations(self, block: Block[Any]) -> float:
         """Return the number of operations of a block.
 
-        If the model does not count operations, the number is chosen so that a study has as many blocks as a block has
-        results.
+        If the model does not count operations, a study gets as many blocks as a block has results.
         """
         count = models.load(self.campaign.model).operations
         if count is not None:
@@ -183,10 +173,7 @@ class Template:
         return {axis.path: _as_array(axis) for axis in self.series.axes}
 
     def sample(self, chunks: Mapping[str, int], position: float) -> Block[Any]:
-        """Return a block whose dimensions have the given sizes; it is used for estimates of operations and memory.
-
-        `position` is the place of the block in the group, from 0 (the first block) to 1 (the last block).
-        """
+        """Return a block of the given lengths for estimates, at a position in the group from 0 (first) to 1 (last)."""
         starts = self._starts(chunks, position)
         return self._block({dim: slice(start, start + chunks[dim]) for dim, start in starts.items()})
 
@@ -248,9 +235,8 @@ def templates(
 ) -> tuple[Template, ...]:
     """Lay out every series of a checked campaign for a number of realisations.
 
-    `stored_chunks` contains the chunk lengths of each group that already exists, by the name of its series. Raise
-    CampaignError with all problems if a series has too many results or one of its cases needs too much memory, and
-    ModelError if an output has a dimension for which the model gives no coordinates.
+    `stored_chunks` are the chunk lengths of existing groups, by the name of the series. Raise CampaignError with all
+    problems if a series has too many results or a case needs too much memory.
     """
     model = models.load(campaign.model)
     known = stored_chunks or {}
@@ -319,9 +305,9 @@ def available_memory() -> float:
 def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
     """Return the lengths of a block along each dimension.
 
-    A block first gets all values of the axes along which cases share work; these axes are cut only if the block would
-    become too large. If the block then still has few operations, it gets more realisations, then more values of the
-    other axes, and finally the realisations of later rounds.
+    A block first gets all values of the axes along which cases share work, as far as it does not become too large. If
+    it still has few operations, it gets more realisations, then more values of the other axes, and finally the
+    realisations of later rounds.
     """
     whole = _whole_dims(template, model)
     chunks = {dim: size if dim in whole else 1 for dim, size in template.sizes.items()}
@@ -352,10 +338,10 @@ def _whole_dims(template: Template, model: Model[Any]) -> list[str]:
 
 
 def _is_cut(template: Template, chunks: Mapping[str, int], dim: str, most: float) -> bool:
-    """Return whether blocks should be halved along the dimension `dim`; cases along this dimension share work.
+    """Return whether blocks with more than `most` operations are halved along `dim`, along which cases share work.
 
-    Blocks with at most `most` operations are not halved. Blocks with more than `MOST_SHARED` operations are halved.
-    Blocks between these limits are halved only if the halves repeat little of the shared work (`REPEATED_WORK`).
+    Up to `MOST_SHARED` operations, they are halved only if the halves repeat little of the shared work
+    (`REPEATED_WORK`).
     """
     now = template.mean_operations(chunks)
     if now <= most or now > MOST_SHARED:
@@ -376,10 +362,9 @@ def _is_whole(axis: Axis, path: str) -> bool:
 
 
 def _part(template: Template, dim: str, most: int) -> int:
-    """Return the length of the parts into which a dimension is cut: at most `most`, in nearly equal parts.
+    """Return the length of the nearly equal parts, of at most `most`, into which a dimension is cut.
 
-    Along ``realisation`` another rule holds if rounds add realisations. The length is then the largest number up to
-    `most` that divides the number of realisations of the first round.
+    If rounds add realisations, the length along ``realisation`` divides the number of realisations of the first round.
     """
     size = template.sizes[dim]
     replication = template.campaign.replication
@@ -420,10 +405,7 @@ def _growth(series: Series) -> float:
 
 
 def _estimate_series(template: Template, model: Model[Any]) -> Estimate:
-    """Estimate the costs of a series from its blocks of the first realisations.
-
-    If there are more than `SAMPLED` such blocks, only `SAMPLED` of them are used.
-    """
+    """Estimate the costs of a series from its blocks of the first realisations, or from `SAMPLED` of them."""
     blocks, lengths = math.prod(template.grid[:-1]), template.grid[:-1]
     sample = np.linspace(0, blocks - 1, min(blocks, SAMPLED)).round().astype(int)
     operations, solves = 0.0, 0.0

@@ -33,15 +33,13 @@ class Work:
 
     place: Place
     model: str
-    # Versions of the program and of the model in the process that started the run (the driver), as `versions` returns
-    # them.
+    # Versions of the program and of the model in the driver, the process that started the run.
     versions: tuple[str, int]
     block: Block[Any]
     # Masks with the shape of the block: results to compute, and results to mark as not needed.
     wanted: NDArray[np.bool_]
     spared: NDArray[np.bool_]
-    # Number of the attempt, from 1: the number of times that the computation of the block was started, including this
-    # one.
+    # Number of times that the computation of the block was started, including this one.
     attempt: int
     operations: float
 
@@ -51,10 +49,7 @@ class Work:
         return f"{self.place.series or '-'} {'.'.join(map(str, self.place.index))}"
 
     def halves(self) -> tuple[Work, ...]:
-        """Return two tasks with half of the results each, to be run one after the other.
-
-        If the task has only one result, return no tasks.
-        """
+        """Return two tasks with half of the results each, or no tasks if there is only one result."""
         cells = np.flatnonzero(self.wanted)
         if cells.size < 2:
             return ()
@@ -70,8 +65,8 @@ class Work:
 class Outcome:
     """The return value of a task: counts and times, but no results.
 
-    `compile_seconds` is the part of `compute_seconds` during which this process compiled kernels. `warned` is the
-    number of results that are done but have a warning.
+    `counts` is indexed by `Status`. `compile_seconds` is the part of `compute_seconds` in which this process compiled
+    kernels. `warned` is the number of results that are done but have a warning.
     """
 
     counts: tuple[int, ...]
@@ -91,8 +86,7 @@ def versions(model: str) -> tuple[str, int]:
 def run_block(work: Work) -> Outcome:
     """Compute a block and write it. Running the same task again gives the same results.
 
-    Raise ClusterError if this worker has another version of the program than the driver, and StoreError if the store
-    cannot be read or written.
+    Raise ClusterError if this worker has another version of the program than the driver.
     """
     if versions(work.model) != work.versions:
         raise ClusterError(_other_version(work))
@@ -126,8 +120,7 @@ def run_block(work: Work) -> Outcome:
 def finished(work: Work) -> Outcome | None:
     """Return the outcome of a task that a worker finished before this worker died; None if the task is not finished.
 
-    The record of an attempt contains the digest of the ledger of the block. The task is finished if the stored ledger
-    has this digest.
+    The task is finished if the stored ledger of the block has the digest that is in the record of the attempt.
     """
     record = store.record(work.place.url, work.place.series, work.place.index, work.attempt)
     if record is None or not store.is_written(work.place, record):
@@ -160,11 +153,9 @@ LONGEST_MESSAGE = 1000
 
 
 def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
-    """Call the model for a block.
+    """Call the model for a block; if it raises an exception, call it for each result, to find the results that fail.
 
-    If the model raises an exception, it is called for each result of the block separately, to find the results that
-    fail. If `is_own` is true, the user wrote the model. Then every exception counts as a failed case, and the results
-    are checked.
+    If the user wrote the model (`is_own`), every exception counts as a failed case, and the results are checked.
     """
     is_single = block.cases == len(block.realisations) == 1
     try:
@@ -263,10 +254,7 @@ def _compute_part(
     values: dict[str, NDArray[np.float64]],
     status: NDArray[np.int8],
 ) -> Result:
-    """Compute the wanted results of a block.
-
-    These results are put into the arrays `values` and `status`, which already hold the other results of the block.
-    """
+    """Compute the wanted results of a block into `values` and `status`, which already hold its other results."""
     flat_status = status.reshape(wanted.shape)
     cases, numbers = np.flatnonzero(wanted.any(axis=1)), np.flatnonzero(wanted.any(axis=0))
     if cases.size == 0:
@@ -333,11 +321,9 @@ def _describe(block: Block[Any], case: int) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def kind() -> str:
-    """Return a text that names the processor and the numerical libraries.
+    """Return the processor and the numerical libraries, on which the last digits of results may depend.
 
-    The last digits of results may depend on them.
-
-    Child processes read the text from the variable `KIND` of their environment, so that they need not import SciPy.
+    Child processes read this text from the environment variable `KIND`, so that they need not import SciPy.
     """
     if KIND in os.environ:
         return os.environ[KIND]
@@ -356,7 +342,7 @@ def kind() -> str:
 def one_blas_thread() -> AbstractContextManager[object]:
     """Limit the libraries for linear algebra to one thread until the context ends.
 
-    Results then do not depend on the number of threads, and each block uses one thread.
+    Results then do not depend on the number of threads.
     """
     import scipy.linalg  # noqa: F401  (loads the BLAS library of SciPy, which must be loaded before it can be limited)
     from threadpoolctl import threadpool_limits

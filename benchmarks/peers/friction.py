@@ -50,9 +50,9 @@ def stepped(line, deborah: float, load: float, nodes: int) -> float:
 
 
 def _carrying(load: float, summits: np.ndarray, depth: float) -> float:
-    """Return the depth at which springs carry a mean load, from their heights in rising order.
+    """Return the depth at which springs carry a mean load, a piecewise linear function of the depth.
 
-    The load is a piecewise linear function of the depth.
+    `summits` are the heights of the springs in rising order.
     """
     falling = summits[::-1]
     numbers = np.arange(1, falling.size + 1)

@@ -1,7 +1,7 @@
 """Kill parts of a campaign at random: ``python -m benchmarks kills [PARTS] [KILLS] [SEED]``.
 
-All parts start at the same time. At random instants, one part is killed with SIGKILL and started again. Afterwards
-every chunk is compared with that of an undisturbed run, and the blocks that were computed twice are counted.
+A part that was killed with SIGKILL is started again. Afterwards every chunk is compared with that of an undisturbed
+run, and the blocks that were computed twice are counted.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """One study, computed by our runner and by other programs; `compare` starts each program in its own process.
 
-A case is the friction of one rough line at one speed. The study has twenty speeds and any number of lines. All programs
-call the same function, case by case, in forty equal blocks on two cores, and are used as their manuals recommend. A run
-computes the missing results. `read` returns all results, NaN where there are none.
+A case is the friction of one rough line at one speed. All programs call the same function, case by case, in forty equal
+blocks on two cores, and are used as their manuals recommend. A second run computes the missing results.
 """
 
 from __future__ import annotations

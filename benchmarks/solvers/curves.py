@@ -44,8 +44,7 @@ WINDOW, POINTS = 2.5, 16  # decades of frequency and number of points of each cu
 class Family(NamedTuple):
     """A family of curves with known shift factors.
 
-    `curves` contains log10 of abscissa and ordinate, `factors` are in decades and zero for the reference, and
-    `vertical` is the kind of vertical factors.
+    `curves` contains log10 of abscissa and ordinate. `factors` are in decades, and zero for the reference.
     """
 
     groups: np.ndarray

@@ -111,7 +111,7 @@ class Revolution(NamedTuple):
     """One revolution of two rollers.
 
     `waves` are those of both rollers together in m, `level` is the height in m above which they touch, and `window` is
-    the contact width as a share of the perimeter.
+    the contact width over the perimeter.
     """
 
     waves: np.ndarray

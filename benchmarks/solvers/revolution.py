@@ -26,7 +26,7 @@ FEW = 20.0  # largest amount of wear for which every cycle is simulated
 class Wearing(NamedTuple):
     """A wear problem: a body r^n, its c / a0 (0 for gross slip), and the amount of wear.
 
-    `held` tells whether the force (or else the depth) is constant; results are compared at `radii`.
+    `held` states whether the force (or else the depth) is constant; results are compared at `radii`.
     """
 
     profile: PowerProfile

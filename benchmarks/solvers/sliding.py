@@ -24,9 +24,9 @@ DOUBT = 1e-3  # cases in which the reference has a larger relative error are lef
 
 
 class Sliding(NamedTuple):
-    """A case: a line, a function for its heights at nodes, a solid, the Deborah number of its dashpot, and the load.
+    """A case of steady sliding.
 
-    `terms` is None for a Kelvin solid.
+    `nodes` returns the heights at nodes. `terms` is None for a Kelvin solid. `deborah` is that of the dashpot.
     """
 
     line: RoughLine

@@ -35,17 +35,9 @@ class Found(NamedTuple):
 class Solver:
     """One solver of the package, and other methods for comparison.
 
-    Parameters
-    ----------
-    name : str
-    about : str
-        Definition of the error, and description of the truth.
-    families : dict
-        Functions by name that draw a case and its truth from a generator, or None if the case has no solution.
-    methods : dict
-        Functions by method and setting that solve a case, or return None if the method does not apply.
-    rounds : int
-        Number of calls of each method; the least time counts, because the first call may compile.
+    `about` defines the error and the truth. A function of `families` draws a case and its truth, or returns None if the
+    case has no solution. A function of `methods`, by method and setting, solves a case, or returns None if the method
+    does not apply. Of `rounds` calls the least time counts, because the first call may compile.
     """
 
     name: str
@@ -55,15 +47,7 @@ class Solver:
     rounds: int = 3
 
     def measure(self, cases: int, seed: int) -> Iterator[Row]:
-        """Yield a row for every family, method and setting: median time, 90 % quantile of the error, stated error.
-
-        Parameters
-        ----------
-        cases : int
-            Random cases of each family.
-        seed : int
-            The first number of the seed of every case.
-        """
+        """Yield a row for every family, method and setting: median time, 90 % quantile of the error, stated error."""
         for family, draw in self.families.items():
             found: dict[tuple[str, str], list[tuple[float, float, float, float]]] = {}
             for index in range(cases):
@@ -85,7 +69,7 @@ class Solver:
 def judged(found: Found, truth: Truth) -> tuple[float, float, float]:
     """Return the largest error and the largest stated error over the scale, and the share of stated errors that hold.
 
-    Errors smaller than the error of the truth cannot be resolved; the error of the truth is then returned.
+    The error returned is at least that of the truth, because smaller errors cannot be resolved.
     """
     errors = np.abs(np.asarray(found.values) - truth.values)
     held = errors <= found.stated + np.asarray(truth.doubt) + ROUNDING * np.asarray(truth.scale)

@@ -101,8 +101,8 @@ def rest_depth(height: np.ndarray, load: float) -> float:
 def backward_euler(height: np.ndarray, ratios: np.ndarray, depth: float, load: float, drag: np.ndarray) -> None:
     """March by backward Euler: in every step each element moves on by one cell.
 
-    The depth follows from the load, which is the sum of max(0, w (1 + r) - r u_old) with r = tau / dt, by Newton's
-    method. The drag is computed with central differences of the height.
+    By Newton's method, the depth follows from the load, which is the sum of max(0, w (1 + r) - r u_old) with r = tau /
+    dt.
     """
     n = height.size
     u, old = np.maximum(height + depth, 0.0), np.empty(n)

@@ -1,7 +1,6 @@
 """Claims of the thesis, the studies by which they are tested, and the page that lists all claims.
 
-Every verdict is a sentence that begins with one of `WORDS`. The first four words are also those of the fits
-(`mdr_dask.fits.base.law_holds`). If a claim is a law that can be fitted, the sentence is taken from the fit.
+A verdict is a sentence that begins with one of `WORDS`; the first four are also those of `law_holds` of the fits.
 """
 
 from __future__ import annotations
@@ -28,16 +27,9 @@ WORDS = ("yes", "approximately", "no", "not tested", "no data", "not modelled")
 
 @dataclass(frozen=True)
 class Studies:
-    """Stores of campaigns; each is computed when it is first needed.
+    """Stores of campaigns in a folder, with at most `lines` realisations; each is computed when it is first needed.
 
-    Parameters
-    ----------
-    lines : int
-        Largest number of realisations.
-    points : int or None
-        Number of Nyquist points of the lines instead of 5000, for a quick test.
-    folder : str
-        Folder of the stores.
+    For a quick test, `points` replaces the 5000 Nyquist points of the lines.
     """
 
     lines: int
@@ -82,18 +74,8 @@ Judge = Callable[[Studies], str]
 class Claim:
     """A claim, law, figure or table of the thesis.
 
-    Parameters
-    ----------
-    item : str
-        Number in the thesis.
-    claim : str
-        The statement.
-    command : str
-        Command that gives our result.
-    judge : callable, Studies -> str, or str
-        The verdict (a sentence that begins with one of `WORDS`), or a function that returns it.
-    why : str
-        Explanation of the verdict.
+    `item` is the number in the thesis, `command` gives our result, and `judge` is the verdict or a function that
+    returns it.
     """
 
     item: str
@@ -121,20 +103,9 @@ def compared(figure: str, *departures: float) -> str:
 class FromFit:
     """A verdict that is the sentence of a fit; with several cases, that of the worst case.
 
-    Parameters
-    ----------
-    campaign, law, series : str
-        As in ``mdr-dask fit results/CAMPAIGN.zarr LAW --series SERIES``.
-    sentence : str
-        Name of the variable with the sentence.
-    constants : tuple of str
-        Constants to print with their intervals.
-    within : dict
-        Cases to which the claim refers, by label along dimensions.
-    shown : dict
-        Cases whose constants are printed.
-    replaced : dict
-        Lines of the campaign to replace, as in `Studies`.
+    `sentence` is the variable of the fit that holds the sentence. `constants` are printed with their intervals.
+    `within` selects the cases to which the claim refers and `shown` those whose constants are printed, both by label
+    along dimensions. `replaced` are lines of the campaign, as in `Studies`.
     """
 
     campaign: str

@@ -25,13 +25,10 @@ FEWEST = 10
 def cases_that_narrow(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, taken: Sequence[IntArray]
 ) -> list[BoolArray]:
-    """Return the cases that need more realisations.
+    """Return the cases that need more realisations, because they affect a constant whose interval is too wide.
 
-    A case needs more realisations if it affects a fitted constant whose interval is too wide. Until some case has
-    `FEWEST` realisations, all new cases of the stage need more.
-
-    `places` are the positions of the cases of the stage in the store. `taken` contains an array for each group: the
-    number of realisations that are used of every case. Further realisations in the store are ignored.
+    Until some case has `FEWEST` realisations, all new cases of the stage need more. `places` are the positions of the
+    cases of the stage in the store; `taken` are the numbers of realisations that are used of every case.
     """
     answers = stage.campaign.replication.answers
     if max(int(each.max()) for each in taken) < FEWEST:
@@ -80,10 +77,7 @@ def unanswered(url: str, stage: Stage, layout: Sequence[Template], taken: Sequen
 
 
 def _groups(url: str, stage: Stage, layout: Sequence[Template], taken: Sequence[IntArray]) -> dict[str, xr.Dataset]:
-    """Return the results of a campaign: a dataset for each series, by the name of the series.
-
-    Failed realisations, and realisations beyond the number in `taken`, are NaN.
-    """
+    """Return the results of every series, without failed realisations and those beyond the number in `taken`."""
     opened, groups = store.datasets(url), {}
     for mesh, template, count in zip(stage.meshes, layout, taken, strict=True):
         name = template.series.name
@@ -104,6 +98,6 @@ def _coordinates(series: Series) -> dict[str, list[object]]:
 
 
 def _of_mesh(cases: xr.DataArray, mesh: Mesh) -> BoolArray:
-    """Return a mask of cases as an array. Its dimensions, and the values along them, are in the order of the series."""
+    """Return a mask of cases as an array over the axes of the series, in their order."""
     ordered = cases.sel({dim: own for dim, own in _coordinates(mesh.series).items() if dim in cases.indexes})
     return np.asarray(ordered.transpose(*mesh.series.sizes).to_numpy())

@@ -21,7 +21,6 @@ from mdr_dask.task import Work, versions
 class Cells:
     """What a round has to do in one group: results to compute, and results to mark as not needed."""
 
-    # The group.
     template: Template
     # Masks with the shape of the group: results to compute, and results to mark as not needed.
     wanted: NDArray[np.bool_]
@@ -36,11 +35,7 @@ class Cells:
         return int(np.count_nonzero(self.wanted) + np.count_nonzero(self.spared))
 
     def operations(self, index: BlockIndex) -> float:
-        """Return the number of operations that a round needs in a block.
-
-        The number of operations of the whole block is multiplied by a fraction: the part of the results of the block
-        that the round has to compute.
-        """
+        """Return the number of operations of a block, times the part of its results that the round computes."""
         part = float(np.mean(self.wanted[self.template.region(index)]))
         return part * self.template.operations(index) if part else 0.0
 
@@ -56,9 +51,8 @@ def find_cells(
 ) -> Cells:
     """Compare a round with the ledger to find the results that are missing.
 
-    `asked` marks the cases of the stage. `needed` marks the cases that need the realisations of the round.
-    `realisations` contains the number of the first realisation of the round, and the number of the last one plus 1.
-    `own` marks the results of this part; None means that the results of all parts are included.
+    `asked` marks the cases of the stage, `needed` those that need the realisations of the round. `realisations` are the
+    first realisation of the round and the last one plus 1. `own` marks the results of this part (None: all results).
     """
     status = store.ledger(url, template.series.name, template.shape)
     open_states = [Status.MISSING, Status.NOT_NEEDED]

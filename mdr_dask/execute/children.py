@@ -1,8 +1,7 @@
 """Compute blocks in child processes of this machine, because a block may crash its process or take too long.
 
-A server process imports all modules and forks one keeper process for each child. Each keeper forks its child. The child
-reads blocks from a pipe, computes them one after the other, and writes the outcomes to the pipe. If the child dies, its
-keeper reports this and forks a new child within milliseconds.
+A server process imports all modules and forks one keeper process for each child. The keeper forks the child, which
+reads blocks from a pipe and writes outcomes to it. If the child dies, the keeper reports this and forks a new one.
 """
 
 from __future__ import annotations
@@ -55,7 +54,7 @@ class Child:
     pipe: Connection
 
     def run(self, work: Work, limit: float | None = None) -> Outcome | Crash:
-        """Compute a block in the child process. Each result may take at most `limit` seconds.
+        """Compute a block in the child process, with at most `limit` seconds for each result.
 
         If the store cannot be written or the machine has a fault, raise the error that the child has raised.
         """
@@ -81,7 +80,7 @@ class Child:
 
 @contextmanager
 def children(count: int, model: str) -> Iterator[list[Child]]:
-    """Start child processes for a model. At the end of the context, wait until each child has finished its block.
+    """Start child processes for a model. The context ends when each child has finished its block.
 
     If an exception ends the context, such as a second Ctrl-C, the child processes are killed.
     """
@@ -105,12 +104,10 @@ def children(count: int, model: str) -> Iterator[list[Child]]:
 
 
 def compute_apart(child: Child, work: Work, limit: float | None = None) -> Iterator[tuple[Work, Outcome]]:
-    """Compute a block that may crash its process.
+    """Compute a block that may crash its process; if it does, compute its halves, and so on down to single results.
 
-    If it crashes, its halves are computed separately, and so on down to single results.
-
-    A single result that crashes its process is marked as failed. If `MOST_CRASHES` results of a case have crashed, the
-    other results of this case are not computed, but also marked as failed.
+    A single result that crashes its process is marked as failed. After `MOST_CRASHES` crashes of a case, its other
+    results are marked as failed too.
     """
     pieces, attempts = [work], itertools.count(work.attempt)
     crashed: Counter[int] = Counter()

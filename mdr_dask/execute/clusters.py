@@ -59,10 +59,7 @@ class _LastMessage(logging.Handler):
 
 @contextmanager
 def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
-    """Start a cluster or connect to a running one, and yield a task window on its workers.
-
-    Raise ClusterError if the cluster cannot be started or does not answer.
-    """
+    """Start a cluster or connect to a running one, and yield a task window on its workers."""
     message = _LastMessage(logging.ERROR)
     with ExitStack() as stack:
         for names, handler in ((ECHOES, logging.NullHandler()), (STARTING, message)):
@@ -93,10 +90,7 @@ def task_window(resources: Resources, tell: Tell) -> Iterator[TaskWindow]:
 
 
 def _require_guard() -> None:
-    """Raise ClusterError if a script without ``if __name__ == "__main__"`` starts a cluster.
-
-    New processes import the script, and would run it again.
-    """
+    """Raise ClusterError if a script without ``if __name__ == "__main__"`` starts processes, which import it."""
     main = sys.modules.get("__main__")
     source = getattr(main, "__file__", None)
     frame = sys._getframe()
@@ -168,10 +162,7 @@ def cluster_class(name: str) -> type[Cluster]:
 
 
 def _closed_to_others(kind: type[Cluster], arguments: Mapping[str, Any], stack: ExitStack) -> dict[str, Any]:
-    """Keep other users out: add arguments for TLS, and for a web page that only this machine can open.
-
-    Arguments that are already set are kept.
-    """
+    """Return arguments that keep other users out: TLS, and a web page that only this machine can open."""
     own = dict(arguments)
     if issubclass(kind, LocalCluster):
         own["dashboard_address"] = own.get("dashboard_address") or DASHBOARD

@@ -14,7 +14,6 @@ from mdr_dask.task import Outcome, Work
 class Event:
     """Something that happened in a run."""
 
-    # Name of the event, such as ``laid out`` or ``block done``.
     name: str
     # Details, as values that JSON can represent.
     facts: Mapping[str, Any] = field(default_factory=dict)

@@ -28,8 +28,8 @@ AHEAD = 2
 class Executor(AbstractContextManager["Executor"]):
     """Compute blocks on the given resources. Processes and clusters are started when there is work for them.
 
-    The blocks of a plain Python model are computed in child processes, because a thread would have to wait for the
-    other threads, and because a crash would end the run.
+    The blocks of a plain Python model are computed in child processes, because threads would wait for each other, and
+    because a crash would end the run.
     """
 
     def __init__(self, resources: Resources, model: str, tell: Tell) -> None:
@@ -77,7 +77,7 @@ class Executor(AbstractContextManager["Executor"]):
     def _in_pool(self, works: Iterable[Work], settle: Settle) -> None:
         """Compute blocks in threads. After an error, the blocks that have started are still finished.
 
-        A second interrupt ends this wait, so the pool is not a context, which would wait once more.
+        A second interrupt ends this wait, so the pool is not used as a context, which would wait once more.
         """
         pool = ThreadPoolExecutor(self._threads)
         remaining = iter(works)

@@ -9,27 +9,12 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Resources:
-    """The threads, processes or cluster that a run uses. By default, it uses all cores of this machine.
+    """The threads, processes or cluster that a run uses: by default, all cores of this machine.
 
-    By default, compiled models are computed in threads, and plain Python models in processes.
-
-    Parameters
-    ----------
-    threads : int or None
-        Number of threads of this process that compute blocks.
-    workers : int or None
-        Number of processes of this machine that compute blocks, instead of threads. If the system cannot fork
-        processes, threads are used.
-    scheduler : str or None
-        Address of a running Dask scheduler, whose workers compute the blocks.
-    cluster : mapping or None
-        Description of a Dask cluster to start, as `mdr_dask.campaign.cluster.load_cluster` returns it.
-    client : distributed.Client or None
-        A Dask client whose workers compute the blocks. It stays open after the run.
-    patience : float
-        Seconds without any worker after which a run on a cluster ends with an error.
-    case_timeout : float or None
-        Seconds after which a case fails. With a limit, blocks are computed in child processes.
+    `workers` is a number of processes, used instead of threads. `scheduler` is the address of a running Dask scheduler,
+    `cluster` a description from `mdr_dask.campaign.cluster.load_cluster`, and `client` a Dask client, which stays open.
+    `patience` and `case_timeout` are seconds: without any worker, after which a run on a cluster ends with an error;
+    and for one case, after which it fails.
     """
 
     threads: int | None = None

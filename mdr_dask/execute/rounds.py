@@ -1,9 +1,8 @@
 """Run a campaign stage after stage and round after round, until no result is missing in its store.
 
-A stage is the campaign with the values that its adaptive axes have so far. In each stage, the first round computes the
-first realisations of all cases. Each further round adds realisations to the cases whose errors are still too large.
-Stages and rounds are determined by the results of the previous ones alone, so a run can be stopped and repeated at any
-time.
+A stage is the campaign with the values that its adaptive axes have so far. Its first round computes the first
+realisations of all cases; each further round adds realisations to the cases whose errors are still too large. Both
+follow from stored results alone, so a run can be stopped and repeated at any time.
 """
 
 from __future__ import annotations
@@ -76,42 +75,10 @@ def run(
     part: Part | None = None,
     tell: Tell = lambda _: None,
 ) -> Progress:
-    """Compute the results of a campaign that are missing in its store.
+    """Compute the results of a campaign that are missing in its store, and return the state at the end of the run.
 
-    Parameters
-    ----------
-    campaign : Campaign
-        The campaign.
-    url : str
-        Path or URL of the store, which is created, resumed or extended.
-    resources : Resources
-        Threads, processes or cluster of the run.
-    report : callable
-        Receives the progress after every block.
-    retry_failed : bool
-        Whether to compute failed and not converged cases again.
-    part : Part, optional
-        Part whose blocks are computed, while other parts may run at the same time. By default, all blocks are computed.
-    tell : callable
-        Receives every `Event`. Any thread may call it.
-
-    Returns
-    -------
-    Progress
-        The state at the end of the run. If `part` is given, only the results of this part are counted.
-
-    Raises
-    ------
-    StoreError
-        If the store was made from another campaign, or is damaged; the store is then unchanged.
-    StoreBusyError
-        If another run is active in the store.
-    CampaignError
-        If the campaign is too large to be run.
-    ClusterError
-        If a cluster cannot be started, disappears, or has no worker for too long.
-    MachineError
-        If this machine cannot compute the model, for example because a disk is full.
+    `report` receives the progress after every block, and `tell` every event, from any thread. With a `part`, only the
+    blocks of this part are computed and counted, while other parts may run at the same time.
     """
     if campaign.replication.answers:
         from mdr_dask.fits.answers import require_known
@@ -150,10 +117,8 @@ def _merge(job: _Job) -> None:
 def outlook(campaign: Campaign, url: str) -> Progress:
     """Return how many results of a campaign are in its store and how many are missing. The store is not changed.
 
-    If realisations are added in rounds, only the results of the first round are counted. If axes are adaptive, all
-    values that are known to be needed are counted. If axes are adaptive and outputs have tolerances for their standard
-    errors, only the first values of the axes are counted. Raise StoreError if the store was made from another campaign,
-    and CampaignError if the campaign is too large to be run.
+    Only the first round is counted. Of adaptive axes, the values that are known to be needed are counted, or only the
+    first values if outputs have tolerances for their standard errors.
     """
     stage: Stage | None = Stage.first(campaign)
     count = campaign.replication.at_least
@@ -213,8 +178,7 @@ def _run_rounds(
 ) -> _Round | None:
     """Run the rounds of a stage. Each round adds realisations to the cases whose errors are still too large.
 
-    Return the last round, or None if the run cannot go on, because another part has not finished a round and is not
-    running.
+    Return the last round, or None if another part has not finished a round and is not running.
     """
     replication = job.stage.campaign.replication
     while current is None or (replication.goes_on and current.realisations[1] < replication.at_most):
@@ -238,7 +202,7 @@ def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], None], rea
     """Finish a study whose adaptive axes need no more values.
 
     If fitted constants have tolerances, add realisations until they are met. Then mark the results that are still
-    missing as not needed, because no tolerance requires them.
+    missing as not needed.
     """
     layout, places = stored_layout(job.stage, job.url)
     if job.stage.campaign.replication.answers:
@@ -337,10 +301,7 @@ def _require_seen(job: _Job, current: _Round) -> None:
 
 
 def _others_are_done(job: _Job, part: Part, current: _Round) -> bool:
-    """Wait until the other parts have finished a round.
-
-    Return False as soon as one of them has not finished the round and is not running.
-    """
+    """Wait until the other parts have finished a round; return False if one has not finished it and is not running."""
     what = f"the round of {current.realisations[1]} realisations needs results of parts"
     reported = time.monotonic()
     while True:

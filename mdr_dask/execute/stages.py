@@ -1,7 +1,6 @@
 """For campaigns with adaptive axes: find the cases of a stage in the store, and choose the values of the next stage.
 
-A stage depends only on the results of the previous stage. So a repeated run finds the same stage again, even if the
-store already contains results of later stages.
+A stage depends only on the results of the previous one, so a repeated run finds the same stage again.
 """
 
 from __future__ import annotations
@@ -22,11 +21,7 @@ Places = tuple[Mapping[str, IntArray], ...]
 
 
 def stored_layout(stage: Stage, url: str) -> tuple[tuple[Template, ...], Places]:
-    """Return the layout of the stored study with the new cases of a stage, and the positions of all cases of the stage.
-
-    Raise StoreError if the store was made from another campaign, and CampaignError if the campaign is too large to be
-    run.
-    """
+    """Return the layout of the store with the new cases of a stage, and the positions of all cases of the stage."""
     campaign = stage.campaign
     if not store.exists(url):
         layout = templates(campaign, campaign.replication.at_least)
@@ -55,9 +50,9 @@ def cases_of(stage: Stage, layout: Sequence[Template], places: Places, cases: Se
 def following(
     url: str, stage: Stage, layout: Sequence[Template], places: Places, realisations: int
 ) -> tuple[Stage | None, Event]:
-    """Return the stage that follows a finished stage, and an event about the choice of its values.
+    """Return the stage that follows a finished stage, or None if no values are needed, and an event about the choice.
 
-    The stage is None if no further values are needed. Only the first `realisations` realisations of each case are used.
+    Only the first `realisations` realisations of each case are used.
     """
     meshes, short = [], []
     facts: dict[str, int] = {}
@@ -85,10 +80,7 @@ def _short(series: str, mesh: Mesh, number: int, count: int) -> str:
 def _means(
     url: str, mesh: Mesh, template: Template, place: Mapping[str, IntArray], realisations: int
 ) -> dict[str, Mean]:
-    """Return the means of each output with a tolerance for interpolation.
-
-    The means are taken over the realisations of each case of a series.
-    """
+    """Return the means over realisations of each output with a tolerance for interpolation."""
     dims, own, name = template.dims[:-1], list(mesh.series.sizes), template.series.name
     cases = np.ix_(*(place[dim] for dim in dims), np.arange(realisations))
     order = [*(dims.index(dim) for dim in own), len(dims)]

@@ -40,10 +40,9 @@ Outcomes = list[tuple[Work, Outcome]]
 class TaskWindow:
     """The blocks that are submitted to a cluster at the same time: a few more than the cluster can compute at once.
 
-    After `patience` seconds without any worker, the run ends with an error. `most` is the largest number of threads of
-    an adaptive cluster, otherwise 0. `replace_lost` requests new workers that replace lost ones, if Dask does not do
-    this itself. `last_message` returns the last error message of the cluster, or an empty text. A case fails after
-    `case_timeout` seconds.
+    `patience`: seconds without any worker after which the run ends with an error. `most`: largest number of threads of
+    an adaptive cluster, otherwise 0. `replace_lost` requests new workers if Dask does not do this itself.
+    `last_message` returns the last error message of the cluster. `case_timeout`: seconds after which a case fails.
     """
 
     def __init__(
@@ -67,11 +66,7 @@ class TaskWindow:
         client.subscribe_topic("all", self._report_worker)
 
     def run(self, works: Iterable[Work], settle: Settle) -> None:
-        """Compute blocks. If the worker of a block dies, compute the block once more, in a child process of a worker.
-
-        Raise ClusterError if the scheduler disappears, there is no worker for too long, or a worker cannot run its
-        task.
-        """
+        """Compute blocks. If the worker of a block dies, compute the block once more, in a child process."""
         remaining = iter(works)
         suspects: set[str] = set()
 
@@ -151,10 +146,7 @@ class TaskWindow:
 
 
 def _outcomes(future: Future) -> Outcomes | None:
-    """Return the result of a task, or None if its workers died.
-
-    Raise any other error with a message of one sentence.
-    """
+    """Return the result of a task, or None if its workers died; raise other errors with a message of one sentence."""
     from concurrent.futures import CancelledError
 
     try:

@@ -1,11 +1,8 @@
 """The Zarr store of a study. Only this package uses Zarr.
 
-A group contains one array for every output, the array ``status`` (the ledger, which holds the state of every result),
-and a coordinate for every parameter. The dimensions of the arrays are the axes and ``realisation``. An output may have
-further dimensions. The process that started the run (the driver) creates the arrays. The process that computes a block
-also writes it, in this order: the record of the block, with the digest of every chunk; one whole chunk of every output;
-and the chunk of ``status``. Readers use only ``zarr.json``. This file holds the metadata of the whole study and is
-replaced in one write.
+Every output is an array over the axes and ``realisation``; the array ``status``, the ledger, holds the state of every
+result. The process that computes a block writes it in this order: the record with the digests of the chunks, one whole
+chunk of every output, the chunk of ``status``. Readers use only the root ``zarr.json``, which is replaced in one write.
 """
 
 from mdr_dask.store.blocks import Place, is_written, layout_mark, read_block, values, write_block

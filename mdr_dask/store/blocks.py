@@ -57,12 +57,8 @@ def write_block(
 ) -> None:
     """Write a block: first its record, then one whole chunk of every output, and finally its chunk of the ledger.
 
-    Only the ledger states which results of a block are done. The record is written first, because it contains the
-    digest of every chunk. So if a task is killed while it writes, its chunks can be identified.
-
-    `attempt` is the number of times that the computation of the block was started, including this one. Each of the
-    `values` has the shape of the region, followed by the further dimensions of the output. `values` is empty if only
-    the ledger changes. `status` is the ledger of the block, and `record` its record without digests.
+    The record holds the digest of every chunk, so that the chunks of a killed task can be identified. `values` have the
+    shape of the region, then the further dimensions of the output; they are empty if only the ledger `status` changes.
     """
     arrays, encoded = _in_memory(place.url, place.series, place.layout)
     given = {**values, "status": status}
@@ -127,10 +123,7 @@ def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
 
 @lru_cache(maxsize=64)
 def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict[str, Buffer]]:
-    """Return empty arrays in memory with the metadata of the stored arrays, and a dictionary.
-
-    Whatever is written to the arrays appears in the dictionary as encoded chunks.
-    """
+    """Return empty arrays in memory like the stored ones, and the dictionary in which their encoded chunks appear."""
     shown, encoded = _arrays(url, series, layout), dict[str, Buffer]()
     memory = zarr.storage.MemoryStore(encoded)
     empty = {name: array_of(_whole_chunks(array), memory, array.path) for name, array in shown.items()}

@@ -126,10 +126,7 @@ def parsed(content: bytes) -> Any:
 
 
 def read_many(url: str, files: Iterable[str]) -> Iterator[tuple[str, bytes | None]]:
-    """Yield the name and the content of many files, in the given order. The content of a missing file is None.
-
-    Many files are requested from a server at the same time.
-    """
+    """Yield the name and the content of many files, in the given order. The content of a missing file is None."""
     path = local(url)
     if path is not None:
         with guarded(url, "reading its files"):
@@ -165,9 +162,8 @@ def write_bytes(url: str, name: str, content: bytes) -> None:
 def write_stages(url: str, stages: Iterable[Mapping[str, bytes]]) -> None:
     """Write files in stages: each file is replaced in one step, after all files of the earlier stages.
 
-    On a disk, the contents of all files are first written and flushed under temporary names. Then the files of all
-    stages except the last one get their final names, and their folders are flushed. Finally the files of the last stage
-    get their final names.
+    On a disk, all contents are first flushed under temporary names. The names of the earlier stages are flushed before
+    the last stage gets its names.
     """
     stages = [stage for stage in stages if stage]
     path = local(url)
@@ -266,10 +262,7 @@ def create(url: str, name: str, content: bytes) -> bool:
 
 
 def conditional(url: str) -> bool:
-    """Return whether `create` is atomic.
-
-    It is atomic for local files, and for servers that create a file with a single request.
-    """
+    """Return whether `create` is atomic: for local files, and for servers that create a file with a single request."""
     if local(url) is not None:
         return True
     from fsspec import AbstractFileSystem
@@ -340,18 +333,14 @@ def group_name(series: str, member: str = "") -> str:
 
 
 def chunk_name(series: str, array: str, block: Iterable[int], further: int = 0) -> str:
-    """Return the name of the chunk of a block in an array.
-
-    `further` is the number of dimensions of the array that the ledger does not have.
-    """
+    """Return the name of the chunk of a block; `further` counts the dimensions that the ledger does not have."""
     return group_name(series, "/".join([array, "c", *map(str, block), *["0"] * further]))
 
 
 def digest(content: bytes) -> str:
     """Return the digest of a file.
 
-    It is not a CRC, because all chunks would have the same CRC: each chunk ends with the CRC of the bytes before it,
-    and the CRC of any bytes followed by their own CRC is a fixed number.
+    A CRC would be the same number for all chunks, because each chunk ends with the CRC of the bytes before it.
     """
     return hashlib.blake2b(content, digest_size=8).hexdigest()
 
@@ -363,10 +352,7 @@ def with_digest(document: Mapping[str, Any]) -> bytes:
 
 
 def without_digest(line: bytes) -> dict[str, Any] | None:
-    """Return a document without its digest, or None if the document is damaged.
-
-    A document that has no digest is not checked.
-    """
+    """Return a document without its digest, or None if it is damaged. A document without a digest is not checked."""
     try:
         document: dict[str, Any] = parsed(line)
         stated = document.pop("digest", None)

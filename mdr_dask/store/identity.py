@@ -41,12 +41,10 @@ class Stored:
 
 
 def reconcile(url: str, campaign: Campaign) -> Stored:
-    """Compare a campaign with the existing store that it resumes or extends.
+    """Compare a campaign with the store that it resumes or extends; raise StoreError that lists all differences.
 
-    A campaign with series may extend a store whose results have no series. These results stay at the root of the store.
-    If a series of the campaign has the same parameters and axes as these results, new results of this series are added
-    at the root. If the store was made from another campaign, raise StoreError with every difference; the store is
-    unchanged.
+    A campaign with series may extend a store without series. A series with the parameters and axes of the stored
+    results then stays at the root of the store.
     """
     attributes(url)  # raises StoreError if this is not a study
     campaign = _with_root(url, campaign)
@@ -187,10 +185,9 @@ def _by_digest(value: Any) -> Any:
 
 
 def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, IntArray]]:
-    """Append the new entries of a series to the stored entries.
+    """Append the new entries of a series to the stored ones.
 
-    Return the extended series. Also return an array for each dimension: for each entry of the given series, the
-    position of this entry in the extended series.
+    Also return, for each dimension, the position of each entry of the given series in the extended series.
     """
     places = {}
     axes = []
@@ -208,12 +205,9 @@ def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, 
 
 
 def _entries(columns: list[list[Any]]) -> dict[tuple[str, int], int]:
-    """Return the position of every entry of a dimension.
+    """Return the position of each entry of a dimension, by its values as text and the number of earlier equal entries.
 
-    Each key contains the values of an entry as text, and the number of earlier entries with the same values.
-
-    Values that agree to `SAME_DIGITS` digits count as equal. The number of earlier entries is needed, because two cases
-    may be equal if their parameters are sampled whole numbers.
+    Values that agree to `SAME_DIGITS` digits count as equal. Two cases may be equal if whole numbers are sampled.
     """
     found: dict[tuple[str, int], int] = {}
     seen: Counter[str] = Counter()

@@ -56,11 +56,9 @@ _Coordinate = tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]
 def lay_out(url: str, layout: Sequence[Template]) -> None:
     """Create the arrays of every template, or extend existing arrays. Readers see either the old shape or the new one.
 
-    Files are written in this order: the record of the layout, which holds the digests of all following files; metadata
-    and coordinates of arrays; the metadata of groups; and finally ``zarr.json``, the metadata of the study. This last
-    write makes the new shape visible. A new store first gets a ``zarr.json`` without arrays. If coordinates or metadata
-    are missing in an existing store, they are written again. Existing groups are extended at the ends of their
-    dimensions.
+    Files are written in this order: the record of the layout with the digests of all other files; coordinates and
+    metadata of arrays; metadata of groups; finally ``zarr.json``. A new store first gets a ``zarr.json`` without
+    arrays.
     """
     if is_laid_out(url, layout):
         return
@@ -91,10 +89,7 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
 
 
 def _write(url: str, root: bytes, coordinates: Mapping[str, bytes]) -> None:
-    """Write the files of a layout in the order that `lay_out` describes; `root` is the content of ``zarr.json``.
-
-    Of the coordinates and the metadata of arrays, only files with new content are written.
-    """
+    """Write the files of a layout in the order that `lay_out` describes; `root` is the content of ``zarr.json``."""
     metadata = metadata_files(json.loads(root))
     members = json.loads(root)["consolidated_metadata"]["metadata"]
     groups = {name: metadata.pop(name) for name in [f"{group}/zarr.json" for group in group_names(members)]}
@@ -213,10 +208,7 @@ def layout_faults(url: str) -> Iterator[Finding]:
 
 
 def _signpost(members: Mapping[str, Any]) -> dict[str, str]:
-    """Return an attribute with a hint how to open a study that has series.
-
-    Without it, such a study would look empty when opened as one dataset.
-    """
+    """Return a hint how to open a study with series, which would look empty when opened as one dataset."""
     series = group_names(members)
     groups = " or ".join(f"group={name!r}" for name in sorted(series))
     text = f"the results of each series are in a group: open_datatree, or open_zarr with {groups}"
@@ -381,10 +373,7 @@ def _plain(value: Any) -> Any:
 
 
 def group_document(members: Mapping[str, Any], attrs: Mapping[str, Any]) -> bytes:
-    """Return the metadata of a group and of its members as the content of one file.
-
-    Readers see a new shape as soon as this file has been written.
-    """
+    """Return the metadata of a group and of its members as the content of one file."""
     held = {
         "zarr_format": 3,
         "node_type": "group",

@@ -60,10 +60,9 @@ class Blocks:
 
 
 def ledger(url: str, series: str, shape: tuple[int, ...] | None = None) -> NDArray[np.int8]:
-    """Return the current ``status`` array of a group.
+    """Return the current ``status`` array of a group, padded with "missing" or cut to `shape` if it is given.
 
-    If a `shape` is given, the array is padded with "missing" or cut to this shape. The stored array may be larger than
-    this shape if the run of another part has extended it.
+    The stored array is larger than the shape if the run of another part has extended it.
     """
     metadata = document(url, series)
     if metadata is None:
@@ -107,9 +106,8 @@ def _read(url: str, blocks: Blocks, metadata: Mapping[str, Any]) -> NDArray[np.i
 def require_undamaged(url: str, series: Sequence[str], to_run: bool = False) -> None:
     """Raise StoreError if the layout of a study is damaged or a chunk of a finished block is missing.
 
-    Only the layout and the ledger are read, not the values. `mdr_dask.store.verify` compares every file with its
-    digest. With `to_run`, missing files of the layout are no fault, because the run writes these files again. If a
-    store has no record of its layout, its metadata and coordinates are not checked.
+    Only the layout and the ledger are read, not the values. With `to_run`, missing files of the layout are no fault,
+    because the run writes these files again.
     """
     faults = _faults(url, series, to_run)
     if any(faults):  # check again, because a run may have changed a file during the first check

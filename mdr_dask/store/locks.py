@@ -1,13 +1,8 @@
 """Locks: a store has one exclusive run, or several parts of a campaign at the same time.
 
-On a file system with locks, the operating system releases a lock when the process of the run ends for any reason. On
-other file systems and at URLs, a run makes a claim instead: it creates a file, which is only possible if the file does
-not exist. The owner of the claim regularly writes a second file as a sign of life. The tasks of a run that has ended
-cannot write any more.
-
-Every run first acquires another lock, the gate, and holds it only for a short time. Meanwhile it checks which other
-runs are active. So a part and an exclusive run cannot start at the same time. A part also acquires the gate to lay out
-the study, while the other parts wait.
+Where the file system has locks, the operating system releases them when a process ends. Elsewhere, and at URLs, a run
+makes a claim: a file that only one process can create, and a second file that its owner regularly writes as a sign of
+life. A run holds another lock, the gate, while it checks which runs are active and while it lays out the study.
 """
 
 from __future__ import annotations
@@ -88,7 +83,7 @@ class Lock:
 class Part:
     """One of several disjoint sets of blocks; a separate process computes each set."""
 
-    # Number of the part, counted from 1, and number of parts.
+    # Counted from 1.
     number: int
     count: int
 
@@ -104,18 +99,17 @@ class Part:
     def of(cls, position: int, count: int) -> Part:
         """Return the part that a block belongs to, from the position of the block among all blocks.
 
-        With n parts, the first n blocks belong to the parts 1, 2, ..., n, the next n blocks to the parts 2, 3, ..., n,
-        1, and so on. Suppose that an axis has n blocks: without this shift, all blocks at the same position on the axis
-        would belong to the same part.
+        With n parts, every further n blocks begin with the next part. Otherwise, if an axis had n blocks, all blocks at
+        one position on the axis would belong to the same part.
         """
         return cls((position + position // count) % count + 1, count)
 
 
 @contextmanager
 def exclusive(url: str) -> Iterator[Lock]:
-    """Lock a study for one run; raise StoreBusyError if another run or a part is active in the store.
+    """Lock a study for one run; raise StoreBusyError if another run or a part is active.
 
-    In a read-only store the lock allows only reading. If locking fails for another reason, raise StoreError.
+    In a read-only store the lock allows only reading.
     """
     with ExitStack() as held:
         with gate(url):
@@ -136,8 +130,7 @@ def exclusive(url: str) -> Iterator[Lock]:
 def shared(url: str, part: Part) -> Iterator[Lock]:
     """Lock one part of a study; the other parts may run at the same time.
 
-    Raise StoreBusyError if another process already runs this part or the whole study. Also raise StoreBusyError if an
-    active part belongs to a division into another number of parts. Otherwise as for `exclusive`.
+    Raise StoreBusyError if this part, the whole study, or a part of another number of parts is running.
     """
     with ExitStack() as held:
         with gate(url), acquire(url):
@@ -169,15 +162,12 @@ def gate(url: str) -> Iterator[None]:
 
 
 def at_work(url: str) -> tuple[str | None, list[Part]]:
-    """Return the process that holds the exclusive lock of a study (None if no process does), and the active parts.
-
-    Nothing is written.
-    """
+    """Return the process that runs the whole study, or None, and the active parts. Nothing is written."""
     return (_holder(url) if _is_held(url) else None), _parts(url)
 
 
 def active_runs(url: str) -> list[str]:
-    """Return texts that describe the active runs of a study: the exclusive run, and the active parts."""
+    """Return texts that describe the active runs of a study."""
     runner, parts = at_work(url)
     found = [runner] if runner else []
     for count, alike in itertools.groupby(parts, key=lambda part: part.count):
@@ -195,9 +185,9 @@ def _ranges(numbers: list[int]) -> str:
 
 @contextmanager
 def acquire(url: str, name: str = "") -> Iterator[Lock]:
-    """Hold the lock with a name; the exclusive lock has an empty name. In a read-only store, it allows only reading.
+    """Hold the lock with a name (empty: the exclusive lock); raise StoreBusyError if another process holds it.
 
-    If another process holds the lock, raise StoreBusyError, which names that process.
+    In a read-only store the lock allows only reading.
     """
     if local(url) is None:
         with _claimed(url, name) as lock:
@@ -260,10 +250,7 @@ def _lock_file(url: str, name: str = "") -> Path:
 
 
 def _locked(file: Path) -> int:
-    """Lock a lock file and return its descriptor.
-
-    If another process deletes the file meanwhile, it is created and locked again.
-    """
+    """Lock a lock file and return its descriptor; create the file again if another process deletes it meanwhile."""
     give_up = time.monotonic() + GLANCE
     while True:
         if not file.parent.exists():
@@ -365,7 +352,7 @@ def _runners(url: str, name: str) -> list[Path]:
 
 @contextmanager
 def _registered(url: str, name: str) -> Iterator[Lock]:
-    """Write a file that names the holder of a lock (the runner file), and remove the runner files of earlier holders.
+    """Write the runner file, which names the holder of a lock, and remove the runner files of earlier holders.
 
     While a task writes, it holds a shared lock on the runner file of its run.
     """
@@ -457,10 +444,7 @@ def _make_claim(url: str, name: str, owner: str) -> int:
 
 
 def _is_alive(url: str, name: str, number: int) -> bool:
-    """Return whether the owner of a claim is active.
-
-    It is active if its last sign of life is recent, or if a new one appears soon.
-    """
+    """Return whether the last sign of life of the owner of a claim is recent, or a new one appears soon."""
     claim = _read_claim(url, _claim(name, number))
     last = _read_claim(url, _life(name, number)) or claim
     if time.time() - last.get("time", 0.0) <= SILENCE:

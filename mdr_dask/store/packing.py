@@ -29,8 +29,7 @@ def contents(url: str) -> Iterator[tuple[str, bytes]]:
 def verify_packed(path: Path) -> Inspection:
     """Compare every file of a published study with its checksum, and verify the store in it.
 
-    Raise StoreError if the zip cannot be unpacked, has no checksums, or would unpack to a huge size: this program
-    cannot have written such a zip.
+    Raise StoreError if the zip cannot be unpacked, has no checksums, or would unpack to a huge size.
     """
     try:
         with zipfile.ZipFile(path) as packed, tempfile.TemporaryDirectory() as folder:

@@ -47,8 +47,7 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
     """Open a study for reading, finished or not; return every group by the name of its series.
 
     The values of numeric axes are in ascending order. The results of a study without series have the name ``""``, or
-    ``"-"`` if series were added later. Arrays are loaded when they are used. Groups larger than `LAZY_BYTES` contain
-    Dask arrays, which are computed chunk by chunk. Raise StoreError if there is no study of mdr_dask at `url`.
+    ``"-"`` if series were added later. Groups larger than `LAZY_BYTES` contain Dask arrays.
     """
     with readable(url):
         names = series_names(url)
@@ -78,10 +77,7 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:
-    """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``.
-
-    A Dataset of lazy arrays is computed and written piece by piece. Lists in attrs become texts.
-    """
+    """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``, lazy arrays piece by piece. Lists in attrs become texts."""
     plain = dataset.copy()
     plain.attrs = {
         name: value if isinstance(value, str | int | float) and not isinstance(value, bool) else json.dumps(value)

@@ -1,7 +1,7 @@
 """Records of blocks: times, versions, messages, and the digest of every chunk.
 
-During a run, the record of each block is written to its own file. These files are merged from time to time, because a
-folder with a hundred thousand files would be slow.
+A run writes one file for each block, and merges them from time to time, because a folder with a hundred thousand files
+would be slow.
 """
 
 from __future__ import annotations
@@ -64,10 +64,7 @@ def _is_message(message: Mapping[str, Any]) -> bool:
 
 
 def record(url: str, series: str, index: BlockIndex, attempt: int) -> dict[str, Any] | None:
-    """Return the record of an attempt at a block.
-
-    Return None if the record is damaged, or has no file of its own (for example because it was merged).
-    """
+    """Return the record of an attempt at a block, or None if it is damaged or has no file of its own."""
     content = read_bytes(url, name_of(series, index, attempt))
     return None if content is None else decoded(content)
 
@@ -98,7 +95,7 @@ def records(url: str, series: str) -> Iterator[dict[str, Any]]:
 
 @lru_cache(maxsize=16)
 def _warn_of_damaged(url: str, count: int) -> None:
-    """Log a warning of damaged records. The warning is repeated only if the number of damaged records has changed."""
+    """Log a warning of damaged records, once for each number of them."""
     log.warning("%s: %d damaged records are left out; 'mdr-dask verify %s' names them", url, count, url)
 
 
@@ -118,10 +115,9 @@ def kinds(url: str, series: Sequence[str]) -> dict[str, int]:
 
 
 def merge_records(url: str, series: str) -> None:
-    """Merge the records of single blocks into files that hold many records each.
+    """Merge the records of single blocks that are in the ledger into files that hold many records each.
 
-    The record of a block that is not in the ledger is not merged. If two processes merge at the same time, or if a
-    process is killed while merging, some records are in two files. Readers use each record only once.
+    If a process is killed while merging, or two processes merge, a record is in two files. Readers use it only once.
     """
     prefix = folder(series)
     loose = [name for name in listed(url, prefix) if _LOOSE.fullmatch(name.removeprefix(prefix))]

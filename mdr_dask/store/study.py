@@ -139,7 +139,7 @@ def only_claimed(found: Mapping[str, Any]) -> bool:
 def attributes(url: str) -> dict[str, Any]:
     """Return the attributes of a study.
 
-    Raise StoreError if there is no study of mdr_dask at `url`, or if a later version with another layout wrote it.
+    Raise StoreError if there is no study of mdr_dask, or one with a layout of a later version.
     """
     refuse_file(url)
     found = _root_attributes(url)

@@ -84,9 +84,8 @@ def verify(url: str) -> Inspection:
 def repair(url: str) -> tuple[Inspection, Inspection]:
     """Repair a store as far as possible, and return the inspections before and after the repair.
 
-    Damaged metadata are written again. Damaged coordinates and damaged blocks are removed, and the next run writes them
-    again. Damaged records, and foreign files in the folders of chunks and records, are removed. Other foreign files are
-    kept. Raise the same errors as `verify`, and StoreError also if the store cannot be written.
+    Damaged metadata are written again. Damaged coordinates, blocks and records are removed, and the next run writes
+    them again. Of foreign files, only those in the folders of chunks and records are removed.
     """
     refuse_file(url)
     with exclusive(url):
@@ -208,10 +207,9 @@ def _check_blocks(url: str, group: Group, found: Inspection, present: set[str]) 
 
 
 def _histories(url: str, group: Group) -> tuple[dict[BlockIndex, History], set[BlockIndex]]:
-    """Return the `History` of each block, and the set of blocks that have a merged record; use only intact records.
+    """Return the `History` of each block, and the blocks that have a merged record; use only intact records.
 
-    The record of a block is merged only when the block is in the ledger. So a block with a merged record must be in the
-    ledger.
+    A record is merged only when its block is in the ledger.
     """
     known: dict[tuple[BlockIndex, int], Mapping[str, str]] = {}
     merged = set()
@@ -264,10 +262,7 @@ def _expected(history: History, status: str, name: str) -> set[str]:
 
 
 def _remove_records(url: str, group: Group) -> None:
-    """Remove the files that contain damaged records or records of damaged blocks.
-
-    All other records in these files are first copied to a new file.
-    """
+    """Remove files with damaged records or records of damaged blocks; copy their other records to a new file."""
     series, bad = group.blocks.series, set(group.bad_records)
     found = [(name, line, decoded(line)) for name, line in lines(url, series)]
     bad |= {name for name, _, record in found if record is None or tuple(record["block"]) in group.bad_blocks}
