@@ -51,23 +51,10 @@ _BEHIND = re.compile(r"(.+?)\s*(?:/|,|\bin\b)\s*(\S.*)")
 
 @dataclass(frozen=True)
 class Column:
-    """The description of a column that a table may have.
+    """The description of a column that a table may have. The table may also use one of the `SYNONYMS` of its name.
 
-    Parameters
-    ----------
-    name : str
-        Name in messages and in the result. A table may also use one of the `SYNONYMS` of this name.
-    unit : str
-        SI unit of the result, ``"1"`` for a pure number. For angular frequencies (``rad/s``) a table may use Hz or rpm.
-    other_names : tuple of str
-        Further names.
-    needed : bool
-        Whether a table must have this column.
-    above, least : float, optional
-        Limits in SI: values must be greater than `above` and not smaller than `least`. None means no limit.
-    given_unit : str
-        Unit to use if the table states no unit. If `given_unit` is empty, a table must state the unit, except for pure
-        numbers.
+    The SI `unit` is ``"1"`` for pure numbers. Values must be greater than `above` and not smaller than `least`, in SI.
+    `given_unit` is used if the table states no unit; without it, the table must state the unit of a quantity.
     """
 
     name: str
@@ -84,9 +71,9 @@ class Column:
 
 
 def plain(name: str) -> str:
-    """Return a name in lower case, with single blanks instead of punctuation and one character for all kinds of primes.
+    """Return a name in lower case, with blanks instead of punctuation.
 
-    The case of a single letter is kept: t is a time, T a temperature.
+    A single letter keeps its case: t is a time, T a temperature.
     """
     name = re.sub(r"[\s_.\-:()|]+", " ", name.translate(_ALIKE)).strip()
     return name if len(name) == 1 else name.casefold()
@@ -121,10 +108,7 @@ def is_called(heading: str, *names: str) -> bool:
 
 
 def nearest(heading: str, names: Sequence[str]) -> str:
-    """Return a hint with the name that is nearest to a heading: a similar name, or one with a word in common.
-
-    The hint is empty if there is no such name.
-    """
+    """Return a hint with a name that is similar to a heading or has a word in common with it, or an empty text."""
     words = {word for word in plain(heading).split() if len(word) > 2}
     similar = did_you_mean(heading, names)
     common = [name for name in names if any(words & set(plain(each).split()) for each in _names_of(name))]
@@ -134,8 +118,7 @@ def nearest(heading: str, names: Sequence[str]) -> str:
 def split_unit(heading: str) -> tuple[str, str]:
     """Return the name and the unit of a heading: ``f [Hz]``, ``f (Hz)``, ``f / Hz``, ``f, Hz`` or ``f in Hz``.
 
-    Text in square brackets is always taken as a unit. Any other text is taken as a unit only if it looks like one. In
-    ``force (F)``, for example, F is not taken as a unit, because F is a symbol of the force.
+    Text in square brackets is always a unit, any other text only if it looks like one: not F in ``force (F)``.
     """
     found = _BRACKETED.fullmatch(heading.strip())
     if found:
@@ -147,10 +130,7 @@ def split_unit(heading: str) -> tuple[str, str]:
 
 
 def match(name: str, unit: str, columns: Sequence[Column]) -> tuple[Column | None, str]:
-    """Return the column that a name means, and its unit, which may be part of the name (``freq_hz``, ``v_mm_s``).
-
-    The column is None if the name fits none of the columns.
-    """
+    """Return the column that a name means, or None, and its unit, which may be part of the name: ``v_mm_s``."""
     fitting = [column for column in columns if column.holds(name)]
     if fitting:
         return next((column for column in fitting if _fits(unit, column)), fitting[0]), unit
@@ -174,7 +154,7 @@ def _fits(unit: str, column: Column) -> bool:
 
 
 def factors(unit: str, wanted: str) -> tuple[float, float, float]:
-    """Return numbers p, q and z: a number x in a unit is p (q x + z) in the SI unit `wanted`.
+    """Return p, q and z: a number x in a unit is p (q x + z) in the SI unit `wanted`.
 
     If an angular frequency is wanted, p is 2 pi for Hz and 1/min (revolutions per minute); 1/s counts as rad/s.
     """

@@ -1,7 +1,4 @@
-"""Run and analyse studies from Python: a dictionary replaces the campaign file, and results are labelled arrays.
-
-Importing this module gives every Dataset of xarray the accessor ``mdr``.
-"""
+"""Run and analyse studies from Python. Importing this module gives every Dataset of xarray the accessor ``mdr``."""
 
 from __future__ import annotations
 
@@ -49,18 +46,10 @@ Words = str | Sequence[str]
 
 
 def read(source: Source) -> Campaign:
-    """Read a campaign from a dictionary or a file.
+    """Read a campaign from the path of a campaign file, or from a mapping with the keys of such a file.
 
-    Parameters
-    ----------
-    source : mapping, str, Path or Campaign
-        The path of a campaign file, or a mapping with the keys of such a file. Values may be numbers in SI units,
-        strings with units, pint quantities, lists and numpy arrays. The key ``name`` is optional.
-
-    Raises
-    ------
-    CampaignError
-        With all problems, as in ``mdr-dask check``.
+    Values may be numbers in SI units, strings with units, pint quantities, lists and numpy arrays. The key ``name`` is
+    optional.
     """
     if isinstance(source, Campaign):
         return source
@@ -367,10 +356,7 @@ class StudyAccessor:
 
     @property
     def numbers(self) -> xr.Dataset:
-        """The dimensionless numbers of the cases.
-
-        A number is left out if the study lacks a quantity that its formula needs.
-        """
+        """The dimensionless numbers of the cases; a number is left out if the study lacks a quantity of its formula."""
         columns = Columns(self._dataset)
         known = [name for name in numbers(self._dataset) if columns.find(name) is not None]
         return xr.Dataset({name: columns.column(name) for name in known if name not in self._dataset})
@@ -406,10 +392,7 @@ class StudyAccessor:
 
 
 def _place(found: Campaign, is_temporary: bool) -> str:
-    """Return the path of the store of a campaign.
-
-    The name of a temporary store contains a digest of the text of the campaign.
-    """
+    """Return the path of the store of a campaign. A temporary store is named after a digest of the campaign."""
     if not is_temporary:
         return found.store
     digest = hashlib.sha256(found.text.encode()).hexdigest()[:16]

@@ -22,12 +22,7 @@ LISTED = 6
 class Summary(Estimate):
     """The results and the costs of a campaign. Printed, it is the text of ``mdr-dask check``.
 
-    Attributes
-    ----------
-    lines : tuple of str
-        The axes of each series, notes about its data, and its costs, as lines of text.
-    questions : tuple of str
-        Questions about numbers without a unit that are far from the usual values.
+    `lines` are the axes of each series, notes, and costs; `questions` are about numbers without a unit.
     """
 
     lines: tuple[str, ...] = ()
@@ -38,13 +33,7 @@ class Summary(Estimate):
 
 
 def summary(campaign: Campaign) -> Summary:
-    """Summarise a campaign without running it.
-
-    Raises
-    ------
-    CampaignError
-        If the campaign is too large to be run, or a tolerance names a constant that no fit of the model gives.
-    """
+    """Summarise a campaign without running it."""
     require_answers(campaign)
     costs = estimate(campaign)
     lines = (f"{campaign.name}: {campaign.model}", *study_lines(campaign, costs))
@@ -78,10 +67,9 @@ def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
 
 
 def _defaults(campaign: Campaign) -> list[str]:
-    """Return names and values of the parameters that are not in the campaign file but have an effect (the defaults).
+    """Return names and values of the parameters that have an effect but are not in the campaign file, except zeros.
 
-    If only some series use a default, the names of these series follow in brackets. Defaults that are zero or empty are
-    left out.
+    If only some series use a default, the names of these series follow in brackets.
     """
     found: dict[str, list[str]] = {}
     for series in campaign.series:
@@ -143,10 +131,7 @@ def spacing(values: tuple[float, ...]) -> str:
 
 
 def cost_lines(costs: Estimate) -> Iterator[str]:
-    """Yield lines with the counts, the size and the time of a study.
-
-    If there may be further rounds, each quantity is given for the first round and for all possible rounds.
-    """
+    """Yield lines with the counts, the size and the time of a study, each for the first round and for all rounds."""
     more = costs.rounds
     cases, results = _counted("case", costs.cases, costs.growth), _counted("result", costs.results, more)
     yield f"{cases} x {_counted('realisation', costs.realisations, costs.at_most / costs.realisations)} = {results}"
@@ -174,10 +159,7 @@ def human_bytes(size: float) -> str:
 
 
 def costs_row(costs: Estimate) -> dict[str, Any]:
-    """Return counts, bytes and seconds of a study by key, for the first round and for all possible rounds.
-
-    The keys stay the same in later versions, because users read them from JSON.
-    """
+    """Return counts, bytes and seconds of a study by key. Users read these keys from JSON: keep them."""
     first = {name: getattr(costs, name) for name in ("results", "solves", "blocks", "bytes", "files")}
     return {
         "cases": costs.cases,

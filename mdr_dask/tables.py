@@ -1,12 +1,7 @@
 """Read tables in the forms in which people and instruments write them.
 
-A table is read in five steps, each in one function:
-
-1. `decoded`: the content of a file becomes text; a workbook becomes text with tabs between the cells.
-2. `_grid`: the text becomes an array of cells, one row for each line.
-3. `read_sheet`: the lines of names, units and numbers are found; the result is a `Sheet`.
-4. `match` of `mdr_dask.headings`: each name and unit is compared with the `Column` descriptions of the caller.
-5. `read_table`: the numbers of these columns are converted to SI.
+`decoded` makes text of a file, `read_sheet` finds its names, units and numbers, `match` of `mdr_dask.headings` compares
+the names with the columns of a caller, and `read_table` converts the numbers to SI.
 """
 
 from __future__ import annotations
@@ -53,10 +48,7 @@ Cells = NDArray[np.object_]
 
 
 class Problem(NamedTuple):
-    """One problem: line and column of a cell, counted from 1, and a text.
-
-    Line 0 means that the problem is not at a single cell, or that the text names the cell of a workbook.
-    """
+    """A problem: line and column of a cell, counted from 1 (0 if there is no such cell), and a text."""
 
     line: int
     column: int
@@ -99,24 +91,10 @@ class TableError(DataError):
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """A table as text.
+    """A table as text: `cells` has the shape (rows, columns) and decimal points, `lines` the line of each row.
 
-    Parameters
-    ----------
-    source : str
-        Name of the file, for messages.
-    names : tuple of str
-        Names of the columns without their units; empty for a table without names.
-    units : tuple of str
-        Unit of each column as written; empty for a column without a unit.
-    cells : array of str, shape (rows, columns)
-        Text of each cell, with decimal points.
-    lines : tuple of Line
-        The line of each row.
-    head : Line
-        The line of names, or the first line of a table without names.
-    notes : tuple of str
-        First cell of each line of text below the numbers.
+    `names` and `units` are as written, and empty if they are missing. `head` is the line of names, or else the first
+    row. `notes` are the first cells of the lines of text below the numbers.
     """
 
     source: str
@@ -135,10 +113,9 @@ class Sheet:
 
 
 class Read(dict[str, FloatArray]):
-    """The columns that were read from a table, by `Column.name`.
+    """The columns that were read from a table, by `Column.name`, in SI.
 
-    `lines` contains the line of each row, and `headings` the names of the columns as written. `remark` is a text that
-    names the columns and lines of the table that were not used; it is empty if all were used.
+    `headings` are the names as written. `remark` names the columns and lines of the table that were not used.
     """
 
     headings: Mapping[str, str] = {}
@@ -152,13 +129,7 @@ def is_table(path: str | Path) -> bool:
 
 
 def decoded(content: bytes, source: str) -> str:
-    """Return the text of a table: UTF-8, UTF-16, Windows-1252, or the cells of an Excel workbook.
-
-    Raises
-    ------
-    DataError
-        If the content is none of these.
-    """
+    """Return the text of a table: UTF-8, UTF-16, Windows-1252, or the cells of an Excel workbook."""
     if content[:4] == b"PK\x03\x04":
         return _workbook(content, source)
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -243,23 +214,10 @@ def _separator(lines: Sequence[str]) -> str:
 def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = None) -> Sheet:
     """Find the names, the units and the lines of numbers of a table.
 
-    Text above the names is skipped. Text below the last numbers is left out. A table may consist of several blocks of
-    numbers, each below the same line of names. If a temperature is stated above every block, the temperatures become a
-    further column, unless the table has a column of temperatures. Pairs of columns with a temperature above each pair
-    (as digitised from a figure) become three columns.
-
-    Parameters
-    ----------
-    text, source : str
-        The table and the name of its file.
-    is_name : callable, optional
-        For tables whose entries may be words. The function returns whether a text is the name of a column; the first
-        line with such a name is the line of names.
-
-    Raises
-    ------
-    TableError
-        If there are no rows, if rows differ in length, or if decimal commas and points are mixed.
+    Text above the names and below the numbers is left out. A table may consist of several blocks of numbers, each below
+    the same line of names. Temperatures above the blocks become a further column. Pairs of columns with a temperature
+    above each pair become three columns. If cells may be words, `is_name` returns whether a text is the name of a
+    column.
     """
     grid = _grid(source, _lines(text))
     head = _head_of_words(grid, is_name) if is_name else _head(grid)
@@ -285,11 +243,9 @@ def read_sheet(text: str, source: str, is_name: Callable[[str], bool] | None = N
 
 @dataclass(frozen=True, eq=False)
 class _Grid:
-    """The cells of a text as an array, and what the cells contain. Short lines are filled up with empty cells.
+    """The cells of a text as an array, and what they contain. Short lines are filled up with empty cells.
 
-    `length` is the number of cells of each line. `filled`, `number` and `word` have the shape of `cells` and mark the
-    cells that are not empty, that are numbers, and that are words. A word is neither a number nor a mark of a missing
-    number, such as ``n/a``.
+    `length` is the number of cells of each line. A `word` is neither a number nor a mark of a missing number.
     """
 
     source: str
@@ -312,10 +268,7 @@ def _further(count: int) -> str:
 
 
 def _grid(source: str, every: Sequence[Line]) -> _Grid:
-    """Split lines into cells.
-
-    Comments are left out. If the first line contains numbers or units, a comment just above it may contain the names.
-    """
+    """Split lines into cells. A comment counts only if it contains the names of the columns."""
     texts = [line for line in every if line.text.lstrip()[0] not in COMMENT]
     if not texts:
         raise TableError(source, [Problem(1, 1, NO_ROWS)])
@@ -339,12 +292,9 @@ def _grid(source: str, every: Sequence[Line]) -> _Grid:
 
 
 class _Head(NamedTuple):
-    """What precedes the numbers, and where the numbers are.
+    """The positions of names, units and labels of pairs of columns, and masks of the numeric columns and lines.
 
-    `names`, `units` and `labels` are the positions of the line of names, of the line of units, and of the line with a
-    label for each pair of columns; each is None if there is no such line. `begin` is the position of the first line
-    below these three lines. `numeric` marks the columns that contain numbers, and `data` the lines that contain
-    numbers.
+    The numbers begin at or below the line `begin`.
     """
 
     names: int | None
@@ -356,11 +306,10 @@ class _Head(NamedTuple):
 
 
 def _head(grid: _Grid) -> _Head:
-    """Find the names and units.
+    """Find the names and units in the lines of text above the numbers that have as many cells as most lines.
 
-    Names and units are in lines of text above the numbers. Only text lines with as many cells as most lines of the
-    table are used. If a line of units follows the names, the line just above the last line of units contains the names.
-    Otherwise the last text line contains the names, and the line above the names may contain the units.
+    If a line of units follows the names, the line above the last line of units contains the names. Otherwise the last
+    line of text contains the names, and the line above may contain the units.
     """
     data, numeric = _lines_of_numbers(grid)
     full = np.flatnonzero(data & (grid.length == numeric.size))
@@ -384,11 +333,10 @@ def _head(grid: _Grid) -> _Head:
 def _lines_of_numbers(grid: _Grid) -> tuple[BoolArray, BoolArray]:
     """Return masks of the lines and of the columns that contain numbers.
 
-    A column is numeric if it contains numbers in at least half of the lines that have the most frequent number of
-    cells. A line contains numbers if, in the numeric columns, at least half of its filled cells are numbers or marks of
-    missing numbers. A line that begins with a word is nevertheless text in two cases. First, the word is in a numeric
-    column: the line is a setting above the table, or a mean below it. Second, less than half of the columns are filled
-    in this line. Exactly half is too few as well if the line has fewer cells than most lines.
+    A column is numeric if it contains numbers in at least half of the lines of the most frequent length. A line
+    contains numbers if at least half of its filled cells in these columns are numbers or marks of missing numbers. A
+    line that begins with a word is text if the word is in a numeric column, or if less than half of the columns are
+    filled (exactly half, if the line is shorter than most lines).
     """
     mostly = grid.number.any(axis=1) & (grid.number.sum(axis=1) >= grid.word.sum(axis=1))
     mostly = mostly if mostly.any() else grid.number.any(axis=1)  # the table has more words than numbers
@@ -420,9 +368,7 @@ def _head_of_words(grid: _Grid, is_name: Callable[[str], bool]) -> _Head:
 
 
 def _body(grid: _Grid, head: _Head) -> tuple[list[int], list[tuple[str, str] | None], tuple[str, ...]]:
-    """Return the positions of the lines of numbers, the temperature stated above each of these lines, and notes.
-
-    The notes are the first cells of the lines of text below the last numbers.
+    """Return the positions of the lines of numbers, the temperature stated above each, and the notes below them.
 
     Text between two lines of numbers must contain the line of names; otherwise TableError is raised.
     """
@@ -456,10 +402,7 @@ def _stated(grid: _Grid, rows: Sequence[int]) -> tuple[str, str] | None:
 
 
 def _names_and_units(grid: _Grid, head: _Head) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names and the units of the columns.
-
-    A unit is taken from the line of units or, if this line has none, from the name of the column.
-    """
+    """Return the names and the units of the columns; a line of units precedes the unit in a name."""
     if head.names is None:
         return (), ("",) * head.numeric.size
     parts = [split_unit(name) for name in grid.cells[head.names][: grid.length[head.names]]]
@@ -504,10 +447,7 @@ def _with_points(grid: _Grid, rows: Sequence[int]) -> Cells:
 
 
 def _from_pairs(grid: _Grid, sheet: Sheet, labels: int | None) -> Sheet:
-    """Convert a table with pairs of columns into a table with three columns: the two of a pair, and the temperature.
-
-    The temperature of each pair is read from the label above the pair.
-    """
+    """Convert pairs of columns with a temperature in the label above each pair into the three columns of a table."""
     count = len(sheet.names) // 2
     above = [] if labels is None else [cell for cell in grid.cells[labels] if cell]
     known = [found for cell in above if (found := re.match(r"\D*?([+-]?\d+(?:[.,]\d+)?)[\s\])(\[]*([^\])]*)", cell))]
@@ -527,10 +467,7 @@ def _from_pairs(grid: _Grid, sheet: Sheet, labels: int | None) -> Sheet:
 
 
 def _are_units(row: Sequence[str]) -> bool:
-    """Return whether a line is a line of units.
-
-    A line is a line of units if at least half of its words are units, or if all of them are in square brackets.
-    """
+    """Return whether at least half of the words of a line are units, or all of them are in square brackets."""
     filled = [text for text in row if text not in ("", "-", "--", "1", "[1]", "[-]")]
     # a text such as "10 mm" is a value of a table with words, but "10^3 um^3" is a unit
     texts = [text for text in filled if re.match(r"(?!\d)|10\s*[\^⁰¹²³⁴-⁹]|1e", text)]
@@ -541,10 +478,7 @@ def _are_units(row: Sequence[str]) -> bool:
 def matched(sheet: Sheet, columns: Sequence[Column]) -> list[tuple[Column | None, str, bool]]:
     """Return for each column of a table its meaning, its unit, and whether its entries are common logarithms.
 
-    The meaning is one of the given `columns`; it is None if the name of the column in the table fits none of the given
-    `columns`.
-
-    If the table has no names, its columns are the given `columns` in this order.
+    The meaning is one of `columns`, or None. A table without names has these `columns` in this order.
     """
     if not sheet.names:
         count = len(sheet.units)
@@ -565,29 +499,10 @@ def matched(sheet: Sheet, columns: Sequence[Column]) -> list[tuple[Column | None
 
 
 def read_table(text: str, source: str, columns: Sequence[Column], allow_missing: bool = False) -> Read:
-    """Read the requested columns of a table, in SI.
+    """Read the requested columns of a table in SI, each of shape (rows,).
 
-    Parameters
-    ----------
-    text : str
-        The table.
-    source : str
-        Name of the file, for messages.
-    columns : sequence of Column
-        The columns that the table may have. The columns of a table without names must be in this order.
-    allow_missing : bool
-        Whether missing entries are read as NaN. Otherwise they are errors.
-
-    Returns
-    -------
-    Read
-        The columns that were found in the table, by `Column.name`, each as an array of shape (rows,).
-
-    Raises
-    ------
-    TableError
-        With all problems, at most one for each column: missing or misspelt columns, two columns of one quantity that
-        disagree, missing or unknown units, entries that are not numbers, impossible values.
+    Columns without names must be in the order of `columns`. If `allow_missing` is true, missing entries become NaN. A
+    TableError contains at most one problem of each column.
     """
     sheet, read, problems = read_sheet(text, source), Read(), []
     meanings = matched(sheet, columns)
@@ -686,15 +601,7 @@ def _values(
 
 
 def numbers(sheet: Sheet) -> FloatArray:
-    """Return the entries of a table as numbers without conversion of units, shape (rows, columns).
-
-    Missing entries become NaN, and so do all entries of a column without any number.
-
-    Raises
-    ------
-    TableError
-        If an entry is not a number in a column that contains numbers.
-    """
+    """Return the entries of a table as numbers; missing entries and columns of words are NaN."""
     values = np.array([[float(text) if _NUMBER.fullmatch(text) else math.nan for text in row] for row in sheet.cells])
     is_numeric = ~np.all(np.isnan(values), axis=0)
     wrong = [
@@ -714,13 +621,7 @@ MOST_DESCRIBED = 6
 
 
 def described(text: str, source: str) -> str:
-    """Return a text with the number of rows of a table, and the name, unit and range of each column as written.
-
-    Raises
-    ------
-    TableError
-        If the text is not a table of numbers.
-    """
+    """Return a text with the number of rows of a table, and the name, unit and range of each column as written."""
     sheet = read_sheet(text, source)
     columns = numbers(sheet).T
     rows = f"{len(sheet.cells)} rows"

@@ -140,25 +140,10 @@ COMMON = (
 
 
 def to_si(value: str, unit: str) -> float:
-    """Convert a number with its unit to SI.
+    """Convert a number with its unit, such as ``"20 mm"``, to a coherent SI unit; raise ValueError with a message.
 
-    Parameters
-    ----------
-    value : str
-        A number with a unit, such as ``"20 mm"``. A number without a unit is taken to be in SI.
-    unit : str
-        The coherent SI unit of the result, ``"1"`` for a pure number.
-
-    Returns
-    -------
-    float
-        The value in SI. For decimal units, the value is correctly rounded: ``"1.1 mm"`` is 0.0011, not the product 1.1
-        x 0.001, which has a rounding error.
-
-    Raises
-    ------
-    ValueError
-        If the text is not a number with a unit, or the unit is unknown or of another dimension.
+    A number without a unit is in SI. Decimal units are converted with correct rounding: ``"1.1 mm"`` is 0.0011, not 1.1
+    x 0.001.
     """
     match = _QUANTITY.match(value)
     if match is None or _SEVERAL.search(value) or not _may_be_unit(match[2]):
@@ -211,16 +196,7 @@ _LEADING = re.compile(r"(m|s|N|Pa|J|W|Hz|ohm|S)(?![\w^*])")
 def shown(value: float, unit: str, digits: int = 4, written: str = "") -> str:
     """Return a quantity for a reader: ``0.5 mm/s`` for 5e-4 m/s, ``-20 degC`` for 253.15 K.
 
-    Parameters
-    ----------
-    value : float
-        In the SI unit.
-    unit : str
-        The SI unit, ``"1"`` for a pure number.
-    digits : int
-        Largest number of digits.
-    written : str
-        Unit in which the value is printed; if it is empty, the SI unit with a suitable prefix is used.
+    It is printed in the unit `written`, or in the SI unit with a suitable prefix.
     """
     if written:
         factor, zero = conversion(written, unit)
@@ -262,18 +238,8 @@ _FAR = 3.0
 def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
     """Return whether a number without a unit may have been meant in another unit than the SI unit.
 
-    The number is first taken as a number in the SI unit. It is doubtful if it then differs from the first usual value
-    by more than 3 decades. It is also doubtful if another unit brings it nearer to the first usual value; the units of
-    all usual values are tried.
-
-    Parameters
-    ----------
-    value : float
-        The number as written.
-    unit : str
-        The SI unit.
-    usual : sequence of str
-        Usual values with their units: ``["2 GPa", "200 HV"]``.
+    In the SI unit, a doubtful number differs from the first of the `usual` values by more than 3 decades. A number is
+    also doubtful if the unit of one of the usual values brings it nearer to the first.
     """
     if value == 0:
         return False
@@ -286,8 +252,8 @@ def is_doubtful(value: float, unit: str, usual: Sequence[str]) -> bool:
 def likely(value: float, unit: str, usual: Sequence[str]) -> str:
     """Return a number with the unit in which it was probably meant, or an empty text.
 
-    The units of the usual values are tried. The unit that brings the number nearest to the first usual value is used.
-    If even this unit leaves a difference of more than 3 decades, the text is empty.
+    Of the units of the usual values, the one that brings the number nearest to the first of them is used, if the
+    difference is at most 3 decades.
     """
     found = {}
     for each in usual:
@@ -344,13 +310,7 @@ def registry() -> UnitRegistry[Any]:
 
 @lru_cache(maxsize=1024)
 def conversion(given: str, unit: str) -> tuple[float, float]:
-    """Return `factor` and `zero` of a unit: ``x`` in the unit `given` is ``x * factor + zero`` in the unit `unit`.
-
-    Raises
-    ------
-    ValueError
-        If the unit is unknown or of another dimension.
-    """
+    """Return `factor` and `zero` of a unit: ``x`` in the unit `given` is ``x * factor + zero`` in the unit `unit`."""
     from pint.errors import DimensionalityError, UndefinedUnitError
 
     units = registry()
@@ -380,13 +340,7 @@ _COHERENT = {"length": "m", "mass": "kg", "time": "s", "temperature": "K", "curr
 
 @lru_cache(maxsize=1024)
 def dimension_of(unit: str) -> tuple[Any, str]:
-    """Return the dimension of a unit as a pint object, and the coherent SI unit of that dimension.
-
-    Raises
-    ------
-    ValueError
-        If the unit is unknown.
-    """
+    """Return the dimension of a unit as a pint object, and the coherent SI unit of that dimension."""
     if unit not in ("", "1") and not is_unit(unit):
         raise ValueError(f"unknown unit {unit!r}{_nearest(unit)}")
     dimension = registry().parse_units(_factor_and_unit(unit)[1]).dimensionality
@@ -416,10 +370,7 @@ def _factor_and_unit(text: str) -> tuple[float, str]:
 
 
 def _nearest(word: str, unit: str = "") -> str:
-    """Return a hint for an unknown unit: the known unit with the nearest spelling.
-
-    If `unit` is given, only units with the dimension of `unit` are considered.
-    """
+    """Return a hint with the known unit of nearest spelling, if `unit` is given among units with its dimension."""
     common = COMMON.split()
     if re.match("HR[A-K]", word):
         return " (Rockwell hardness is not a pressure: convert it to HV by a table)"

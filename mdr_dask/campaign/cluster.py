@@ -18,10 +18,7 @@ _EXPECTED = {
 
 
 def load_cluster(path: FilePath) -> dict[str, Any]:
-    """Read a cluster file: the key ``class``, and the optional keys ``arguments``, ``scale`` and ``adapt``.
-
-    If the file has problems, raise CampaignError. The error lists all problems, sorted by line.
-    """
+    """Read a cluster file: the key ``class``, and the optional keys ``arguments``, ``scale`` and ``adapt``."""
     document = parse(read_text(path), str(path))
     data = document.data if isinstance(document.data, dict) else {}
     for key, value in data.items():

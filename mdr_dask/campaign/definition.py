@@ -1,7 +1,4 @@
-"""The data classes of a campaign.
-
-Instances of these classes cannot be changed. Their values are in SI units and have been checked.
-"""
+"""The data classes of a campaign. Their values are checked and in SI units."""
 
 from __future__ import annotations
 
@@ -15,11 +12,9 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.models.base import Parameters
 from mdr_dask.models.data_file import DataFile
 
-#: Number of digits to which the values of a range are rounded. A double has two digits more; rounding errors, which
-#: affect these two digits, thus disappear.
+#: Number of digits to which the values of a range are rounded. Rounding errors are in the last two digits of a double.
 _DIGITS = 14
-#: Two values of an axis count as equal if they agree in this number of digits. The number is smaller than `_DIGITS` by
-#: two, because the values may come from different formulas.
+#: Values of an axis count as equal if they agree in this number of digits; they may come from different formulas.
 SAME_DIGITS = 12
 #: Largest number of values that `Axis.some` returns, so that a check of an axis with a million values is fast.
 SOME = 64
@@ -54,11 +49,7 @@ class Spread:
 
 
 def tidy(value: float, whole: bool, exact: bool = False) -> float:
-    """Round a number that belongs to a range.
-
-    It is rounded to a whole number if `whole` is true. Otherwise it is rounded to 14 digits, or not at all if `exact`
-    is true.
-    """
+    """Round a number to a whole number if `whole` is true, otherwise to 14 digits, or not at all if `exact` is true."""
     if whole:
         return round(value)
     return float(value) if exact else float(f"{value:.{_DIGITS}g}")
@@ -72,8 +63,7 @@ class Axis:
     path: str
     # Name of its coordinate in the store: the path with ``_`` for ``.``.
     name: str
-    # Its dimension in the store. In a grid, the dimension is `name`; in a study whose parameters vary together, it is
-    # ``case``.
+    # Its dimension in the store: `name` in a grid, ``case`` if parameters vary together.
     dim: str
     # Checked values in SI, in the order of the file: numbers, names, or whole parameter sets.
     values: tuple[Any, ...]
@@ -96,7 +86,7 @@ class Axis:
 class Series:
     """The parameters and the axes of one series of a campaign. Each series is one group of the store."""
 
-    # Name of the Zarr group. It is empty in a campaign without series, whose arrays are at the root of the store.
+    # Name of the Zarr group; empty in a campaign without series.
     name: str
     # All parameters. A varied parameter has the first value of its axis.
     parameters: Parameters
@@ -110,12 +100,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """The largest accepted relative error and the largest accepted absolute error.
-
-    An error is accepted if it does not exceed at least one of these two limits.
-
-    `place` is the position of the tolerance in the campaign file.
-    """
+    """The largest accepted relative and absolute error; an error needs to meet only one of the two limits."""
 
     relative: float = 0.0
     absolute: float = 0.0
@@ -128,20 +113,16 @@ class Refinement:
 
     # The interval of the axis. Its scale, linear or logarithmic, is also used to interpolate the outputs.
     spread: Spread
-    # Largest accepted interpolation error of each output. A relative error refers to the largest value of the output
-    # along the axis.
+    # Largest accepted interpolation error of each output, relative to its largest value along the axis.
     until: Mapping[str, Tolerance]
     at_most: int
 
 
 @dataclass(frozen=True)
 class Replication:
-    """The number of realisations of each case.
+    """The number of realisations of each case. Further rounds follow until every tolerance is met."""
 
-    The first round has `at_least` realisations. Further rounds follow until every tolerance is met.
-    """
-
-    # Number of realisations in the first round (`at_least`), and largest total number in all rounds (`at_most`).
+    # Realisations of the first round, and of all rounds at most.
     at_least: int
     at_most: int
     # Largest accepted standard error of the mean of each output.
@@ -174,8 +155,7 @@ class Campaign:
     blocks: Mapping[str, int]
     text: str
     source: str
-    # Questions and remarks for the user: numbers without a unit that are unusually large or small, each with its
-    # position in the file, and columns of a table of cases that are not used.
+    # Questions about numbers without a unit, and columns of a table of cases that are not used.
     remarks: tuple[str, ...] = ()
-    # Table of measured values of an output, for the fit ``calibration``. None if the campaign has no table.
+    # Table of measured values of an output, for the fit ``calibration``.
     measured: DataFile | None = None

@@ -47,10 +47,7 @@ class Document:
         return self._at(self._nodes[path]) if path in self._nodes else Place(self.source, 1, 1)
 
     def key_place(self, path: Path) -> Place:
-        """Return the position of the key at a path.
-
-        An entry of a list has no key; for an entry, return the position of its value.
-        """
+        """Return the position of the key at a path. An entry of a list has no key; its value is used."""
         return self._at(self._keys[path]) if path in self._keys else self.place(path)
 
     def report(self, path: Path, what: str, key: bool = False) -> None:
@@ -76,10 +73,7 @@ def read_text(path: str | FilePath) -> str:
 
 
 def parse(text: str, source: str) -> Document:
-    """Return the document in a YAML 1.2 text. `source` is the name of the text in messages, such as its file name.
-
-    Syntax errors, duplicate keys, keys that are not strings, and unknown tags become problems of the document.
-    """
+    """Return the document in a YAML 1.2 text. Messages call the text `source`, which may be the name of its file."""
     document = Document(source, text)
     problems = document.problems
     if len(text) > _LONGEST:
@@ -116,10 +110,7 @@ _COLON_WITHIN = re.compile(r"\s*(?:- )?\w+: +[^\s'\"{\[#][^#]*: ")
 
 
 def _hint(text: str, index: int) -> str:
-    """Return a hint that names the likely mistake.
-
-    The mistake is looked for at the syntax error and in the lines just above the error.
-    """
+    """Return a hint that names the likely mistake at a syntax error or in the lines just above."""
     if text[index : index + 1] == "\t":
         return " (indent with spaces, not with tabs)"
     end = text.find("\n", index)
@@ -136,10 +127,7 @@ def _hint(text: str, index: int) -> str:
 
 
 def _is_indented_otherwise(lines: list[str]) -> bool:
-    """Return whether the last line is indented differently from the line above.
-
-    If the line above ends with a colon, return False.
-    """
+    """Return whether the last line is indented differently from the line above, unless that line ends with a colon."""
     written = [line for line in lines if line.strip() and not line.lstrip().startswith("#")][-2:]
     if len(written) < 2 or written[0].rstrip().endswith(":"):
         return False
@@ -148,10 +136,7 @@ def _is_indented_otherwise(lines: list[str]) -> bool:
 
 
 class _EndlessError(Exception):
-    """Raised to stop reading a document.
-
-    The document is too large or contains itself, and this problem has been reported.
-    """
+    """Raised to stop reading a document that is too large or contains itself, after this problem was reported."""
 
 
 class _Reader:

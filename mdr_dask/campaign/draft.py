@@ -41,7 +41,7 @@ _BOUNDS = ("gt", "ge", "lt", "le")
 
 
 def draft(name: str, model: Model[Any], file: str) -> str:
-    """Return the text of a campaign. The campaign passes every check, unless the model needs a data file.
+    """Return the text of a campaign that passes every check, unless the model needs a data file.
 
     `name` is the name of the model in a campaign, and `file` the name of the campaign file, for its comments.
     """
@@ -72,10 +72,7 @@ def _entries(parameters: type[Parameters]) -> Iterator[str]:
 
 
 def _needed(parameters: type[BaseModel]) -> set[str]:
-    """Return the dotted names of the parameters that a first campaign needs.
-
-    These are the required parameters, and from each group of alternatives the parameters of its first member.
-    """
+    """Return the dotted names of the required parameters and of the first member of each group of alternatives."""
     groups = getattr(parameters, "alternatives", ())
     return {*fields.required(parameters), *(name for group in groups for name in group[0])}
 
@@ -98,10 +95,7 @@ def _choices(info: FieldInfo) -> list[str]:
 
 
 def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str]:
-    """Return example texts of a value.
-
-    There is one text for each structure that the value may have. A value that is not a structure has one text.
-    """
+    """Return example texts of a value: one for each structure that it may have, or a single text."""
     info = parameters.model_fields[name]
     kinds = list(fields.structures(info))
     if inner:
@@ -113,7 +107,7 @@ def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str
 
 
 def _structures(kind: type[BaseModel], inner: set[str]) -> list[str]:
-    """Return examples of a structure, each on one line. There is one example for each alternative of the structure."""
+    """Return examples of a structure, one for each of its alternatives, each on one line."""
     group = next(iter(getattr(kind, "alternatives", ())), ())
     wanted = [{*fields.required(kind), *member} for member in group] or [_needed(kind)]
     open_keys = [key for key in kind.model_fields if key not in fields.fixed(kind)]

@@ -35,10 +35,7 @@ def expand(
 ) -> tuple[tuple[Series, ...], tuple[str, ...]]:
     """Return the series of a campaign that have no problems, and questions and remarks for the user.
 
-    The user is asked about numbers without a unit, and a remark names columns of a table of cases that are not used.
-
-    `directory` is the folder to which the names of files are relative, and `outputs` are the names of the requested
-    outputs. Every problem of parameters, ranges and tables is added to the problems of the document.
+    Names of files are relative to `directory`. `outputs` are the requested outputs. Problems are added to the document.
     """
     found = []
     asked: dict[str, None] = {}
@@ -93,10 +90,7 @@ class _Expansion:
     def _require_places(
         self, base: Parameters, axis: Axis, origin: Origin, model: Model[Any], outputs: Sequence[str]
     ) -> None:
-        """Report a problem if an axis changes the coordinates of an output.
-
-        All cases share one array, so they must have the same coordinates.
-        """
+        """Report a problem if an axis changes the coordinates of an output: all cases share one array."""
         wanted = [model.output(name) for name in outputs]
         if not any(output.dims for output in wanted):
             return
@@ -158,10 +152,7 @@ class _Expansion:
     def _grid_values(
         self, base: Parameters | None, variations: Sequence[Variation], index: int, broken: set[Path]
     ) -> list[Any] | None:
-        """Return the checked values of one axis, or None if a value is wrong.
-
-        Each value is checked in combination with the first value of every other axis.
-        """
+        """Return the values of one axis, each checked with the first values of all other axes; None if one is wrong."""
         one = variations[index]
         known = _checked(base, self._substituted(self.data, variations, 0), {one.path[0]})
         # the problems of the other axes are reported when their own values are checked
@@ -192,10 +183,7 @@ class _Expansion:
     def _case_values(
         self, base: Parameters | None, variations: Sequence[Variation], broken: set[Path]
     ) -> list[list[Any] | None]:
-        """Return the checked values of every varied parameter in all cases.
-
-        If a case is wrong, return None for every parameter.
-        """
+        """Return the checked values of every varied parameter in all cases; only None if a case is wrong."""
         known = _checked(base, self.data, {one.path[0] for one in variations})
         cases = range(min((len(one.items) for one in variations), default=0))
         sizes = [[item.value for item in one.items] for one in variations]

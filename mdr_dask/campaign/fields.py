@@ -29,10 +29,7 @@ class Entry(NamedTuple):
 
 
 def walk(parameters: type[BaseModel], before: str = "") -> Iterator[Entry]:
-    """Yield all keys of a parameter set and of its nested sets, except keys with only one possible value.
-
-    `before` is the start of the dotted names.
-    """
+    """Yield all keys of a parameter set and of its nested sets, except keys with only one possible value."""
     for name, info in parameters.model_fields.items():
         if name not in fixed(parameters):
             yield Entry(f"{before}{name}", parameters, info, structures(info))
@@ -41,10 +38,7 @@ def walk(parameters: type[BaseModel], before: str = "") -> Iterator[Entry]:
 
 
 def members(annotation: Any) -> tuple[Any, ...]:
-    """Return the types that an annotation allows.
-
-    Unions and ``Annotated`` are replaced by the types that they contain.
-    """
+    """Return the types that an annotation allows, with unions and ``Annotated`` resolved."""
     origin = get_origin(annotation)
     if origin is Annotated:
         return members(get_args(annotation)[0])
@@ -54,10 +48,7 @@ def members(annotation: Any) -> tuple[Any, ...]:
 
 
 def holds_list(info: FieldInfo) -> bool:
-    """Return whether a single value of this field is a list.
-
-    In any other field, a list contains the values of an axis.
-    """
+    """Return whether a single value of this field is a list. In other fields, a list contains the values of an axis."""
     kinds = [get_origin(kind) or kind for kind in members(info.annotation)]
     return any(isinstance(kind, type) and issubclass(kind, Sequence) and kind is not str for kind in kinds)
 
@@ -76,9 +67,7 @@ def structures(info: FieldInfo) -> tuple[type[BaseModel], ...]:
 def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
     """Return the parameter set that a mapping describes, from its fixed keys such as ``shape: cone``.
 
-    If several sets fit, return the set that has the largest number of keys in common with the mapping. If several sets
-    have equally many keys in common with the mapping, count also misspelt keys: return the set whose fields resemble
-    the largest number of keys.
+    If several sets fit, the set with most keys of the mapping is returned, and then the set with most similar keys.
     """
     if not isinstance(value, dict):
         return None
@@ -143,10 +132,7 @@ def is_independent(parameters: type[BaseModel], path: Path, data: Any) -> bool:
 
 
 def choices(parameters: type[BaseModel], path: Path) -> tuple[str, ...]:
-    """Return the forms in which a nested parameter may be written.
-
-    For the path of the exponent of an indenter, for example, this is ``indenter: {shape: power, ...}``.
-    """
+    """Return the forms in which a nested parameter may be written, such as ``indenter: {shape: power, ...}``."""
     name, *rest = path
     if name not in parameters.model_fields or not rest:
         return ()

@@ -16,11 +16,10 @@ from mdr_dask.errors import CampaignError
 
 
 def of_keys(source: Mapping[str, Any]) -> Campaign:
-    """Read a campaign from the keys of a campaign file; raise CampaignError with every problem.
+    """Read a campaign from the keys of a campaign file. Messages have no line numbers.
 
-    Values may be written as in a file. They may also be arrays and numbers of numpy, pandas or xarray, ranges of
-    Python, paths, or quantities of pint. Messages have no line numbers. Numbers of numpy are rounded to 14 digits, like
-    the values of a range in a file. So ``np.linspace(a, b, n)`` gives the same values as ``{linear: [a, b, n]}``.
+    Values may also be arrays and numbers of numpy, pandas or xarray, ranges of Python, paths, or quantities of pint.
+    Numbers of numpy are rounded to 14 digits, so that ``np.linspace(a, b, n)`` equals ``{linear: [a, b, n]}``.
     """
     text = json.dumps({"name": "study", **{str(key): _plain(value) for key, value in source.items()}}, indent=1)
     try:

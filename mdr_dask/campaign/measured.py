@@ -34,26 +34,10 @@ FEW = 3
 
 @dataclass(frozen=True)
 class Measured:
-    """Measured points.
+    """Measured points in SI; each array has the shape (points,).
 
-    Parameters
-    ----------
-    source : str
-        Name of the table, for messages.
-    output : str
-        The output that was measured.
-    values : array, shape (points,)
-        The measured values, in SI.
-    errors : array, shape (points,), or None
-        Standard errors of the values; None if the table does not contain them.
-    error_column : str
-        A text with the name of the column that contains the errors.
-    conditions : dict of str to array, shape (points,)
-        The values of the parameters at each measured point, in SI, by the names of their coordinates in the store.
-    lines : tuple of Line
-        For each measured point, the line in the table from which the point was read.
-    remark : str
-        A text that names unused columns and counts rows that lack a number; empty if all columns and rows are used.
+    `errors` are standard errors of the values, and `error_column` the name of their column. The keys of `conditions`
+    are coordinates of the store. `remark` names unused columns and counts rows that lack a number.
     """
 
     source: str
@@ -69,22 +53,10 @@ class Measured:
 def read_measured(
     text: str, source: str, conditions: Mapping[str, str], outputs: Mapping[str, str], structures: Iterable[str] = ()
 ) -> Measured:
-    """Read a table of measured points.
+    """Read a table of measured points. `conditions` and `outputs` are SI units of the columns that it may contain.
 
-    Parameters
-    ----------
-    text, source : str
-        The table and the name of its file.
-    conditions, outputs : mapping of str to str
-        SI units of the conditions and of the outputs that the table may contain, by their names in the store.
-    structures : iterable of str
-        Names of nested parameter sets, such as ``solid``. If only one of these sets has a parameter ``temperature``,
-        for example, the table may call its column ``temperature`` instead of ``solid_temperature``.
-
-    Raises
-    ------
-    DataError
-        If the text is not a table, has no column or several columns for outputs, or has fewer than two points.
+    `structures` are names of nested parameter sets, such as ``solid``. If only one of them has a parameter
+    ``temperature``, the table may call its column ``temperature`` instead of ``solid_temperature``.
     """
     sheet = read_sheet(text, source)
     of_outputs = {name: Column(name, unit) for name, unit in outputs.items()}
@@ -117,14 +89,11 @@ def read_measured(
 
 
 def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...], str, bool]:
-    """Find the columns that contain errors of the output.
+    """Return the headings of columns with errors of the output, their unit, and whether the errors are relative.
 
-    Return the headings of these columns; the unit of the errors, empty if a heading states a unit; and whether the
-    errors are relative. The output is the last entry of `columns`. Errors without a unit have the unit of the output.
-    Errors in percent are relative to the values, unless the values are in percent as well.
-
-    If a heading does not name a quantity, such as ``std``, the column holds errors of the nearest known column before
-    it.
+    The output is the last of `columns`. The unit is empty if a heading states it. Errors without a unit have the unit
+    of the output. Errors in percent are relative, unless the values are in percent as well. A heading without a
+    quantity, such as ``std``, belongs to the nearest known column before it.
     """
     output, headings, given, before = columns[-1], [], "", None
     for name, unit in zip(sheet.names, sheet.units, strict=True):
@@ -147,20 +116,14 @@ def _error_of(sheet: Sheet, columns: Sequence[Column]) -> tuple[tuple[str, ...],
 
 
 def _short_names(names: Sequence[str], structures: Iterable[str]) -> dict[str, list[str]]:
-    """Return short names of nested parameters: the name of the parameter without the name of its structure.
-
-    Only short names that are unique are returned.
-    """
+    """Return the names of nested parameters without the name of their structure, if these short names are unique."""
     short = [(name, name.removeprefix(f"{one}_")) for one in structures for name in names if name.startswith(f"{one}_")]
     called = [*names, *(inner for _, inner in short)]
     return {name: [inner] for name, inner in short if called.count(inner) == 1}
 
 
 def require_readable(text: str, source: str, model: str, outputs: Sequence[str], series: Sequence[Series]) -> None:
-    """Raise DataError if a table is too large, or does not fit any series of a campaign.
-
-    If the table fits no series, the message says why the table does not fit the first series.
-    """
+    """Raise DataError if a table is too large, or does not fit any series of a campaign."""
     if len(text) > LARGEST:
         size, most = distinguishable(len(text) / 1e6, LARGEST / 1e6)
         raise DataError(f"{source}: expected a table of at most {most} MB, got {size} MB")
@@ -231,10 +194,7 @@ def _reach(name: str, series: Series, conditions: Iterable[str]) -> dict[str, tu
 
 
 def unknowns(campaign: Campaign) -> tuple[str, ...]:
-    """Return the axes of a campaign for which the table of measured points has no column.
-
-    If the campaign has no table, return no axes.
-    """
+    """Return the axes of a campaign for which its table of measured points has no column."""
     table = campaign.measured
     if table is None:
         return ()

@@ -37,10 +37,7 @@ _KINDS = {
 
 
 def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, report: Report) -> None:
-    """Report every error of ``kind.model_validate(data)``.
-
-    If a value fits none of the types of a union, its errors for all these types become one message.
-    """
+    """Report every error of ``kind.model_validate(data)``; the errors of all types of a union become one message."""
     groups: dict[Path, list[ErrorDetails]] = {}
     for details in error.errors(include_url=False):
         if _is_of_another_branch(details, kind, data):
@@ -54,10 +51,7 @@ def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, repo
 
 
 def path_into(data: Any, details: ErrorDetails) -> Path:
-    """Return the path in the data to the value with an error.
-
-    It is the ``loc`` of the error without the names that pydantic adds for the types of a union.
-    """
+    """Return the path in the data to the value with an error: its ``loc`` without the names of types of a union."""
     path: Path = ()
     location = details["loc"]
     for depth, part in enumerate(location):
@@ -72,10 +66,7 @@ def path_into(data: Any, details: ErrorDetails) -> Path:
 
 
 def _is_of_another_branch(details: ErrorDetails, kind: type[BaseModel], data: Any) -> bool:
-    """Return whether an error comes from a structure that the user did not mean.
-
-    The keys of the value show which structure is meant.
-    """
+    """Return whether an error comes from a structure that the user did not mean, judged by the keys of the value."""
     path: Path = ()
     value = data
     for part in details["loc"]:
@@ -140,10 +131,7 @@ def _hint(group: list[ErrorDetails], value: Any) -> str:
 
 
 def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return a hint that a unit may have been forgotten after a number.
-
-    The number is out of bounds without the unit.
-    """
+    """Return a hint that a unit may have been forgotten after a number that is out of bounds without the unit."""
     value, info, unit = value_at(data, path), _field(kind, path, data), fields.unit_at(kind, path, data)
     usual = fields.usual(info) if info else ()
     if not isinstance(value, int | float) or group[0]["type"] not in _BOUNDS:
@@ -155,10 +143,7 @@ def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel]
 
 
 def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return a hint for a parameter that needs a mapping or a list, but got a single word.
-
-    The hint shows how to write the value.
-    """
+    """Return a hint how to write a value that is a single word instead of a mapping or a list."""
     value, info = value_at(data, path), _field(kind, path, data)
     if not info or not isinstance(value, str):
         return ""
@@ -245,10 +230,7 @@ def _quantity(path: Path, kind: type[BaseModel], data: Any) -> str:
 
 
 def _unknown(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return the message about an unknown key.
-
-    The message gives the new name if the key was renamed, and otherwise the known key that is most similar.
-    """
+    """Return the message about an unknown key, with its new name if it was renamed, or with the most similar key."""
     around = _structure_around(path, kind, data)
     instead = getattr(around, "renamed", {}).get(path[-1])
     if instead:

@@ -24,18 +24,13 @@ from mdr_dask.units import to_si
 def load(path: str | FilePath) -> Campaign:
     """Read a campaign file. Names of files in it are relative to its folder.
 
-    If the file has problems, raise CampaignError. The error lists all problems, sorted by line, such as
-    ``force.yaml:12:12: parameters.hurst: expected a number of at most 1, got 1.2``.
+    A CampaignError lists all problems by line: ``force.yaml:12:12: parameters.hurst: expected at most 1, got 1.2``.
     """
     return loads(read_text(path), str(path), str(FilePath(path).parent))
 
 
 def loads(text: str, source: str, directory: str) -> Campaign:
-    """Read a campaign from its text (YAML 1.2).
-
-    `source` is the name of the campaign file in messages, and `directory` the folder to which the names of files in the
-    campaign are relative. If the text has problems, raise CampaignError. The error lists all problems, sorted by line.
-    """
+    """Read a campaign from a YAML 1.2 text, called `source` in messages. Names of files are relative to `directory`."""
     document = parse(text, source)
     if not isinstance(document.data, dict):
         if not document.problems:
@@ -81,10 +76,7 @@ def loads(text: str, source: str, directory: str) -> Campaign:
 
 
 def _spec(document: Document, directory: str) -> tuple[CampaignSpec, set[str]]:
-    """Return the checked keys and the names of the wrong keys.
-
-    Among the checked keys, each wrong key has its default value.
-    """
+    """Return the checked keys, with the default value for each wrong key, and the names of the wrong keys."""
     wrong: set[str] = set()
 
     def report(path: Path, what: str, key: bool) -> None:

@@ -101,10 +101,7 @@ def alternatives_of(model: Model[Any]) -> list[str]:
 
 
 def output_rows(model: Model[Any]) -> list[dict[str, str]]:
-    """Return a row for every output of a model.
-
-    It contains name, unit, own dimensions, whether the output is computed by default, and its meaning.
-    """
+    """Return name, unit, own dimensions, default, error and meaning of every output of a model."""
     return [
         {
             "output": output.name,

@@ -24,10 +24,9 @@ _NOT_A_HEADING = "expected the name of a parameter, perhaps with a unit in brack
 
 
 def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Variation, ...]:
-    """Return the varied parameters with their values. Every parameter has one value for each point of the design.
+    """Return the varied parameters with one value for each point of the design, drawn from their intervals.
 
-    The values are drawn from the intervals of the parameters, and `seed` makes the drawing repeatable. A longer Sobol
-    sequence begins with the points of a shorter one.
+    The same `seed` gives the same values. A longer Sobol sequence begins with the points of a shorter one.
     """
     import numpy as np
     from scipy.stats import qmc
@@ -49,10 +48,9 @@ def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Va
 
 
 def _exchanged(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return the points of the design of Saltelli from pairs of points a and b.
+    """Return the points of the design of Saltelli from pairs of points a and b, shape (points, inputs).
 
-    Each pair gives the points a and b, and one further point for every input: a copy of a in which this input has its
-    value from b.
+    Each pair gives a, b, and one point for every input: a copy of a in which this input has its value from b.
     """
     import numpy as np
 
@@ -75,12 +73,8 @@ def tabled(
 ) -> tuple[Variation, ...] | None:
     """Read the varied parameters from a CSV file: each column is a parameter, and each line is a case.
 
-    Return None if there is a problem.
-
-    `name` is the name of the file, relative to `directory`, and `origin` the position of this name in the campaign.
-    `data` are the values of all parameters that are not in the table, as read from the campaign file. Problems of the
-    table, such as misspelt columns, wrong units and missing cells, are added to `problems`. A sentence that names the
-    ignored columns is added to `remarks`.
+    The file `name` is relative to `directory`; `origin` is the position of this name in the campaign. `data` are the
+    values of the other parameters. If there are `problems`, the result is None. Ignored columns go into `remarks`.
     """
     path = Path(directory, name)
     try:
@@ -115,11 +109,7 @@ def tabled(
 
 
 def _is_unused(heading: str, entries: Iterable[str], parameters: type[Parameters]) -> bool:
-    """Return whether a column is ignored. It is ignored if its heading does not name a parameter.
-
-    A column of numbers whose heading is similar to the name of a parameter is not ignored, but counts as a misspelt
-    parameter.
-    """
+    """Return whether a column is ignored. Numbers below a heading similar to a parameter are not ignored."""
     if heading.split(".")[0] in parameters.model_fields:
         return False
     has_numbers = any(isinstance(_value(entry, ""), int | float) for entry in entries)

@@ -19,11 +19,7 @@ _QUANTITY_REFERENCE = {"$ref": "#/$defs/quantity"}
 
 
 def json_schema() -> Schema:
-    """Return the JSON schema (draft 2020-12) of campaign files. The schema covers all models.
-
-    It accepts every valid file. It refuses unknown keys, wrong types and numbers out of bounds, but does not check
-    units.
-    """
+    """Return the JSON schema (draft 2020-12) of campaign files of all models. It does not check units."""
     root = _readable(CampaignSpec.model_json_schema())
     definitions = {**root.pop("$defs"), **_ranges()}
     choices = []
@@ -44,8 +40,7 @@ def json_schema() -> Schema:
 def parameters_schema(parameters: type[Parameters], references: str = "#/$defs/{model}") -> Schema:
     """Return the schema of the key ``parameters`` for a model. Each parameter is a value, a list or a range.
 
-    `references` is the JSON reference to the schema of a nested parameter set. In this text, ``{model}`` stands for the
-    name of the nested set.
+    `references` is the JSON reference to a nested parameter set, with ``{model}`` for the name of this set.
     """
     own: Schema = _readable(parameters.model_json_schema(ref_template=references))
     own.pop("required", None)

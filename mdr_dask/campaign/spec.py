@@ -26,20 +26,14 @@ FileName = Annotated[str, AfterValidator(_usable_as_file_name)]
 
 
 class ToleranceSpec(Parameters):
-    """The largest accepted relative and absolute error of an output.
-
-    An error is accepted if it does not exceed at least one of these two limits.
-    """
+    """The largest accepted relative and absolute error of an output."""
 
     relative: float = quantity("1", "largest error relative to the mean, such as 1 %", default=0.0, ge=0)
     absolute: float | str = Field(0.0, description="largest error in the unit of the output, such as 2 um")
 
 
 class AdaptiveSpec(Parameters):
-    """A number of realisations that is increased separately for each case.
-
-    It grows until the standard errors of the case are small enough.
-    """
+    """A number of realisations that grows for each case until its standard errors are small enough."""
 
     at_least: int = Field(20, ge=2, description="number of realisations that every case gets")
     at_most: int = Field(description="largest number of realisations that a case may get", ge=2)

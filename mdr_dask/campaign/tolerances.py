@@ -26,11 +26,7 @@ def tolerances(
     model: Model[Any],
     outputs: Sequence[str],
 ) -> dict[str, Tolerance]:
-    """Return the tolerance, in SI, of every output that is named at a path of a document.
-
-    `given` are the tolerances as written, by output, and `outputs` the outputs of the campaign. Unknown names and wrong
-    tolerances are reported.
-    """
+    """Return the tolerances at a path in SI, by output. Unknown names and wrong tolerances are reported."""
     known = [output.name for output in model.outputs if output.name in outputs]
     found = {}
     for name, written in given.items():
@@ -51,10 +47,7 @@ def is_of_fit(name: str, model: Model[Any]) -> bool:
 
 
 def answers(document: Document, path: Path, given: Mapping[str, Written]) -> dict[str, Tolerance]:
-    """Return the tolerances of fitted constants, indexed by names of the form ``fit.constant``.
-
-    A tolerance with ``%`` is relative to the constant. A number without ``%`` is absolute.
-    """
+    """Return the tolerances of fitted constants, by ``fit.constant``: relative with ``%``, otherwise absolute."""
     found = {}
     for name, written in given.items():
         constant = name if "." in name else f"{name}.{name}"

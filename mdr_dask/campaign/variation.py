@@ -27,10 +27,7 @@ DECADE = 10.0
 
 @dataclass(frozen=True)
 class Origin:
-    """The place where a value is written, for messages: the name of the key, the position in the file, and the path.
-
-    Values from a table have no path.
-    """
+    """The place where a value is written, for messages: key, position in the file, and path (None in a table)."""
 
     name: str
     place: Place
@@ -38,10 +35,7 @@ class Origin:
 
 
 class Item(NamedTuple):
-    """One value of a varied parameter, as written or in SI.
-
-    `inner` is true if the value lies between the ends of a range.
-    """
+    """One value of a varied parameter, as written or in SI; `inner` is true between the ends of a range."""
 
     value: Any
     origin: Origin
@@ -50,10 +44,7 @@ class Item(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The text of the value as written in the file.
-
-        A value that was computed from a range has no such text; its number is used.
-        """
+        """The text of the value as written in the file, or its number if it was computed from a range."""
         return self.written or f"{self.value:g}"
 
 
@@ -61,8 +52,7 @@ class Item(NamedTuple):
 class Variation:
     """A varied parameter: its path in the parameters, and its values or the interval from which they are drawn.
 
-    An adaptive axis has both values and an interval. For an adaptive axis, `written` is the path of the axis in the
-    document.
+    An adaptive axis has both, and `written` is its path in the document.
     """
 
     path: tuple[str, ...]
@@ -86,9 +76,8 @@ def find(
 ) -> tuple[Variation, ...]:
     """Return the varied parameters, in the order of the data, and report wrong ranges and empty lists.
 
-    `data` are the values of the parameters as read from the file, and `paths` their paths in the document. If `drawn`
-    is true, values will be drawn from the ranges, so the user writes a range without the number of values. If a
-    parameter has a problem, its variation has neither values nor an interval.
+    `paths` are the paths of the values `data` in the document. If `drawn` is true, ranges have no number of values. The
+    variation of a parameter with a problem is empty.
     """
     search = _Search(document, parameters, data, drawn)
     return tuple(found for name, value in data.items() for found in search.below((name,), value, paths[name]))
@@ -241,12 +230,7 @@ class _Search:
 
 
 def spaced(spread: Spread, count: int) -> list[float]:
-    """Return `count` values from one end of an interval to the other.
-
-    The ends are exact, and the values between them are rounded to 14 digits.
-
-    In an interval of whole numbers each value appears only once, so there may be fewer than `count` values.
-    """
+    """Return at most `count` values between the exact ends of an interval. Whole numbers are not repeated."""
     inner = spread.at(np.arange(1, count - 1) / (count - 1))
     ends = [tidy(end, spread.whole, exact=True) for end in (spread.low, spread.high)]
     return list(dict.fromkeys([ends[0], *inner, ends[1]]))

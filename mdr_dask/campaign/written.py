@@ -17,9 +17,8 @@ from mdr_dask.units import is_doubtful, likely, unit_behind
 
 @lru_cache(maxsize=16)
 def written_units(text: str) -> dict[str, str]:
-    """Return the unit of every parameter whose values are all written in the same unit.
+    """Return the unit of every parameter whose values are all written in one unit, by coordinate: ``indenter_radius``.
 
-    The keys are the names of the coordinates of the parameters: ``{"rotation_speed": "rpm", "indenter_radius": "mm"}``.
     If the text of the campaign cannot be read, the result is empty.
     """
     whole = parse(text, "").data
@@ -42,8 +41,7 @@ def questions(
 ) -> Iterator[str]:
     """Yield a question for each parameter that has a number without a unit, if this number may not be meant in SI.
 
-    `data` are the values of the parameters as read from the file, and `paths` their paths in the document. `units`
-    contains only parameters whose unit is not the declared unit, as in a dimensionless campaign.
+    `paths` are the paths of the values `data` in the document. `units` are units that differ from the declared ones.
     """
     asked: set[Path] = set()
     for name, given in data.items():
@@ -67,10 +65,7 @@ def _question(value: float, unit: str, usual: tuple[str, ...]) -> str:
 
 
 def _scalars(value: Any, field: Path, at: Path) -> Iterator[tuple[Path, Path, Any]]:
-    """Yield the parameter, the position and the value of every number and every text.
-
-    The entries of a list or range belong to the parameter that they vary.
-    """
+    """Yield parameter, position and value of every number and text. Lists belong to the varied parameter."""
     if isinstance(value, dict):
         for key, inner in value.items():
             if key in RANGES and isinstance(inner, list):

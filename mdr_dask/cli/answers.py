@@ -1,7 +1,4 @@
-"""Print the table that answers a question, or write it to a file.
-
-Rows are written as soon as they are computed.
-"""
+"""Print the table that answers a question, or write it to a file, row by row."""
 
 from __future__ import annotations
 
@@ -32,9 +29,7 @@ FILES = (".csv", ".json", ".jsonl", ".parquet", ".nc", ".zarr")
 
 
 def print_answer(answer: Table, form: str, limit: int, join: bool) -> None:
-    """Print a table in aligned columns, as CSV, as JSON, or as one JSON object per line.
-
-    A table in aligned columns has at most `limit` rows (0 for all rows). The other forms contain all rows.
+    """Print a table in aligned columns with at most `limit` rows, or all rows as CSV, JSON or one JSON object per line.
 
     If `join` is true, each mean and its errors are printed in one column.
     """
@@ -65,11 +60,7 @@ def write_answer(answer: Table, path: Path) -> int:
 
 
 def check_target(path: Path) -> None:
-    """Raise an error if a table cannot be written to a path.
-
-    A table cannot be written if the suffix of the path is unknown, if there is the store of a study at the path, or if
-    the suffix is ``.parquet`` and pyarrow is not installed.
-    """
+    """Raise an error if a table cannot be written to a path: wrong suffix, a study at the path, or no pyarrow."""
     from mdr_dask.store import is_study
 
     require_suffix(path, FILES)
@@ -112,12 +103,9 @@ def _print_frame(frame: pd.DataFrame, answer: Table, join: bool) -> None:
 
 
 def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
-    """Join the columns of each mean and its errors or interval to one column of texts.
+    """Join each mean and its errors, ``0.1234 +- 0.0005``, or its interval, ``0.1234 (0.1220, 0.1240)``, in one column.
 
-    Examples are ``0.1234 +- 0.0005 +- 0.0001`` for errors and ``0.1234 (0.1220, 0.1240)`` for an interval.
-
-    The column of an error is left out if the error is unknown in all rows, or if the error is zero or a rounding error
-    in all rows. The returned text names the errors that are printed.
+    An error is left out if it is unknown or zero in all rows. The returned text names the errors that are printed.
     """
     known = {name for name, values in columns.items() if any(map(_is_known, values))}
     joined: dict[str, list[Any]] = {}

@@ -71,10 +71,7 @@ def _indented(path: str) -> str:
 
 
 def _parameter(row: dict[str, str]) -> str:
-    """Return the meaning, unit, default and allowed values of a parameter.
-
-    Parameters nested in it are not described here, because each has a line of its own.
-    """
+    """Return the meaning, unit, default and allowed values of a parameter, without the parameters nested in it."""
     words = [word for word in row["allowed"].split(" or ") if not word.startswith("{")]
     default = f"default {row['default']}" if row["default"] not in ("", "required") else row["default"]
     short = re.sub(r"\[([^\]]{9})[^\]]{30,}, ([^,\]]*)\]", r"[\1..., \2]", default)
@@ -82,10 +79,7 @@ def _parameter(row: dict[str, str]) -> str:
 
 
 def _output(row: dict[str, str]) -> str:
-    """Return the meaning, unit and dimensions of an output.
-
-    The text also says whether the output is computed by default, and whether it has an error.
-    """
+    """Return the meaning, unit and dimensions of an output, and whether it is a default and has an error."""
     along = row["dimensions"] and f"along {row['dimensions']}"
     missing = "" if row["default"] == "yes" else "only if requested"
     return "; ".join(filter(None, [_with_unit(row), along, missing, row["error"] and "with error"]))

@@ -24,10 +24,9 @@ if TYPE_CHECKING:
 
 @contextmanager
 def telling(quiet: bool, log: Path | None, **about: Any) -> Iterator[Tell]:
-    """Yield the function that writes the events of a run to its log, and their messages to stderr unless `quiet`.
+    """Yield the function that writes the events of a run to the file `log`, and their messages to stderr.
 
-    The events are appended to the file `log`; if `log` is None, no file is written. `about` contains facts about the
-    run for the first line.
+    `about` contains facts about the run for the first line.
     """
     if log is None:
         yield _printer(quiet)

@@ -83,11 +83,7 @@ def look_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def figure_options(*names: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Add an option for the file of a figure, and the options for the look of the figure.
-
-    `names` are the spellings of the option for the file. The command gets the file as the argument `figure`, and the
-    options for the look as the argument `look`.
-    """
+    """Add an option, spelt `names`, for the file of a figure as the argument `figure`, and options for its `look`."""
 
     def add(command: Callable[..., Any]) -> Callable[..., Any]:
         @wraps(command)

@@ -55,10 +55,7 @@ def _filled(line: str) -> str:
 
 
 def print_rows(rows: Sequence[Row], units: dict[str, str], form: str, limit: int | None = None) -> None:
-    """Print rows with the same keys as an aligned ``table``, as ``csv``, or as one ``json`` document with units.
-
-    `limit` is the largest number of rows of an aligned table; the number of further rows is printed on stderr.
-    """
+    """Print rows with the same keys as an aligned ``table``, as ``csv``, or as one ``json`` document with units."""
     if form == "json":
         print_json({"units": units, "rows": [{key: _finite(value) for key, value in row.items()} for row in rows]})
         return
@@ -82,12 +79,10 @@ def titled(name: str, unit: str) -> str:
 
 
 def print_aligned(titles: Sequence[str], columns: Sequence[Sequence[Any]], keys: int = 1, note: str = "") -> None:
-    """Print columns side by side, within the width of the terminal.
+    """Print columns side by side. A table that is too wide is printed in parts that repeat the first `keys` columns.
 
-    The text `note` is printed above the table. The note also gives the columns that have the same value in all rows,
-    each with this value, and the names of the columns without values. If a table is too wide, it is printed in parts.
-    Each part begins with the first `keys` columns, which identify a row. A single row that is too wide is printed as a
-    list.
+    Columns with the same value in all rows, and columns without values, are named above the table, after the text
+    `note`. A single row that is too wide is printed as a list.
     """
     rows = len(columns[0]) if columns else 0
     cells = [[short(value) for value in column] for column in columns]
@@ -206,10 +201,7 @@ def print_json(document: Any) -> None:
 
 
 def table(dataset: xr.Dataset) -> tuple[list[Row], dict[str, str]]:
-    """Turn a Dataset into rows, one for each point of its dimensions, and the units of the columns.
-
-    Variables that lack a dimension are repeated along it; scalar coordinates are left out.
-    """
+    """Return one row for each point of the dimensions of a Dataset, and the units of the columns."""
     data = dataset.drop_vars([name for name, coord in dataset.coords.items() if coord.ndim == 0])
     dims = [str(dim) for dim in data.sizes]
     names = [*dims, *(str(name) for name in data.variables if name not in dims)]

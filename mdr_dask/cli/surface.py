@@ -125,10 +125,7 @@ def _option(name: str) -> str:
 
 
 def _kind(file: str, options: dict[str, Any]) -> str:
-    """Return whether a file contains a map, a scan or a spectrum.
-
-    A spectrum is recognised by the names of its columns. A map has two dimensions, a scan has one.
-    """
+    """Return the kind of a file: a spectrum by the names of its columns, a map with two dimensions, or else a scan."""
     from mdr_dask.models.data_file import DataFile
     from mdr_dask.models.parts.height_file import TEXT, dimensions
     from mdr_dask.models.parts.surface_files import is_spectrum

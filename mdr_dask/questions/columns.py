@@ -25,10 +25,7 @@ WORDS = np.array([state.name.lower() for state in Status], dtype=object)
 
 
 def numbers(dataset: xr.Dataset) -> dict[str, Number]:
-    """Return the dimensionless numbers of the model of a study, indexed by name.
-
-    If the model cannot be loaded, the result is empty.
-    """
+    """Return the dimensionless numbers of the model of a study by name; none if the model cannot be loaded."""
     try:
         return {number.name: number for number in models.load(str(dataset.attrs.get("model"))).numbers}
     except ModelError:
@@ -36,10 +33,7 @@ def numbers(dataset: xr.Dataset) -> dict[str, Number]:
 
 
 def fixed_words(dataset: xr.Dataset) -> dict[str, str]:
-    """Return the fixed parameters whose value is a word, indexed by name.
-
-    The parts of the name of a nested parameter are joined by ``_``.
-    """
+    """Return the fixed parameters whose value is a word, by name with ``_`` for dots."""
     import pandas as pd
 
     flat = pd.json_normalize(_parameters(dataset.attrs.get("parameters", "{}")), sep="_")
@@ -54,13 +48,7 @@ def _parameters(text: str) -> dict[str, object]:
 
 
 class Columns:
-    """The columns of a part of a study; each column is computed once.
-
-    Parameters
-    ----------
-    dataset : Dataset
-        A group of a study. Its cases are a grid, or are along the dimension ``row``.
-    """
+    """The columns of a part of a study; each column is computed once."""
 
     def __init__(self, dataset: xr.Dataset) -> None:
         self.dataset = dataset
@@ -81,13 +69,7 @@ class Columns:
         return self._found[name]
 
     def column(self, name: str) -> xr.DataArray:
-        """Return a column with its unit.
-
-        Raises
-        ------
-        DataError
-            If there is no such column, or the study lacks a quantity that the formula of the column needs.
-        """
+        """Return a column with its unit; raise DataError if it is unknown or cannot be computed from this study."""
         found = self.find(name)
         if found is None:
             raise self.unknown(name)

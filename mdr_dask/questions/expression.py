@@ -1,8 +1,6 @@
 """Conditions and formulas as a user types them: ``velocity > 3 km/h and contact_fraction < 50 %``.
 
-Python's own parser converts the text to a syntax tree. The nodes of the tree are then evaluated with numpy. Allowed are
-numbers, quantities, names, words, arithmetic, comparisons, ``and``, ``or``, ``not``, ``in`` and the functions in
-`FUNCTIONS`. No text is ever executed as code.
+Python's own parser converts the text to a syntax tree, whose nodes are evaluated with numpy. No text is executed.
 """
 
 from __future__ import annotations
@@ -54,9 +52,8 @@ Find = Callable[[str], xr.DataArray | None]
 class Value(NamedTuple):
     """The value of an expression: numbers in SI, words, or truth values.
 
-    `dimension` is the physical dimension of numbers, as an object of the package pint. The dimension is None for words,
-    for truth values, and for a number without a unit. If a number without a unit is combined with a quantity, the
-    number is in the SI unit of this quantity.
+    `dimension` is the dimension of numbers as an object of pint. It is None for words, truth values and numbers without
+    a unit. A number without a unit is taken in the SI unit of the quantity with which it is combined.
     """
 
     array: Any
@@ -84,13 +81,7 @@ class Expression:
 
 
 def parse(text: str) -> Expression:
-    """Read a condition or a formula.
-
-    Raises
-    ------
-    DataError
-        If the text is neither a condition nor a formula.
-    """
+    """Read a condition or a formula; raise DataError if the text is neither."""
     wanted = "expected a condition such as 'velocity > 1 mm/s and hurst < 0.7'"
     if len(text) > _LONGEST:
         raise DataError(f"{wanted}, got {len(text)} characters")
@@ -103,15 +94,9 @@ def parse(text: str) -> Expression:
 
 
 def evaluate(expression: Expression, find: Find, known: Sequence[str] = ()) -> Value:
-    """Return the value of an expression.
+    """Return the value of an expression. Unknown names and quantities of different kinds raise DataError.
 
-    The function `find` returns the values of a name, or None if the name is unknown. The SI unit of the values is in
-    ``attrs["units"]``. `known` are all known names. The message about an unknown name suggests a known name.
-
-    Raises
-    ------
-    DataError
-        If a name is unknown, or quantities of different kinds are added or compared.
+    `find` returns the values of a name with ``attrs["units"]``, or None. Messages suggest names from `known`.
     """
     with np.errstate(all="ignore"):
         return _Evaluation(expression, find, known).value(expression.tree)
@@ -234,10 +219,7 @@ class _Evaluation:
         return _OPERATORS[type(op)](first.array, second.array)
 
     def _equal(self, left: ast.expr, right: ast.expr) -> Any:
-        """Compare numbers within `SAME`, or compare words.
-
-        An unknown name that is compared with words counts as a word.
-        """
+        """Compare numbers within `SAME`, or compare words. An unknown name counts as a word."""
         sides = [None if self._is_unknown(node) else self.value(node) for node in (left, right)]
         if any(side is not None and side.kind in "OUT" for side in sides):
             names = (_name(left), _name(right))

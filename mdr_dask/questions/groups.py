@@ -24,30 +24,13 @@ CASES = "cases"
 def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None = None) -> xr.Dataset:
     """Average every output over the cases of each group, separately for each realisation.
 
-    A group has C cases. The mean m_c of a case is the mean over its realisations. The mean m of the group is the mean
-    of all m_c, with the same weight for each case. All cases use the same R realisations. Therefore the results of
-    different cases are correlated, and the scatter of the group cannot be computed from the scatter of each case.
-    Instead, a result is computed for each realisation r of the group: ``m + R u_r``, where ``u_r`` is the sum over the
-    cases c of ``(x_cr - m_c) / (n_c C)``. Here x_cr is the result of case c in realisation r, and n_c is the number of
-    realisations of case c. The mean and the standard error of these R results are the mean and the standard error of
-    the group, even if n_c differs between cases. If every case has all R realisations, ``m + R u_r`` is the mean of
-    x_cr over the cases.
+    A group has C cases, and m_c is the mean of case c over its n_c realisations. All cases use the same R realisations,
+    so the results of different cases are correlated. Therefore realisation r of the group is ``m + R u_r``: m is the
+    mean of all m_c, and ``u_r`` the sum over c of ``(x_cr - m_c) / (n_c C)``, where x_cr is a result of case c. The
+    mean and the standard error of these R results are those of the group, even if n_c differs between cases.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        A group of a study.
-    by : sequence of str
-        Names of axes, or of columns of a sampled study.
-    kept : DataArray of bool, optional
-        The cases that are included; by default all cases.
-
-    Returns
-    -------
-    Dataset
-        The dimension ``group`` replaces the dimensions of the cases. The axes in `by` are coordinates along ``group``.
-        The variable ``cases`` is the number of cases of each group, and ``state_counts`` is the number of results in
-        each state. The grid error of a group is the mean grid error of its cases.
+    `by` are names of axes, or of columns of a sampled study; `kept` marks the cases that are included. The groups are
+    along the dimension ``group``. The grid error of a group is the mean grid error of its cases.
     """
     import xarray as xr
 
@@ -81,10 +64,7 @@ def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None =
 
 @dataclass(frozen=True)
 class _Members:
-    """The cases of all groups.
-
-    `order` are the indices of the cases, sorted by group. `starts` are the positions in `order` at which groups begin.
-    """
+    """The cases of all groups: their indices sorted by group, and the positions in `order` at which groups begin."""
 
     order: NDArray[np.intp]
     starts: NDArray[np.intp]

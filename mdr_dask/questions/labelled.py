@@ -24,15 +24,9 @@ PIECE = 2**20
 
 
 def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn) -> xr.Dataset:
-    """Answer a question with lazy arrays; cases that do not meet the condition are NaN.
+    """Answer a question with lazy arrays: statistics with ``state_counts``, or single results with their ``status``.
 
-    If the question requests statistics, the arrays are these statistics, and the number of results in each state along
-    the dimension ``state``. Otherwise the arrays are single results, and the ``status`` of each result.
-
-    Raises
-    ------
-    DataError
-        If a name is unknown, or the question requests sorted rows.
+    Cases that do not meet the condition are NaN.
     """
     if question.sort:
         raise DataError("expected a table (.csv, .jsonl or .parquet) with --sort, got labelled arrays")

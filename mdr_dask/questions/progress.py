@@ -20,15 +20,7 @@ if TYPE_CHECKING:
 class Group(NamedTuple):
     """Messages of one series that differ only in their numbers.
 
-    Attributes
-    ----------
-    series, kind, reason : str
-        `series` is the name of the series. `kind` is the state of the results; for results that are done, `kind` is
-        ``warning``. `reason` is the message.
-    results : int
-        Number of results.
-    cases : str
-        The range of each varied parameter.
+    `kind` is the state of the results, or ``warning`` if they are done. `cases` is the range of each varied parameter.
     """
 
     series: str
@@ -49,11 +41,7 @@ def counts(url: str) -> list[dict[str, Any]]:
 
 
 def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return the current messages of a series.
-
-    Only the message of the last attempt of each result is current. If the state of the result has changed since this
-    message, the message is left out.
-    """
+    """Return the message of the last attempt of each result of a series, unless its state has changed since."""
     last: dict[tuple[int, ...], dict[str, Any]] = {}
     telling = [record for record in store.records(url, series) if record["messages"]]
     for record in sorted(telling, key=lambda record: record["attempt"]):
@@ -66,11 +54,9 @@ def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]
 
 
 def grouped(found: Sequence[dict[str, Any]], studies: Mapping[str, xr.Dataset]) -> list[Group]:
-    """Group messages that differ only in their numbers, in the order of their first appearance.
+    """Group messages that differ only in their numbers; each warning of a result is a message of its own.
 
-    If one result has several warnings, each warning is a message of its own. `studies` are the groups of the study,
-    indexed by the name of the series. Quantities in the messages are converted to the units of the campaign file. The
-    attributes of the groups contain the text of this file.
+    Quantities in the messages are converted to the units of the campaign file, which is an attribute of the `studies`.
     """
     wanted = {name: _units(study) for name, study in studies.items()}
     groups: dict[tuple[str, str, str], list[tuple[str, Any]]] = {}
@@ -92,10 +78,7 @@ def grouped(found: Sequence[dict[str, Any]], studies: Mapping[str, xr.Dataset]) 
 
 
 def warnings(found: Sequence[dict[str, Any]]) -> dict[str, int]:
-    """Return the warnings of finished results, and the number of results with each warning.
-
-    The details after a colon are left out.
-    """
+    """Return the number of results with each warning, without details after a colon."""
     groups: dict[str, list[str]] = {}
     for message in (each for each in found if each["status"] == "done"):
         for text in dict.fromkeys(text.partition(": ")[0] for text in message["message"].split("; ")):
@@ -110,10 +93,9 @@ _QUANTITY = re.compile(
 
 
 def _units(study: xr.Dataset) -> dict[str, str]:
-    """Return the unit that replaces each SI unit in messages: the unit that the campaign file of a study uses.
+    """Return the unit of the campaign file that replaces each SI unit in messages, if it is only one.
 
-    If the campaign file uses several units instead of one SI unit, this SI unit is not replaced. Temperatures are in
-    degC unless the file uses another unit.
+    Temperatures are in degC unless the file uses another unit.
     """
     found: dict[str, set[str]] = {"K": {"degC"}}
     written = as_written(study)

@@ -24,30 +24,12 @@ Tell = Callable[[str], object]
 
 
 def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings.warn) -> xr.Dataset:
-    """Keep a part of a group of a study.
+    """Keep a part of a group of a study; no dimension is removed.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        A group of a study, or a Dataset derived from it.
-    selections : sequence of str
-        A selection is a name, ``=``, and values or ranges that are separated by commas: ``velocity=1 mm/s..1 m/s``,
-        ``hurst=0.3,0.7``, ``radius=..2``. The name is an axis, a column of a sampled study, ``case`` or
-        ``realisation``. Both ends of a range are included. Numbers without a unit are in SI. If a number is not a value
-        of the axis, the nearest value is selected.
-    tell : callable, str -> object
-        Receives a message if the selected value differs from the given number.
-
-    Returns
-    -------
-    Dataset
-        The selected part. No dimension is removed. If the name is a fixed parameter that has the given value, the whole
-        group is selected.
-
-    Raises
-    ------
-    DataError
-        If the name is unknown, or no value is selected.
+    A selection is a name, ``=``, and values or ranges that are separated by commas: ``velocity=1 mm/s..1 m/s``,
+    ``hurst=0.3,0.7``, ``radius=..2``. The name is an axis, a column of a sampled study, ``case``, ``realisation`` or a
+    fixed parameter. Both ends of a range are included. If a number is not a value of the axis, the nearest value is
+    selected, and `tell` receives a message.
     """
     for text in selections:
         name, wanted = _parsed(text)
@@ -61,10 +43,7 @@ def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings
 def select_all(
     datasets: Mapping[str, xr.Dataset], selections: Sequence[str], tell: Tell = warnings.warn
 ) -> dict[str, xr.Dataset]:
-    """Apply each selection to every series in which the selected parameter varies.
-
-    If the parameter varies in no series, apply the selection to the first series.
-    """
+    """Apply each selection to every series in which the selected parameter varies, or to the first series."""
     chosen = dict(datasets)
     for text in selections:
         name, _ = _parsed(text)
@@ -75,10 +54,7 @@ def select_all(
 
 
 def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
-    """Keep the cases that meet a condition on means over realisations.
-
-    The results of all other cases become NaN and get the state *not needed*.
-    """
+    """Keep the cases that meet a condition on means. All other results become NaN with the state *not needed*."""
     truth = Columns(dataset).truth(condition)
     masked = {name: array.where(truth) for name, array in dataset.data_vars.items() if name != "status"}
     status = dataset["status"].where(truth, Status.NOT_NEEDED.value).astype(dataset["status"].dtype)
@@ -106,11 +82,7 @@ def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
 
 
 def outputs(dataset: xr.Dataset, names: Sequence[str], tell: Tell | None = None) -> xr.Dataset:
-    """Keep the named outputs and their errors.
-
-    If `names` is empty, all outputs that have one number for each result are kept. Outputs with further dimensions are
-    then left out, and `tell` receives a sentence about these outputs.
-    """
+    """Keep the named outputs and their errors; by default all outputs that have one number for each result."""
     known = [str(name) for name in dataset.data_vars if name != "status"]
     for name in names:
         if name not in known:
@@ -133,10 +105,7 @@ def written(value: Any, unit: str | None, digits: int = 6) -> str:
 
 
 def written_apart(unit: str, value: float, *limits: float) -> tuple[str, ...]:
-    """Return a value and limits as texts with a unit.
-
-    The texts have enough digits to distinguish the value from the limits.
-    """
+    """Return a value and limits as texts with a unit, with enough digits to distinguish the value from the limits."""
     return distinguishable(value, *limits, digits=6, write=lambda number, digits: written(number, unit, digits))
 
 

@@ -32,32 +32,11 @@ ROWS, WHOLE = 2**16, 2**26
 
 @dataclass(frozen=True)
 class Question:
-    """A question about a group of a study.
+    """A question about a group of a study. Without statistics, the table has one row for each result.
 
-    Parameters
-    ----------
-    outputs : tuple of str
-        Names of outputs. If the tuple is empty, the table has all outputs that have one number for each result.
-    selections : tuple of str
-        Selections as in `mdr_dask.questions.selection.select`.
-    where : str
-        A condition. If `statistics` is None, the condition is on single results; otherwise it is on means over
-        realisations.
-    group_by : tuple of str
-        Names of axes. The table has one row for each combination of values along these axes. A row is an average over
-        all other axes.
-    sort : tuple of str
-        Columns or formulas by which rows are sorted. With a leading ``-``, the order is descending. Missing values come
-        last.
-    columns : tuple of str
-        Names of axes, parameters, outputs and dimensionless numbers; ``status``; and ``realisations``. By default, all
-        axes and outputs, the number of realisations if there are several, and the status.
-    units : mapping of str to str
-        Units, indexed by the name of the column. Columns that are not named are in SI.
-    statistics : tuple of str, optional
-        Statistics over realisations. If `statistics` is None, the table has one row for each result.
-    written : bool
-        Whether axes and parameters that are not in `units` are in the unit of the campaign file instead of SI.
+    `where` is a condition on single results, or on means if there are statistics. A row of `group_by` is an average
+    over all other axes. `sort` contains columns or formulas, with a leading ``-`` for descending order. `units` are
+    units by column. If `written` is true, axes and parameters are in the units of the campaign file instead of SI.
     """
 
     outputs: tuple[str, ...] = ()
@@ -73,10 +52,9 @@ class Question:
 
 @dataclass(frozen=True)
 class Table:
-    """A table as a sequence of data frames, with the units of its columns.
+    """A table as a sequence of data frames. The first `keys` columns identify a row.
 
-    `total` is the number of rows, or None if this number is known only after the last frame. The first columns of the
-    table identify a row; `keys` is the number of these columns.
+    `total` is the number of rows, or None if it is known only after the last frame.
     """
 
     frames: Iterator[pd.DataFrame]
@@ -86,16 +64,10 @@ class Table:
 
 
 def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = warnings.warn) -> Table:
-    """Answer a question about a group of a study with rows.
+    """Answer a question about a group of a study with rows, which are computed when their data frame is read.
 
-    The rows of a data frame are computed when this frame is read. Unless the question sorts rows, the memory needed
-    does not grow with the number of rows. `limit` is the number of rows that the caller will read, or 0 if the caller
-    will read all rows. `tell` receives messages about the selection.
-
-    Raises
-    ------
-    DataError
-        If a name is unknown. The error is raised before any row is computed.
+    Unless the question sorts rows, the memory needed does not grow with the number of rows. `limit` is the number of
+    rows that the caller will read, or 0 for all. Unknown names raise DataError before any row is computed.
     """
     maker = _Maker(dataset, question, tell)
     units = maker.units()
@@ -255,10 +227,9 @@ def _flattened(array: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
 
 
 def boxes(sizes: Mapping[str, int], most: int, chunks: Sequence[int] = ()) -> Iterator[dict[str, slice]]:
-    """Divide a grid into boxes of at most `most` points, in the order of the rows of the table.
+    """Divide a grid into boxes of at most `most` points, in the order of the rows of the table, last dimension fastest.
 
-    The index of the last dimension in `sizes` varies fastest. `chunks` are the lengths of the chunks of the store. A
-    box that is longer than a chunk ends at the end of a chunk.
+    A box that is longer than a chunk of the store ends at the end of a chunk.
     """
     dims, inner = list(sizes), 1
     cut = len(dims)

@@ -20,13 +20,7 @@ _DIFFERENCES = ("error", "standard_deviation", "standard_error", "grid_error")
 
 
 def parse_units(texts: Sequence[str]) -> dict[str, str]:
-    """Return units, indexed by the name of the column, from texts such as ``velocity=km/h,temperature=degC``.
-
-    Raises
-    ------
-    DataError
-        If a part is not ``NAME=UNIT``.
-    """
+    """Return units by column from texts such as ``velocity=km/h,temperature=degC``."""
     wanted = {}
     for part in (part for text in texts for part in text.split(",")):
         name, equals, unit = (piece.strip() for piece in part.partition("="))
@@ -43,15 +37,7 @@ def as_written(study: xr.Dataset) -> dict[str, str]:
 
 
 def in_units(dataset: xr.Dataset, wanted: Mapping[str, str]) -> xr.Dataset:
-    """Convert variables and coordinates to other units. The statistics and errors of an output are also converted.
-
-    `wanted` are units, indexed by the name of an axis, a parameter or an output, and spelt as in a campaign file.
-
-    Raises
-    ------
-    DataError
-        If a name or a unit is unknown, or the unit has another dimension.
-    """
+    """Convert variables and coordinates to other units, together with their statistics and errors."""
     for name, unit in wanted.items():
         own = {name, *(f"{name}_{ending}" for ending in (*_OF_OUTPUTS, *_DIFFERENCES))}
         found = [str(each) for each in dataset.variables if each in own]
