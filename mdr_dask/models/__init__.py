@@ -1,7 +1,6 @@
-"""Find a model by its name; a model is imported only when a campaign names it.
+"""Find a model by its name. A model is imported only when a campaign names it.
 
-Models come from three sources. The models of this package are listed in `NAMES`. Other installed packages declare
-models in the entry point group `GROUP`. A model in a module of the user is named ``package.module:NAME``.
+Models come from this package, from the entry points of other packages, or from a module of the user.
 """
 
 from __future__ import annotations
@@ -39,18 +38,7 @@ def names() -> tuple[str, ...]:
 
 
 def load(name: str) -> Model[Any]:
-    """Return the model of this name.
-
-    Parameters
-    ----------
-    name : str
-        One of `names`, or ``package.module:NAME``.
-
-    Raises
-    ------
-    ModelError
-        If there is no model of this name, or if the object of this name is not a model.
-    """
+    """Return the model called `name`: one of `names`, or ``package.module:NAME``. Otherwise raise ModelError."""
     if name in NAMES:
         model: Model[Any] = import_module(f"mdr_dask.models.{name}").MODEL
         return model
@@ -109,11 +97,7 @@ def _own(name: str, entry: EntryPoint, module: str) -> Model[Any]:
 
 
 def _guarded(model: str, what: str, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Add checks to a function of a user's model.
-
-    If the function raises an exception, raise ModelError. The functions `operations` and `memory` must also return a
-    finite number that is not negative.
-    """
+    """Return a function of a user's model that raises ModelError instead of any other exception."""
 
     def call(argument: Any) -> Any:
         try:

@@ -40,19 +40,15 @@ def unquoted(value: Any) -> Any:
 class Parameters(BaseModel):
     """Base class of every parameter set. The numbers are in SI units, and their bounds are checked.
 
-    A parameter set cannot be changed, and unknown keys are errors.
-
-    A subclass may declare more about its parameters:
+    A parameter set cannot be changed, and unknown keys are errors. A subclass may declare:
 
     * `renamed`: earlier names of parameters and outputs, each with a text that says what to write now.
     * `alternatives`: groups of alternatives; a user gives exactly one member of each group. A member is a tuple of
-    parameters that are given together; in the path of a nested parameter, a dot separates the names.
-    * `overrides`: parameters that replace another parameter. Each is listed with the name of the parameter that it
-    replaces.
-    * `settings`: parameters of the numerical solution, such as its resolution or the stored points. These parameters do
-    not change the physical problem.
-    * `requires`: parameters that have an effect only if another parameter has a certain value. Each of these parameters
-    is listed with the name and the value of the other parameter.
+    parameters that are given together. In the path of a nested parameter, a dot separates the names.
+    * `overrides`: parameters that replace another parameter, each with the name of that other parameter.
+    * `settings`: parameters of the numerical solution that do not change the physical problem, such as a resolution.
+    * `requires`: parameters that have an effect only if another parameter has a certain value, each with the name and
+    the value of that other parameter.
     """
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
@@ -108,25 +104,13 @@ LEAST, MOST = 1e-30, 1e30
 
 
 def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any:
-    """Declare a physical parameter.
+    """Declare a physical parameter, as in ``length: float = quantity("m", "length of the line", gt=0)``.
 
-    Parameters
-    ----------
-    unit : str
-        The coherent SI unit of the value; ``"1"`` for a pure number.
-    description : str
-        Meaning of the parameter in one line.
-    usual : str
-        A common value with its unit, such as ``"10 MPa"``, for ``mdr-dask init``. If a number without a unit differs
-        from this value by more than three decades, ``check`` asks the user about it. Further values after commas, as in
-        ``"2 GPa, 200 HV"``, show other units in which people write the quantity.
-    **bounds
-        ``default``, ``gt``, ``ge``, ``lt``, ``le`` and other arguments of :func:`pydantic.Field`.
-
-    Returns
-    -------
-    pydantic field
-        Field for a declaration such as ``length: float = quantity("m", "length of the line", gt=0)``.
+    `unit` is the coherent SI unit, ``"1"`` for a pure number. `usual` is a common value with its unit, such as ``"10
+    MPa"``, for ``mdr-dask init``. If a number without a unit differs from `usual` by more than three decades, ``check``
+    asks the user about it. Further values after commas, as in ``"2 GPa, 200 HV"``, show other units in which people
+    write the quantity. The other arguments, such as ``default``, ``gt`` and ``le``, are those of
+    :func:`pydantic.Field`.
     """
 
     def to_si(value: Any, info: ValidationInfo) -> Any:
@@ -179,22 +163,13 @@ CANONICAL_BITS = 44
 
 
 def canonical(number: ArrayLike) -> Any:
-    """Return dimensionless numbers, rounded to `CANONICAL_BITS` bits.
-
-    Numbers that differ only by rounding errors thus become equal.
-    """
+    """Return dimensionless numbers, rounded so that numbers which differ only by rounding errors become equal."""
     mantissa, exponent = np.frexp(number)
     return np.ldexp(np.rint(np.ldexp(mantissa, CANONICAL_BITS)), exponent - CANONICAL_BITS)
 
 
 def deferred(module: str, name: str) -> Callable[..., Any]:
-    """Return a function that imports another function at its first call, so that declarations are quick to import.
-
-    Parameters
-    ----------
-    module, name : str
-        Module and name of the function, such as ``"mdr_dask.models.ehl_line.solve"`` and ``"compute"``.
-    """
+    """Return a function that imports another function at its first call, so that declarations are quick to import."""
 
     def call(*arguments: Any) -> Any:
         return getattr(import_module(module), name)(*arguments)
@@ -209,30 +184,18 @@ P = TypeVar("P", bound=Parameters)
 class Output:
     """One array that a model can compute.
 
-    Parameters
-    ----------
-    name, unit, long_name : str
-        Name, SI unit and meaning of the output in the store; a pure number has the unit ``"1"``.
-    dims : tuple of str
-        Dimensions of the output for a single case, such as ``("radius",)``. ``Model.coordinates`` gives the coordinates
-        of these dimensions.
-    default : bool
-        Whether the output is computed if the campaign names no outputs.
-    has_error : bool
-        Whether the solver estimates the discretisation error of the output. The error is stored as the companion
-        `error`, unless the campaign has ``errors: false``.
-    comment : str
-        A limitation of the output, stored as its attribute ``comment``.
-    scatter : str
-        Name of another output that is the standard error of this output, estimated from a single realisation. If errors
-        are stored, this other output is stored, too.
-    floor : float
-        A value in the unit of the output, for outputs that can be zero in ordinary cases. If the output is smaller than
-        `floor`, the relative error is the error divided by `floor`. An accuracy a thus allows an error up to a times
-        the larger of `abs(value)` and `floor`.
-    allow_nan : bool
-        Whether the output may be NaN or infinite. Otherwise, a case of a user's own model has failed if the output is
-        NaN or infinite.
+    * `unit` and `long_name`: SI unit (``"1"`` for a pure number) and meaning of the output.
+    * `dims`: dimensions of the output for a single case, such as ``("radius",)``. ``Model.coordinates`` gives their
+    values.
+    * `default`: whether the output is computed if the campaign names no outputs.
+    * `has_error`: whether the solver estimates the discretisation error. The error is stored as the companion `error`,
+    unless the campaign has ``errors: false``.
+    * `comment`: a limitation of the output, stored as its attribute ``comment``.
+    * `scatter`: name of another output, the standard error of this output in a single realisation. It is stored with
+    the errors.
+    * `floor`: for an output that can be zero, a value in its unit. The relative error of a smaller output is the error
+    divided by `floor`.
+    * `allow_nan`: whether NaN and infinite values are valid. Otherwise they are failures of a user's own model.
     """
 
     name: str
@@ -257,13 +220,8 @@ class Output:
 class Number:
     """A dimensionless number of each case of a model, for tables and conditions.
 
-    Parameters
-    ----------
-    name, meaning : str
-        Name of the number, and its meaning in one line.
-    formula : str
-        A formula for `mdr_dask.questions.expression`. The formula may contain outputs, other numbers and parameters;
-        the name of a nested parameter is its path, joined by ``_``.
+    `formula` is a formula for `mdr_dask.questions.expression`. It may contain outputs, other numbers and parameters;
+    the name of a nested parameter is its path, joined by ``_``.
     """
 
     name: str
@@ -284,25 +242,13 @@ class Coordinate:
 class Block(Generic[P]):
     """A rectangle of cases and realisations: one Dask task, one chunk of every array, and one atomic write.
 
-    Parameters
-    ----------
-    parameters : Parameters
-        The fixed parameters. Do not use the values that this set has for varied parameters: these are the values of an
-        arbitrary case. The method `column` gives the values of all cases.
-    columns : mapping of str to array, shape (cases,)
-        The varied parameters by dotted path (such as ``velocity`` or ``indenter.angle``), with one value for each case
-        in SI units.
-    cases : int
-        Number of cases.
-    realisations : tuple of int
-        Indices of the realisations. The index and `seed` determine every random number of a realisation.
-    seed : int
-        Seed of the campaign.
-    outputs : tuple of str
-        Names of the arrays to compute, including the companions that hold errors.
-    accuracy : float or None
-        Largest relative discretisation error that is allowed for every output with a companion (see `Output.floor`).
-        None if the campaign states no accuracy.
+    * `parameters`: the fixed parameters. Its values of varied parameters are those of an arbitrary case; `column` gives
+    the values of all cases.
+    * `columns`: the varied parameters by dotted path (such as ``velocity`` or ``indenter.angle``), one value for each
+    case in SI units.
+    * `realisations`: indices of the realisations. An index and `seed` determine every random number of a realisation.
+    * `outputs`: names of the arrays to compute, including the companions that hold errors.
+    * `accuracy`: largest allowed relative discretisation error of every output with a companion (see `Output.floor`).
     """
 
     parameters: P
@@ -350,17 +296,11 @@ def with_value(parameters: Any, path: str, value: Any) -> Any:
 class Result:
     """The return value of a model for a block.
 
-    Parameters
-    ----------
-    values : dict of str to array, shape (cases, realisations, ...)
-        The requested arrays; NaN where a case failed.
-    status : int8 array, shape (cases, realisations)
-        Values of `Status`.
-    messages : dict of (case, realisation position) to str
-        Messages by case and position of the realisation. The message of a failed result is the reason for the failure.
-        The messages of other results are warnings.
-    solves : int
-        Number of solutions computed; several cases may share one solution.
+    * `values`: the requested arrays, shape (cases, realisations, ...); NaN where a case failed.
+    * `status`: values of `Status`, shape (cases, realisations).
+    * `messages`: reasons for failures, and warnings for other results, by index of the case and position of the
+    realisation in the block.
+    * `solves`: number of solutions computed; several cases may share one solution.
     """
 
     values: dict[str, FloatArray]
@@ -378,43 +318,22 @@ class Result:
 class Model(Generic[P]):
     """A computation that a campaign can name.
 
-    Parameters
-    ----------
-    name : str
-        Name for the key ``model`` of a campaign file.
-    version : int
-        Version number. The number is increased when a change of the code changes results. Only the version that created
-        a store can extend it.
-    summary : str
-        One line for ``mdr-dask models``.
-    parameters : type
-        The parameter set.
-    outputs : tuple of Output
-        All arrays that the model can compute, except ``status`` and the companions that hold errors.
-    compute : callable, Block -> Result
-        A pure function. The value of a case depends on its parameters, the seed and its realisation, but not on the
-        other cases of the block. The function does not raise an exception for a case that fails.
-    operations : callable, Block -> float, optional
-        Approximate number of floating-point operations of `compute` for a block. The sizes of blocks are chosen from
-        this number. The function must be fast; it should use array operations over the cases. Without this function, a
-        study with n results is divided into about sqrt(n) blocks.
-    whole : tuple of str
-        Parameters whose axes are not divided among blocks, because cases along these axes share work. If a block
-        becomes too large, the axis of the last parameter in this list is divided first.
-    coordinates : callable, Parameters -> dict of str to Coordinate
-        Coordinates of the dimensions of outputs other than case and realisation.
-    distinct : callable, Block -> int, optional
-        Number of different solutions among the cases of a block, for ``check``. Without this function, every case
-        counts as one solution.
-    units : callable, Parameters -> dict of str to str
-        Units of outputs and parameters that differ from the declared units, for example in a dimensionless campaign.
-    memory : callable, Block -> float
-        Estimated peak memory of `compute` in bytes, without the memory of the outputs.
-    notes : callable, sequence of Parameters -> tuple of str
-        Notes for ``check`` about a study. The argument contains parameter sets of the study, in which one axis at a
-        time is varied. Notes about a nested parameter set come from the method `notes` of that set.
-    numbers : tuple of Number
-        Dimensionless numbers of the cases.
+    * `version`: raised when a change of the code changes results. Only this version can extend a store.
+    * `summary`: one line for ``mdr-dask models``.
+    * `outputs`: all arrays that the model can compute, except ``status`` and the companions that hold errors.
+    * `compute`: a pure function. The value of a case depends on its parameters, the seed and its realisation, but not
+    on the other cases of the block. The function raises no exception for a case that fails.
+    * `operations`: approximate number of floating-point operations of a block, from which block sizes are chosen. The
+    function must be fast. Without it, a study with n results is divided into about sqrt(n) blocks.
+    * `whole`: parameters whose axes are not divided among blocks, because cases along these axes share work. If a block
+    becomes too large, the axis of the last parameter is divided first.
+    * `coordinates`: coordinates of the dimensions of outputs other than case and realisation.
+    * `distinct`: number of different solutions among the cases of a block, for ``check``; by default the number of
+    cases.
+    * `units`: units that differ from the declared ones, by output or parameter, as in a dimensionless campaign.
+    * `memory`: estimated peak memory of `compute` in bytes, without the outputs.
+    * `notes`: notes for ``check`` about a study. The argument contains parameter sets of the study, in which one axis
+    at a time is varied. Notes about a nested parameter set come from the method `notes` of that set.
     """
 
     name: str
@@ -434,10 +353,7 @@ class Model(Generic[P]):
 
     @property
     def companions(self) -> dict[str, Output]:
-        """The companions, which hold the errors.
-
-        The keys are the names of the outputs to which the companions belong.
-        """
+        """The companions, which hold the errors, by the names of their outputs."""
         return {output.name: output.error for output in self.outputs if output.has_error}
 
     def output(self, name: str) -> Output:
@@ -445,11 +361,7 @@ class Model(Generic[P]):
         return {output.name: output for output in (*self.outputs, *self.companions.values())}[name]
 
     def with_companions(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Return the given names of outputs, and the names of their standard errors and companions.
-
-        The standard error of an output is another output, which `Output.scatter` names. If an output has a companion,
-        the name of the companion follows the name of the output.
-        """
+        """Return the given names of outputs, each followed by its companion, and the names of their standard errors."""
         companions = self.companions
         asked = {*names, *(self.output(name).scatter for name in names)}
         kept = [output.name for output in self.outputs if output.name in asked]

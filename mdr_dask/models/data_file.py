@@ -19,10 +19,7 @@ LARGEST_TABLE = 10**7
 
 
 class DataFile(BaseModel):
-    """A file that is named in a campaign. The SHA-256 digest of its content is computed when the campaign is read.
-
-    If the content changes later, it cannot be read any more.
-    """
+    """A file that is named in a campaign, with the digest of its content when the campaign was read."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     name: str
@@ -42,13 +39,7 @@ class DataFile(BaseModel):
         return content
 
     def read_text(self) -> str:
-        """Return the file's text.
-
-        Raises
-        ------
-        DataError
-            If the file has changed since the campaign was read, or is not text.
-        """
+        """Return the text of the file; raise DataError if the file has changed or is not text."""
         return decoded(self.read_bytes(), self.path)
 
     @contextmanager
@@ -65,10 +56,7 @@ class DataFile(BaseModel):
 
 
 def check_in_campaign(info: ValidationInfo, check: Callable[[], object]) -> None:
-    """Call the function `check` if a campaign is being read.
-
-    If the function raises DataError, raise ValueError instead, as pydantic expects.
-    """
+    """Call `check` if a campaign is being read, and raise ValueError, as pydantic expects, in place of DataError."""
     if info.context is not None:
         try:
             check()

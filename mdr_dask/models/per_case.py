@@ -1,7 +1,4 @@
-"""Make the function `compute` of a model from a function that solves one case.
-
-The function `per_case` is the easiest way to define a model of your own.
-"""
+"""Make the function `compute` of a model from a function that solves one case."""
 
 from __future__ import annotations
 
@@ -33,20 +30,12 @@ Solve = Callable[[Any, np.random.Generator], Mapping[str, ArrayLike]]
 def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
     """Return a function for ``Model(compute=...)`` that solves the cases of a block one after another.
 
-    Parameters
-    ----------
-    solve : callable, (parameters, random generator) -> mapping of output to number or array
-        The function receives the parameters of one case in SI units, and the random generator of a realisation. All
-        cases of a realisation get the same random numbers. The function returns a mapping from the name of each output
-        to its value. If an output has an error, the error is returned as ``<output>_error``. A case has failed if
-        `solve` raises any exception, even SystemExit, or if an error is negative. A case has also failed if an output
-        is missing, is not a real number or an array of real numbers, is not finite (unless declared with
-        ``allow_nan=True``), or has a shape other than the declared one.
+    `solve` receives the parameters of one case in SI units and a random generator. All cases of a realisation get the
+    same random numbers. `solve` returns a value for each output, by name. If an output has an error, `solve` returns it
+    as ``<output>_error``.
 
-    Notes
-    -----
-    If an output has different shapes in two cases, the returned function raises an exception. The runner then computes
-    the cases one by one and compares the shapes of each case with the declared shapes.
+    A case fails if `solve` raises an exception, even SystemExit. A case also fails if an output is missing, is not
+    real, has another shape than declared, or is not finite without ``allow_nan=True``, and if an error is negative.
     """
 
     def compute(block: Block[Any]) -> Result:
@@ -92,10 +81,7 @@ def _limited(solve: Solve, parameters: Any, random: np.random.Generator) -> Any:
 
 
 def is_interrupt(error: BaseException) -> bool:
-    """Return whether an exception comes from Ctrl-C.
-
-    Only the main thread receives Ctrl-C, and only if it handles SIGINT.
-    """
+    """Return whether an exception comes from Ctrl-C, which only the main thread receives."""
     is_main = threading.current_thread() is threading.main_thread()
     return isinstance(error, KeyboardInterrupt) and is_main and signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
 
@@ -110,12 +96,10 @@ def reason(error: BaseException) -> str:
 
 
 def where(error: BaseException) -> str:
-    """Return the file and line of the user's function in which an exception was raised.
+    """Return where the user's function failed, such as `` (model.py:12)``.
 
-    The text is in parentheses after a space, such as ``(model.py:12)``.
-
-    If the exception was raised in another file, the text names the line of the user's file that called the other file.
-    If the exception was raised in this package, for example because of an invalid output, the text is empty.
+    If another package raised the exception, this is the line of the user's file that called it. The text is empty if
+    this package raised the exception, for example because of an invalid output.
     """
     frames = [(frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)]
     others = [(file, line) for file, line in frames if not file.startswith(PACKAGE)]
@@ -136,11 +120,7 @@ def _output(name: str, outputs: Any) -> NDArray[np.float64]:
 def real_numbers(name: str, value: Any) -> NDArray[np.float64]:
     """Return an output as an array of floating-point numbers.
 
-    Raises
-    ------
-    ValueError
-        If the value is not a real number or an array of real numbers, but for example True, a text or a quantity with a
-        unit.
+    Raise ValueError if the output contains anything but real numbers, such as True, a text or a quantity with a unit.
     """
     if type(value) is float:
         return np.asarray(value)

@@ -1,8 +1,4 @@
-"""The lubricated line contact: film thickness, pressure and traction for a given load, speed and oil.
-
-`declaration` defines the parameters and outputs, and is quick to import; `solve` computes the outputs of a block of
-cases.
-"""
+"""The lubricated line contact: film thickness, pressure and traction for a given load, speed and oil."""
 
 from mdr_dask.models.ehl_line.declaration import MODEL, EhlLineParameters, groups
 

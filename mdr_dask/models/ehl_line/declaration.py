@@ -115,10 +115,7 @@ class EhlLineParameters(Parameters):
 
     @model_validator(mode="after")
     def _one_of_each_pair(self) -> Self:
-        """Raise ValueError unless exactly one parameter of each pair is given.
-
-        If this is the quantity with a unit, the further parameters that it needs must be given, too.
-        """
+        """Raise ValueError unless one parameter of each pair is given, with the further parameters that it needs."""
         for number, dimensional, companions in _PAIRS:
             given = [name for name in (number, dimensional) if getattr(self, name) is not None]
             if len(given) != 1:
@@ -178,14 +175,9 @@ OUTPUTS = (
 
 
 def groups(lookup: Callable[[str], Any]) -> tuple[Any, Any, Any]:
-    """Return the dimensionless parameters W (load), U (speed) and G (material).
+    """Return the dimensionless parameters W (load), U (speed) and G (material), given or computed.
 
-    Each of these numbers is taken as given, or computed from the quantities with units.
-
-    Parameters
-    ----------
-    lookup : callable, str -> array or None
-        Returns the values of a parameter, or None if it is not given.
+    `lookup` returns the values of a parameter, or None if it is not given.
     """
     modulus = 2 * lookup("contact_modulus")
     W, U, G = lookup("load_parameter"), lookup("speed_parameter"), lookup("material_parameter")
@@ -207,10 +199,10 @@ distinct = deferred("mdr_dask.models.ehl_line.solve", "distinct")
 
 
 def operations(block: Block[EhlLineParameters]) -> float:
-    """Return the approximate number of operations of `compute`.
+    """Return the approximate number of operations of `compute`, from measured numbers for one solution.
 
-    A solution with the default accuracy needs about 6 million operations. If the pressure or its spike is requested
-    with an accuracy, the finest grid is needed. A solution on the finest grid needs 1.5 billion operations.
+    A solution with the default accuracy needs about 6 million. The finest grid, which the pressure and its spike need
+    if an accuracy is given, needs 1.5 billion.
     """
     accuracy = block.accuracy or ACCURACY
     is_sharp = block.accuracy is not None and {"pressure", "spike_pressure", "spike_position"} & set(block.outputs)

@@ -57,7 +57,7 @@ def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
 
 
 def _readings(case: EhlLineParameters, W: float, contact: LineContact) -> dict[str, Reading]:
-    """Return a function for each output. The function evaluates the output from the solution on one grid.
+    """Return a function for each output that evaluates the output from the solution on one grid.
 
     Positions are in half widths a, film thicknesses in a^2/R, and pressures in units of Hertz' maximum pressure.
     """

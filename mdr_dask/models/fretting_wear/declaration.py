@@ -177,10 +177,7 @@ class FrettingWear(Parameters):
 
     @property
     def dimensionless(self) -> bool:
-        """Whether the campaign is dimensionless.
-
-        Its lengths are then in units of a0, its heights in units of d0, and so on.
-        """
+        """Whether the campaign is dimensionless, with lengths in units of a0 and heights in units of d0."""
         return self.stick_radius is not None or (self.path is not None and self.contact_modulus is None)
 
     @model_validator(mode="after")
@@ -305,10 +302,7 @@ def coordinates(parameters: FrettingWear) -> dict[str, Coordinate]:
 
 
 def units(parameters: FrettingWear) -> dict[str, str]:
-    """Return the units that differ from the declared units.
-
-    In a dimensionless campaign, every output and the path have the unit 1. In other campaigns, no unit differs.
-    """
+    """Return the units that differ from the declared units: those of outputs and path in a dimensionless campaign."""
     return {"path": "1"} | {output.name: "1" for output in OUTPUTS} if parameters.dimensionless else {}
 
 

@@ -1,8 +1,4 @@
-"""Conversion of the parameters of a block to dimensionless numbers for every case and realisation.
-
-These numbers are the exponent n of the body, the value g_c of its one-dimensional image at the stick border, and the
-dimensionless number of cycles N.
-"""
+"""Conversion of the parameters of a block to dimensionless numbers for every case and realisation."""
 
 from __future__ import annotations
 
@@ -33,8 +29,9 @@ MOST_CYCLES = 1e12  # largest N; wear has ended long before this N
 class Numbers:
     """The dimensionless numbers and the units of every case in every realisation; shape (cases, realisations).
 
-    `level` is g_c = 1 - eta, the value of the one-dimensional image at the stick border. The number of cycles times
-    `advance` is the dimensionless number N.
+    `exponent` is the exponent n of the body. `level` is g_c = 1 - eta, the value of the one-dimensional image at the
+    stick border; it is 0 in sliding wear. `cycles` is the dimensionless number of cycles N, or the dimensionless path
+    in sliding wear. `advance` is N divided by the number of cycles. The units are a0, d0 and E* d0 a0.
     """
 
     exponent: FloatArray
@@ -50,8 +47,7 @@ class Numbers:
 def indenters(block: Block[FrettingWear]) -> list[Indenter]:
     """Return a list of indenters: one for every case, or a single one for all cases.
 
-    A single indenter is enough if all indenters are equal. It is also enough if all are power laws of the same shape,
-    such as cones with different angles.
+    A single indenter also stands for power laws of the same shape, such as cones with different angles.
     """
     if isinstance(block.parameters.indenter, Pressed) and any(path.startswith("indenter") for path in block.columns):
         return [block.case(case).indenter for case in range(block.cases)]
@@ -104,12 +100,7 @@ def _factor(block: Block[FrettingWear], name: str, normal: FloatArray) -> FloatA
 
 
 def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str]]:
-    """Return the dimensionless numbers and the units of every case, and messages about cases that cannot be solved.
-
-    The numbers are n, g_c and N. The units are a0, d0 and E* d0 a0.
-
-    For sliding wear, g_c is 0 and N is the dimensionless path s.
-    """
+    """Return the dimensionless numbers and the units of every case, and messages about cases that cannot be solved."""
     with np.errstate(all="ignore"):
         numbers, messages = _reduced(block)
     for case, position in np.argwhere(numbers.level >= 1):
@@ -217,10 +208,7 @@ def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: di
 
 
 def notes(sets: Sequence[FrettingWear]) -> tuple[str, ...]:
-    """Return a note if cases of a study will fail.
-
-    The cases are judged without random scatter of friction, amplitude and wear coefficient.
-    """
+    """Return a note if cases of a study will fail, judged without random scatter."""
     texts: list[str] = []
     for parameters in sets:
         scatter = dict.fromkeys(("friction_scatter", "amplitude_scatter", "wear_coefficient_scatter"), 0.0)

@@ -1,7 +1,7 @@
 """Solution of a block of fretting wear.
 
-With the exact rule and no load history, one solution for each combination of body and stick radius gives the results
-at all numbers of cycles.
+With the exact rule and no load history, one solution for each combination of body and stick radius gives the results at
+all numbers of cycles.
 """
 
 from __future__ import annotations
@@ -48,10 +48,9 @@ Places = list[tuple[int, int]]
 
 @dataclass(frozen=True)
 class Task:
-    """Input of a solution that several cases share.
+    """Input of a solution that several cases share: all data except N and the factor xi of the fast rule.
 
-    A task contains all data except the number of cycles N and the factor xi of the fast rule. `extent` is the last
-    radius of the profiles, divided by a0.
+    `extent` is the last radius of the profiles, divided by a0.
     """
 
     table: Pressed | None
@@ -110,10 +109,7 @@ def operations(block: Block[FrettingWear]) -> float:
 
 
 def _followed(hold: str, accuracy: float) -> float:
-    """Return the number of operations to solve one evolution and its errors.
-
-    The evaluation at each N is not included.
-    """
+    """Return the number of operations to solve one evolution and its errors, without the evaluation at each N."""
     if hold == "force":
         return 9e7 * float(max(COARSEST_OF_MOVING / accuracy, 1.0) ** 1.1)
     return 1.2e7 * float((_USUAL / accuracy) ** 0.6)
@@ -161,10 +157,9 @@ def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
 
 
 def _is_plain(block: Block[FrettingWear]) -> bool:
-    """Return whether closed forms are sufficient for a block.
+    """Return whether closed forms give all outputs of a block.
 
-    Closed forms are sufficient if four conditions hold: every body is a power law; the depth is constant and there is
-    no history; only the limiting profile or the fast rule is requested; and every output has a closed form.
+    They do so for power laws at constant depth, by the limit or the fast rule, without a load history.
     """
     simple = set(block.columns.get("wear_rule", [block.parameters.wear_rule])) <= {"limit", "fast"}
     depth = set(block.columns.get("hold", [block.parameters.hold])) == {"depth"}
@@ -223,10 +218,7 @@ def _solve_each(
     status: NDArray[np.int8],
     messages: dict[tuple[int, int], str],
 ) -> int:
-    """Solve the tasks one after another; return the number of solutions.
-
-    Each task is solved for all its numbers of cycles.
-    """
+    """Solve each task for all its numbers of cycles; return the number of solutions."""
     solves = 0
     for task, wanted in _tasks(block, numbers, status).items():
         places = np.linspace(0.0, task.extent, block.parameters.points)
@@ -249,10 +241,7 @@ def _solve_each(
 
 
 def _answer(records: Sequence[Worn], name: str, places: FloatArray) -> float | FloatArray:
-    """Return one output of a solution.
-
-    An output whose name begins with `block_` has one row for each block of a history.
-    """
+    """Return one output of a solution. An output ``block_...`` has one row for each block of a history."""
     plain, is_error = _plain_name(name)
     answers = [
         one.error(plain, places) if is_error else one.value(plain, places)
@@ -288,10 +277,7 @@ def _missed(records: Sequence[Worn], block: Block[FrettingWear], places: FloatAr
 
 
 def _solves_of(task: Task, wanted: Collection[tuple[float, float]]) -> int:
-    """Return the number of solutions of a task.
-
-    The number is one if a single time integration gives all N, or if the result does not depend on N.
-    """
+    """Return the number of solutions of a task: one if a single solution gives the results at all N."""
     marched = task.rule == "sliding" or (task.rule == "exact" and not task.blocks)
     return 1 if marched or task.rule == "limit" else len(wanted)
 
@@ -346,12 +332,10 @@ def _first_resolution(accuracy: float | None, hold: str) -> float:
 def _contacts(
     task: Task, wanted: Sequence[tuple[float, float]], block: Block[FrettingWear], places: FloatArray
 ) -> list[tuple[Sequence[Worn], str]]:
-    """Solve a task for all its pairs (N, xi).
+    """Solve a task for all its pairs (N, xi); return the contacts, each with a message if outputs miss the accuracy.
 
-    If the outputs of a pair miss the accuracy, the pair is solved again at a finer resolution.
-
-    Return the contacts, each with a message about the outputs that miss the accuracy at the last resolution. The final
-    resolution of a result depends only on its own case. Results with the same resolution are solved together.
+    A pair that misses the accuracy is solved again at a finer resolution. The final resolution of a result depends only
+    on its own case.
     """
     resolution, left = _first_resolution(block.accuracy, task.hold), list(range(len(wanted)))
     errors = block.accuracy is not None or any(_plain_name(name)[1] for name in block.outputs)
@@ -369,10 +353,7 @@ def _contacts(
 def _solved(
     task: Task, wanted: Sequence[tuple[float, float]], accuracy: float, *, errors: bool
 ) -> list[Sequence[Worn]]:
-    """Return one sequence of contacts for every pair (N, xi).
-
-    For a history, a sequence has the contact after every block; otherwise it has a single contact.
-    """
+    """Return the contacts for every pair (N, xi): after every block of a history, otherwise a single contact."""
     profile, force = task.profile, task.hold == "force"
     if task.blocks:
         return [_loaded(task, profile, errors=errors)] * len(wanted)

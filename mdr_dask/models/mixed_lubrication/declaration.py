@@ -173,12 +173,7 @@ class MixedLubrication(Parameters):
         return self.roller_radius / 2
 
     def source(self) -> Source:
-        """Return the source of the rough lines.
-
-        The lines are generated, or they are measured profiles, or they have the spectra of measured surfaces.
-
-        Cases with equal sources share their lines.
-        """
+        """Return the source of the rough lines. Cases with equal sources share their lines."""
         one, two = self.surface_1, self.surface_2
         if one is not None and two is not None and one.profile is not None and two.profile is not None:
             return Measured(one.profile, two.profile, self.rms_roughness is not None)

@@ -30,13 +30,8 @@ def points_for(modes: int) -> tuple[int, ...]:
 class _Random:
     """Base class of pairs of rough lines with random phases.
 
-    Parameters
-    ----------
-    points : tuple of int
-        Number of points of each grid, from coarse to fine. The lines have the same waves on every grid.
-    longest, modes : float, int
-        `longest` is the circumference of a roller divided by the longest wavelength of the roughness; `modes` is the
-        circumference divided by the shortest wavelength.
+    `points` is the number of points of each grid, from coarse to fine; the lines have the same waves on every grid.
+    `longest` and `modes` are the circumference of a roller divided by the longest and by the shortest wavelength.
     """
 
     points: tuple[int, ...]
@@ -98,10 +93,7 @@ class Generated(_Random):
 
 @dataclass(frozen=True)
 class OfSurfaces(_Random):
-    """Two lines with the spectra of measured surfaces, in m.
-
-    If a surface has several files, the realisations use them in turn.
-    """
+    """Two lines with the spectra of measured surfaces, in m. The realisations use the files of a surface in turn."""
 
     surface_1: Surface
     surface_2: Surface
@@ -135,10 +127,7 @@ class OfSurfaces(_Random):
 
 @dataclass(frozen=True)
 class Measured:
-    """Two measured lines.
-
-    The end of each line is joined to its beginning, and every realisation begins at random points.
-    """
+    """Two measured lines. The end of each line is joined to its beginning."""
 
     file_1: ProfileFile
     file_2: ProfileFile
@@ -168,9 +157,9 @@ class Measured:
     def lines(self, seed: int, realisation: int, points: int) -> FloatArray:
         """Return the interpolating splines of both lines, shape (2, points), on all points or on every second point.
 
-        Each line begins at one of its points, which is drawn at random. During one revolution at the mean velocity,
-        with a slide-roll ratio S, the contact travels (1 + S/2) times the length of line 1, and (1 - S/2) times the
-        length of line 2. Means over realisations are therefore unbiased only if both lines begin at random points.
+        During one revolution at the mean velocity, with a slide-roll ratio S, the contact travels (1 + S/2) times the
+        length of line 1, and (1 - S/2) times the length of line 2. Means over realisations are therefore unbiased only
+        if both lines begin at random points.
         """
         from mdr_dask.physics.surfaces.splines import through_heights
 
@@ -180,10 +169,7 @@ class Measured:
         return np.array([through_heights(np.roll(line, roll)[:: self.points[-1] // points]) for line, roll in rings])
 
     def _pair(self) -> tuple[FloatArray, FloatArray]:
-        """Return the lines without mean and tilt.
-
-        Without the tilt, the two ends of a line meet without a large step.
-        """
+        """Return the lines without mean and tilt, so that the two ends of a line meet without a large step."""
         from mdr_dask.physics.surfaces.measured import detrended, rms_height
 
         lines = [detrended(line_of(file).height[: self.points[-1]], "line") for file in (self.file_1, self.file_2)]

@@ -67,10 +67,7 @@ class OilData(Parameters):
 
     @property
     def two_viscosities(self) -> tuple[float, float, float, float]:
-        """Two temperatures in K, each followed by the kinematic viscosity in m^2/s.
-
-        They are given or computed from the table.
-        """
+        """Two temperatures in K, each followed by the kinematic viscosity in m^2/s, from the user or the table."""
         if self.viscosities is not None:
             found = _fitted(self.viscosities, self.density, self.density_temperature)
             low, high = float(found.temperature[0]), float(found.temperature[-1])
@@ -108,9 +105,9 @@ class OilData(Parameters):
 
 
 class _Fit(NamedTuple):
-    """Walther's law fitted to a table.
+    """Walther's law fitted to a table. The temperatures in K ascend.
 
-    The temperatures in K ascend; `departures` are the relative deviations of the measured viscosities from the law.
+    `departures` are the relative deviations of the measured viscosities from the law.
     """
 
     temperature: FloatArray
@@ -124,13 +121,7 @@ class _Fit(NamedTuple):
 
 @lru_cache(maxsize=16)
 def _fitted(file: DataFile, density: float, density_temperature: float) -> _Fit:
-    """Fit Walther's law to a table of viscosities.
-
-    Raises
-    ------
-    DataError
-        If columns are missing, or the law cannot describe the viscosities.
-    """
+    """Fit Walther's law to a table of viscosities; raise DataError if this is impossible."""
     text = file.read_text()
     is_dynamic = any(_is_dynamic(unit) for unit in read_sheet(text, file.name).units)
     viscous = Column("dynamic viscosity", "Pa s", above=0)

@@ -33,10 +33,9 @@ class Film(NamedTuple):
 class Operation:
     """The smooth contact, the film and the boundary layer of a case.
 
-    `viscosity` is the dynamic viscosity in Pa s, and `alpha` the pressure-viscosity coefficient in 1/Pa. `shared` has
-    the film thickness in m and the load shares, and `film_error` is the relative error of the film thickness. The
-    heights of the lines are in units of `scale`, which is in m. `strength` is the strength of the layer for heights in
-    this unit. `width` is the width of the contact in m.
+    `viscosity` is the dynamic viscosity in Pa s, `alpha` the pressure-viscosity coefficient in 1/Pa, and `width` the
+    width of the contact in m. `film_error` is the relative error of the film thickness. The heights of the lines are in
+    units of `scale`, which is in m; `strength` is the strength of the layer for heights in this unit.
     """
 
     case: MixedLubrication
@@ -78,13 +77,7 @@ class Operation:
 
 
 def operation_of(case: MixedLubrication, accuracy: float | None = None) -> Operation:
-    """Return the smooth contact and the film of a case; the result does not depend on other cases of a block.
-
-    Raises
-    ------
-    NoFilmError
-        If the film of the EHL solution is requested, but the solution fails.
-    """
+    """Return the smooth contact and the film of a case; raise NoFilmError if the EHL solution fails."""
     data, source = case.oil_data(), case.source()
     viscosity = float(data.dynamic(case.temperature))
     alpha = case.pressure_viscosity
@@ -125,8 +118,7 @@ def _shared_load(
 ) -> tuple[SharedLoad, float, str]:
     """Return the film thickness and the load shares, the relative error of the film thickness, and a warning.
 
-    The warning is empty unless the film is so thin that the asperities would carry more than the load, or the case is
-    outside the range of the film formula.
+    The warning is not empty if asperities would carry more than the load, or outside the range of the film formula.
     """
     pressure = _mean_pressure(case)
 
@@ -150,7 +142,7 @@ def _film_of(
 ) -> tuple[Callable[[float], Film], str]:
     """Return a function that computes the film from the share of the load that it carries, and a warning.
 
-    The warning says that the case is outside the range of the film formula; otherwise it is empty.
+    The warning is not empty outside the range of the film formula.
     """
     E_star, radius = case.contact_modulus, case.radius
     velocity = case.rotation_speed * case.roller_radius

@@ -26,17 +26,9 @@ WINDOWS = 4
 class Revolution:
     """Intimate contact during one revolution of the rollers.
 
-    The window is the part of both lines that is in the Hertzian contact at one moment.
-
-    Parameters
-    ----------
-    contact : int array, shape (windows,)
-        Length in intimate contact in each window. The windows are equidistant in time.
-    unit : float
-        Unit of `contact` in m.
-    parts : int
-        Number of equal parts of the revolution. The scatter between the parts gives the standard error. A part is at
-        least two windows long, unless there is only one part.
+    A window is the part of both lines that is in the Hertzian contact at one moment. `contact` is the length in
+    intimate contact in each window in units of `unit`, which is in m; the windows are equidistant in time. `parts` is
+    the number of equal parts of the revolution, whose scatter gives the standard error.
     """
 
     contact: NDArray[np.int32] | IntArray
@@ -79,10 +71,7 @@ def revolve(operation: Operation, lines: FloatArray) -> Revolution:
 
 
 def _windows(operation: Operation, lines: FloatArray, travels: ArrayLike) -> IntArray:
-    """Return the length in intimate contact at each of the given positions of the contact.
-
-    A position is the distance that the contact has travelled, in spacings between points.
-    """
+    """Return the length in intimate contact at given positions of the contact, in spacings between points."""
     spacing = operation.length / lines.shape[1]
     pair = breakthrough.Pair(lines[0], lines[1], operation.level, spacing, operation.strength)
     starts = breakthrough.creep_positions(travels, lines.shape[1], operation.case.slide_roll_ratio)
@@ -115,7 +104,7 @@ def drawn(
 ) -> dict[str, FloatArray]:
     """Return the requested outputs that are arrays: the trace of the contact length, and the profiles.
 
-    The profiles are both surfaces around the contact, at the time step with the largest length in intimate contact.
+    The profiles are both surfaces around the contact, at the moment with the largest length in intimate contact.
     """
     case, points, found = operation.case, lines.shape[1], {}
     if "contact_length_trace" in wanted:

@@ -1,9 +1,4 @@
-"""Find the results that miss the accuracy of a campaign, for all models.
-
-The accuracy limits the relative error of every output: the error divided by the value. For a profile or a history, the
-relative error is the largest error divided by the largest value. For an output that can be zero, the model gives a
-floor in the unit of the output. If the output is smaller than its floor, the error is divided by the floor instead.
-"""
+"""Find the results that miss the accuracy of a campaign, for all models."""
 
 from __future__ import annotations
 
@@ -23,19 +18,11 @@ def missed_accuracy(
     floors: Mapping[str, ArrayLike] | None = None,
     where: str = "",
 ) -> dict[int, str]:
-    """Return a message for every case with outputs that miss the accuracy; the keys are the indices of the cases.
+    """Return a message for every case with outputs that miss the accuracy, by the index of the case.
 
-    Parameters
-    ----------
-    values, errors : mapping of str to array, shape (cases, ...)
-        Results and their absolute errors, by the name of the output. Elements are ignored where the result or the error
-        is NaN.
-    accuracy : float
-        Allowed relative error of every output.
-    floors : mapping of str to array, shape (cases,), or float
-        The floor of each named output, in the unit of the output. The floor of any other output is 0.
-    where : str
-        Text that is added to the message, such as ``" on the finest grid"``.
+    The accuracy limits the relative error of each output: its largest error divided by the larger of its largest value
+    and its floor. `values` and `errors` have the shape (cases, ...); elements with NaN are ignored. A floor has the
+    unit of its output. `where` is added to the messages, such as ``" on the finest grid"``.
     """
     shares = {
         name: _relative_errors(value, errors[name], (floors or {}).get(name, 0.0)) for name, value in values.items()

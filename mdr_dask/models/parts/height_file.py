@@ -31,7 +31,7 @@ MOST_COLUMNS = 6
 
 
 class Units(NamedTuple):
-    """Units of heights and of positions; and the distances, in m, between points along x and y.
+    """Units of heights and of positions, and the distances between points along x and y in m.
 
     A unit that is not stated is empty, and a distance that is not stated is None.
     """
@@ -58,10 +58,7 @@ class Scan(NamedTuple):
 
 
 class _Grid(NamedTuple):
-    """Heights in the unit of the file, and the steps along x and y in the unit of the positions.
-
-    Rows of heights run along x.
-    """
+    """Heights in the unit of the file, in rows along x, and the steps along x and y in the unit of the positions."""
 
     rows: FloatArray
     steps: tuple[float | None, float | None] = (None, None)
@@ -70,22 +67,10 @@ class _Grid(NamedTuple):
 
 
 def read_map(file: DataFile, units: Units) -> Recorded:
-    """Return the heights of a map.
+    """Return the heights of a map from a text, an array of numpy, or a format of SurfaceTopography.
 
-    Units and spacings are read from the file if it states them. Rows of text and npy files run along x and are stacked
-    along y.
-
-    Parameters
-    ----------
-    file : DataFile
-        Text, npy, or any format that SurfaceTopography can read.
-    units : Units
-        Units and spacings stated by the user.
-
-    Raises
-    ------
-    DataError
-        If the file holds no map, if a unit or spacing is missing, or if the file and the user state different values.
+    `units` are those that the user states. Rows of text and npy files run along x and are stacked along y. Raise
+    DataError if a unit or spacing is missing, or if the file and the user state different ones.
     """
     from mdr_dask.physics.surfaces.maps import SurfaceMap
 
@@ -102,19 +87,10 @@ def read_map(file: DataFile, units: Units) -> Recorded:
 
 
 def read_scan(file: DataFile, units: Units) -> Scan:
-    """Return a line scan as recorded, with missing heights interpolated.
+    """Return a line scan, with missing heights interpolated, from a table or a format of SurfaceTopography.
 
-    Parameters
-    ----------
-    file : DataFile
-        Table of x and z, or any format that SurfaceTopography can read.
-    units : Units
-        Units and spacings stated by the user.
-
-    Raises
-    ------
-    DataError
-        If the file holds no line, if a unit is missing, or if the file and the user state different values.
+    `units` are those that the user states. Raise DataError if a unit is missing, or if the file and the user state
+    different ones.
     """
     import numpy as np
 
@@ -167,8 +143,8 @@ def dimensions(file: DataFile) -> int:
 def _settled(file: DataFile, grid: _Grid, units: Units) -> tuple[float, tuple[float, float]]:
     """Return the length, in m, of the unit of the heights, and the spacings along x and y in m.
 
-    The file or the user states the unit and the spacings. If the positions have no unit, their unit is found from the
-    spacing that the user states: this spacing must be the step of the positions times a power of ten.
+    The file or the user states them. If only the unit of positions is missing, it is found from the spacing that the
+    user states: this spacing must be the step of the positions times a power of ten.
     """
     height = _one_unit(file, "unit", grid.stated.height, units.height)
     position = _one_unit(file, "x_unit", grid.stated.position, units.position)
@@ -221,10 +197,7 @@ def _metre(file: DataFile, unit: str, option: str) -> float:
 
 
 def _channel(file: DataFile) -> Any:
-    """Return the main channel of a file that SurfaceTopography can read.
-
-    Return None for a text file in which SurfaceTopography finds no unit. This module then reads the file itself.
-    """
+    """Return the main channel of a file that SurfaceTopography can read; None for a text without a unit."""
     file.read_bytes()  # to raise an error if the file has changed
     import warnings
 
@@ -350,10 +323,9 @@ def _without_positions(file: DataFile, rows: FloatArray, stated: Units, remarks:
 def _stated(file: DataFile, head: list[str], first: str) -> Units:
     """Return the units and spacings that a file states before its heights.
 
-    They are stated in lines of their own, or in a corner cell such as ``y [um]``.
-
-    A line that names heights or positions and ends in a unit of length states the unit of this quantity. A line that
-    names a spacing states the value of the spacing.
+    They are in lines of their own or in a corner cell such as ``y [um]``. A line that names heights or positions and
+    ends in a unit of length states the unit of this quantity. A line that names a spacing states the value of the
+    spacing.
     """
     corner = re.split(r"[\t;,]", first)[0]
     head = [*head, f"position {corner}"] if re.search(r"[\[(]", corner) else head
@@ -390,10 +362,7 @@ def _is_length(unit: str) -> bool:
 
 
 def _block(file: DataFile, lines: list[str]) -> tuple[pd.DataFrame, int]:
-    """Return the numeric rows of a text as a table, and the index of the first numeric line.
-
-    Words in the table become NaN.
-    """
+    """Return the numeric rows of a text as a table, with NaN for words, and the index of the first numeric line."""
     import pandas as pd
 
     kept = [line for line in lines if line.strip() and line.lstrip()[0] not in "#%"]
@@ -445,9 +414,7 @@ COORDINATES = (
 
 
 def _coordinates(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame) -> tuple[tuple[int, str], ...]:
-    """Return index and unit of the columns x, y and z of a table.
-
-    Return an empty tuple if one of these columns is missing.
+    """Return index and unit of the columns x, y and z of a table; empty if one of them is missing.
 
     If the table has no names, x, y and z are the three columns that do not hold row numbers.
     """
@@ -491,8 +458,8 @@ def _scattered(file: DataFile, lines: list[str], first: int, cells: pd.DataFrame
 def _line_of_text(file: DataFile, units: Units) -> tuple[FloatArray, FloatArray]:
     """Return positions and heights of a table in m.
 
-    The columns are found by their names. If the table has no names, the positions are the column that only rises or
-    only falls. A table of heights alone needs a spacing.
+    If the table has no names, the positions are the column that only rises or only falls. A table of heights alone
+    needs a spacing.
     """
     import numpy as np
 

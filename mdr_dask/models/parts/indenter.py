@@ -1,8 +1,4 @@
-"""Parameters of indenters.
-
-The model of fretting wear extends these parameters: the size of an indenter becomes optional, and an indenter may also
-be a measured profile.
-"""
+"""Parameters of indenters."""
 
 from __future__ import annotations
 
@@ -31,10 +27,7 @@ class _PowerLaw(Parameters):
     """A body of revolution whose height is a power of the distance from its axis."""
 
     def power_law(self) -> tuple[float, float]:
-        """Return coefficient c and exponent n of the body c r^n.
-
-        The coefficient is NaN if the size of the body is not given, as in a dimensionless study of wear.
-        """
+        """Return coefficient c and exponent n of the body c r^n; c is NaN if the size of the body is not given."""
         raise NotImplementedError
 
     def line(self) -> Shape:

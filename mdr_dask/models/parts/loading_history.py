@@ -106,14 +106,8 @@ Protocol = Annotated[Jump | Steps | Ramp | Oscillation | TableFile, Field(discri
 def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> tuple[tuple[float, float], list[Piece]]:
     """Return velocity and normal force before t = 0, and the pieces of the history after t = 0.
 
-    Within a piece, velocity and force are linear in time, and a sine may be added to both. The last piece has no end.
-    `velocity` and `force` are the velocity and the normal force of the sliding body. `change` is the relative change of
-    the velocity at a jump.
-
-    Raises
-    ------
-    DataError
-        If a table is not a loading history, or if it contradicts the state before t = 0.
+    `velocity` and `force` are those of the sliding body, and `change` is the relative change of the velocity at a jump.
+    The last piece has no end. Raise DataError if a table contradicts the state before t = 0.
     """
     from mdr_dask.physics.transients.elements.loading_history import Piece
 

@@ -129,10 +129,7 @@ class Material(Parameters):
 def solid_of(material: Material) -> LinearSolid:
     """Return static modulus, Prony terms and dashpot of the material at its temperature.
 
-    Raises
-    ------
-    DataError, ValueError
-        If the numbers do not describe a solid, or the table cannot be fitted.
+    Raise DataError or ValueError if the numbers do not describe a solid, or if the table cannot be fitted.
     """
     from mdr_dask.physics import solids as rheology
 
@@ -156,11 +153,7 @@ def _shift(material: Material) -> float | None:
 
 
 def _vertical(material: Material) -> float:
-    """Return the vertical factor b_T for the moduli of a table; return 1 for other materials.
-
-    The table gives one curve of moduli. The moduli at the material's temperature are the moduli of this curve divided
-    by b_T.
-    """
+    """Return b_T at the material's temperature, by which the moduli of a table are divided; 1 for other materials."""
     table, temperature = material.dma_table, material.temperature
     if table is None or temperature is None:
         return 1.0
@@ -213,12 +206,7 @@ def _power_law_fit(law: PowerLaw) -> SeriesFit:
 
 
 def fit_error(material: Material | None) -> float:
-    """Return the rms relative error of a fitted Prony series.
-
-    A series is fitted to a power law or a table. For other materials, return 0.
-
-    Raises the same errors as `solid_of`.
-    """
+    """Return the rms relative error of a Prony series that is fitted to a power law or a table; otherwise return 0."""
     fit = None if material is None else _fit_of(material)
     return 0.0 if fit is None else fit.error
 

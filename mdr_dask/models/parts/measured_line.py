@@ -73,13 +73,7 @@ def _statistics(profile: ProfileFile) -> str:
 
 @lru_cache(maxsize=16)
 def line_of(profile: ProfileFile) -> MeasuredLine:
-    """Return one period of the measured line.
-
-    Raises
-    ------
-    DataError
-        If the file does not contain a line.
-    """
+    """Return one period of the measured line; raise DataError if the file does not contain a line."""
     from mdr_dask.physics.surfaces.measured import measured_line
 
     scan = _scan(profile)

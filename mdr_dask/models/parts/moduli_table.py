@@ -83,19 +83,10 @@ class ModulusTable(NamedByFile):
 
 @dataclass(frozen=True)
 class Moduli:
-    """One curve of moduli.
+    """One curve of moduli: angular frequency in rad/s, storage and loss modulus in Pa.
 
-    Parameters
-    ----------
-    omega, storage, loss : array, shape (points,)
-        Angular frequency in rad/s and moduli in Pa. In the result of `one_curve`, they are shear moduli. In all other
-        curves, they are in shear or in tension as measured.
-    temperature : float or None
-        Temperature of the curve in K; None if the table has no temperatures.
-    measured : tuple of float or None
-        Lowest and highest temperature of the table in K; None if the table has no temperatures.
-    superposed : str
-        A text that describes how the curves of several temperatures were superposed; empty for one temperature.
+    `temperature` is the temperature of the curve, `measured` the lowest and highest temperature of the table, all in K;
+    None if the table has no temperatures. `superposed` describes how curves of several temperatures were superposed.
     """
 
     omega: FloatArray
@@ -109,12 +100,8 @@ class Moduli:
 def one_curve(chosen: ModulusTable, law: Law | None) -> Moduli:
     """Return the shear moduli of a table at one temperature.
 
-    The curves of several temperatures are superposed, unless the user chooses one temperature.
-
-    Raises
-    ------
-    DataError
-        If the table has no moduli, or its curves cannot be superposed.
+    The curves of several temperatures are superposed, unless the user chooses one temperature. Raise DataError if this
+    is impossible.
     """
     found = _as_measured(chosen, law)
     divisor = 1.0 if chosen.poisson_ratio is None else 2 * (1 + chosen.poisson_ratio)
@@ -169,10 +156,10 @@ def _levels(temperature: FloatArray) -> tuple[IntArray, FloatArray]:
 
 
 def vertical_factor(chosen: ModulusTable, temperature: FloatArray, reference: float) -> FloatArray:
-    """Return b_T = rho0 T0 / (rho T), the vertical factor of moduli, for each temperature T.
+    """Return b_T = rho0 T0 / (rho T), the vertical factor of moduli, for each temperature T in K.
 
-    A modulus at T, multiplied by b_T, becomes a modulus at the reference temperature T0. Both temperatures are in K.
-    The densities at T0 and T are rho0 and rho. With the option `vertical: none`, b_T is 1.
+    A modulus at T, multiplied by b_T, becomes a modulus at the reference temperature T0. The densities at T0 and T are
+    rho0 and rho. With the option `vertical: none`, b_T is 1.
     """
     from mdr_dask.physics.superposition.master_curve import known_rise
 
@@ -190,12 +177,7 @@ def _vertical(chosen: ModulusTable) -> str:
 
 @lru_cache(maxsize=16)
 def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
-    """Return log10 of the horizontal shift factors, log10 of the vertical shift factors, and a text about the factors.
-
-    There is one factor of each kind for every temperature.
-
-    Curves that are shifted by these factors form a single curve, which belongs to the reference temperature.
-    """
+    """Return log10 of the horizontal and the vertical shift factor of every temperature, and a text about them."""
     from mdr_dask.physics.superposition.master_curve import rereference, superpose
 
     omega, storage, loss, temperature = _measured(chosen)
@@ -224,10 +206,7 @@ def _superposed(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, str]:
 
 
 def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, reference: float) -> str:
-    """Return a text with the largest difference between two sets of shift factors.
-
-    One set was found from the curves, the other set follows from a law.
-    """
+    """Return a text with the largest difference between the shift factors found from the curves and those of a law."""
     if law is None:
         return ""
     try:

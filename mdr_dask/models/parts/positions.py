@@ -25,9 +25,9 @@ FEW_LEVELS = 10
 
 
 class Outer(NamedTuple):
-    """A table of heights from which rows and columns of positions were removed.
+    """A table of heights without the rows and columns of positions, which `remarks` name.
 
-    `steps` are the steps of the positions along x and y, None if unknown. `remarks` name the removed rows and columns.
+    `steps` are the steps of the positions along x and y, None if unknown.
     """
 
     rows: FloatArray
@@ -36,10 +36,7 @@ class Outer(NamedTuple):
 
 
 def rising(lines: FloatArray) -> NDArray[np.bool_]:
-    """Return, for each line, whether its numbers only rise or only fall.
-
-    The positions in a file and the numbers of its rows only rise or only fall. The heights of a rough surface do not.
-    """
+    """Return, for each line, whether its numbers only rise or only fall, as positions and row numbers do."""
     steps = np.diff(lines, axis=1)
     known = np.isfinite(steps)
     one_way = np.all((steps >= 0) | ~known, axis=1) | np.all((steps <= 0) | ~known, axis=1)
@@ -49,10 +46,7 @@ def rising(lines: FloatArray) -> NDArray[np.bool_]:
 def without_positions(rows: FloatArray) -> Outer:
     """Remove the outermost rows and columns that hold positions or row numbers.
 
-    Raises
-    ------
-    DataError
-        If positions are not equidistant, or if several lines of positions have different steps.
+    Raise DataError if positions are not equidistant, or if several lines of positions have different steps.
     """
     if min(rows.shape) < 4 * OUTER:
         return Outer(rows, (None, None), ())
@@ -71,9 +65,8 @@ def without_positions(rows: FloatArray) -> Outer:
 def _leading(lines: FloatArray) -> int:
     """Return the number of lines at the beginning that hold positions or row numbers.
 
-    Lines of positions only rise or only fall. Lines of heights on a tilted or curved surface may also only rise or only
-    fall. Lines of positions are distinguished by a second property: they differ much more from the adjacent lines than
-    two lines of heights differ from each other.
+    Heights on a tilted surface may only rise, as positions do. But positions differ much more from the adjacent line
+    than two lines of heights differ from each other.
     """
     inner = lines[:, OUTER:-OUTER]
     rises = rising(inner)
@@ -91,12 +84,9 @@ def is_numbered(line: FloatArray) -> bool:
 
 
 def _common_step(lines: list[FloatArray], name: str) -> float | None:
-    """Return the common step of all lines of positions. Return None if every line holds the numbers of its points.
+    """Return the common step of all lines of positions; raise DataError if their steps differ.
 
-    Raises
-    ------
-    DataError
-        If the steps of two lines differ.
+    Return None if every line holds the numbers of its points.
     """
     steps = [regular(line)[1] for line in lines if not is_numbered(line)]
     if any(abs(step - steps[0]) > 0.01 * steps[0] for step in steps):
@@ -108,12 +98,7 @@ def _common_step(lines: list[FloatArray], name: str) -> float | None:
 def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
     """Return the index of each position on a regular grid, counted from 0, and the step of the grid.
 
-    Positions may deviate a little from the grid, and grid points may be missing.
-
-    Raises
-    ------
-    DataError
-        If a position is half a step or more off the grid.
+    Grid points may be missing. Raise DataError if a position is half a step or more off the grid.
     """
     known = np.sort(positions[np.isfinite(positions)])
     gaps = np.diff(known)
@@ -135,12 +120,7 @@ def regular(positions: FloatArray) -> tuple[NDArray[np.int64], float]:
 def scattered(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, tuple[float, float]]:
     """Arrange points, which are given in any order, in rows of heights; return the rows and the steps along x and y.
 
-    A height is NaN where a point is missing.
-
-    Raises
-    ------
-    DataError
-        If the points do not lie on a regular grid, or if two points have the same position.
+    Missing points become NaN. Raise DataError if two points have the same position or the grid is not regular.
     """
     (column, step_x), (row, step_y) = regular(x), regular(y)
     shape = row.max() + 1, column.max() + 1
@@ -154,10 +134,9 @@ def scattered(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, 
 def without_codes(height: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     """Replace numbers that cannot be heights, such as the code 9999 for missing points, by NaN. Also return remarks.
 
-    The largest number is replaced if its distance from all other heights exceeds the range of these other heights. The
-    smallest number is treated in the same way. A number that occurs only once may belong to a deep groove; it is
-    replaced only if the distance exceeds `FAR_ALONE` times the range. Nothing is replaced if the other heights have at
-    most `FEW_LEVELS` different values, as on a grating.
+    The largest number is replaced if its distance from all other heights exceeds the range of these other heights; so
+    is the smallest number. A number that occurs once may belong to a deep groove: its distance must exceed `FAR_ALONE`
+    times the range. A surface with at most `FEW_LEVELS` different heights, such as a grating, stays as it is.
     """
     height = np.where(np.isfinite(height), height, np.nan)
     found: list[str] = []

@@ -1,9 +1,4 @@
-"""The four kinds of lines.
-
-A line is self-affine, has the spectrum of a measured surface, is a measured profile, or is smooth.
-
-All heights are in units of the rms height, and all lengths in units of the length of the line.
-"""
+"""The four kinds of lines. Heights are in units of the rms height, and lengths in units of the length of the line."""
 
 from __future__ import annotations
 
@@ -64,8 +59,8 @@ def _slope(line: Generated) -> float:
 class OfSurface:
     """Lines with the spectrum of a measured surface and random phases.
 
-    If the surface has several files, the realisations use the files in turn. Therefore the scatter between realisations
-    includes the scatter between files, and the mean over realisations is also a mean over files.
+    If the surface has several files, the realisations use the files in turn. The scatter between realisations then
+    includes the scatter between files.
     """
 
     surface: Surface

@@ -37,7 +37,7 @@ NUMBERS = (
 class SlidingBody(Parameters):
     """A viscoelastic body that slides over a rough line.
 
-    The roughness is generated or measured. The roughness lies on a plane or on the surface of an indenter.
+    The roughness is generated or measured. It lies on a plane or on the surface of an indenter.
     """
 
     renamed: ClassVar[Mapping[str, str]] = {
@@ -128,7 +128,7 @@ class SlidingBody(Parameters):
 
 
 def frequency_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
-    """Return a note for each material. The note compares the frequencies of a study with the frequencies of the data.
+    """Return a note for each material that compares the frequencies of a study with the frequencies of the data.
 
     At the sliding velocity v, a wave of the roughness with the wave number q excites the angular frequency q v.
     """

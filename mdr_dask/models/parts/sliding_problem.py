@@ -41,8 +41,7 @@ LEAST = 1e-100  # a product of three numbers between LEAST and 1 / LEAST does no
 class Setting:
     """The dimensionless roughness, shape and solid that several cases have in common.
 
-    `body` is the shape of the indenter, None for a plane. `terms` are the Prony terms of the solid, None for a Kelvin
-    solid.
+    `body` is None for a plane, and `terms` is None for a Kelvin solid.
     """
 
     roughness: Roughness
@@ -54,22 +53,10 @@ class Setting:
 class SlidingProblems:
     """The cases of a block as dimensionless numbers. Cases with equal numbers have the same dimensionless solution.
 
-    Parameters
-    ----------
-    settings : list of Setting
-        The different combinations of line, shape and solid.
-    which : int array, shape (cases,)
-        Index into `settings` for every case; -1 for a case that cannot be solved.
-    loads : array, shape (cases,)
-        Dimensionless load F_N / (4 G_inf L h), with the static shear modulus G_inf.
-    deborah : array, shape (cases,)
-        eta v / (G_inf L), with the viscosity eta and the velocity v. For a Kelvin body, this is the Deborah number v
-        tau / L.
-    length, height : array, shape (cases,)
-        The units of length and of height, L and h, in m. L is the length of the line. h is the rms height, or equals L
-        if there is no roughness.
-    faults : dict of int to str
-        Messages about cases that cannot be solved, by the index of the case.
+    `which` is the index into `settings` for every case, -1 for a case that cannot be solved. `loads` are F_N / (4 G_inf
+    L h) with the static shear modulus G_inf. `deborah` is eta v / (G_inf L) with the viscosity eta, which is v tau / L
+    for a Kelvin body. `length` is the length L of the line in m. `height` is the rms height h in m, or L without
+    roughness. `faults` are messages about cases that cannot be solved, by the index of the case.
     """
 
     settings: list[Setting]
@@ -81,10 +68,7 @@ class SlidingProblems:
     faults: dict[int, str]
 
     def groups(self, *columns: NDArray[Any]) -> Iterator[tuple[Setting, IntArray]]:
-        """Yield groups of solvable cases.
-
-        All cases of a group have the same setting, and the same value in each given column.
-        """
+        """Yield groups of solvable cases with equal settings and equal values in the columns: setting and indices."""
         is_sound = self.which >= 0
         is_sound[list(self.faults)] = False
         sound = np.flatnonzero(is_sound)
@@ -94,10 +78,7 @@ class SlidingProblems:
             yield self.settings[self.which[sound[k]]], members
 
     def different(self, members: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Return the different pairs (Deborah number, load) of the cases `members`.
-
-        Also return the index of the pair of each case.
-        """
+        """Return Deborah number and load of each different case, and for every member its index among these cases."""
         pairs, which = np.unique(self.deborah[members] + 1j * self.loads[members], return_inverse=True)
         return pairs.real.copy(), pairs.imag.copy(), which
 
@@ -105,12 +86,7 @@ class SlidingProblems:
 def combinations(*columns: NDArray[Any]) -> tuple[IntArray, IntArray]:
     """Find the different rows of a table, which is given by its columns. Objects are compared by identity.
 
-    Returns
-    -------
-    first : int array, shape (combinations,)
-        The first row with each combination.
-    which : int array, shape (rows,)
-        The index of the combination of each row.
+    Return the first row with each combination of values, and for every row the index of its combination.
     """
     which = np.zeros(columns[0].size, np.int64) if columns else np.zeros(1, np.int64)
     first = np.zeros(min(which.size, 1), np.int64)
@@ -170,10 +146,7 @@ def _without_units(body: Shape | None, length: float, height: float) -> Shape | 
 
 
 def _travelling(term: tuple[FloatArray, FloatArray] | None, velocity: float, length: float) -> PronyTerms | None:
-    """Return dimensionless Prony terms: relaxation times are divided by L / v, the time of sliding over the distance L.
-
-    Return None if there are no terms.
-    """
+    """Return Prony terms, with relaxation times divided by L / v, the time of sliding over the distance L."""
     from mdr_dask.physics.sliding.problem import PronyTerms
 
     if term is None:
@@ -190,10 +163,7 @@ def refuse_immense(numbers: dict[str, FloatArray], faults: dict[int, str]) -> No
 
 
 def each(block: Block[Any], name: str) -> tuple[list[Any], IntArray]:
-    """Return the different values of a nested parameter, and for every case the index of its value.
-
-    The whole nested parameter may vary between the cases, or only some of its fields.
-    """
+    """Return the different values of a nested parameter, and for every case the index of its value."""
     varied = [column for path, column in block.columns.items() if path.partition(".")[0] == name]
     if not varied:
         return [getattr(block.parameters, name)], np.zeros(block.cases, np.int64)
@@ -247,18 +217,10 @@ def _lines(
 
 
 def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArray, FloatArray, list[Any], IntArray]:
-    """Return the solids of a block.
+    """Return static modulus in Pa and viscosity of the dashpot over static modulus in s for every case, and the solids.
 
-    Returns
-    -------
-    static, viscosity : array, shape (cases,)
-        `static` is the static modulus in Pa. `viscosity` is the viscosity of the dashpot divided by the static modulus,
-        in s.
-    terms : list
-        For every different solid, the moduli of its Prony terms divided by the static modulus, and their relaxation
-        times in s; None for a Kelvin solid.
-    which : int array, shape (cases,)
-        Index of the solid of every case.
+    The solids are the Prony terms of every different solid (moduli over static modulus, and times in s), None for a
+    Kelvin solid. The last array is the index of the solid of every case.
     """
     static, viscosity = _numbers(block, "shear_modulus"), _numbers(block, "relaxation_time")
     materials, which = each(block, "material")

@@ -119,10 +119,7 @@ def without_exponent(value: Any, surface: str) -> Any:
 def spectra_of(surface: Surface) -> tuple[Spectrum, ...]:
     """Return the spectra C2D of a surface between its cut-offs, one for each file.
 
-    Raises
-    ------
-    DataError
-        If a file has no spectrum, or if the cut-offs are outside the range of the spectrum.
+    Raise DataError if a file has no spectrum, or if a cut-off is outside the range of the spectrum.
     """
     return tuple(
         _within(surface, found, file)
@@ -131,10 +128,7 @@ def spectra_of(surface: Surface) -> tuple[Spectrum, ...]:
 
 
 def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
-    """Return a spectrum between the cut-offs.
-
-    If `shortest_wavelength` is not given, the spectrum ends where noise begins.
-    """
+    """Return a spectrum between the cut-offs. Without `shortest_wavelength`, the spectrum ends where noise begins."""
     spectrum = found.spectrum
     ends = surface.longest_wavelength or 0.0, surface.shortest_wavelength or 0.0
     if surface.extrapolate:
@@ -162,12 +156,7 @@ def _beyond(name: str, wavelength: float, which: str, end: float) -> str:
 def lines_of(surface: Surface, length: float, modes: int) -> tuple[FloatArray, ...]:
     """Return the amplitudes, in m, of the lines that replace a surface in the method of dimensionality reduction (MDR).
 
-    There is one line for each file.
-
-    Raises
-    ------
-    DataError
-        If no wave of the line lies in the range of the spectrum.
+    There is one line for each file. Raise DataError if no wave of the line lies in the range of the spectrum.
     """
     import numpy as np
 

@@ -41,16 +41,9 @@ COLUMNS = (
 
 
 class Found(NamedTuple):
-    """The spectrum of a file.
+    """The spectrum C2D of a file within the range of the data.
 
-    Parameters
-    ----------
-    spectrum : Spectrum
-        C2D within the range of the data.
-    resolution : float
-        Wavelength in m below which there is only noise; 0 if no noise was found.
-    remarks : tuple of str
-        Remarks about missing points, outliers and stripes, and about points that were changed.
+    `resolution` is the wavelength in m below which there is only noise, 0 if no noise was found.
     """
 
     spectrum: Spectrum
@@ -129,10 +122,7 @@ class MapFiles(HeightFiles):
 
 
 def is_spectrum(text: str) -> bool:
-    """Return whether a text begins with column names of a spectrum.
-
-    Two such names are enough, or one of several letters.
-    """
+    """Return whether a text begins with column names of a spectrum: two such names, or one of several letters."""
     try:
         sheet = read_sheet("\n".join(text.splitlines()[:20]), "")
     except DataError:
@@ -188,10 +178,7 @@ def line_of_scan(scans: ScanFiles, file: DataFile) -> MeasuredLine:
 
 
 def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
-    """Return a warning if a line may contain the form of the measured part, and a warning if it is too steep.
-
-    If a line is steeper than 45 degrees, the unit of its heights or positions may be wrong.
-    """
+    """Return warnings if a line may contain the form of the measured part, or if it is steeper than 45 degrees."""
     import numpy as np
 
     place = np.linspace(-1, 1, line.height.size)
@@ -201,10 +188,7 @@ def doubts_of_line(line: MeasuredLine, detrend: str) -> tuple[str, ...]:
 
 
 def _form(level: FloatArray, curved: FloatArray) -> tuple[str, ...]:
-    """Return a warning if a parabola explains most of the levelled heights.
-
-    The heights may then contain the form of the part.
-    """
+    """Return a warning if a parabola explains most of the levelled heights: they may contain the form of the part."""
     import numpy as np
 
     square, rest = (float(np.nanmean((height - np.nanmean(height)) ** 2)) for height in (level, curved))
@@ -235,10 +219,7 @@ def scanned(scans: ScanFiles, file: DataFile) -> Found:
 
 
 def of_surface_cut(cut: Cut) -> Found:
-    """Return the spectrum of the surface from the spectrum of a straight profile.
-
-    Short waves that are only noise are left out.
-    """
+    """Return the spectrum of the surface from the spectrum of a straight profile, without waves that are only noise."""
     import numpy as np
 
     from mdr_dask.physics.surfaces.scans import NOISE_SLOPE, NOISE_TAIL, of_cut
@@ -250,10 +231,7 @@ def of_surface_cut(cut: Cut) -> Found:
 
 @lru_cache(maxsize=16)
 def mapped(maps: MapFiles, file: DataFile) -> Found:
-    """Return the spectrum of one map.
-
-    It is averaged over all directions, or found from profiles along the given direction.
-    """
+    """Return the spectrum of one map, averaged over all directions or found from profiles along the given direction."""
     import numpy as np
 
     from mdr_dask.physics.surfaces.scans import NOISE_SLOPE, averaged
@@ -289,14 +267,8 @@ def anisotropic(maps: MapFiles, file: DataFile) -> str:
 class LevelledMap(NamedTuple):
     """A map after its trend is subtracted.
 
-    Parameters
-    ----------
-    height_rms, height_mean : float
-        Sq and Sa of the measured points in m: the rms height and the mean absolute height.
-    spectrum : MapSpectrum
-        Spectrum of the windowed map, with missing points filled.
-    remarks : tuple of str
-        Changes made to the points.
+    `height_rms` and `height_mean` are Sq and Sa of the measured points in m. `spectrum` is the spectrum of the windowed
+    map, with missing points filled.
     """
 
     height_rms: float
@@ -309,10 +281,7 @@ class LevelledMap(NamedTuple):
 def levelled_map(maps: MapFiles, file: DataFile) -> LevelledMap:
     """Return height parameters and spectrum of one map.
 
-    Raises
-    ------
-    DataError
-        If the file holds no map, or if too many points are missing.
+    Raise DataError if the file holds no map, or if too many points are missing.
     """
     import numpy as np
 

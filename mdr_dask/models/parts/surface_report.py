@@ -52,21 +52,9 @@ of its interval.
 class FileReport(NamedTuple):
     """Report on one file.
 
-    Parameters
-    ----------
-    file : DataFile
-        The file.
-    row : dict of str to number or str
-        Values of the columns of `UNITS`.
-    found : Found
-        The two-dimensional power spectrum C2D, the wavelength below which there is only noise, and remarks.
-    bins : Cut
-        C2D in logarithmic bins with relative errors.
-    cuts : dict of str to (array, array)
-        Wave numbers and one-dimensional power spectrum, in m^3, of straight profiles in each direction; empty for a
-        table.
-    law : SelfAffine or None
-        The fitted power law; None if no power law fits.
+    `row` has the values of the columns of `UNITS`, and `bins` has C2D in logarithmic bins with relative errors. `cuts`
+    are wave numbers and power spectrum, in m^3, of straight profiles in each direction. `law` is None if no power law
+    fits.
     """
 
     file: DataFile
@@ -78,13 +66,7 @@ class FileReport(NamedTuple):
 
 
 def reports(surface: Surface) -> tuple[FileReport, ...]:
-    """Return a report on each file of a surface.
-
-    Raises
-    ------
-    DataError
-        If a file cannot be read.
-    """
+    """Return a report on each file of a surface; raise DataError if a file cannot be read."""
     measured = surface.measured
     return tuple(_report(surface, file, found) for file, found in zip(measured.files, measured.found(), strict=True))
 
@@ -134,10 +116,11 @@ def _of_scan(
 
 
 def mean_spectrum(spectra: tuple[Spectrum, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the wave numbers of the first spectrum, the mean of all spectra, and the relative error of the mean.
+    """Return the mean of several spectra at the wave numbers of the first one, and the relative standard error of the
+    mean.
 
-    At each wave number, the mean includes only the spectra that have this wave number in their range. The error is one
-    standard error; it is NaN for a single spectrum.
+    At each wave number, the mean includes only the spectra that contain this wave number. The error is NaN for a single
+    spectrum.
     """
     q = spectra[0].wavenumber
     each = np.array([spectrum.at(q) for spectrum in spectra])

@@ -25,10 +25,7 @@ class Wlf(Parameters):
     reference: float = quantity("K", "reference temperature for c1 and c2, at which a_T = 1", usual="20 degC", gt=0)
 
     def factor(self, temperature: FloatArray | float) -> FloatArray:
-        """Return a_T for temperatures in K, in the same shape.
-
-        Raise ValueError for temperatures outside the range of the law.
-        """
+        """Return a_T for temperatures in K; raise ValueError for temperatures at which the law diverges."""
         from mdr_dask.physics.solids import wlf_factor
 
         lowest, end = float(np.min(temperature)), self.reference - self.c2
@@ -78,10 +75,7 @@ class ShiftFactors(Parameters):
         return float(np.interp(0.0, decades[::-1], temperature[::-1]))
 
     def factor(self, temperature: FloatArray | float) -> FloatArray:
-        """Return a_T for temperatures in K, by linear interpolation of log a_T.
-
-        Raise ValueError for temperatures outside the range of the table.
-        """
+        """Return a_T for temperatures in K, by linear interpolation of log a_T; raise ValueError outside the table."""
         known, decades = _shifts(self)
         wanted = np.asarray(temperature, dtype=np.float64)
         for outside in wanted[(wanted < known[0]) | (wanted > known[-1])].ravel():

@@ -47,18 +47,10 @@ def load_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
 
 
 def beyond_tested(setting: Setting, loads: FloatArray, fractions: FloatArray) -> dict[int, str]:
-    """Return messages, by the index of the case, for all cases outside the tested range.
+    """Return messages about cases outside the tested range, by the index of the case.
 
-    Parameters
-    ----------
-    setting : Setting
-        Line and solid of the cases. Only cases with a plane body on lines that represent a measured surface are
-        checked; other cases give no message.
-    loads : array, shape (cases,)
-        F_N / (4 G_inf L h); for a history, the largest value during the history.
-    fractions : array, shape (cases,)
-        Length in contact divided by the length of the line; for a history, the largest value. NaN if the contact is not
-        known.
+    `loads` are F_N / (4 G_inf L h), and `fractions` are fractions of the line in contact; for a history, the largest
+    values during the history. Only plane bodies with the spectrum of a measured surface are checked.
     """
     if setting.body is not None or not isinstance(setting.roughness, OfSurface):
         return {}

@@ -1,8 +1,4 @@
-"""Steady friction of a viscoelastic body that slides over a rough line (thesis chapter 3).
-
-`declaration` defines the parameters and outputs, and is quick to import; `solve` computes the outputs of a block of
-cases.
-"""
+"""Steady friction of a viscoelastic body that slides over a rough line (thesis chapter 3)."""
 
 from mdr_dask.models.sliding_friction.declaration import MODEL, SlidingFriction
 

@@ -53,11 +53,7 @@ def compute(block: Block[SlidingFriction]) -> Result:
 def _groups(
     block: Block[SlidingFriction], problems: SlidingProblems
 ) -> Iterator[tuple[Setting, SlidingFriction, IntArray]]:
-    """Yield groups of cases with equal setting, oversampling and scheme.
-
-    Each group consists of the setting, the parameters of one case of the group, and the indices of all cases of the
-    group.
-    """
+    """Yield groups of cases with equal setting, oversampling and scheme: setting, one case, indices of all cases."""
     varied = [block.columns[name] for name in ("oversampling", "scheme") if name in block.columns]
     for setting, members in problems.groups(*varied):
         yield setting, block.case(int(members[0])), members
@@ -138,10 +134,7 @@ class _Group:
 
 
 def distinct(block: Block[SlidingFriction]) -> int:
-    """Return the number of solutions of a block.
-
-    In each realisation with a new line, every different case is solved once.
-    """
+    """Return the number of solutions of a block."""
     problems, total = sliding_problems(block), 0
     for setting, _, members in _groups(block, problems):
         total += problems.different(members)[0].size * _lines(block, setting)
@@ -154,10 +147,7 @@ def _lines(block: Block[SlidingFriction], setting: Setting) -> int:
 
 
 def operations(block: Block[SlidingFriction]) -> float:
-    """Return the approximate number of operations of a block.
-
-    The number is computed from the grid points of all sweeps.
-    """
+    """Return the approximate number of operations of a block, from the grid points of all sweeps."""
     problems, nodes = sliding_problems(block), 0.0
     for setting, case, members in _groups(block, problems):
         solves = problems.different(members)[0].size

@@ -82,10 +82,7 @@ class VelocityJump(SlidingBody):
         return kelvin(self.shear_modulus, self.relaxation_time)
 
     def time_unit(self) -> float:
-        """Return tau in s, the unit of stored times.
-
-        It is the longest of the relaxation times of Prony terms and dashpot.
-        """
+        """Return tau in s, the unit of stored times: the longest relaxation time of Prony terms and dashpot."""
         solid = self.solid()
         return float(max([solid.viscosity / solid.static_modulus, *solid.times]))
 

@@ -60,10 +60,7 @@ TRANSIENT = ("friction_coefficient", "indentation_depth")
 
 @dataclass(frozen=True)
 class _Found:
-    """The dimensionless outputs of several cases, and the errors of these outputs.
-
-    Friction is divided by h / L, and depth by h.
-    """
+    """The dimensionless outputs of several cases, and their errors. Friction is divided by h / L, and depth by h."""
 
     values: dict[str, FloatArray]
     errors: dict[str, FloatArray]
@@ -94,10 +91,9 @@ def compute(block: Block[VelocityJump]) -> Result:
 
 
 def _groups(block: Block[VelocityJump], problems: SlidingProblems) -> Iterator[_Group]:
-    """Yield groups of cases.
+    """Yield groups of cases. Jumps of a plane Kelvin body with the same line and grid form a group.
 
-    If jumps of a plane Kelvin body have the same line and grid, they form a group. Every other case is a group by
-    itself.
+    Every other case is a group by itself.
     """
     protocols, which = each(block, "protocol")
     is_jump = np.array([protocol.shape == "jump" for protocol in protocols])[which]
@@ -175,13 +171,10 @@ class _Group:
         yield from beyond_tested(self.setting, self.largest_loads, found.contact).items()
 
     def _floor(self, found: _Found, name: str) -> FloatArray:
-        """Return the floor of an output for every case.
-
-        If a value is smaller than its floor, the relative error is the error divided by the floor.
+        """Return the floor of an output for every case (see `missed_accuracy`).
 
         The floor of a depth is the rms height, which is the unit of the depths here. If friction is zero within its
-        error, as for a body at rest, the floor is the largest friction of the case. In all other cases the floor is 0:
-        the relative error is the error divided by the value.
+        error, as for a body at rest, the floor is the largest friction of the case. In all other cases the floor is 0.
         """
         cases = found.outcome.size
         if name == "indentation_depth":
@@ -221,8 +214,7 @@ class _Marched(_Group):
     def different(self) -> tuple[FloatArray, FloatArray, IntArray]:
         """Loads and Deborah numbers of the different cases, and for every case the index of its numbers among them.
 
-        The different cases are sorted by velocity, because the solver shares work among neighbours with equal Deborah
-        numbers.
+        They are sorted by velocity, because the solver shares work among neighbours with equal Deborah numbers.
         """
         before = self.problems.deborah[self.members]
         change = np.asarray(self.block.column("velocity_change"), dtype=np.float64)[self.members]
@@ -235,10 +227,7 @@ class _Followed(_Group):
     """One case that is computed from the motion of all elements: any history, solid and indenter."""
 
     def found(self, waves: Waves) -> tuple[_Found, int]:
-        """Solve the case with a quarter, half and all of the nodes.
-
-        The time step is proportional to the spacing of the nodes.
-        """
+        """Solve the case with a quarter, half and all of the nodes. The time step is proportional to their spacing."""
         nodes = waves.points * self.oversampling
         grids = [nodes // every for every in (4, 2, 1) if nodes % every == 0 and nodes // every >= waves.points]
 
