@@ -84,6 +84,7 @@ def refine(
     safety: float = SAFETY,
     floors: ArrayLike = 0.0,
     shared: bool = True,
+    requested: int | None = None,
 ) -> Refined:
     """Solve every case on the coarsest grid on which all outputs meet an accuracy.
 
@@ -115,6 +116,9 @@ def refine(
         If True, the largest relative change among the outputs of a case is used for all outputs of this case. The
         reason: one output may be the same on two grids by chance, but hardly all outputs at once. Choose False for
         outputs that converge at different rates.
+    requested : int or None
+        Number of outputs that must meet the accuracy; None for all outputs. The other outputs come last. Their errors
+        are infinite.
 
     Returns
     -------
@@ -156,7 +160,7 @@ def refine(
         fine = solve(finer, left)
         change = relative_changes(coarse, fine, floor)
         if shared:
-            change = np.broadcast_to(change.max(axis=0, initial=0.0), change.shape)
+            change = np.broadcast_to(change[:requested].max(axis=0, initial=0.0), change.shape)
         # if a case had no solution on a previous grid, `before` is infinite and the second term is left out
         earlier = np.where(np.isfinite(before), before, 0.0) / reduction
         relative = safety / (reduction - 1) * np.maximum(change, earlier) + fine.unseen
@@ -168,8 +172,10 @@ def refine(
         outcome[kept], level[kept] = fine.outcome[better], finer
         with np.errstate(invalid="ignore"):
             errors[:, kept] = np.where(solved, relative * _sizes(fine.values, floor), np.inf)[:, better]
-        met[left] = solved & np.all(relative <= accuracy, axis=0)
+        met[left] = solved & np.all(relative[:requested] <= accuracy, axis=0)
         coarse, before = fine, change
+    if requested is not None:
+        errors[requested:] = np.inf
     for value in values:
         value[outcome != Outcome.CONVERGED] = np.nan
     return Refined(values, errors, met, level, outcome)

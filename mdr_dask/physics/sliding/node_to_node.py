@@ -668,14 +668,11 @@ class NodeToNode:
         v tau / L and F_N / (4 G L), positive and finite.
     error : float
         Largest relative error of the drag due to the search for the depth.
-    contact : bool
-        Whether the errors of contact fraction and contact slope include the effect of contact patches that fall between
-        the nodes.
     """
 
-    def __init__(self, line: RoughLine, cases: Cases, error: float, contact: bool) -> None:
+    def __init__(self, line: RoughLine, cases: Cases, error: float) -> None:
         self._height, self._slope = line.nodes
-        self._cases, self._error, self._contact = cases, error, contact
+        self._cases, self._error = cases, error
         loads = cases.loads
         self._rates = np.full((loads.size, SECANTS), np.nan)
         self._depth = np.full(loads.size, np.nan)  # penetration of the mean line
@@ -731,7 +728,7 @@ class NodeToNode:
         with np.errstate(invalid="ignore", divide="ignore"):
             cells = fraction * (self._height.size // 2 * level)
             resolved = (drag > 0) & (cells >= RESOLVED)
-            patch = np.where(resolved, self._contact / cells, np.inf)
+            patch = np.where(resolved, 1.0 / cells, np.inf)
         outcome = np.where(resolved, np.int8(Outcome.CONVERGED), np.int8(Outcome.DEPTH_NOT_FOUND))
         unseen = np.full((4, drag.size), ARITHMETIC)
         unseen[2:] += patch, 0.5 * patch

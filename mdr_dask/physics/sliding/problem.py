@@ -79,6 +79,11 @@ class Request:
     with_errors: bool = True
     contact: bool = True
 
+    @property
+    def columns(self) -> int:
+        """Number of requested results, in the order of `Steady.columns`: drag and depth, or all four."""
+        return 4 if self.contact else 2
+
 
 def solve(
     line: RoughLine, terms: PronyTerms | None, deborah: FloatArray, loads: FloatArray, request: Request
@@ -134,8 +139,16 @@ def _to_accuracy(line: RoughLine, cases: Cases, request: Request) -> tuple[Stead
     columns, errors, status = _in_full_contact(line, PronyTerms(), cases) if on_plane else _unsolved(cases)
     left = np.flatnonzero(valid(*cases) & (status != Outcome.CONVERGED))
     if on_plane and left.size and request.accuracy > node_to_node.ARITHMETIC:
-        search = node_to_node.NodeToNode(line, cases.only(left), SEARCH * request.accuracy, request.contact)
-        found = refine(search.solve, left.size, NODE_LEVELS, request.accuracy, node_to_node.ORDER, floors=FLOORS)
+        search = node_to_node.NodeToNode(line, cases.only(left), SEARCH * request.accuracy)
+        found = refine(
+            search.solve,
+            left.size,
+            NODE_LEVELS,
+            request.accuracy,
+            node_to_node.ORDER,
+            floors=FLOORS,
+            requested=request.columns,
+        )
         _write((columns, errors, status), left, found)
         left = left[~found.met]
     if left.size:
@@ -158,7 +171,7 @@ def _swept(line: RoughLine, cases: Cases, request: Request, levels: tuple[int, .
 
     # sweeps over cubic cells have the order ORDER_OF_CELLS only from two nodes per Nyquist point on
     order = ORDER_OF_CELLS if request.scheme == "hermite" and levels[0] > 1 else ORDER_OF_STEPS
-    return refine(solve, cases.loads.size, levels, accuracy, order, floors=FLOORS)
+    return refine(solve, cases.loads.size, levels, accuracy, order, floors=FLOORS, requested=request.columns)
 
 
 def _on_grid(line: RoughLine, cases: Cases, request: Request, oversampling: int, depths: FloatArray | None) -> Steady:
@@ -230,7 +243,8 @@ def _general(line: RoughLine, terms: PronyTerms, cases: Cases, request: Request)
     if left.size:
         solve(1, np.arange(left.size))
         levels, accuracy = (GENERAL_LEVELS, request.accuracy) if is_auto else (GENERAL_LEVELS[:2], np.inf)
-        _write(results, left, refine(solve, left.size, levels, accuracy, viscoelastic.ORDER, floors=FLOORS))
+        found = refine(solve, left.size, levels, accuracy, viscoelastic.ORDER, floors=FLOORS, requested=request.columns)
+        _write(results, left, found)
     # The relative error of the stresses is equal to the tolerance of the depth. In very fast or very slow sliding, the
     # drag is a small difference of large stresses; the relative error of the drag is then larger than that of the
     # stresses.
