@@ -25,29 +25,10 @@ def literal(
     substeps: int = 32,
     constant_force: bool = False,
 ) -> Worn:
-    """Return the worn contact by simulating every cycle.
+    """Return the worn contact, without an estimate of its error, by simulating every cycle.
 
-    Parameters
-    ----------
-    profile : Profile
-        The virgin body.
-    stick_radius : float
-        c, between 0 and 1.
-    cycles : float
-        N in units of N0.
-    cells : int
-        Cells of the uniform grid up to a little beyond a(c).
-    cycles_per_unit : float, optional
-        N0, how many cycles make one unit of N; by default the fewest that stay stable, 3 / h.
-    substeps : int
-        Steps of a cycle.
-    constant_force : bool
-        Keep the force of the virgin contact instead of its depth.
-
-    Returns
-    -------
-    Worn
-        Its error is not estimated (NaN): compare grids.
+    `cycles` is N in units of N0. Such a unit consists of `cycles_per_unit` cycles, by default of 3 / h, which are just
+    enough for a stable simulation on cells of the width h.
     """
     check_stick_radius(stick_radius)
     reach = farthest_contact(profile, stick_radius) if constant_force else 1.02 * limit_radius(profile, stick_radius)

@@ -1,11 +1,8 @@
 """Breakthrough of a boundary layer between two rough lines that roll on a film (thesis section 5.2.2).
 
-The film ``h0`` separates the two lines; where the sum ``z`` of their heights exceeds the film, they overlap. A cluster
-is one connected interval of overlap, with the length ``D`` and the force ``F = E* int (z - h0) dx`` (eq. 5.5). A
-cluster breaks the layer if ``pi tau0 D^3/(12 F) < h_c`` (eq. 5.6), that is, if ``int (z - h0) dx > s D^3`` with the
-layer strength ``s = pi tau0/(12 E* h_c)``. The shear strength tau0 of the layer, the contact modulus E* and the
-critical thickness h_c enter only through s. Lines are closed (periodic) cubic splines, for which these integrals are
-exact. The contact zone is an interval of given width, called the window; a window is placed at every node.
+A cluster is an interval of length D in which the sum ``z`` of the heights exceeds the film ``h0``. It breaks the layer
+if ``int (z - h0) dx > s D^3`` with the layer strength ``s = pi tau0/(12 E* h_c)`` (eqs. 5.5, 5.6). The contact zone is
+a window of given width, placed at every node of the closed lines; lines are cubic splines, whose integrals are exact.
 """
 
 from __future__ import annotations
@@ -30,23 +27,16 @@ PARTS = 64
 
 
 def layer_strength(shear_strength: ArrayLike, E_star: ArrayLike, thickness: ArrayLike) -> FloatArray:
-    """Return ``s = pi tau0/(12 E* h_c)`` in 1/m. A parabolic asperity breaks the layer if its curvature exceeds 12 s.
+    """Return ``s = pi tau0/(12 E* h_c)`` in 1/m; a parabolic asperity breaks the layer if its curvature exceeds 12 s.
 
-    Parameters
-    ----------
-    shear_strength : array_like
-        Limiting shear stress of the layer, tau0, in Pa.
-    E_star : array_like
-        Contact modulus in Pa.
-    thickness : array_like
-        Critical thickness h_c of the layer in m.
+    tau0 is the limiting shear stress of the layer in Pa, and h_c its critical thickness in m.
     """
     return np.asarray(np.pi * np.asarray(shear_strength) / (12 * np.asarray(E_star) * np.asarray(thickness)))
 
 
 @jit
 def _counted(length: float) -> int:
-    """Convert a length in spacings to a whole number of parts, at least 1; a spacing has `PARTS` parts."""
+    """Convert a length in spacings to a whole number of parts (see `PARTS`), at least 1."""
     return max(1, int(length * PARTS + 0.5))
 
 
@@ -54,7 +44,7 @@ def _counted(length: float) -> int:
 def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> None:
     """Add `number` to `count` entries of the trace, the first of which has the index `begin`.
 
-    Entry k of the trace is the length in contact in the window that begins at node k of the closed line. `jumps` holds
+    Entry k of the trace is the length in contact in the window that begins at node k of the closed line; `jumps` holds
     the differences between neighbouring entries.
     """
     points = jumps.size - 1
@@ -72,10 +62,7 @@ def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> Non
 
 @jit
 def _add(jumps: NDArray[np.int32], at: int, number: int) -> None:
-    """Add `number` to one entry of the trace; `jumps` is described in `_block`.
-
-    The index `at` may be negative or beyond the last entry; the length of the trace is then added or subtracted once.
-    """
+    """Add `number` to one entry of the trace; `at` may lie outside the trace by less than its length."""
     points = jumps.size - 1
     at = at + points if at < 0 else at - points if at >= points else at
     jumps[at] += number
@@ -86,9 +73,8 @@ def _add(jumps: NDArray[np.int32], at: int, number: int) -> None:
 def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: float, jumps: NDArray[np.int32]) -> None:
     """Add the contribution of a cluster to the windows that contain only its head or only its tail.
 
-    The head or tail in a window counts if it breaks the layer. If `judged` is true, the head or tail has to break the
-    layer by itself. If `judged` is false, the whole cluster has to break the layer. A part longer than `reach` cannot
-    break the layer, whatever its shape.
+    If `judged`, this part has to break the layer by itself, else the whole cluster has to. A part longer than `reach`
+    cannot break the layer, whatever its shape.
     """
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
     start, end, total = clusters.start[c], clusters.end[c], clusters.total[c]
@@ -161,24 +147,10 @@ def _collect(clusters: Clusters, window: float, rule: int, jumps: NDArray[np.int
 
 
 def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> NDArray[np.int32]:
-    """Return the length in intimate contact for the window that begins at each node.
+    """Return the length in intimate contact for the window that begins at each node, in whole parts (see `PARTS`).
 
-    The computing time is proportional to the number of points.
-
-    Parameters
-    ----------
-    clusters : Clusters
-        The clusters of the whole line.
-    window : float
-        Width of the window in spacings, at most the length of the line.
-    rule : str
-        One of `EDGE_RULES`.
-
-    Returns
-    -------
-    int array, shape (points,)
-        Lengths in whole parts of a spacing (a spacing has `PARTS` parts), so that sums are exact. An entry is above
-        zero if its window is in intimate contact. The fraction of entries above zero is the breakthrough probability.
+    The window is in spacings, at most the length of the line, and `rule` is one of `EDGE_RULES`. The fraction of
+    entries above zero is the breakthrough probability.
     """
     trace = np.zeros(clusters.points + 1, dtype=np.int32)
     if clusters.start.size:
@@ -187,18 +159,10 @@ def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> ND
 
 
 class Pair(NamedTuple):
-    """Two rough lines, separated by a film.
+    """Splines of the heights of two closed lines in m (see `surfaces.splines`), separated by a film.
 
-    Parameters
-    ----------
-    line_1, line_2 : array, shape (points,)
-        Splines of the heights of the two closed lines in m, see `surfaces.splines`.
-    level : float
-        Film thickness h0 in m.
-    spacing : float
-        Distance dx between nodes in m.
-    strength : float
-        Layer strength from `layer_strength`, in 1/m.
+    `level` is the film h0 in m, `spacing` the distance of nodes in m, and `strength` comes from `layer_strength`, in
+    1/m.
     """
 
     line_1: FloatArray
@@ -210,7 +174,7 @@ class Pair(NamedTuple):
 
 @jit
 def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
-    """Write the spline coefficients of the overlap to `overlap`, starting at node p of line 1 and node q of line 2."""
+    """Write the spline coefficients of the overlap from node p of line 1 and node q of line 2."""
     points = pair.line_1.size
     for k in range(overlap.size):
         overlap[k] = pair.line_1[(p + k - 1) % points] + pair.line_2[(q + k - 1) % points] - pair.level
@@ -218,10 +182,9 @@ def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
 
 @jit
 def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work: FloatArray) -> tuple[float, float]:
-    """Return the length of the part of a cluster beyond an edge of the window, and the integral of the overlap over it.
+    """Return length and overlap integral of the part of a cluster beyond an edge of the window.
 
-    The cluster is followed to the right if `most` is positive, else to the left. The cluster is cut off at the distance
-    ``|most|`` from the edge.
+    The cluster is followed to the right if `most` is positive, else to the left, up to the distance ``|most|``.
     """
     overlap, found = work[:4], work[4:]
     direction = 1 if most > 0 else -1
@@ -247,11 +210,7 @@ def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work
 
 @jit
 def _judge(pair: Pair, position: tuple[int, int], window: float, rule: int, work: FloatArray) -> int:
-    """Return the length in intimate contact of one window.
-
-    `work` is workspace for the overlap of the lines in the window, and for the positions where the overlap changes
-    sign.
-    """
+    """Return the length in intimate contact of one window; `work` is workspace for the overlap and its zeros."""
     points, pieces = pair.line_1.size, int(np.ceil(window))
     overlap, found, beyond = work[: pieces + 3], work[pieces + 3 : 4 * pieces + 3], work[4 * pieces + 3 :]
     limit = pair.strength * pair.spacing**2
@@ -289,25 +248,10 @@ def _windows(
 
 
 def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray], rule: str = "part") -> IntArray:
-    """Return the length in intimate contact of each given window.
+    """Return the length in intimate contact, in whole parts (see `PARTS`), of the windows at any pairs of left nodes.
 
-    This function is needed for rolling with creep. For pure rolling, :func:`contact_lengths` is faster.
-
-    Parameters
-    ----------
-    pair : Pair
-        The two lines and the film.
-    window : float
-        Width of the window in spacings, at most the length of the line.
-    positions : tuple of two int arrays, shape (n,)
-        For each window, the node of line 1 and the node of line 2 at the left edge; see `creep_positions`.
-    rule : str
-        One of `EDGE_RULES`.
-
-    Returns
-    -------
-    int array, shape (n,)
-        Length in intimate contact of each window, in whole parts of a spacing (a spacing has `PARTS` parts).
+    Rolling with creep needs this function (see `creep_positions`); for pure rolling, :func:`contact_lengths` is faster.
+    The window is in spacings, and `rule` is one of `EDGE_RULES`.
     """
     contact = np.zeros(positions[0].size, dtype=np.int64)
     if pair.line_1.max() + pair.line_2.max() > pair.level:
@@ -317,22 +261,10 @@ def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray
 
 
 def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> tuple[IntArray, IntArray]:
-    """Return the node of each line at the left edge of the window, for given distances of travel.
+    """Return the nodes of both lines at the left edge of the window after distances of travel in spacings.
 
-    Parameters
-    ----------
-    travel : array_like, shape (n,)
-        Distances that the contact has travelled at the mean velocity of the surfaces, in spacings. If results are
-        averaged over the travel, steps of an eighth of the window are small enough.
-    points : int
-        Number of points of each line.
-    slide_roll_ratio : float
-        ``S = (v1 - v2)/u`` with the mean velocity u. The lines move by ``1 + S/2`` and ``1 - S/2`` times the travel.
-
-    Returns
-    -------
-    two int arrays, shape (n,)
-        Node of line 1 and node of line 2 at the left edge of the window.
+    The travel is at the mean velocity u. With the slide-roll ratio ``S = (v1 - v2)/u``, the lines move by ``1 + S/2``
+    and ``1 - S/2`` times the travel.
     """
     steps = np.asarray(travel, dtype=np.float64)
     first, second = (np.round(steps * (1 + sign * slide_roll_ratio / 2)).astype(np.int64) % points for sign in (1, -1))
@@ -342,12 +274,7 @@ def creep_positions(travel: ArrayLike, points: int, slide_roll_ratio: float) -> 
 def contact_resistance(resistivity: ArrayLike, contact_length: ArrayLike) -> FloatArray:
     """Return the resistance ``R_c = rho/L_cont`` of parallel spots in ohm (thesis eq. 5.1); infinite without contact.
 
-    Parameters
-    ----------
-    resistivity : array_like
-        Resistivity of the contacting materials in ohm m.
-    contact_length : array_like
-        Sum of the diameters of the spots in m.
+    `resistivity` is in ohm m, and `contact_length` is the sum of the diameters of the spots in m.
     """
     length = np.asarray(contact_length, dtype=np.float64)
     safe = np.where(length > 0, length, 1.0)

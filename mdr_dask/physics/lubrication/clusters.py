@@ -12,23 +12,12 @@ from mdr_dask.physics.surfaces.splines import integral, piece, zeros
 
 
 class Clusters(NamedTuple):
-    """The clusters of a closed line, in the order in which they begin.
+    """The clusters of a closed line, in the order in which they begin; lengths are in spacings of the nodes.
 
-    Parameters
-    ----------
-    start, end : array, shape (n,)
-        Beginning and end of each cluster in spacings. If a cluster continues from the last node of the closed line to
-        the first node, the end of the cluster lies beyond the last node.
-    total : array, shape (n,)
-        Integral of ``z - h0`` over each cluster, in m times the spacing of the nodes.
-    overlap : array, shape (points + 3,)
-        Spline of ``z - h0`` in m, extended periodically: the last coefficient, all coefficients, and the first two
-        coefficients.
-    limit : float
-        The number ``s dx^2`` in m, with the layer strength s and the distance dx between nodes. A cluster breaks the
-        layer if ``total > limit (end - start)^3`` (thesis eq. 5.6).
-    closed : bool
-        Whether a single cluster covers the whole closed line; such a cluster has no end.
+    If a cluster continues from the last node to the first, its `end` lies beyond the last node. `total` is the integral
+    of ``z - h0`` over each cluster in m. `overlap`, shape (points + 3,), is the spline of ``z - h0`` in m: the last
+    coefficient, all coefficients, and the first two. A cluster breaks the layer if ``total > limit (end - start)^3``
+    (thesis eq. 5.6), with `limit` in m. `closed` means that a single cluster covers the whole line.
     """
 
     start: FloatArray
@@ -53,10 +42,7 @@ def whole_piece(overlap: FloatArray, k: int) -> float:
 
 @jit
 def total(overlap: FloatArray, start: float, end: float) -> float:
-    """Return the integral from `start` to `end` of a closed spline with ``overlap.size - 3`` nodes.
-
-    `end` may lie beyond the last node; the integral then continues at the first node.
-    """
+    """Return the integral of a closed spline from `start` to `end`, which may lie beyond the last node."""
     points = overlap.size - 3
     first, last = int(start), int(end)
     found: float = -integral(piece(overlap, first), start - first)
@@ -69,10 +55,7 @@ def total(overlap: FloatArray, start: float, end: float) -> float:
 
 @jit
 def crossings(overlap: FloatArray, found: FloatArray) -> int:
-    """Write the positions where a spline changes sign to `found`, and return the number of these positions.
-
-    The spline has ``overlap.size - 3`` nodes.
-    """
+    """Write the positions where a spline changes sign to `found`, and return their number."""
     count = 0
     above = 4 * (overlap[0] > 0) + 2 * (overlap[1] > 0) + (overlap[2] > 0)
     for k in range(overlap.size - 3):
@@ -89,18 +72,9 @@ def _totals(overlap: FloatArray, start: FloatArray, end: FloatArray, found: Floa
 
 
 def find_clusters(line: FloatArray, level: float, spacing: float, strength: float) -> Clusters:
-    """Return the clusters for a given film thickness.
+    """Return the clusters of the spline of the summed heights in m (at least three nodes), for the film `level` in m.
 
-    Parameters
-    ----------
-    line : array, shape (points,)
-        Spline of the sum of the heights of both lines in m, see `surfaces.splines`; at least three nodes.
-    level : float
-        Film thickness h0 in m.
-    spacing : float
-        Distance dx between nodes in m.
-    strength : float
-        Layer strength from `layer_strength`, in 1/m.
+    `spacing` is the distance of nodes in m, and `strength` comes from `layer_strength`, in 1/m.
     """
     points = line.size
     overlap = np.concatenate((line[-1:], line, line[:2])) - level

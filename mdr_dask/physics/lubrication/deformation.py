@@ -24,8 +24,7 @@ def _second_integral(x: float) -> float:
 def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
     """Replace second integrals of ``ln|x|`` at the nodes by the integral of ``ln|x|`` times each hat function.
 
-    The hat function of a node is 1 at this node, 0 at all others, and linear in between. The entries of both end nodes
-    become zero.
+    A hat function is 1 at its node, 0 at all others, and linear in between. The entries of both end nodes become zero.
     """
     left, left_slope = row[0], 0.0
     for j in range(nodes.size - 1):
@@ -47,18 +46,9 @@ def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
 
 @jit
 def influence_matrix(nodes: FloatArray) -> FloatArray:
-    """Return the matrix that converts nodal pressures to the nodal deformations minus the deformation at ``X = 0``.
+    """Return the matrix D, shape (n, n), with ``delta_i - delta(0) = sum_j D_ij P_j``; both end pressures are zero.
 
-    Parameters
-    ----------
-    nodes : array, shape (n,)
-        Ascending nodes in half widths. The pressure is linear between the nodes and zero at both ends.
-
-    Returns
-    -------
-    array, shape (n, n)
-        The matrix ``D`` with ``delta_i - delta(0) = sum_j D_ij P_j = -(1/pi) int P (ln|X_i - X| - ln|X|) dX`` (thesis
-        eq. B.19).
+    The deformation is ``-(1/pi) int P (ln|X_i - X| - ln|X|) dX`` (thesis eq. B.19).
     """
     n = nodes.size
     matrix, origin = np.empty((n, n)), np.empty(n)
@@ -76,22 +66,9 @@ def influence_matrix(nodes: FloatArray) -> FloatArray:
 
 @jit
 def film(points: FloatArray, nodes: FloatArray, pressure: FloatArray, central_film: float) -> FloatArray:
-    """Return the film ``H = H(0) + X^2/2 + delta(X) - delta(0)`` at any points (thesis eq. B.19).
+    """Return the film ``H = H(0) + X^2/2 + delta(X) - delta(0)`` at any points X (thesis eq. B.19).
 
-    Parameters
-    ----------
-    points : array, shape (m,)
-        Positions in half widths.
-    nodes, pressure : array, shape (n,)
-        Ascending nodes in half widths, and the pressures at the nodes in units of p0. The first and the last pressure
-        are zero.
-    central_film : float
-        Film at ``X = 0`` in units of ``a^2/R``.
-
-    Returns
-    -------
-    array, shape (m,)
-        Film in units of ``a^2/R``.
+    The first and the last pressure are zero.
     """
     origin, row = np.empty(nodes.size), np.empty(nodes.size)
     _influence_row(0.0, nodes, origin)

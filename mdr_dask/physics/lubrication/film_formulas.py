@@ -1,8 +1,7 @@
 """Film thickness of a lubricated line contact in closed form: Hertz contact, regressions, regimes and limiting films.
 
-Conventions (physics of thesis section 5.2.1 and appendix B): ``E* = E'/2`` with
-``1/E* = (1-nu1^2)/E1 + (1-nu2^2)/E2``; the velocity is the mean ``u = (u1 + u2)/2``;
-``W = F/(L' E' R)``, ``U = eta0 u/(E' R)``, ``G = alpha E'``; films are given as ``h/R``.
+The velocity is the mean ``u = (u1 + u2)/2``, and films are given as ``h/R`` (thesis section 5.2.1 and appendix B). The
+groups are ``W = F/(L' E' R)``, ``U = eta0 u/(E' R)`` and ``G = alpha E'``, with ``E' = 2 E*``.
 """
 
 from __future__ import annotations
@@ -61,27 +60,9 @@ def fluid_friction(
 ) -> float:
     """Return the friction force of a uniform film under the Hertzian pressure, divided by the load.
 
-    Parameters
-    ----------
-    contact : HertzLine
-        Half width in m and maximum pressure in Pa.
-    film : float
-        Film thickness in m.
-    sliding_velocity : float
-        Difference of the two surface velocities in m/s.
-    log_viscosity : callable
-        Returns the natural logarithm of the viscosity (in Pa s) at pressures in Pa.
-    eyring_stress : float
-        Eyring stress tau_E in Pa. The shear stress is ``tau_E asinh(eta v/(h tau_E))`` for the viscosity eta, the
-        sliding velocity v and the film h. If tau_E is large, the liquid is Newtonian.
-    film_share : float
-        Fraction of the load, and therefore of the Hertzian pressure, that the film carries.
-
-    Returns
-    -------
-    float
-        Mean shear stress, divided by the mean of the Hertzian pressure under the whole load. Rolling friction is not
-        included. With ``x = a sin(angle)``, the integral over the angle uses 64 Gauss points.
+    `log_viscosity` returns ln of the viscosity in Pa s at pressures in Pa; all other arguments are in SI units. The
+    shear stress is ``tau_E asinh(eta v/(h tau_E))``, so a large `eyring_stress` means a Newtonian liquid. `film_share`
+    is the fraction of the load, and of the pressure, that the film carries. Rolling friction is not included.
     """
     if sliding_velocity == 0:
         return 0.0
@@ -151,17 +132,7 @@ def dimensionless_groups(
 
 @dataclass(frozen=True)
 class FilmFormula:
-    """A regression ``h/R = factor W^load U^speed G^material``, and the ranges of W, U and G of the fitted data.
-
-    Parameters
-    ----------
-    name : str
-        The authors, and whether the formula gives the central or the minimum film.
-    factor, load, speed, material : float
-        Factor and exponents.
-    load_range, speed_range, material_range : tuple of float
-        Lowest and highest W, U and G in the fitted data. Outside these ranges, the formula is an extrapolation.
-    """
+    """A regression ``h/R = factor W^load U^speed G^material``, and the ranges of W, U and G of the fitted data."""
 
     name: str
     factor: float
@@ -248,18 +219,9 @@ ELASTIC_ISOVISCOUS = 2.05
 
 
 def limiting_films(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:
-    """Return the minimum film ``h/R`` of each of the four limiting regimes.
+    """Return the minimum film ``h/R`` of the four limiting regimes, shape (4, ...), in the order of `REGIMES`.
 
-    Parameters
-    ----------
-    W, U, G : array_like
-        Load, speed and material parameters; they broadcast to ``shape``.
-
-    Returns
-    -------
-    array, shape (4, *shape)
-        The films in the order of `REGIMES`. The film of the last regime is the Dowson-Higginson formula, as in
-        Johnson's map of the regimes.
+    As in Johnson's map of the regimes, the last film is that of Dowson and Higginson.
     """
     W, U, G = np.broadcast_arrays(np.asarray(W, float), np.asarray(U, float), np.asarray(G, float))
     M = moes_parameters(W, U, G).M
@@ -274,7 +236,7 @@ def limiting_films(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:
 
 
 def expected_film(M: float, L: float) -> float:
-    """Return a first guess of the film in units of ``a^2/R``, estimated from the four limiting regimes."""
+    """Return a first guess of the film in units of ``a^2/R`` from the four limiting regimes."""
     rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(M, 0.5, L) * np.pi / (8 * M)
     return float(max(min(rigid_piezo, elastic_piezo), max(rigid_iso, elastic_iso)))
 
@@ -283,9 +245,8 @@ def regime(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> NDArray[np.intp]:
     """Return the regime of each case as an index of `REGIMES`.
 
     Elastic flattening makes an isoviscous film thicker and a piezoviscous film thinner. So the isoviscous film is the
-    thicker of its two limits, and the piezoviscous film is the thinner of its two limits. The limit that gives the
-    thicker of these two films determines the regime. Moes' formula gives the same regimes if its smooth transitions are
-    replaced by sharp ones.
+    thicker and the piezoviscous film the thinner of its two limits, and the thicker of both films determines the
+    regime.
     """
     rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(W, U, G)
     isoviscous = np.where(elastic_iso > rigid_iso, 2, 0)

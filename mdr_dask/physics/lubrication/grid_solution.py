@@ -16,8 +16,7 @@ from mdr_dask.physics.lubrication.grids import adapted_density
 
 #: A second pressure maximum is a spike if it exceeds the minimum before it by this fraction of the maximum pressure.
 _SPIKE = 0.01
-#: The interpolating polynomial at a position uses this number of nodes on either side of the position. For the minimum
-#: film on coarse grids, three nodes on either side are needed.
+#: Number of nodes on either side of a position, through which the interpolating polynomial passes.
 _CUBIC, _QUINTIC = 2, 3
 #: If the film ends at a node, the computed pressure ends too far upstream by this fraction of a cell.
 _TOO_EARLY = 0.035
@@ -27,10 +26,9 @@ _TOO_EARLY = 0.035
 class GridSolution:
     """Pressure in units of p0, and film in units of ``a^2/R``, at the nodes of one grid.
 
-    `central` is the film at ``X = 0``. `spacing` is the distance between two nodes times the density of nodes; each
-    finer grid has about half the spacing of the grid before. The numerical method uses a pressure that is linear
-    between two nodes. The film computed from this pressure is slightly too thin between the nodes, so
-    :meth:`film_between` uses a polynomial through the nodal films.
+    `central` is the film at ``X = 0``, and `spacing` is the distance between two nodes times the density of nodes. The
+    numerical method takes the pressure as linear between nodes. This makes the film slightly too thin there, so
+    :meth:`film_between` interpolates the nodal films.
     """
 
     nodes: FloatArray
@@ -52,11 +50,10 @@ class GridSolution:
         return np.where(inside, np.maximum(_between(self.nodes, self.pressure, positions, _CUBIC), 0.0), 0.0)
 
     def pressure_carried(self, nodes: FloatArray, front: float) -> FloatArray:
-        """Return the pressure interpolated at the nodes of another grid, with its front moved to `front`.
+        """Return the pressure at the nodes of another grid, with its front (see :attr:`front`) moved to `front`.
 
-        The front is the steep fall of the pressure behind the spike (see :attr:`front`). This grid has certain
-        pressures half a cell before and half a cell behind its own front. The two nodes next to the new front get these
-        pressures, because the pressures half a cell from the front are nearly the same on a finer grid.
+        The two nodes next to the new front get the pressures that this grid has half a cell before and behind its own
+        front, because these pressures are nearly the same on a finer grid.
         """
         if np.isnan(front + self.front):
             return self.pressure_between(nodes)
@@ -78,7 +75,7 @@ class GridSolution:
 
     @cached_property
     def minimum(self) -> tuple[float, float]:
-        """Position and height of the minimum film, interpolated between the nodes around the lowest node.
+        """Position and height of the minimum film, interpolated around the lowest node.
 
         The polynomial is of fifth order, because the interpolation error of a cubic would exceed the other errors.
         """
@@ -108,8 +105,7 @@ class GridSolution:
     def front(self) -> float:
         """Position at which the pressure behind the spike equals the minimum before it; NaN if there is no spike.
 
-        On any grid, the pressure falls within one or two cells around this position. The position hardly depends on the
-        nodes, but the height of the spike does.
+        Unlike the height of the spike, this position hardly depends on the nodes.
         """
         peak, lowest = self._spike
         if not peak:
@@ -119,10 +115,7 @@ class GridSolution:
 
     @cached_property
     def _spike(self) -> tuple[int, float]:
-        """The node of the spike, and the lowest pressure before it; the node is 0 if there is no spike.
-
-        The lowest pressure is taken between the spike and the maximum before the spike.
-        """
+        """The node of the spike (0 if there is none), and the lowest pressure between it and the maximum before it."""
         P = self.pressure
         peaks = np.flatnonzero((P[1:-1] > P[:-2]) & (P[1:-1] >= P[2:])) + 1
         if peaks.size < 2:
@@ -132,10 +125,7 @@ class GridSolution:
 
     @cached_property
     def rupture(self) -> float:
-        """Position where the film ends, extrapolated from the last four pressures.
-
-        The pressure is assumed to tend to zero quadratically.
-        """
+        """Position where the film ends, extrapolated from the last four pressures, which tend to zero quadratically."""
         last = int(np.flatnonzero(self.pressure)[-1])
         behind = self.nodes[min(last + 1, self.nodes.size - 1)]
         x, root = self.nodes[max(last - 3, 0) : last + 1], np.sqrt(self.pressure[max(last - 3, 0) : last + 1])
@@ -155,12 +145,9 @@ def _cell_around(nodes: FloatArray, position: float) -> FloatArray:
 def expected(
     before: Sequence[GridSolution], reading: Callable[[GridSolution], float | FloatArray], spacing: float
 ) -> FloatArray:
-    """Return the expected value of a quantity on a grid of another spacing.
+    """Return the expected value on a grid of another spacing of a quantity that `reading` evaluates on one grid.
 
-    `reading` evaluates the quantity on a solved grid.
-
-    If `before` has two grids or more, the value is extrapolated from the last two grids, assuming an error of second
-    order in the spacing. If `before` has only one grid, the value on this grid is returned.
+    From two grids or more, the value is extrapolated with an error of second order in the spacing.
     """
     last = np.asarray(reading(before[-1]))
     if len(before) == 1:

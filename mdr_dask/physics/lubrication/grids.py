@@ -1,9 +1,7 @@
-"""Graded grids for a lubricated line contact.
-
-The first grid follows from the expected film. Every other grid follows from the solution on an earlier grid.
+"""Graded grids for a lubricated line contact; positions are in half widths, films in ``a^2/R``.
 
 A grid is sampled from a density of nodes along the contact. Grids with different numbers of nodes are therefore
-similar, so that Richardson extrapolation can compare their errors. Positions are in half widths, films in ``a^2/R``.
+similar, as Richardson extrapolation requires.
 """
 
 from __future__ import annotations
@@ -27,22 +25,7 @@ def outlet_position(central_film: float) -> float:
 
 
 def sample(positions: FloatArray, density: FloatArray, count: int) -> FloatArray:
-    """Return `count` nodes whose spacing is inversely proportional to a density.
-
-    The density is linear between the given positions.
-
-    Parameters
-    ----------
-    positions, density : array, shape (m,)
-        Ascending positions, and the positive density at these positions, in any unit.
-    count : int
-        Number of nodes, including both ends.
-
-    Returns
-    -------
-    array, shape (count,)
-        Ascending nodes.
-    """
+    """Return `count` nodes whose spacing is inversely proportional to a piecewise linear density."""
     number = _cells(positions, density)
     nodes = _placed(positions, density, number, np.linspace(0.0, number[-1], count))
     nodes[-1] = positions[-1]
@@ -69,30 +52,11 @@ def _placed(positions: FloatArray, density: FloatArray, number: FloatArray, want
 def aligned(
     positions: FloatArray, density: FloatArray, count: int, rupture: float, front: float = np.nan
 ) -> tuple[FloatArray, float]:
-    """Return nodes with a given density; the film ends at a node, and the front lies near the middle of a cell.
+    """Return about `count` nodes with a given density, and the distance between nodes times the density.
 
-    Without alignment, the film would end somewhere inside a cell. The error of the film is least if the film ends at a
-    node, and up to a tenth larger if the film ends elsewhere in a cell. Errors on different grids can therefore be
-    compared only if the film ends at a node on every grid. Behind a sharp spike, the pressure falls within one or two
-    cells, and the minimum film depends on the position of these cells. Therefore the cells are made slightly wider or
-    narrower, so that the front lies near the middle of a cell.
-
-    Parameters
-    ----------
-    positions, density : array, shape (m,)
-        Ascending positions, and the positive density at these positions, in any unit.
-    count : int
-        Number of nodes; the result may differ by one or two.
-    rupture : float
-        Position of the end of the film, estimated from coarser grids.
-    front : float
-        Position of the steep fall of the pressure between the spike and the end of the film; NaN if there is no spike.
-
-    Returns
-    -------
-    tuple of array and float
-        Ascending nodes; and the distance between neighbouring nodes times the density, which is the same for all cells.
-        The last node lies at or behind the last position.
+    The film ends at a node on every grid, so that errors on different grids can be compared. At the front, the fall of
+    the pressure behind a spike (NaN if there is none), the pressure changes within one or two cells. So the cells are
+    made slightly wider or narrower until the front lies near the middle of a cell.
     """
     number = _cells(positions, density)
     reached = _cells_before(rupture, positions, density, number)
@@ -115,10 +79,7 @@ def _halved_by(share: float, cells: int) -> int:
 
 
 def _cells_before(position: float, positions: FloatArray, density: FloatArray, number: FloatArray) -> float:
-    """Return the number of cells before a position.
-
-    `number` contains the number of cells before each of the `positions`, at which the density is given.
-    """
+    """Return the number of cells before a position; `number` is that before each of the `positions`."""
     before = int(np.clip(np.searchsorted(positions, position) - 1, 0, positions.size - 2))
     rest = position - positions[before]
     slope = (density[before + 1] - density[before]) / (positions[before + 1] - positions[before])
@@ -126,19 +87,10 @@ def _cells_before(position: float, positions: FloatArray, density: FloatArray, n
 
 
 def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:
-    """Return a grid for an expected film.
+    """Return a grid of `count` nodes for an expected central film.
 
-    For a thin film, the grid is fine at both ends of the dry contact. For a thick film, the grid is fine around the
-    minimum of the parabolic gap.
-
-    Parameters
-    ----------
-    central_film : float
-        Expected film at ``X = 0`` in units of ``a^2/R``.
-    inlet : float
-        Position where the film begins, in half widths; negative.
-    count : int
-        Number of nodes.
+    For a thin film, the grid is fine at both ends of the dry contact. For a thick film, it is fine around the minimum
+    of the parabolic gap.
     """
     length = max(1.0, float(np.sqrt(2 * central_film)))
     finest = min(0.7 * central_film ** (2 / 3), length)
@@ -156,21 +108,14 @@ def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:
 
 
 def first_pressure(nodes: FloatArray, central: float) -> FloatArray:
-    """Return a first guess of the pressure, shaped like half an ellipse.
-
-    For a thin film, this is Hertz' pressure. For a thick film, the ellipse is wider and flatter, and lies further
-    upstream.
-    """
+    """Return a first guess of the pressure: Hertz' ellipse, or a wider one further upstream for a thick film."""
     reach = float(np.sqrt(2 * central))
     width, centre = (1.0, 0.0) if reach < 1 else (max(1.0, 0.8 * reach), -0.4 * reach)
     return np.sqrt(np.maximum(1 - ((nodes - centre) / width) ** 2, 0.0)) / width
 
 
 def second_derivative(nodes: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the second derivative at the nodes from divided differences.
-
-    Each end node gets the value of its neighbour.
-    """
+    """Return the second derivative at the nodes from divided differences; at both ends, that of the neighbour."""
     width = np.diff(nodes)
     inner = 2 * np.diff(np.diff(values) / width) / (width[1:] + width[:-1])
     return np.concatenate([inner[:1], inner, inner[-1:]])
@@ -179,11 +124,9 @@ def second_derivative(nodes: FloatArray, values: FloatArray) -> FloatArray:
 def adapted_density(nodes: FloatArray, pressure: FloatArray, film: FloatArray, central_film: float) -> FloatArray:
     """Return the density of nodes that is suitable for a solution, shape (n,).
 
-    Two terms of the density follow from the solution. The error of the flow is of second order in the spacing; the term
-    for the flow is ``sqrt(|H''|/H)``. The error of the deformation is of third order, because it is an integral over a
-    cell; the term for the deformation is proportional to the cube root of ``|P''|``. A third term, the least density,
-    provides nodes where the other two are small: in the contact and in the inlet. Smoothing makes neighbouring cells
-    similar.
+    The flow, with an error of second order, needs ``sqrt(|H''|/H)``, and the deformation, with an error of third order,
+    the cube root of ``|P''|``. A least density provides nodes in the contact and in the inlet. Smoothing makes
+    neighbouring cells similar.
     """
     length = max(1.0, float(np.sqrt(2 * central_film)))
     of_film = np.sqrt(np.abs(second_derivative(nodes, film)) / film)

@@ -1,13 +1,8 @@
 """The elastohydrodynamic film of a line contact, in all regimes from rigid isoviscous to elastic piezoviscous.
 
-Hertz units: ``X = x/a``, ``P = p/p0``, ``H = h R/a^2`` (thesis eq. B.13), with ``a/R = sqrt(8 W/pi)`` and
-``p0 = E' sqrt(W/(2 pi))``, where ``E' = 2 E*``. The velocity is the mean of the two surface velocities. With Barus' law
-and an incompressible liquid, the solution depends only on the two numbers M and L of Moes.
-
-The first solutions of a case only serve to find a suitable density of nodes. The case is then solved on grids of 40,
-80, 160, ... nodes with this density. The error on one grid is of second order in the spacing. The error of a value
-extrapolated from two grids is of third order; this error is estimated from the changes of the extrapolated value from
-grid to grid (`mdr_dask.physics.refine`).
+Hertz units are ``X = x/a``, ``P = p/p0`` and ``H = h R/a^2`` (thesis eq. B.13). With ``E' = 2 E*``, they follow from
+``a/R = sqrt(8 W/pi)`` and ``p0 = E' sqrt(W/(2 pi))``. The first solutions of a case give the density of nodes for grids
+of 40, 80, 160, ... nodes. Values extrapolated from two grids have an error of third order in the spacing.
 """
 
 from __future__ import annotations
@@ -32,27 +27,22 @@ VISCOSITY_LAWS = ("barus", "roelands")
 
 #: Numbers of nodes of the grids. On the finest grid, a Newton step solves 1281 dense equations in about 0.1 s.
 NODES = (40, 80, 160, 320, 640, 1280)
-#: `ORDER` is the order of convergence of the values extrapolated from two grids. The stated error of an extrapolated
-#: value is `FACTOR` times the last change of this value, or times an eighth of the change before if this is larger.
+#: Order of convergence of the values extrapolated from two grids. Their error is `FACTOR` times the last change, or
+#: times an eighth of the change before if this is larger (see `refine`).
 ORDER = 3.0
 FACTOR = SAFETY / (2.0**ORDER - 1)
-#: Before the grids of `NODES`, up to two grids with about this number of nodes are solved. These solutions only serve
-#: to find the density of nodes for the grids of `NODES`.
+#: Number of nodes of the two grids whose solutions only give the density of nodes for the grids of `NODES`.
 ADAPTED_NODES = 161
 
 
-#: Attempts at the first solution, in the order in which they are tried. Each attempt has four entries. The guessed film
-#: is the first entry times the film expected from the limiting regimes, but at most the second entry times the square
-#: of the position of the inlet. The third entry is the number of nodes, the fourth the step limits of Newton's method.
-#: The second attempt takes small steps from a thick film on a fine grid; it is slow but hardly ever fails.
+#: Attempts at the first solution: factor of the expected film, largest film over the square of the inlet position,
+#: number of nodes, and step limits of Newton's method. The second attempt is slow but hardly ever fails.
 ATTEMPTS = ((1.5, 0.2, 121, Pace(0.12, 80)), (2.5, 0.4, 361, Pace(0.05, 200)))
-#: Step limits on further grids. The first limits are used with an extrapolated initial guess. If Newton's method fails,
-#: the second limits are used, with the solution on the previous grid as the initial guess.
+#: Step limits on further grids: from an extrapolated guess, and, if that fails, from the solution on the previous grid.
 PACES = (Pace(0.12, 16), Pace(0.03, 250))
 #: The stated error of a position is never smaller than this number of cells.
 PLACED = 0.1
-#: The stated error of a profile at a position is the largest error within this distance, in cells of the coarser of the
-#: two finest grids. The largest error is used because the position of a steep front differs between the grids.
+#: The stated error of a profile at a position is the largest error within this number of cells of the coarser grid.
 REACH = 2.0
 
 
@@ -72,18 +62,11 @@ Reading = Callable[[GridSolution], float | FloatArray]
 
 
 class LineContact(NamedTuple):
-    """A case in dimensionless numbers; cases with equal numbers have the same solution.
+    """A case in dimensionless numbers: Moes' numbers `M` and `L`, and the laws of the liquid.
 
-    Parameters
-    ----------
-    M, L : float
-        Moes' load and lubricant parameters.
-    pole, exponent : float
-        Roelands' pressure p_r divided by p0, and his exponent z; both are zero for Barus' law.
-    density_rise, density_saturation : float
-        Constants of the density law, multiplied by p0; both are zero for an incompressible liquid.
-    inlet : float or None
-        Beginning of the oil in half widths (negative); None for a fully flooded inlet.
+    `pole` is Roelands' pressure p_r divided by p0, and `exponent` his z; both are zero for Barus' law. The density
+    constants are multiplied by p0, and zero for an incompressible liquid. `inlet` is where the oil begins, in half
+    widths (negative); None for a fully flooded inlet.
     """
 
     M: float
@@ -166,20 +149,10 @@ def line_contact(
 
 @dataclass(frozen=True)
 class LineSolution:
-    """The film of a line contact in Hertz units.
+    """The film of a line contact in Hertz units; if there is none, `outcome` and `reason` say why.
 
-    Parameters
-    ----------
-    case : LineContact
-        The solved case.
-    outcome : Outcome
-        CONVERGED, or why there is no film.
-    reason : str
-        The reason, in one sentence, if no film was found; otherwise empty.
-    grids : tuple of GridSolution
-        The solutions on all grids, the finest grid last; empty if no film was found.
-    central_film, minimum_film : Estimate
-        Films in units of ``a^2/R``; NaN if no film was found.
+    `grids` are the solutions on all grids, the finest last. `central_film` and `minimum_film` are in units of
+    ``a^2/R``. Without a film, `grids` is empty and both films are NaN.
     """
 
     case: LineContact
@@ -210,20 +183,10 @@ class LineSolution:
         return Estimate(np.asarray(values[-1]), np.asarray(_error(values)))
 
     def profile(self, read: Callable[[GridSolution, FloatArray], FloatArray], positions: FloatArray) -> Estimate:
-        """Return a profile at positions in half widths, with an error at each position.
+        """Return a profile at ascending positions in half widths; `read` evaluates it on one grid.
 
-        Parameters
-        ----------
-        read : callable, (grid, positions) -> array
-            Evaluates the profile of one grid at given positions.
-        positions : array, shape (m,)
-            Ascending positions in half widths.
-
-        Notes
-        -----
-        The error at a position is the largest estimated error within `REACH` cells of this position. The error at the
-        position alone would be too small where the profiles of two grids intersect, and these profiles have the spike
-        or the front at different positions.
+        The error at a position is the largest one within `REACH` cells, because profiles of two grids intersect, and
+        their spikes and fronts lie at different positions.
         """
         pairs = list(_pairs(self.grids))
         coarse = pairs[-1][0].nodes
@@ -237,16 +200,16 @@ class LineSolution:
         return Estimate(value, np.where(np.isnan(value), np.nan, largest))
 
     def position(self, reading: Reading) -> Estimate:
-        """Return a position in half widths; the stated error of the position is at least a tenth of a cell."""
+        """Return a position in half widths, whose stated error is at least `PLACED` cells."""
         found, nodes = self.estimate(reading), self.finest.nodes
         after = np.clip(np.searchsorted(nodes, found.value), 1, nodes.size - 1)
         return found._replace(error=np.maximum(found.error, PLACED * (nodes[after] - nodes[after - 1])))
 
     def spike(self) -> tuple[Estimate, Estimate]:
-        """Return position (in half widths) and pressure (in units of p0) of the spike; NaN if there is no spike.
+        """Return position (in half widths) and pressure (in p0) of the spike; NaN if there is no spike.
 
         The values are those on the finest grid. If the pressure behind the spike falls within one cell, the height of
-        the spike depends on the nodes, and the error of the height is infinite.
+        the spike depends on the nodes, and its error is infinite.
         """
         position, height = (np.array([grid.spike[k] for grid in self.grids[-3:]]) for k in (0, 1))
         grid, changes = self.finest, [np.abs(np.diff(each)) for each in (position, height)]
@@ -275,10 +238,7 @@ def _extrapolated(reading: Reading, coarse: GridSolution, fine: GridSolution) ->
 
 
 def _error(values: Sequence[FloatArray]) -> FloatArray:
-    """Return the estimated error of the last of several extrapolated values, by the rule of `refine`.
-
-    The values are extrapolated from pairs of finer and finer grids.
-    """
+    """Return the estimated error of the last of several extrapolated values, by the rule of `refine`."""
     if len(values) < 2:
         return np.full_like(values[-1], np.inf)
     changes = np.abs(np.diff(values[-3:], axis=0))
@@ -320,10 +280,7 @@ def _first_solution(case: LineContact) -> tuple[Outcome, GridSolution]:
 def _refined(
     case: LineContact, before: Sequence[GridSolution], source: GridSolution, count: int
 ) -> tuple[Outcome, GridSolution]:
-    """Solve on about `count` nodes with the density of `source`.
-
-    The initial guess follows from the last one or two solutions in `before`.
-    """
+    """Solve on about `count` nodes with the density of `source`; `before` contains the last one or two solutions."""
     last = before[-1]
     spacing = last.spacing * (last.nodes.size - 1) / (count - 1)
     end = float(expected(before, lambda grid: grid.rupture, spacing))

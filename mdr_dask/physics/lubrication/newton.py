@@ -1,13 +1,9 @@
-"""Semismooth Newton method for pressure and central film of a lubricated line contact on a given grid.
+"""Semismooth Newton method for pressure and central film of a lubricated line contact on a given grid, in Hertz units.
 
-Hertz units as in :mod:`mdr_dask.physics.lubrication.deformation`. The film obeys (thesis eq. B.15)
-
-    d/dX( rho H^3/eta dP/dX ) = K d(rho H)/dX,   K = (3 pi^2/4) U/W^2,
-
-in finite volumes around the nodes. Cavitation is described by the complementarity conditions ``P >= 0``, ``R <= 0`` and
-``P R = 0``, with the pressure P and the flow balance R of each volume. The last equation, ``int P dX = pi/2``, states
-that the pressure carries the load. The unknowns are the nodal pressures and the film at ``X = 0``, called the central
-film.
+The film obeys ``d/dX( rho H^3/eta dP/dX ) = K d(rho H)/dX`` with ``K = (3 pi^2/4) U/W^2`` (thesis eq. B.15), in finite
+volumes around the nodes. Cavitation means ``P >= 0``, ``R <= 0`` and ``P R = 0`` for the pressure P and the flow
+balance R of each volume. The unknowns are the nodal pressures and the film at ``X = 0``, which follows from the load,
+``int P dX = pi/2``.
 """
 
 from __future__ import annotations
@@ -24,23 +20,18 @@ from mdr_dask.physics.linear import factorise
 from mdr_dask.physics.lubrication.deformation import influence_matrix
 from mdr_dask.physics.outcome import Outcome
 
-#: Weight of the quadratic (QUICK) face value in the second-order upwind Couette flux. The other part of the flux is
-#: extrapolated linearly from upstream.
+#: Weight of the quadratic (QUICK) face value in the upwind Couette flux; the rest is extrapolated linearly.
 _QUADRATIC = 1.0 / 3.0
 #: One step may reduce the film at a node by at most this fraction of the film.
 _FILM_SHARE = 0.8
 #: If a step would have to be shortened to this fraction or less, the film counts as collapsed.
 _LEAST_SHARE = 1e-9
-#: The factorised Jacobian is reused if the active nodes are the same and the last step was smaller than this fraction
-#: of the step before. The first step is compared with a step of size 1.
+#: The factorised Jacobian is reused if the last step was smaller than this fraction of the step before.
 _SHRINKS = 0.1
 
 
 class Grid(NamedTuple):
-    """Nodes in half widths, their weights in the trapezoidal rule, and the influence of nodal pressures on nodal films.
-
-    The influence is the matrix :func:`mdr_dask.physics.lubrication.deformation.influence_matrix`, shape (n, n).
-    """
+    """Nodes in half widths, their trapezoidal weights, and the matrix `deformation.influence_matrix`."""
 
     nodes: FloatArray
     weights: FloatArray
@@ -58,16 +49,9 @@ class Grid(NamedTuple):
 class Pace(NamedTuple):
     """Limits of an iteration.
 
-    Parameters
-    ----------
-    clip : float
-        Largest change of a pressure in one step, divided by the largest pressure.
-    most : int
-        Largest number of steps.
-    tolerance : float
-        The iteration ends after a step whose relative size is below this value. The remaining error is about the square
-        of the size of this step. After a step with a reused Jacobian, the remaining error is larger, so the limit for
-        the size of such a step is a hundred times smaller.
+    `clip` is the largest change of a pressure in one step divided by the largest pressure, and `most` the largest
+    number of steps. The iteration ends after a step whose relative size is below `tolerance`, or below a hundredth of
+    it if the Jacobian was reused. With a new Jacobian, the remaining error is about the square of the size.
     """
 
     clip: float
@@ -87,16 +71,8 @@ class Iterate(NamedTuple):
 class Liquid(NamedTuple):
     """Viscosity and density as functions of pressure, in Hertz units.
 
-    Parameters
-    ----------
-    alpha : float
-        Slope of ``ln eta`` at ambient pressure, ``alpha p0``.
-    pole : float
-        Roelands' pressure p_r divided by p0; not used if `exponent` is zero.
-    exponent : float
-        Roelands' exponent z; zero for Barus' law.
-    density_rise, density_saturation : float
-        Constants of ``rho/rho0 = 1 + rise P/(1 + saturation P)``; both are zero for an incompressible liquid.
+    `alpha` is the slope of ``ln eta`` at ambient pressure, ``alpha p0``. `pole` is Roelands' p_r divided by p0, and
+    `exponent` his z, which is zero for Barus' law. The density is ``rho/rho0 = 1 + rise P/(1 + saturation P)``.
     """
 
     alpha: float
@@ -108,10 +84,7 @@ class Liquid(NamedTuple):
 
 @jit
 def log_viscosity_at(P: float, liquid: Liquid) -> tuple[float, float]:
-    """Return ``ln(eta/eta0)`` and its derivative at the pressure P in units of p0.
-
-    Barus' law is used if the exponent of the liquid is zero, otherwise Roelands' law.
-    """
+    """Return ``ln(eta/eta0)`` and its derivative at the pressure P in p0, by Barus' law or, if z > 0, Roelands' law."""
     if liquid.exponent == 0.0:
         return liquid.alpha * P, liquid.alpha
     ratio = 1.0 + P / liquid.pole
@@ -121,7 +94,7 @@ def log_viscosity_at(P: float, liquid: Liquid) -> tuple[float, float]:
 
 @jit
 def log_viscosities(pressure: FloatArray, liquid: Liquid) -> FloatArray:
-    """Return ``ln(eta/eta0)`` at every pressure, in units of p0."""
+    """Return ``ln(eta/eta0)`` at every pressure in units of p0."""
     result = np.empty_like(pressure)
     for i in range(pressure.size):
         result[i] = log_viscosity_at(pressure[i], liquid)[0]
@@ -130,10 +103,9 @@ def log_viscosities(pressure: FloatArray, liquid: Liquid) -> FloatArray:
 
 @jit
 def _mobility(left: float, right: float) -> tuple[float, float, float]:
-    """Return the mean of 1/eta between two nodes, and the derivatives of this mean.
+    """Return the mean of 1/eta between two nodes, and its derivatives by `left` and `right`, the values of ln(eta).
 
-    The derivatives are those with respect to `left` and `right`, the values of ln(eta) at the two nodes. The mean is
-    exact if ln(eta) is linear between the nodes.
+    The mean is exact if ln(eta) is linear between the nodes.
     """
     rise = right - left
     if abs(rise) < 1e-3:
@@ -149,10 +121,7 @@ def _mobility(left: float, right: float) -> tuple[float, float, float]:
 
 @jit
 def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
-    """Return the weights of the nodes f-1, f, f+1 in the value at the face between f and f+1.
-
-    The weights are for a flow from node f to node f+1.
-    """
+    """Return the weights of the nodes f-1, f, f+1 in the value at the face between f and f+1, for a flow to f+1."""
     if f == 0:
         return 0.0, 0.5, 0.5
     dx = nodes[f + 1] - nodes[f]
@@ -166,10 +135,9 @@ def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
 
 
 class Imbalance(NamedTuple):
-    """Imbalance (inflow minus outflow) of every volume, shape (n,), and the derivatives of the imbalance, shape (n, 4).
+    """Inflow minus outflow of every volume, shape (n,), and its derivatives by pressure and film, shape (n, 4).
 
-    Row i contains the derivatives of the imbalance of volume i with respect to pressure and film at the four nodes from
-    i - 2 to i + 1.
+    Row i contains the derivatives by pressure and film at the four nodes from i - 2 to i + 1.
     """
 
     value: FloatArray
@@ -226,10 +194,7 @@ def balance(
 def _fill_jacobian_row(
     i: int, influence: FloatArray, by_pressure: FloatArray, by_film: FloatArray, row: FloatArray
 ) -> None:
-    """Write the derivatives of the imbalance of volume i with respect to all pressures to `row`.
-
-    The derivatives include the effect of the pressures on the film.
-    """
+    """Write the derivatives of the imbalance of volume i by all pressures, which also change the film, to `row`."""
     c0, c1, c2, c3 = by_film[i]
     far, near, own, next_ = influence[max(i - 2, 0)], influence[i - 1], influence[i], influence[i + 1]
     for j in range(row.size):
@@ -241,10 +206,9 @@ def _fill_jacobian_row(
 
 @jit
 def _fill_active(influence: FloatArray, P: FloatArray, found: Imbalance, active: NDArray[np.int64]) -> int:
-    """Write the indices of the active nodes to `active`, and return their number.
+    """Write the indices of the active nodes, whose pressures are unknowns of the Newton step, and return their number.
 
-    The pressure at an active node is an unknown of the Newton step. An inner node is active if ``P + R/d > 0``, where d
-    estimates the size of dR/dP at this node.
+    An inner node is active if ``P + R/d > 0``, where d estimates the size of dR/dP at this node.
     """
     R, by_pressure, by_film = found
     count = 0
@@ -262,9 +226,7 @@ def _fill_active(influence: FloatArray, P: FloatArray, found: Imbalance, active:
 def _fill_equations(
     grid: Grid, P: FloatArray, found: Imbalance, active: NDArray[np.int64], A: FloatArray, b: FloatArray
 ) -> None:
-    """Write the matrix `A` and the right side `b` of the Newton equations.
-
-    The unknowns of these equations are the active pressures and the central film.
+    """Write the matrix `A` and right side `b` of the Newton equations for the active pressures and the central film.
 
     The step sets all other pressures to zero.
     """
@@ -292,10 +254,7 @@ def _fill_equations(
 
 @jit
 def _fill_imbalance(grid: Grid, P: FloatArray, R: FloatArray, active: NDArray[np.int64], b: FloatArray) -> None:
-    """Write the right side of the Newton equations to `b`; the pressures at all inactive nodes have to be zero already.
-
-    A step with a reused Jacobian needs only this right side.
-    """
+    """Write the right side for a step with a reused Jacobian; the pressures at inactive nodes are zero already."""
     for k in range(active.size):
         b[k] = -R[active[k]]
     b[active.size] = 0.5 * np.pi
@@ -305,10 +264,7 @@ def _fill_imbalance(grid: Grid, P: FloatArray, R: FloatArray, active: NDArray[np
 
 @jit
 def _add_deformation(influence: FloatArray, P: FloatArray, H: FloatArray) -> None:
-    """Add the deformation that the pressures P cause to the film H.
-
-    Four rows are summed at a time, so that the processor can compute the sums in parallel.
-    """
+    """Add the deformation under the pressures P to the film H; four rows at a time are summed in parallel."""
     n = P.size
     for i in range(0, n - 3, 4):
         h0, h1, h2, h3 = H[i], H[i + 1], H[i + 2], H[i + 3]
@@ -334,9 +290,9 @@ def _fill_film(grid: Grid, P: FloatArray, central: float, H: FloatArray) -> None
 
 @jit
 def _step_length(grid: Grid, P: FloatArray, H: FloatArray, step: FloatArray, change: float, clip: float) -> float:
-    """Return the largest fraction of a step that keeps the film above zero and does not change any pressure too much.
+    """Return the largest fraction of a step that is allowed.
 
-    A pressure may change by at most `clip` times the largest pressure.
+    The film must remain positive, and no pressure may change by more than `clip` times the largest pressure.
     """
     largest = np.max(np.abs(step))
     share = min(1.0, clip * np.max(P) / largest) if largest > 0.0 else 1.0
@@ -354,8 +310,8 @@ def _take_step(
 ) -> tuple[float, float]:
     """Change P, H and the film at ``X = 0`` by the allowed fraction of a Newton step.
 
-    Return the film at ``X = 0`` and the relative size of the step. The size is infinite if the step was shortened, and
-    NaN if the film closes.
+    Return the film at ``X = 0`` and the relative size of the step: infinite if it was shortened, NaN if the film
+    closes.
     """
     share = _step_length(grid, P, H, step, change, clip)
     if not share > _LEAST_SHARE:
@@ -376,27 +332,10 @@ def film_on(grid: Grid, P: FloatArray, central: float) -> FloatArray:
 
 
 def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: float, pace: Pace) -> Iterate:
-    """Solve for pressure and film on one grid.
+    """Solve for pressure and film on one grid; the outcome is CONVERGED, TOO_MANY_STEPS, SINGULAR or FILM_COLLAPSED.
 
-    Parameters
-    ----------
-    grid : Grid
-        Nodes, with the influence of their pressures on the film.
-    liquid : Liquid
-        Viscosity and density of the liquid.
-    K : float
-        ``(3 pi^2/4) U/W^2``.
-    guess : array, shape (n,)
-        Initial guess of the pressure; zero at both ends, nowhere negative.
-    central : float
-        Initial guess of the film at ``X = 0``, so large that the film is positive at all nodes.
-    pace : Pace
-        Limits of the step and of the number of steps.
-
-    Returns
-    -------
-    Iterate
-        The outcome is CONVERGED, TOO_MANY_STEPS, SINGULAR or FILM_COLLAPSED.
+    The guessed pressure is zero at both ends and nowhere negative. The guessed central film is so large that the film
+    is positive at all nodes.
     """
     n = guess.size
     P, H = guess.copy(), film_on(grid, guess, central)

@@ -80,22 +80,9 @@ def kinematic_viscosity(temperature: ArrayLike, A: float, B: float) -> FloatArra
 
 
 def density_at(temperature: ArrayLike, density: float, reference_temperature: float) -> FloatArray:
-    """Return the density of a lubricating oil at a temperature and ambient pressure.
+    """Return the density at a temperature in K: ``rho_ref exp(-b dT (1 + 0.8 b dT))`` with ``b = 0.6278/rho_ref``.
 
-    Parameters
-    ----------
-    temperature : array_like
-        Temperature in K.
-    density : float
-        Density in kg/m^3 at the reference temperature.
-    reference_temperature : float
-        Reference temperature in K.
-
-    Returns
-    -------
-    array
-        ``rho_ref exp(-b dT (1 + 0.8 b dT))`` with ``b = 0.6278/rho_ref`` and the temperature difference dT from the
-        reference. In ASTM D1250, table 54D, the reference is 60 F.
+    `density` in kg/m^3 is rho_ref at the reference temperature, which is 60 F in ASTM D1250, table 54D.
     """
     expansion = _LUBRICANT_EXPANSION / density * (np.asarray(temperature, dtype=np.float64) - reference_temperature)
     return np.asarray(density * np.exp(-expansion * (1 + 0.8 * expansion)))

@@ -1,8 +1,7 @@
 """Friction of a lubricated line contact from the shear of its film.
 
-The film is computed for pure rolling and a Newtonian liquid of constant temperature; the shear stress follows from this
-film. This is a good approximation for small sliding velocities. Heating and shear thinning are neglected; both effects
-would make film and traction smaller.
+The film is that of pure rolling of an isothermal Newtonian liquid, so slide-roll ratios have to be small. Heating and
+shear thinning would make film and traction smaller.
 """
 
 from __future__ import annotations
@@ -14,35 +13,17 @@ from mdr_dask.physics.lubrication.grid_solution import GridSolution
 from mdr_dask.physics.lubrication.line_contact import LineContact
 from mdr_dask.physics.lubrication.newton import log_viscosities
 
-#: Largest natural logarithm of the viscosity ratio that is evaluated; a Newtonian liquid of higher viscosity has no
-#: physical meaning.
+#: Largest natural logarithm of the viscosity ratio that is evaluated, against overflow.
 _LARGEST_EXPONENT = 600.0
 
 
 def shear_stress(
     case: LineContact, grid: GridSolution, W: float, slide_roll_ratio: float, eyring_stress: float | None
 ) -> FloatArray:
-    """Return the shear stress at mid-film.
+    """Return the shear stress at mid-film in units of p0 at the nodes; zero where the film has ended.
 
-    Parameters
-    ----------
-    case : LineContact
-        The dimensionless numbers of the case.
-    grid : GridSolution
-        Pressure and film of the case.
-    W : float
-        Load parameter; the shear stress in units of p0 depends on W because of ``a/R = sqrt(8 W/pi)``.
-    slide_roll_ratio : float
-        ``(u1 - u2)/u`` with the mean velocity u.
-    eyring_stress : float or None
-        Eyring's stress in units of p0; None for a Newtonian liquid.
-
-    Returns
-    -------
-    array, shape (n,)
-        Shear stress in units of p0 at the nodes. The stress of a Newtonian liquid is ``tau = eta (u1 - u2)/h``. With
-        Eyring's law, the stress is ``tau_E asinh(tau/tau_E)``, where tau is the Newtonian stress. The stress is zero
-        where the film has ended.
+    The Newtonian stress is ``tau = eta (u1 - u2)/h``, with the slide-roll ratio ``(u1 - u2)/u``. An Eyring stress tau_E
+    in p0 makes it ``tau_E asinh(tau/tau_E)``. The load parameter W is needed because of ``a/R = sqrt(8 W/pi)``.
     """
     slope = case.film_number * np.sqrt(2 * W / np.pi) / 6 * slide_roll_ratio
     exponent = np.minimum(log_viscosities(grid.pressure, case.liquid), _LARGEST_EXPONENT)

@@ -1,10 +1,7 @@
-"""Matrices of both transforms on graded panels.
+"""Matrices of the MDR transforms on graded panels, for functions that are a polynomial inside each panel.
 
-The matrices are exact for functions that are a polynomial inside each panel.
-
-As functions of z, the square of the radius, both transforms of the MDR are Abel's half-integrals. The substitution
-``z' = z - t^2`` turns the integrands into polynomials in t, which Gauss's rule integrates exactly. All contacts are
-scaled to the interval [0, 1], so that one set of matrices is enough.
+As functions of z = r^2, both transforms are Abel's half-integrals. Substitutions remove the square roots, and Gauss's
+rule integrates the result to rounding.
 """
 
 from __future__ import annotations
@@ -23,21 +20,11 @@ from mdr_dask.physics.mdr.transforms import gauss
 
 
 class Mesh(NamedTuple):
-    """The panels (intervals) and nodes on which a function is a piecewise polynomial.
+    """Panels between `edges`, on which a function is a polynomial through the `nodes`.
 
-    The first panel begins at 0. There is no node at 0, because functions may jump there.
-
-    Parameters
-    ----------
-    edges : array, shape (panels + 1,)
-        Ends of the panels.
-    order : int
-        Number of nodes per panel: the interior Lobatto points and the right end.
-    nodes : array, shape (n,)
-        Nodes of all panels, increasing.
-    barycentric : array, shape (panels, order + 1)
-        Barycentric weights for the interpolation inside each panel. The first panel has no node at its left end, and
-        uses only the last `order` weights.
+    The `order` nodes of a panel are the interior Lobatto points and the right end. The first edge, 0, has no node,
+    because functions may jump there. `barycentric`, shape (panels, order + 1), holds the weights of interpolation; the
+    first panel uses only the last `order` weights.
     """
 
     edges: FloatArray
@@ -46,7 +33,7 @@ class Mesh(NamedTuple):
     barycentric: FloatArray
 
     def extended(self, end: float) -> Mesh:
-        """Return the mesh with an additional last panel, which ends at `end`."""
+        """Return the mesh with one more panel, which ends at `end`."""
         last = self.edges[-1]
         local = (self.nodes[-self.order :] - self.edges[-2]) / (last - self.edges[-2])
         nodes = np.append(self.nodes, last + (end - last) * local)
@@ -55,25 +42,13 @@ class Mesh(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Panels:
-    """Nodes on [0, 1], and matrices for functions that are given by their values u at the nodes.
+    """Nodes z on [0, 1], and matrices that turn the values u at the nodes into integrals and slopes at the nodes.
 
-    The product of a matrix and u contains the expression stated below, with z equal to the position of each node. The
-    last node is at 1.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The panels, with n nodes.
-    inner : array, shape (n, n)
-        (1/pi) int_0^z u(z') / sqrt(z - z') dz'.
-    full : array, shape (n, n)
-        (1/pi) int_0^z u(z') / sqrt(z' (z - z')) dz'.
-    outer : array, shape (n, n)
-        (1/pi) int_z^1 u'(z') / sqrt(z' - z) dz'.
-    slope : array, shape (n, n)
-        u'(z). At the common end of two panels, this is the slope in the left panel.
-    weights : array, shape (n,)
-        Weights of the integral int_0^1 u dz.
+    `inner`: (1/pi) int_0^z u(z') / sqrt(z - z') dz'
+    `full`: (1/pi) int_0^z u(z') / sqrt(z' (z - z')) dz'
+    `outer`: (1/pi) int_z^1 u'(z') / sqrt(z' - z) dz'
+    `slope`: u'(z), at the common end of two panels the slope in the left one
+    `weights`: weights of int_0^1 u dz
     """
 
     mesh: Mesh
@@ -91,20 +66,7 @@ class Panels:
 
 @lru_cache(maxsize=64)
 def graded_panels(left: int, right: int, order: int) -> Panels:
-    """Return panels that become narrower towards both ends, by repeated halving of the panel at the end.
-
-    Parameters
-    ----------
-    left, right : int
-        Number of halvings of the panel at the left end, and of the panel at the right end.
-    order : int
-        Nodes per panel, at least 2.
-
-    Returns
-    -------
-    Panels
-        Nodes and matrices with (left + right + 2) * order nodes; cached.
-    """
+    """Return panels of `order` > 1 nodes that become narrower towards both ends by `left` and `right` halvings."""
     towards_left = 0.5 * 0.5 ** np.arange(left, -1, -1.0)
     towards_right = 1.0 - 0.5 * 0.5 ** np.arange(1.0, right + 1.0)
     edges = np.concatenate([[0.0], towards_left, towards_right, [1.0]])
@@ -126,10 +88,7 @@ def graded_panels(left: int, right: int, order: int) -> Panels:
 
 
 def panel_members(panel: int, order: int) -> NDArray[np.intp]:
-    """Return the indices of the nodes of a panel, and of the last node of the previous panel.
-
-    The polynomial of the panel interpolates at these nodes.
-    """
+    """Return the nodes through which the polynomial of a panel passes: its own, and the last of the previous panel."""
     return np.arange(max(panel * order - 1, 0), (panel + 1) * order)
 
 
@@ -172,21 +131,14 @@ def _add_panel(
 
 
 def interpolate(mesh: Mesh, values: FloatArray, places: FloatArray) -> FloatArray:
-    """Return the piecewise polynomial through `values`, shape (n,), at the positions `places`.
-
-    Beyond the mesh the result is 0.
-    """
+    """Return the piecewise polynomial through `values` at the positions `places`; beyond the mesh the result is 0."""
     result = np.zeros_like(places)
     _interpolate(mesh, values, places, result)
     return result
 
 
 def interpolate_weighted(mesh: Mesh, rows: FloatArray, shares: FloatArray, stretch: FloatArray) -> FloatArray:
-    """Return a weighted sum of piecewise polynomials at all nodes.
-
-    At the node z, term k of the sum is shares[k] p_k(stretch[k] z), where p_k is the piecewise polynomial through
-    rows[k].
-    """
+    """Return at each node z the sum of shares[k] p_k(stretch[k] z) over k, with the polynomials p_k through rows[k]."""
     result = np.zeros(mesh.nodes.size)
     _weighted(mesh, rows, shares, stretch, result)
     return result

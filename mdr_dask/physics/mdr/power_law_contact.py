@@ -1,8 +1,6 @@
-"""Closed forms for contacts of power-law bodies of revolution, such as spheres and cones.
+"""Closed forms for contacts of bodies f = A r^n with the effective normal and tangential moduli E_star and G_star.
 
-The profile is f = A r^n, and its image is g = B |x|^n with B = kappa_n A (see `transforms.power_factor`). E_star and
-G_star are the effective moduli of normal and tangential contact. The bodies are assumed to be elastically similar, so
-that the normal and the tangential problem are independent of each other.
+The bodies are elastically similar, so that the normal and the tangential problem are independent.
 """
 
 from __future__ import annotations

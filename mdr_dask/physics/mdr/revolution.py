@@ -1,7 +1,6 @@
-"""Unworn bodies of revolution: the profile f0(r) and its image g0(x), the line of the MDR.
+"""Unworn bodies of revolution: the profile f0(r) and its image g0(x).
 
-The index 0 denotes the state before any wear. Lengths along the surface are divided by the contact radius a0, and
-heights are divided by the depth d0. In these units g0(1) = 1.
+Lengths are divided by the contact radius a0, and heights by the depth d0, so that g0(1) = 1.
 """
 
 from __future__ import annotations
@@ -25,16 +24,9 @@ from mdr_dask.physics.mdr.transforms import forward_transform, gauss, power_fact
 
 
 class Image(NamedTuple):
-    """The image g0 of a body for compiled code: a piecewise cubic, or a power law if there are no knots.
+    """The image g0 for compiled code: a piecewise cubic, or the power law x^exponent if there are no knots.
 
-    Parameters
-    ----------
-    exponent : float
-        Exponent n of g0 = x^n; used if there are no knots.
-    knots : array, shape (k + 1,)
-        Ends of the pieces; empty for a power law.
-    coefficients : array, shape (4, k)
-        Coefficients of the powers 3, 2, 1, 0 of the distance from the left end of each piece.
+    `coefficients`, shape (4, pieces), belong to the powers 3, 2, 1, 0 of the distance from the left knot of each piece.
     """
 
     exponent: float
@@ -70,13 +62,7 @@ class Profile(Protocol):
 
 @dataclass(frozen=True)
 class PowerProfile:
-    """Power law g0 = x^n, f0 = r^n / kappa_n: a parabola for n = 2, a cone for n = 1.
-
-    Parameters
-    ----------
-    exponent : float
-        n > 0.
-    """
+    """The power law g0 = x^n and f0 = r^n / kappa_n, with n > 0: a cone for n = 1, a parabola for n = 2."""
 
     exponent: float
     largest_radius: float = np.inf
@@ -98,7 +84,7 @@ class PowerProfile:
         return np.asarray(self.exponent * position ** (self.exponent - 1.0))
 
     def rise(self, gap: FloatArray, start: float) -> FloatArray:
-        """Return (c + gap)^n - c^n without cancellation, even for a very small gap; c is `start`."""
+        """Return (start + gap)^n - start^n without cancellation."""
         if start == 0.0:
             return self.image(gap)
         return np.asarray(start**self.exponent * np.expm1(self.exponent * np.log1p(gap / start)))
@@ -114,15 +100,7 @@ class PowerProfile:
 
 @dataclass(frozen=True, eq=False)
 class TableProfile:
-    """A body described by two piecewise cubics; `from_table` and `from_body` return such a body.
-
-    Parameters
-    ----------
-    curve, image_curve : PPoly
-        f0(r) and g0(x), in units of d0 and a0.
-    length : float
-        a0 in the original unit of the body.
-    """
+    """A body with piecewise cubic f0(r) and g0(x) in units of d0 and a0; `length` is a0 in the unit of the body."""
 
     curve: PPoly
     image_curve: PPoly
@@ -151,10 +129,7 @@ class TableProfile:
         return self.image_slope_curve(np.asarray(position))
 
     def rise(self, gap: FloatArray, start: float) -> FloatArray:
-        """Return g0(start + gap) - g0(start).
-
-        If `gap` is small, the difference is computed as an integral of the slope, to avoid cancellation.
-        """
+        """Return g0(start + gap) - g0(start); if it is small, as an integral of the slope, to avoid cancellation."""
         gap = np.asarray(gap, dtype=float)
         abscissa, weight = gauss(8)
         short = gap * (self.image_slope_curve(start + gap[..., None] * abscissa) @ weight)
@@ -174,7 +149,7 @@ _ABSCISSA, _WEIGHT = gauss(8)
 
 @jit_inline
 def image_rise(image: Image, start: float, level: float, gap: float) -> float:
-    """Return g0(start + gap) - level without cancellation. The argument `level` must be g0(start)."""
+    """Return g0(start + gap) - g0(start) without cancellation; `level` is g0(start)."""
     if image.knots.size == 0:
         n = image.exponent
         if n == 2.0:
@@ -196,7 +171,7 @@ def image_rise(image: Image, start: float, level: float, gap: float) -> float:
 
 @jit
 def _piece(image: Image, place: float, derivative: int) -> float:
-    """Return the image (if `derivative` is 0) or its slope (if `derivative` is 1) at the position `place`."""
+    """Return the image (`derivative` 0) or its slope (`derivative` 1) at a position."""
     cell = last_until(image.knots, place, 0, image.coefficients.shape[1])
     local, k = place - image.knots[cell], image.coefficients
     if derivative == 0:
@@ -205,25 +180,9 @@ def _piece(image: Image, place: float, derivative: int) -> float:
 
 
 def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfile:
-    """Build the profile of a body that is given by a table and pressed to a depth.
+    """Return the profile of a table of radii and heights, pressed to a depth; all are in the same unit of length.
 
-    Parameters
-    ----------
-    radius, height : array_like, shape (m,)
-        Radii r from 0 upwards, and heights f(r), in the same unit of length. Heights are counted from f(0).
-    depth : float
-        Indentation depth d0 > 0, in the same unit.
-
-    Returns
-    -------
-    TableProfile
-        Scaled so that g0(1) = 1.
-
-    Raises
-    ------
-    ValueError
-        If the table contains values that are not finite, does not start at r = 0, does not rise with the radius, or
-        ends inside the contact.
+    The radii begin at 0, and heights are counted from the first one.
     """
     r, f = np.asarray(radius, dtype=float), np.asarray(height, dtype=float)
     check_table(r, f)
@@ -248,17 +207,9 @@ FARTHEST, KNOTS = 8.0, 80
 
 
 def from_body(body: Any, depth: float) -> TableProfile:
-    """Build the profile of a body that is given in closed form and pressed to a depth.
+    """Return the profile of a `surfaces.shapes.Shape`, pressed to a depth in the unit of length of the body.
 
-    The depth is in the unit of length of the body. The profile consists of cubic pieces. The pieces become shorter
-    towards the axis, the contact edge and the radii `breaks` of the body.
-
-    Parameters
-    ----------
-    body : Any
-        A body with the methods `at` and `body`, and the property `breaks`, of `surfaces.shapes.Shape`.
-    depth : float
-        Indentation depth d0 > 0.
+    The cubic pieces become shorter towards the axis, the contact edge and the `breaks` of the body.
     """
 
     def sunk(x: float) -> float:

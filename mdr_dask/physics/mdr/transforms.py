@@ -1,10 +1,7 @@
-"""The transforms of the method of dimensionality reduction for bodies of revolution, with an error estimate.
+"""The transforms between the profile f(r) of a body of revolution and its image g(x), with an error estimate.
 
-The transforms convert the profile f(r) of a body into its image g(x), the line that represents the body, and back.
-Every integral has a square-root singularity. The singularity disappears if the variable of integration is replaced by
-an angle t (x = r sin t or r = x sin t) or a hyperbolic angle t (x = r cosh t). The integrals are split at the kinks and
-jumps of the profile and computed by Gauss-Legendre rules. The number of nodes is doubled until two successive results
-agree.
+A substitution x = r sin t, r = x sin t or x = r cosh t removes the square-root singularity of each integral. The
+integrals are split at kinks and jumps, and the number of Gauss nodes is doubled until two results agree.
 """
 
 from __future__ import annotations
@@ -40,18 +37,7 @@ def gauss(nodes: int) -> tuple[FloatArray, FloatArray]:
 
 
 def power_factor(exponent: ArrayLike) -> FloatArray:
-    """Return kappa, the factor between a profile f = c r^n and its image g = kappa c |x|^n.
-
-    Parameters
-    ----------
-    exponent : array_like
-        Exponent n > 0 of the profile.
-
-    Returns
-    -------
-    array
-        sqrt(pi)/2 n Gamma(n/2) / Gamma((n+1)/2): pi/2 for a cone, 2 for a parabola.
-    """
+    """Return kappa = sqrt(pi)/2 n Gamma(n/2) / Gamma((n+1)/2): the profile c r^n has the image kappa c |x|^n."""
     n = np.asarray(exponent, dtype=float)
     return np.asarray(0.5 * np.sqrt(np.pi) * n * gamma(0.5 * n) / gamma(0.5 * (n + 1.0)))
 
@@ -215,21 +201,9 @@ def volume(image: Function, radius: float, *, breaks: Sequence[float] = (), tole
 
 
 def power_pressure(exponent: float, radius: ArrayLike, contact_radius: float) -> FloatArray:
-    """Return p / E* for the image g = |x|^n pressed to the contact radius a, in closed form.
+    """Return p / E* for the image |x|^n pressed to the contact radius a; zero outside the contact.
 
-    Parameters
-    ----------
-    exponent : float
-        n > 0.
-    radius : array_like
-        Radii; the pressure is zero outside the contact.
-    contact_radius : float
-        a > 0.
-
-    Returns
-    -------
-    array
-        (n/pi) a^(n-2) w 2F1(1, 1 - n/2; 3/2; w^2/a^2) with w^2 = a^2 - r^2; for n = 2 this is Hertz's pressure.
+    With w^2 = a^2 - r^2, this is (n/pi) a^(n-2) w 2F1(1, 1 - n/2; 3/2; w^2/a^2).
     """
     r = np.asarray(radius, dtype=float)
     a = contact_radius

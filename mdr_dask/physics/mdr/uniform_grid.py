@@ -1,12 +1,8 @@
-"""The transforms on a uniform grid by product integration.
+"""The transforms of piecewise linear functions on a uniform grid, with the singular weights integrated exactly.
 
-The functions are taken as piecewise linear. The product of a linear function and the singular weight is integrated
-exactly.
-
-Each error is proportional to a power of the cell width. The exponent is 2 for the inverse transform, 1.5 for the
-forward transform, and 1 for the pressure. The error of the pressure is largest at the nodes next to the axis. The
-contact edge may be anywhere inside a cell. This method converges more slowly than `half_integrals`, but accepts any
-profile, any history and any number of kinks.
+The error is proportional to the cell width to the power 2 for the inverse and 1.5 for the forward transform. For the
+pressure the power is 1, and the error is largest next to the axis. Unlike `half_integrals`, the grid accepts any number
+of kinks.
 """
 
 from __future__ import annotations
@@ -22,18 +18,9 @@ from mdr_dask.arrays import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class UniformGrid:
-    """Nodes 0, h, 2h, ... and the matrices of the transforms.
+    """Nodes 0, h, 2h, ... and matrices, shape (n, n): f = inverse @ g, g = forward @ f and p / E* = stress @ q.
 
-    Parameters
-    ----------
-    nodes : array, shape (n,)
-        Radii r and positions x.
-    inverse : array, shape (n, n)
-        f = inverse @ g.
-    forward : array, shape (n, n)
-        g = forward @ f.
-    stress : array, shape (n, n)
-        p / E* = stress @ q, where q is the line load: d - g inside the contact, and zero outside.
+    The line load q is d - g inside the contact and zero outside.
     """
 
     nodes: FloatArray
@@ -81,10 +68,7 @@ class UniformGrid:
         return float(2.0 * np.trapezoid(load[:k], self.nodes[:k]) + last)
 
     def depth(self, image: FloatArray, force: float, guess: float | None = None) -> float:
-        """Return the depth at which F_N / E* is equal to `force`, by Newton's method.
-
-        The method converges, because the force is a convex function of the depth.
-        """
+        """Return the depth at which F_N / E* equals `force`, by Newton's method; the force is convex in the depth."""
         depth = float(np.max(image[: max(int(self.nodes.size * 0.4), 2)])) if guess is None else guess
         for _ in range(60):
             slope = 2.0 * max(self.edge(image, depth), self.spacing)
@@ -97,15 +81,7 @@ class UniformGrid:
 
 @lru_cache(maxsize=8)
 def uniform_grid(cells: int, length: float) -> UniformGrid:
-    """Return the grid with the given number of cells on [0, length]; cached.
-
-    Parameters
-    ----------
-    cells : int
-        Number of cells.
-    length : float
-        Position of the last node.
-    """
+    """Return the grid of equal cells on [0, length]."""
     x = np.linspace(0.0, length, cells + 1)
     h = x[1]
     inverse, forward, stress = (np.zeros((cells + 1, cells + 1)) for _ in range(3))
@@ -128,11 +104,10 @@ def uniform_grid(cells: int, length: float) -> UniformGrid:
 
 
 def _kernel(low: ArrayLike, high: ArrayLike, radius: ArrayLike) -> FloatArray:
-    """Return the integral of 1 / sqrt(x^2 - r^2) from `low` to `high`, for low >= r.
+    """Return the integral of 1 / sqrt(x^2 - r^2) from `low` >= r to `high`; it diverges for r = low = 0.
 
-    For r = low = 0, which is the cell next to the axis, the integral diverges. In this cell the slope of the line load
-    is therefore taken as proportional to x, with the mean value of the constant slope. The integral of the slope
-    divided by x is then twice this mean value, so that the function returns 2.
+    In that cell, the slope of the line load is taken as proportional to x with the same mean. The integral of slope / x
+    is then twice the mean slope, so the function returns 2.
     """
     low, high, r = np.broadcast_arrays(*(np.asarray(each, dtype=np.float64) for each in (low, high, radius)))
     with np.errstate(divide="ignore", invalid="ignore"):

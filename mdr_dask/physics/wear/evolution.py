@@ -1,9 +1,7 @@
-"""Time integration of a worn contact with backward differentiation formulas at fixed radii, for any kind of slip.
+"""Time integration of a worn contact with backward differentiation formulas (BDF) of order 1 to 3.
 
-A quantity, for example the worn depth, accumulates at every radius (see `Problem`). The contact is mapped onto graded
-panels in r^2, which follow the moving edge. Each step uses a backward differentiation formula (BDF) of order 1 to 3,
-because the equations are stiff. Newton's method solves for the image and the edge together, and reuses its Jacobian as
-long as it converges.
+The equations are stiff. The nodes follow the moving edge. In every step, Newton's method solves for the image and the
+edge together.
 """
 
 from __future__ import annotations
@@ -20,13 +18,12 @@ from mdr_dask.physics.linear import Factors, factorise
 from mdr_dask.physics.mdr.half_integrals import Panels
 from mdr_dask.physics.outcome import Outcome
 
-#: Local error of a BDF step of order 1, 2 and 3. It is given as a fraction of the difference between the result of the
-#: step and the extrapolation of the past steps.
+#: Local error of a BDF step of order 1, 2 and 3, as a fraction of the difference between result and extrapolation.
 _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
 
 
 MOST_STEPS = 20000
-"""Number of steps after which a march fails: about a hundred times more than usual."""
+"""Number of steps after which a march fails."""
 MOST_ITERATIONS = 12
 """Number of Newton iterations after which a step fails; a step that is short enough needs about three."""
 GROWTH = 1.8
@@ -36,11 +33,13 @@ SLOW = 0.4
 DIFFERENCE = 1e-7
 """Step of the finite differences for the unknowns that follow the image; about the root of the rounding error."""
 SHORTEST = 1e-4
-"""A march fails if a step is shorter than this value times the longest step so far, or than this value times the first
-step if that is shorter. In marches that succeeded, no later step was shorter than 0.13 times the longest step."""
+"""A march fails if a step is shorter than this fraction of the longest step so far, or of the first step if that is
+shorter.
+"""
 NEWTON, ROUNDING = 1e-5, 1e-9
-"""Tolerance of Newton's method: `NEWTON` times the step tolerance, but at least `ROUNDING`. `NEWTON` is small, because
-a moving border amplifies the error of Newton's method."""
+"""Tolerance of Newton's method: `NEWTON` times the step tolerance, because a moving border amplifies the error, but at
+least `ROUNDING`.
+"""
 
 
 class NotConvergedError(ArithmeticError):
@@ -49,18 +48,11 @@ class NotConvergedError(ArithmeticError):
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """The contact at one time.
+    """The contact at one time: cycles N in partial slip, sliding path s in gross slip.
 
-    Parameters
-    ----------
-    time : float
-        Cycles N in partial slip, sliding path s in gross slip.
-    unknowns : array, shape (n,)
-        The unknowns of the problem. First come the values of the image at all nodes except the last; then the width of
-        the panels in squared radii, divided by its value in the virgin contact. Some problems have further unknowns.
-        All unknowns are of the order of one.
-    accumulated : array, shape (n,)
-        The quantity accumulated at the radii of the nodes; zero at the edge.
+    `unknowns`, all of the order of one, begin with the image at all nodes except the last. Then come the width of the
+    panels in squared radii, divided by its virgin value, and the further unknowns of the problem. `accumulated`, shape
+    (nodes,), is the worn quantity at the nodes; it is zero at the edge.
     """
 
     time: float
@@ -97,7 +89,7 @@ class Problem(Protocol):
         """Return the derivatives of the residual with respect to the nodal unknowns."""
 
     def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return the quantity whose error is controlled in every step; its unit is the largest possible wear."""
+        """Return the quantity whose error is controlled in every step, in units of the largest possible wear."""
 
 
 def march(
@@ -108,34 +100,10 @@ def march(
     start: Moment | None = None,
     stops: Callable[[Any], bool] = lambda moment: False,
 ) -> list[Any]:
-    """Advance a contact in time until a step ends at or beyond `end`.
+    """Return the first moment and the end of every accepted step.
 
-    The steps do not depend on `end`: a march to a later end begins with exactly the same steps.
-
-    Parameters
-    ----------
-    problem : Problem
-        The kind of slip.
-    end : float
-        Time to reach.
-    tolerance : float
-        Allowed error of the quantity `Problem.worn` in one step.
-    first : float
-        Length of the first step.
-    start : Moment, optional
-        The first moment; by default the virgin contact.
-    stops : callable, Moment -> bool
-        Function that returns True for a moment at which the march must stop, even before `end`.
-
-    Returns
-    -------
-    list of Moment
-        The start, and the moment at the end of every accepted step.
-
-    Raises
-    ------
-    NotConvergedError
-        If a step fails even if it is very short.
+    The last step ends at or beyond `end`, or at a moment for which `stops` returns True. `tolerance` is the error of
+    `Problem.worn` allowed in one step, and `first` is the length of the first step. The steps do not depend on `end`.
     """
     newton = _Newton(problem, tolerance)
     history = [settled(problem) if start is None else start]
@@ -159,10 +127,7 @@ def march(
 
 
 def settled(problem: Problem) -> Any:
-    """Return the virgin contact as a solution of the discrete equations.
-
-    If a march began with the exact virgin contact, its first step would contain a jump to the discrete solution.
-    """
+    """Return the virgin contact as a solution of the discrete equations, so that a march does not begin with a jump."""
     virgin = problem.start()
     known = problem.memory([virgin], np.zeros(1))
     unknowns = _Newton(problem, 1e-9).solve(virgin.unknowns, 0.0, known)
@@ -170,19 +135,9 @@ def settled(problem: Problem) -> Any:
 
 
 def at(problem: Problem, history: Sequence[Any], time: float, tolerance: float) -> tuple[int, Any]:
-    """Return the number of steps before a time, and the moment at this time, computed by one or a few additional steps.
+    """Return the number of steps before a time within the history, and the moment at this time.
 
-    Parameters
-    ----------
-    problem, tolerance
-        As in :func:`march`, whose result is `history`.
-    time : float
-        A time within the history.
-
-    Raises
-    ------
-    NotConvergedError
-        If the step fails even if it is divided.
+    If the history has no such moment, a few additional steps lead to it.
     """
     before = int(np.searchsorted([moment.time for moment in history], time))
     if history[before].time == time:
@@ -203,7 +158,7 @@ def at(problem: Problem, history: Sequence[Any], time: float, tolerance: float) 
 
 
 def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatArray:
-    """Return the integral of a rate up to every moment, by the BDF formulas of the steps; shape (steps + 1,)."""
+    """Return the integral of a rate up to every moment, by the BDF formulas of the steps."""
     total = np.zeros(len(history))
     for number in range(1, len(history)):
         order = min(number, 3)
@@ -214,10 +169,7 @@ def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatAr
 
 
 def _try_step(problem: Problem, newton: _Newton, history: Sequence[Moment], time: float) -> tuple[Moment | None, float]:
-    """Make one step of the highest order for which there are enough past moments; return the moment and the error.
-
-    The moment is None if Newton's method fails.
-    """
+    """Return the moment after one step of the highest order possible, and its error; None if Newton's method fails."""
     past = list(history[-1:-4:-1])
     order = len(past)
     shares = _backward_shares(np.array([time, *(m.time for m in past)]))
@@ -254,9 +206,9 @@ class _Newton:
     def _iterate(
         self, guess: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray], *, fresh: bool
     ) -> FloatArray | None:
-        """Iterate until the unknowns converge; return None if they do not.
+        """Return the solution, or None if the iteration fails.
 
-        If convergence is slow and `fresh` is True, renew the Jacobian; if `fresh` is False, return None.
+        If convergence is slow, the Jacobian is renewed if `fresh` is True; otherwise the iteration fails.
         """
         unknowns, last, renew = guess.copy(), np.inf, fresh
         for _ in range(MOST_ITERATIONS):
@@ -285,10 +237,7 @@ class _Newton:
     def _renew(
         self, unknowns: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray], residual: FloatArray
     ) -> None:
-        """Factorise the Jacobian.
-
-        The columns for the width of the panels and for all later unknowns are finite differences.
-        """
+        """Factorise the Jacobian; the columns of the unknowns after the image are finite differences."""
         matrix = self.problem.jacobian(unknowns, theta)
         for column in range(self.problem.panels.nodes.size - 1, unknowns.size):
             moved = unknowns.copy()

@@ -1,7 +1,6 @@
-"""Worn contacts by the exact evolution, with errors: fretting and sliding, at constant depth and under constant force.
+"""Worn contacts by the exact evolution: fretting and sliding, at constant depth and under constant force.
 
-Each contact is solved three times, with coarser panels and longer steps each time, and the error is estimated from the
-differences. If the third solution fails, the error is estimated from one difference.
+Each contact is solved three times, each time with coarser panels and longer steps; the differences give the error.
 """
 
 from __future__ import annotations
@@ -33,27 +32,27 @@ from mdr_dask.physics.wear.worn import (
 )
 
 COARSEST = 2e-3
-"""Largest allowed error for which panels and steps are chosen. If a larger error is allowed, this value is used
-instead, because coarser panels do not resolve the image of a steep body."""
+"""Largest error for which panels and steps are chosen, because coarser panels do not resolve the image of a steep
+body.
+"""
 COARSEST_OF_MOVING = 3e-4
-"""Largest allowed error for which panels and steps are chosen under constant force. With a larger value, the steps are
-too long to follow the border: more steps fail, and the solution takes longer."""
+"""The same under constant force, where longer steps cannot follow the border."""
 ENDED = 1e4
-"""Value of N / sqrt(a^2 - c^2) from which on the limiting profile is returned; a is a bound of the contact radius. The
-difference from the limiting profile falls at least as fast as exp(-N / (5 sqrt(a^2 - c^2))), so it is below the
-rounding error."""
+"""Value of N / sqrt(a^2 - c^2) from which on the limiting profile is returned. The difference from it falls at least as
+fast as exp(-N / (5 sqrt(a^2 - c^2))), so it is below the rounding error.
+"""
 JUMP = 0.1
-"""If y = 1 - (d - g) / eta exceeds this value in the panel next to the border, the image jumps at the border; the
-border then no longer moves."""
+"""If y = 1 - (d - g) / eta exceeds this value in the panel next to the border, the border no longer moves."""
 FLAT = 1e-2
-"""The path of the border is computed only after (d - 1) / eta has reached this fraction of the allowed error of a step.
-A steep body is so flat at the border that the border moves far during the first moments of wear."""
+"""The path of the border is computed only after (d - 1) / eta has reached this fraction of the allowed error of a step,
+because the border of a steep body moves far during the first moments of wear.
+"""
 ROUGHER = 4.0
 """Ratio of the step tolerance of each rougher solution to that of the previous solution."""
 EDGE = 0.2
-"""The stated error of a radius is never smaller than this fraction of the change of the radius in the last time step.
-All solutions have this error in common: a position that the edge passes within a step begins to wear only at the end of
-this step."""
+"""The stated error of a radius is at least this fraction of its change in the last time step. All solutions share this
+error: a position that the edge passes within a step begins to wear only at the end of the step.
+"""
 NEAR_AXIS = 1e-5
 """Radius, in units of a0, at which the exponent of a body at its tip is evaluated."""
 SHARPEST = 8.0
@@ -61,14 +60,9 @@ SHARPEST = 8.0
 
 
 class Resolution(NamedTuple):
-    """Panels and steps for a requested accuracy.
+    """Panels and steps for an allowed error of the profile f, divided by eta d0.
 
-    Parameters
-    ----------
-    accuracy : float
-        Allowed error of the profile f, divided by eta d0.
-    rougher : int
-        0 for the solution, 1 and 2 for the two rougher solutions from which its error is estimated.
+    `rougher` is 0 for the solution, and 1 and 2 for the two rougher solutions from which its error is estimated.
     """
 
     accuracy: float
@@ -83,7 +77,7 @@ class Resolution(NamedTuple):
     def first(self) -> float:
         """The length of the first step, as a fraction of the time scale of the contact.
 
-        The upper limit of this length keeps the error of small amounts of wear below 2 %.
+        Its upper limit keeps the error of small amounts of wear below 2 %.
         """
         return min(0.1 * self.accuracy, 1e-3) * ROUGHER**self.rougher
 
@@ -97,10 +91,9 @@ class Resolution(NamedTuple):
         return graded_panels(left, right, order - min(self.rougher, 1))
 
     def panels_in_gross_slip(self, sharpness: float) -> Panels:
-        """Return panels that resolve the pressure jump that develops at the edge, and a power-law tip at the axis.
+        """Return panels that resolve the pressure jump at the edge, and the tip of a sharp body (see `_slid`).
 
-        `sharpness` is 2 / n for a tip of the power n < 2. The error at the tip is the height of the profile within the
-        innermost panel.
+        The error at the tip is the height of the profile within the innermost panel.
         """
         digits = -np.log10(self.accuracy)
         tip = max(round(2.0 * digits) + 1 - self.rougher, 3.3 * digits - 2.2 - self.rougher)
@@ -196,7 +189,7 @@ class _Leg(NamedTuple):
         return float(self.moments[-1].time)
 
     def at(self, time: float) -> tuple[Any, _Common]:
-        """Return the moment at a time, and the outputs that are computed in the same way for all kinds of slip."""
+        """Return the moment at a time, and the outputs that all kinds of slip have in common."""
         number, moment = at(self.problem, self.moments, time, self.tolerance)
         moments = [*self.moments[:number], moment]
         energy = self.before + integral_along(moments, [self.problem.wear_rate(one.unknowns) for one in moments])[-1]
@@ -266,8 +259,7 @@ def _moved(profile: Profile, c: float, rise: float) -> float:
 def farthest_contact(profile: Profile, stick_radius: float) -> float:
     """Return an upper bound of the contact radius under constant force.
 
-    If the profile is a table, the bound is the end of the table. For other bodies, the bound is a radius at which the
-    virgin profile is at least as high as the largest possible depth.
+    The bound is the end of a table, or a radius at which the virgin profile is as high as the largest possible depth.
     """
     if np.isfinite(profile.largest_radius):
         return profile.largest_radius
@@ -291,11 +283,7 @@ def _refuse_beyond(inside: bool, profile: Profile, c: float) -> None:
 
 
 class _Frozen(NamedTuple):
-    """The image in the annulus that the border has passed.
-
-    The image follows from pairs of values: a radius of the border, and the depth at the moment when the border reached
-    this radius. Depths are divided by d0.
-    """
+    """The image in the annulus that the border has passed: radii of the border, and the depths in d0 at these times."""
 
     reached: FloatArray
     depths: FloatArray
@@ -317,9 +305,8 @@ def _frozen(problem: PartialSlip, path: FloatArray) -> _Frozen:
 def _end(problem: PartialSlip, moment: SlipMoment) -> Worn:
     """Return the limiting profile of a contact whose stick border stops at `moment`.
 
-    After infinitely many cycles, the stick zone carries the whole force, and its shape no longer changes. Beyond the
-    border b, g is therefore equal to the depth d = (F/2 + int_0^b g dx) / b. The radius a of the scar is the root of
-    int_0^a (g - g0) / sqrt(a^2 - x^2) dx = 0.
+    In the end the stick zone carries the whole force, so that g = d = (F/2 + int_0^b g dx) / b beyond the border b. The
+    radius a of the scar is the root of int_0^a (g - g0) / sqrt(a^2 - x^2) dx = 0.
     """
     profile, c, eta = problem.profile, problem.inner_radius, problem.eta
     border, frozen = problem.radius(moment.path[0, -1]), _frozen(problem, moment.path)
@@ -412,8 +399,7 @@ def _breaks(c: float, border: float) -> tuple[float, ...]:
 def _slid(profile: Profile, wanted: Sequence[float], constant_force: bool, resolution: Resolution) -> dict[float, Worn]:
     """Return the contact after each wanted sliding path, from a single solution.
 
-    At the axis f is the power n/2 of r^2, so a body with an exponent n below 2 needs smaller panels there. After a long
-    path under constant force the pressure is uniform and jumps to zero at the edge.
+    At the axis f is the power n/2 of r^2, so a body with n < 2 needs smaller panels there.
     """
     near, far = profile.image(np.array([NEAR_AXIS, 2.0 * NEAR_AXIS]))
     sharpness = float(np.clip(2.0 / np.log2(far / near), 1.0, SHARPEST)) if near > 0.0 else 1.0

@@ -1,9 +1,7 @@
 """Wear under histories of amplitude, depth and force; every block is a new problem of partial or gross slip.
 
-The wear in one cycle is exactly df/dN = p(r) s(r), where s is the half-integral of the positive part of
-1 - (d - g) / eta. The grid is uniform, because earlier blocks leave stick borders at different radii. At constant
-force, the depth and the stick radius grow. If the amplitude causes gross slip, s is positive everywhere. An infinite
-amplitude means sliding.
+The wear in one cycle is df/dN = p(r) s(r), where s is the half-integral of the positive part of 1 - (d - g) / eta. The
+grid is uniform, because earlier blocks leave stick borders at different radii.
 """
 
 from __future__ import annotations
@@ -21,25 +19,15 @@ from mdr_dask.physics.wear.worn import Worn
 STEP_SHARE = 0.45
 """Time step as a fraction of the largest stable explicit step, which is 1.7 grid spacings."""
 LEAST_EDGE_ERROR = 0.5
-"""The stated error of contact radius and stick border is never smaller than this number of cells of the grid. The
-position of a border between two nodes is uncertain, and the results of two grids may agree by chance."""
+"""Least stated error of contact radius and stick border, in cells; the results of two grids may agree by chance."""
 
 
 @dataclass(frozen=True)
 class LoadBlock:
-    """A number of cycles with a constant amplitude, and with a constant depth or a constant force.
+    """A number of cycles with a constant amplitude, and with a constant `depth` (in d0) or `force` (in E* d0 a0).
 
-    Parameters
-    ----------
-    cycles : float
-        Dimensionless number of cycles N = 4 U0 n k E* / (sigma0 a0), with the number n of cycles and the amplitude U0
-        of this block.
-    slip_share : float
-        eta = G* U0 / (mu E* d0) > 0, with the depth d0 of the virgin contact. If eta exceeds the depth in units of d0,
-        the slip is gross. An infinite eta means sliding.
-    depth, force : float, optional
-        The quantity that is constant during the block: depth in units of d0, or force in units of E* d0 a0. Exactly one
-        of them must be given.
+    `cycles` is N = 4 U0 n k E* / (sigma0 a0) for n cycles of the amplitude U0 of this block. `slip_share` is eta = G*
+    U0 / (mu E* d0). If eta exceeds the depth in units of d0, the slip is gross; an infinite eta means sliding.
     """
 
     cycles: float
@@ -61,31 +49,11 @@ class LoadBlock:
 def history(
     profile: Profile, blocks: Sequence[LoadBlock], *, cells: int = 200, reach: float = 2.0, errors: bool = True
 ) -> list[Worn]:
-    """Wear a virgin body through blocks of load.
+    """Return the contact at the end of every block, worn from a virgin body with the contact radius 1 at depth 1.
 
-    Parameters
-    ----------
-    profile : Profile
-        The virgin body; at depth 1 its contact radius is 1.
-    blocks : sequence of LoadBlock
-        The blocks in the order of time.
-    cells : int
-        Number of cells of the grid. The error is about proportional to the cell width. Once the image has a jump, the
-        error is about proportional to the square root of the cell width.
-    reach : float
-        Largest radius of the grid, in units of a0.
-    errors : bool
-        Whether to estimate the errors by two further solutions, on grids with 1/2 and 1/4 of the cells.
-
-    Returns
-    -------
-    list of Worn
-        The contact at the end of every block.
-
-    Raises
-    ------
-    ValueError
-        If the contact grows beyond the grid or the table of the profile.
+    The error is about proportional to the cell width, and to its root once the image has a jump. `reach` is the largest
+    radius of the grid in units of a0. `errors` adds solutions with 1/2 and 1/4 of the cells, from which errors are
+    estimated.
     """
     length = min(reach, profile.largest_radius)
     fine, *rough = (
@@ -118,7 +86,7 @@ def _run(profile: Profile, blocks: Sequence[LoadBlock], grid: UniformGrid) -> li
 
 
 def _advance(grid: UniformGrid, image_0: FloatArray, worn: FloatArray, block: LoadBlock) -> tuple[FloatArray, float]:
-    """Step through a block with Heun's method; return the worn depth and the dissipated energy divided by mu."""
+    """Return the worn depth and the dissipated energy divided by mu after a block, by Heun's method."""
     done, energy = 0.0, 0.0
     while done < block.cycles:
         step = min(STEP_SHARE * 1.7 * grid.spacing, block.cycles - done)
@@ -147,10 +115,7 @@ def _state(grid: UniformGrid, image: FloatArray, block: LoadBlock) -> _State:
 def _record(
     grid: UniformGrid, profile: Profile, worn: FloatArray, state: _State, block: LoadBlock, energy: float
 ) -> Worn:
-    """Turn the state at the end of a block into a worn contact.
-
-    Beyond the grid, the image of the contact is NaN and the pressure is zero.
-    """
+    """Return the worn contact at the end of a block; beyond the grid, the image is NaN and the pressure zero."""
     stuck = np.flatnonzero(state.depth - state.image < block.slip_share)
     k = int(stuck[0]) if stuck.size else 0
     border = 0.0

@@ -1,11 +1,8 @@
-"""The fast rule of the thesis for wear at constant depth, and its limiting profile, for any body of revolution.
+"""The fast rule of the thesis for wear at constant depth, and the limiting profile, for any body of revolution.
 
-The functions are compiled.
-
-The fast rule (thesis eq. 6.11) has a closed form. Inside the first contact, y = (g - g0(c)) / eta follows a logistic
-law, with eta = 1 - g0(c). Outside the first contact, g - 1 decays. Both laws contain the factor exp(-xi N / a(c)),
-called the remaining fraction. This factor is zero for the limiting profile (thesis eqs. 6.8-6.10). Where the rule would
-give a profile below the virgin profile, the virgin profile is used.
+In the fast rule (thesis eq. 6.11), y = (g - g0(c)) / eta with eta = 1 - g0(c) follows a logistic law up to r = 1, and g
+- 1 decays beyond. Both contain the remaining fraction exp(-xi N / a(c)), which is zero in the limiting profile (eqs.
+6.8-6.10).
 """
 
 from __future__ import annotations
@@ -30,15 +27,15 @@ THESIS_XI = 0.8
 NODES = 16
 """Number of Gauss nodes in each of the four pieces of integration; it is sufficient for the accuracy `ERROR`."""
 LAYER_GROWTH = 30.0
-"""Ratio of the widths of successive pieces of integration at the stick border. The piece next to the border is as wide
-as the layer in which the fast rule has not yet flattened the image."""
+"""Ratio of the widths of successive pieces of integration at the stick border."""
 LEAST = 1e-30
 """Smallest remaining fraction, so that the layer at the stick border does not become thinner than round-off."""
 SCAR, END = 1e-10, 1e-13
-"""Tolerances, divided by eta, of the integral that vanishes at the radius of the scar. `SCAR` is for the fast rule,
-whose results need only be smooth to `ERROR`. `END` is for the limiting profile; it is about the rounding error."""
+"""Tolerances, divided by eta, of the integral that vanishes at the radius of the scar: `SCAR` in the fast rule, `END`
+(about the rounding error) in the limiting profile.
+"""
 ERROR = 2e-6
-"""Numerical error of every output divided by its largest value. The error of the fast rule itself is not included."""
+"""Numerical error of every output divided by its largest value, without the error of the fast rule itself."""
 _NO_TABLE = PowerProfile(1.0).pieces()
 
 
@@ -63,7 +60,7 @@ class Quadrature(NamedTuple):
 class Bracket(NamedTuple):
     """Interval that contains the root of a falling function: its ends, and the values of the function at the ends.
 
-    `newer` is -1 if the lower end was replaced last, 1 if the higher end was replaced last, and 0 at the start.
+    `newer` is the end that was replaced last: -1 the lower one, 1 the higher one, 0 neither.
     """
 
     low: float
@@ -74,13 +71,7 @@ class Bracket(NamedTuple):
 
 
 def limit_radius(profile: Profile, stick_radius: float) -> float:
-    """Return a(c): the root of int_c^a (1 - g0) / sqrt(a^2 - x^2) dx = 0 (thesis eq. 6.10, exact).
-
-    Raises
-    ------
-    ValueError
-        If c is not between 0 and 1, or if the scar would reach beyond the table of the profile.
-    """
+    """Return a(c), the root of int_c^a (1 - g0) / sqrt(a^2 - x^2) dx = 0 (thesis eq. 6.10)."""
     check_stick_radius(stick_radius)
     radius = float(_limit_radius(_rule(profile, stick_radius, 0.0), profile.largest_radius, _quadrature()))
     if np.isnan(radius):
@@ -125,18 +116,7 @@ def fast(profile: Profile, stick_radius: float, cycles: float, xi: float = THESI
 
 
 def limit_cases(exponent: ArrayLike, stick_radius: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return contact radius, volume and normal force of the limiting profiles of power-law bodies.
-
-    Parameters
-    ----------
-    exponent, stick_radius : array_like, broadcast together
-        n > 0 and 0 < c < 1.
-
-    Returns
-    -------
-    contact_radius, wear_volume, normal_force : array
-        In the units of `mdr_dask.physics.wear.worn`.
-    """
+    """Return contact radius, wear volume and normal force of the limiting profiles of power-law bodies."""
     n, c = (np.array(part, dtype=float) for part in np.broadcast_arrays(exponent, stick_radius))
     result = np.empty((3, n.size))
     _limits(np.stack([n.ravel(), c.ravel()]), _NO_TABLE, _quadrature(), result)
@@ -147,18 +127,7 @@ def limit_cases(exponent: ArrayLike, stick_radius: ArrayLike) -> tuple[FloatArra
 def fast_cases(
     exponent: ArrayLike, stick_radius: ArrayLike, cycles: ArrayLike, xi: ArrayLike, limit_radius: ArrayLike
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return scar radius, volume and normal force of power-law bodies by the fast rule.
-
-    Parameters
-    ----------
-    exponent, stick_radius, cycles, xi, limit_radius : array_like, broadcast together
-        n, c, N, xi and the limiting radius a(c), which is the contact radius from `limit_cases`.
-
-    Returns
-    -------
-    contact_radius, wear_volume, normal_force : array
-        The same quantities as in the result of :func:`fast`.
-    """
+    """Return scar radius, wear volume and normal force of power-law bodies by the fast rule; `limit_radius` is a(c)."""
     parts = np.broadcast_arrays(exponent, stick_radius, cycles, xi, limit_radius)
     cases = np.array([np.array(part, dtype=float).ravel() for part in parts])
     result = np.empty((3, cases.shape[1]))
@@ -177,7 +146,7 @@ def _rule(profile: Profile, c: float, rest: float) -> Rule:
 
 
 def _worn(profile: Profile, rule: Rule, radius: float, edge: float) -> Worn:
-    """Turn the rule into a worn contact that carries load up to the radius `edge`."""
+    """Return the worn contact that carries load up to the radius `edge`."""
     quadrature = _quadrature()
     radius, volume, force = _numbers(rule, radius, quadrature)
     c, eta, rest = rule.c, rule.eta, rule.rest
@@ -307,7 +276,7 @@ def _scar_radius(rule: Rule, bracket: Bracket, quadrature: Quadrature) -> float:
 
 @jit
 def _limit_radius(rule: Rule, largest: float, quadrature: Quadrature) -> float:
-    """Return a(c) for a rule whose remaining fraction is zero. If a(c) exceeds the largest radius, return NaN."""
+    """Return a(c) for a rule whose remaining fraction is zero, or NaN if a(c) exceeds the largest radius."""
     _put_cuts(rule, quadrature.cuts)
     low, high = 1.0, min(1.5, largest)
     low_value, high_value = _scar_integral(rule, low, 0, quadrature), _scar_integral(rule, high, 0, quadrature)
@@ -321,7 +290,7 @@ def _limit_radius(rule: Rule, largest: float, quadrature: Quadrature) -> float:
 
 @jit
 def _numbers(rule: Rule, limit: float, quadrature: Quadrature) -> tuple[float, float, float]:
-    """Return scar radius, volume and normal force; write the ends of the pieces of integration to `quadrature`."""
+    """Return scar radius, volume and normal force, and write the ends of the pieces of integration to `quadrature`."""
     abscissa, weight, cuts = quadrature
     _put_cuts(rule, cuts)
     radius = limit

@@ -1,16 +1,7 @@
 """The equations of one time step of partial slip and of gross slip, for `evolution.march`.
 
-Partial slip has fewer unknowns at constant depth than under constant force. At constant depth the stick border b
-stays at its first value c. Under constant force the depth d grows, and the border moves outwards until the image has
-a jump at the border; then the border no longer moves. Inside the border the image is frozen: it keeps the value
-g = d - eta that it had when the border passed. The slip is s = (f - f_star) / eta. Here f_star is the profile of an
-image that equals g up to the border and has the constant value d - eta (the plateau) beyond the border. While the
-plateau rises, f_star changes by df_star = (2/pi) arccos(b / r) dd. Therefore it is enough to store the path (b, d) for
-the annulus between c and b.
-
-The accumulated quantity is the worn depth divided by eta. Squared radii are expressed by q = (r^2 - c^2) / (1 - c^2),
-which is 1 at the edge of the virgin slip zone. The depth is expressed by (d - 1) / eta. All unknowns are then of the
-order of one, even near full stick.
+In partial slip, squared radii are given as q = (r^2 - c^2) / (1 - c^2), depths as (d - 1) / eta, and worn depths
+divided by eta. The unknowns are then of the order of one, even near full stick.
 """
 
 from __future__ import annotations
@@ -31,29 +22,22 @@ from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear.evolution import Moment, settled
 
-#: Weight of the border relative to the depth in the error of a step. It is large, because f rises like a square root
-#: beyond the border.
+#: Weight of the border relative to the depth in the error of a step; beyond the border, f rises like a square root.
 BORDER_WEIGHT = 30.0
 #: Position on the panels up to which the rise of the plateau is stored; the border is at 0, the edge at 1.
 BEYOND = 1.25
 #: Lower limit of q, so that its logarithm is finite.
 SMALLEST = 1e-30
-#: `_piece` uses a series if (r1 - r2) / (r1 + r2) is below this value, where r1 and r2 are the values of
-#: sqrt(r^2 - b^2) at the two ends of a straight piece of the path.
+#: `_piece` uses a series if sqrt(r^2 - b^2) changes along the piece by less than this fraction of the sum at both ends.
 SHORT = 0.02
 _ABSCISSA, _WEIGHT = gauss(3)
 
 
 class VirginBody(NamedTuple):
-    """The virgin body for compiled code.
+    """The virgin body for compiled code: `square` = c^2, `width` = 1 - c^2, and a cubic spline of ln s0 against ln q.
 
-    Parameters
-    ----------
-    square, width : float
-        c^2 and 1 - c^2.
-    first, step, coefficients : float, float, array of shape (4, k)
-        First knot, knot spacing and coefficients of a cubic spline of ln s0 as a function of ln q. The slip of the
-        virgin body is s0(r) = (2/pi) int_c^r (g0(x) - g0(c)) / (eta sqrt(r^2 - x^2)) dx.
+    `first` and `step` are the first knot and the knot spacing of the spline. The virgin slip is s0(r) = (2/pi) int_c^r
+    (g0(x) - g0(c)) / (eta sqrt(r^2 - x^2)) dx.
     """
 
     square: float
@@ -64,7 +48,7 @@ class VirginBody(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Border and width of the slip zone, and the depth, in the units of the module.
+    """Border b and width of the slip zone, and depth d.
 
     `border` is (b^2 - c^2) / (1 - c^2), `width` is (a^2 - b^2) / (1 - c^2), and `depth` is (d - 1) / eta.
     """
@@ -75,28 +59,12 @@ class Place(NamedTuple):
 
 
 class Past(NamedTuple):
-    """Past moments, with their weights in the formula of one step.
+    """Past moments, the newest first, with their `shares` in the formula of one step.
 
-    Parameters
-    ----------
-    shares, borders, widths : array, shape (m,)
-        One entry for each moment: its weight, border and width.
-    worn : array, shape (m, n)
-        Worn depth divided by eta at the nodes. If the border does not move, `frozen` is subtracted, and the difference
-        is divided by sqrt(z), where z is the position on the panels. If `is_growth`, the array holds ln(s / s0)
-        instead: at constant depth, s increases exponentially from the virgin slip s0, which is very small next to the
-        border of a steep body.
-    is_growth : bool
-        Whether the depth is constant.
-    frozen : float
-        The worn depth divided by eta at a border that does not move; NaN while the border moves.
-    moved : array, shape (n + order,)
-        The rise of the plateau along the path, at the nodes of the newest past moment and at the nodes of one panel
-        beyond the edge.
-    path : array, shape (2, k)
-        The path of the newest past moment, see `SlipMoment`.
-    carried : float
-        The integral of (1 - d) db along the path, where b is the radius of the border, and d is `Place.depth`.
+    `worn`, shape (moments, nodes), holds the worn depths. If the border does not move, `frozen` (the worn depth there,
+    else NaN) is subtracted, and the result is divided by sqrt(z) with the position z on the panels. At constant depth
+    (`is_growth`), `worn` holds ln(s / s0) instead, because s grows exponentially from a very small s0. `path` and
+    `moved` belong to the newest moment, see `SlipMoment`; `carried` is from `PartialSlip.carried`.
     """
 
     shares: FloatArray
@@ -114,12 +82,8 @@ class Past(NamedTuple):
 class SlipMoment(Moment):
     """A moment of partial slip.
 
-    Parameters
-    ----------
-    path : array, shape (2, k)
-        All pairs of border and depth while the border moved, joined by straight lines.
-    moved : array, shape (n + order,)
-        The rise of the plateau along the path, at the nodes and in one panel beyond the edge.
+    `path`, shape (2, k), holds border and depth while the border moved, joined by straight lines. `moved` is the rise
+    of the plateau along the path, at the nodes and in one panel beyond the edge.
     """
 
     path: FloatArray
@@ -128,27 +92,17 @@ class SlipMoment(Moment):
 
 @dataclass(frozen=True, eq=False)
 class PartialSlip:
-    """Slip outside the stick border.
+    """Slip s = (f - f_star) / eta outside the stick border b.
+
+    Inside b the image keeps the value g = d - eta that it had when the border passed. f_star is the profile of an image
+    that equals g up to b and d - eta (the plateau) beyond. While the plateau rises by dd, f_star rises by (2/pi)
+    arccos(b / r) dd, so it is enough to store the path (b, d). At constant depth b stays at c. Under constant force b
+    moves outwards until the image jumps there.
 
     The unknowns are y = 1 - (d - g) / eta at all nodes except the last, where y = 1, and the width of the slip zone.
-    Under constant force, the depth is the next unknown, and the border is the last one as long as it moves.
-
-    Parameters
-    ----------
-    profile : Profile
-        The virgin body.
-    inner_radius, eta : float
-        The virgin stick radius c, and eta = 1 - g0(c).
-    body : VirginBody
-        The virgin body for compiled code.
-    panels : Panels
-        The panels between the border and the edge.
-    load : float, optional
-        Half the force on the virgin slip zone, divided by eta, if the force is kept constant; None at constant depth.
-    border : float, optional
-        Value of q at the border if the border does not move; None while it moves.
-    frozen : float
-        The worn depth divided by eta at a border that does not move.
+    Under constant force the depth follows, and then the border as long as it moves. `load` is half the force on the
+    virgin slip zone divided by eta, None at constant depth. `border` is q at a border that does not move, else None,
+    and `frozen` is the worn depth there.
     """
 
     profile: Profile
@@ -223,8 +177,7 @@ class PartialSlip:
     def memory(self, past: Sequence[SlipMoment], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
         """Return a function of the unknowns that computes the contributions of the past moments to the residual.
 
-        The function returns the contributions to s and to the worn depth at the nodes, and the additional load of the
-        stick zone.
+        They are the contributions to s and to the worn depth at the nodes, and the additional load of the stick zone.
         """
         places = [self.place(moment.unknowns) for moment in past]
         worn = np.array([moment.accumulated for moment in past])
@@ -263,7 +216,7 @@ class PartialSlip:
         return before.path if self.border is not None else np.append(before.path, end, axis=1)
 
     def frozen_depth(self, path: FloatArray, place: FloatArray) -> FloatArray:
-        """Return the worn depth divided by eta at values of q that the border has passed."""
+        """Return the worn depth at values of q that the border has passed."""
         result = np.empty_like(place)
         _plateau_rise(self.body, np.stack(rising(path)), place, result)
         slip = np.empty_like(place)
@@ -271,7 +224,7 @@ class PartialSlip:
         return np.where(place > 0.0, result - slip, 0.0)
 
     def worn_depth(self, moment: SlipMoment, q: FloatArray) -> FloatArray:
-        """Return the worn depth divided by eta at values of q; 0 beyond the edge."""
+        """Return the worn depth at values of q; 0 beyond the edge."""
         place = self.place(moment.unknowns)
         z = (q - place.border) / place.width
         inside = np.clip(z, 0.0, 1.0)
@@ -308,10 +261,9 @@ class PartialSlip:
         return shares
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return s - known - theta (p / eta) s at the nodes and, under constant force, the deviation of the force.
+        """Return s - known - theta (p / eta) s at the nodes; at the last node, this is the continuity of s at the edge.
 
-        The row of the last node is the condition that s is continuous at the edge. If the border moves, one more row is
-        y at the border, which must be zero.
+        Under constant force, the deviation of the load follows, and then y at a moving border.
         """
         size, y, place = self.size, self.image(unknowns), self.place(unknowns)
         root, factor = math.sqrt(self.body.width * place.width), self._factor(place)
@@ -361,10 +313,7 @@ class PartialSlip:
     def moment(
         self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[SlipMoment]
     ) -> SlipMoment:
-        """Return the moment at the end of a solved step.
-
-        The worn depth at this moment is the contribution of the past moments plus the wear in the step.
-        """
+        """Return the moment at the end of a solved step."""
         size, place = self.size, self.place(unknowns)
         worn = known[size : 2 * size] + theta * self.rate(unknowns) * self.slip(unknowns)
         path, moved = self.path_to(past[0], place), np.empty(self.mesh.nodes.size)
@@ -379,10 +328,7 @@ class PartialSlip:
 
 
 def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: float) -> PartialSlip:
-    """Return the problem at constant depth, with the virgin slip tabulated up to the radius `reach`.
-
-    The table is computed without cancellation next to c.
-    """
+    """Return the problem at constant depth, with the virgin slip tabulated up to the radius `reach`."""
     c, width = stick_radius, (1.0 - stick_radius) * (1.0 + stick_radius)
     eta = float(profile.rise(np.array(1.0 - c), c))
     table = np.linspace(np.log(0.5 * panels.nodes[0]), np.log((reach - c) * (reach + c) / width), 300)
@@ -408,7 +354,7 @@ def rising(path: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 @jit
 def _fill_known(mesh: Mesh, body: VirginBody, past: Past, place: Place, result: FloatArray) -> None:
-    """Write three results: the past contributions to s and to the worn depth at the nodes, and the sticking load."""
+    """Write the past contributions to s and to the worn depth at the nodes, and the load of the stick zone."""
     nodes, path, is_still = result.size // 2, past.path, past.frozen == past.frozen
     border, depth = path[0, -1], path[1, -1]
     for i in range(nodes):
@@ -468,8 +414,7 @@ def _rise(body: VirginBody, path: FloatArray, q: float) -> float:
 def _piece(body: VirginBody, first: float, last: float, change: float, q: float) -> float:
     """Return the rise of the plateau at q on a straight piece of the path, along which the depth changes by `change`.
 
-    The border moves from `first` to `last`. The integration variable is sqrt(r^2 - b^2), because the integrand is a
-    smooth function of this variable.
+    The integrand is a smooth function of sqrt(r^2 - b^2).
     """
     low, high = min(first, last), max(first, last)
     if low >= q:
@@ -492,11 +437,10 @@ def _piece(body: VirginBody, first: float, last: float, change: float, q: float)
 
 @dataclass(frozen=True, eq=False)
 class GrossSlip:
-    """Slip in the whole contact; nodes lie at r^2 = z a^2, where z is the position on the panels.
+    """Slip in the whole contact; the nodes lie at r^2 = z a^2, with the position z on the panels.
 
-    The unknowns are the image g at all nodes except the last, the squared contact radius a^2 in units of a0^2, and, if
-    the force is given, the depth d. At the last node, the edge, g equals d. The accumulated quantity is the worn depth,
-    int p ds.
+    The unknowns are the image g at all nodes except the last, where g = d, the squared contact radius a^2, and the
+    depth d if the force is given. The accumulated quantity is the worn depth int p ds.
     """
 
     profile: Profile
@@ -561,7 +505,7 @@ class GrossSlip:
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
         """Return f - f0 - known - theta p at the nodes and, if the force is given, the deviation of the force.
 
-        The row of the last node is the condition that f is continuous at the edge.
+        At the last node, this is the continuity of f at the edge.
         """
         virgin = self.profile.height(self.edge(unknowns) * np.sqrt(self.panels.nodes))
         rows = self.worn(unknowns) - virgin - self._accumulated(unknowns, theta, known)

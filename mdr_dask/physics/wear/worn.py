@@ -1,7 +1,7 @@
-"""The worn contact, which every rule and evolution returns, with its error and the integral transforms of its shape.
+"""The worn contact that every rule and evolution returns, with its error and the transforms of its shape.
 
-Units: lengths a0, heights d0, pressure E* d0 / a0, volume a0^2 d0, cycles N0 = a0 sigma0 / (4 U0 k E*), where a0 and d0
-belong to the virgin contact. Wear increases f, the profile height measured upwards from the virgin apex.
+Units: lengths a0, heights d0, pressure E* d0 / a0, volume a0^2 d0, cycles N0 = a0 sigma0 / (4 U0 k E*). Heights f are
+measured upwards from the virgin apex, so wear increases f.
 """
 
 from __future__ import annotations
@@ -26,8 +26,9 @@ FUNCTIONS = {"worn_profile": "height", "worn_image": "image", "pressure": "press
 JUMP_WIDTH = 1e-9
 """Distance from a border, as a fraction of the border's radius, within which a change of the image counts as a jump."""
 REACH = 5
-"""The error of a function at a position is the largest difference there and at this number of neighbours on each side.
-This is necessary, because the difference of two functions vanishes where they intersect."""
+"""The error of a function is the largest difference within this number of neighbours, because the difference of two
+functions vanishes where they intersect.
+"""
 NOWHERE = np.zeros(0)
 
 
@@ -85,10 +86,8 @@ class Worn:
     def error(self, output: str, places: FloatArray) -> float | FloatArray:
         """Return the expected absolute error of an output; for functions, at the positions `places`.
 
-        The error follows from the differences between this solution and the rougher solutions. Without rougher
-        solutions, the error is the largest value times `relative_error`. For a function of position, the differences
-        are also computed at positions that are dense at the borders of stick zone and contact. The error at a position
-        is the largest difference at this position and at its neighbours.
+        The error follows from the differences between this solution and the rougher ones. Without rougher solutions,
+        the error is `relative_error` times the largest value.
         """
         if not self.rougher:
             value = np.asarray(self.value(output, places), dtype=float)
@@ -101,10 +100,9 @@ class Worn:
         return SAFETY * np.maximum(self._distance(output, places), np.interp(places, crowd, wide))
 
     def _distance(self, output: str, places: FloatArray = NOWHERE) -> FloatArray:
-        """Return the distance of an output from the rougher solutions.
+        """Return the difference from the first rougher solution, or half that from the second one if it is larger.
 
-        This is the larger of two numbers: the difference from the first rougher solution, and half the difference from
-        the second one, if there is a second one. Both are used, because two solutions may agree by chance.
+        Both are used, because two solutions may agree by chance.
         """
         value = self.value(output, places)
         with np.errstate(invalid="ignore"):
@@ -127,18 +125,9 @@ def _spread(distance: FloatArray) -> FloatArray:
 
 
 class Scar(NamedTuple):
-    """The change g - g0 of the image between the first stick border and the scar's radius.
+    """The change g - g0 of the image between the first stick border c = `border` and the `radius` of the scar.
 
-    Parameters
-    ----------
-    border : float
-        The first stick border c; inside it the body is unworn.
-    radius : float
-        The radius of the scar.
-    change, slope : callable, array -> array
-        g - g0 and its derivative.
-    breaks : tuple of float
-        Positions between border and radius at which the change is not smooth.
+    `change` and its derivative `slope` are functions of position; at `breaks` the change is not smooth.
     """
 
     border: float
@@ -174,7 +163,7 @@ def worn_volume(scar: Scar) -> float:
 
 
 def worn_image(profile: Profile, scar: Scar) -> Function:
-    """Return the worn image g(x). Beyond the scar, the image is continued so that the profile is unworn, f = f0."""
+    """Return the worn image g(x); beyond the scar, the image is continued so that f = f0."""
 
     def image(position: FloatArray) -> FloatArray:
         x = np.abs(position)
@@ -263,11 +252,10 @@ def largest_wear(scar: Scar) -> float:
 
 
 def _change_beyond(scar: Scar, position: FloatArray) -> FloatArray:
-    """Return g - g0 outside a scar of radius a, where f = f0.
+    """Return g - g0 outside a scar of radius a, where f = f0, so that the half-integral of the change vanishes.
 
-    Beyond a, the change of the image follows from the condition that its half-integral vanishes there:
-    g - g0 at x is (2x/pi) sqrt(x^2 - a^2) int_c^a (g - g0) / ((x^2 - t^2) sqrt(a^2 - t^2)) dt. The integral is computed
-    with the substitutions t = a cos(phi) and a sin(phi) = sqrt(x^2 - a^2) sinh(w).
+    This is (2x/pi) sqrt(x^2 - a^2) int_c^a (g - g0) / ((x^2 - t^2) sqrt(a^2 - t^2)) dt. The substitutions are t = a
+    cos(phi) and a sin(phi) = sqrt(x^2 - a^2) sinh(w).
     """
     c, a = scar.border, scar.radius
     s = np.sqrt((position - a) * (position + a))
@@ -286,7 +274,7 @@ def _change_beyond(scar: Scar, position: FloatArray) -> FloatArray:
 
 
 def check_stick_radius(stick_radius: float) -> None:
-    """Raise ValueError unless the stick radius is between 0 and 1, so that the contact is in partial slip."""
+    """Raise ValueError unless the stick radius lies between 0 and 1."""
     if not 0.0 < stick_radius < 1.0:
         raise ValueError(
             f"the stick radius must lie between 0 and 1 for partial slip, got {stick_radius!r}; "
@@ -295,10 +283,7 @@ def check_stick_radius(stick_radius: float) -> None:
 
 
 def virgin_load(profile: Profile, radius: float) -> float:
-    """Return int_0^c (1 - g0) dx for c = `radius`.
-
-    With the substitution x = c t^4, the integrand of a power-law body is smooth at the axis.
-    """
+    """Return int_0^c (1 - g0) dx for c = `radius`; x = c t^4 makes a power law smooth at the axis."""
     abscissa, weight = gauss(64)
     return 4.0 * radius * float(((1.0 - profile.image(radius * abscissa**4)) * abscissa**3) @ weight)
 
