@@ -1,10 +1,8 @@
 """Choose the values of an adaptive axis, stage after stage, until interpolation meets every tolerance.
 
-Outputs are interpolated by monotone cubics on the linear or logarithmic scale of the axis. Every new value lies halfway
-between two older values. So cases that differ in other parameters use the same values of the axis. An interval is
-tested by a prediction: the newer one of its two ends is ignored, and the output in the interval is predicted from older
-values only. If the error of the prediction is within the tolerance, the interval is accepted. Otherwise the interval is
-halved.
+Every new value lies halfway between two older values. So cases that differ in other parameters use the same values of
+the axis. An interval is tested by a prediction from older values only, and halved if the error of the prediction
+exceeds the tolerance.
 """
 
 from __future__ import annotations
@@ -151,9 +149,8 @@ def _beyond(cases: BoolArray, before: BoolArray) -> BoolArray:
 class _Interval:
     """An interval of an adaptive axis whose interpolation error exceeds the tolerance or was not tested.
 
-    `case` is the index of the combination of non-adaptive values. `share` is the position of the middle of the interval
-    and `width` its length, both as fractions of the axis. `excess` is the interpolation error divided by the tolerance,
-    or 1 if this ratio is smaller.
+    `case` is the index of the combination of non-adaptive values. `share` is the middle of the interval and `width` its
+    length, both as fractions of the axis. `excess` is the interpolation error divided by the tolerance, at least 1.
     """
 
     case: tuple[int, ...]
@@ -165,10 +162,9 @@ class _Interval:
 def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]]:
     """Halve the intervals in which a test has not yet shown that interpolation meets the tolerance.
 
-    All needed cases of the mesh must have results. `means` contains the means of each output for which an adaptive axis
-    has a tolerance. The returned mesh has more values; it is unchanged if no further value is needed or allowed. Also
-    return a number for each adaptive axis: in this number of combinations of non-adaptive values, some intervals miss a
-    tolerance or were not tested, but none of these intervals may be halved.
+    All needed cases of the mesh must have results. `means` contains the means of each output that has a tolerance. Also
+    return a number for each adaptive axis: the combinations of non-adaptive values with an interval that misses a
+    tolerance or was not tested, but that cannot be halved.
     """
     found, short = mesh, {}
     for number in mesh.used:
@@ -183,10 +179,7 @@ def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]
 
 
 def _chosen(used: BoolArray, intervals: list[_Interval], at_most: int) -> list[_Interval]:
-    """Return the intervals to halve.
-
-    The widest intervals are chosen first, so that one discontinuity does not use up all values that are allowed.
-    """
+    """Return the intervals to halve, the widest first, so that one discontinuity does not use up all values."""
     ordered = sorted(intervals, key=lambda interval: (-interval.width, -interval.excess, interval.share))
     count = np.array(used.sum(axis=-1))
     chosen = []
@@ -246,10 +239,10 @@ def _lines(mean: Mean, number: int) -> Mean:
 
 
 def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolerance) -> FloatArray:
-    """Divide interpolation errors by the tolerance; return the largest ratio of all lines for each interval.
+    """Return the largest ratio of interpolation error and tolerance of all lines, for each interval.
 
-    Failed cases are left out of their line. If every line has a failed case at an end of an interval, the ratio of this
-    interval is minus infinity.
+    Failed cases are left out of their line. The ratio is minus infinity if every line has a failed case at an end of
+    the interval.
     """
     worst = np.full(places.size - 1, -np.inf)
     known = np.isfinite(lines.groups[0])
@@ -267,19 +260,16 @@ def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolera
 
 
 def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray, error: FloatArray) -> FloatArray:
-    """Return the interpolation error of each interval, from predictions that use older values only.
+    """Return the interpolation error of each interval, shape (lines, values - 1).
 
     A value of level n lies halfway between two values of lower levels. In the two intervals next to this value, the
-    output is predicted from all values of lower levels, once by a monotone cubic and once by a cubic spline. Both
-    predictions are compared with the monotone cubic through all values, at the newer end and at the quarters of the
-    interval. Several points are compared, because a prediction may be right at a single point by chance.
+    output is predicted from all values of lower levels, once by a monotone cubic and once by a cubic spline. The error
+    is the largest difference to the monotone cubic through all values, minus an allowance for the scatter of the
+    realisations and the discretisation errors. It may be negative.
 
-    `places`, shape (values,), are the ascending positions along the axis, and `levels` their levels: 0 for the ends of
-    the axis, 1 for its middle, 2 for the quarters, ... `groups`, shape (1 + groups, lines, values), are means as in
-    `Mean.groups`, and `error`, shape (lines, values), their discretisation errors. The result has the shape (lines,
-    values - 1). It is the largest absolute difference between a prediction and the interpolation through all values,
-    minus an allowance. The allowance covers the scatter of the realisations and the discretisation errors. If the
-    allowance is larger than the difference, the result is negative.
+    `places` are the ascending positions along the axis, and `levels` their levels: 0 for the ends of the axis, 1 for
+    its middle, 2 for the quarters, ... `groups`, shape (1 + groups, lines, values), are means as in `Mean.groups`, and
+    `error`, shape (lines, values), their discretisation errors.
     """
     from scipy.interpolate import CubicSpline, PchipInterpolator
     from scipy.special import ndtri

@@ -20,18 +20,14 @@ UNCOUNTED = OPTIONS | {"_nrt": False}  # if `_nrt` is False, numba does not coun
 
 
 def jit(function: Kernel) -> Kernel:
-    """Compile a function of numbers and arrays, and store the machine code in numba's cache.
-
-    If the cache cannot be written or read, every process compiles the function again. The repeated compilation takes
-    time, but is harmless.
-    """
+    """Compile a function of numbers and arrays, and store the machine code in numba's cache if possible."""
     return _cached(function, OPTIONS)
 
 
 def jit_uncounted(function: Kernel) -> Kernel:
     """Compile a function that creates no arrays, without reference counting for arrays.
 
-    With reference counting, functions that read arrays from named tuples inside loops are several times slower.
+    Reference counting makes functions several times slower that read arrays from named tuples inside loops.
     """
     return _cached(function, UNCOUNTED)
 
@@ -42,10 +38,7 @@ def jit_inline(function: Kernel) -> Kernel:
 
 
 def jit_inline_uncounted(function: Kernel) -> Kernel:
-    """Compile a function into each kernel that calls the function, without reference counting.
-
-    The function must not create arrays.
-    """
+    """Compile a function that creates no arrays into each kernel that calls it, without reference counting."""
     return cast(Kernel, numba.njit(forceinline=True, **UNCOUNTED)(function))
 
 
@@ -62,11 +55,7 @@ def _cached(function: Kernel, options: dict[str, Any]) -> Kernel:
 
 
 def _survive_faults(stored: Any) -> None:
-    """Replace errors of the cache by warnings.
-
-    If a file of the cache cannot be read, the kernel is compiled again. If a file cannot be written, the kernel is used
-    without being stored.
-    """
+    """Replace errors of the cache by warnings: the kernel is then compiled again, or used without being stored."""
     load, save = stored.load_overload, stored.save_overload
 
     def load_overload(signature: Any, context: Any) -> Any:
@@ -93,10 +82,7 @@ def _warn_once(problem: str) -> None:
 
 @jit_inline
 def last_until(values: Any, x: float, low: int, high: int) -> int:
-    """Return the last index in [low, high) at which the value is at most x; the values must ascend.
-
-    If all values are above x, return `low`.
-    """
+    """Return the last index in [low, high) at which the ascending values are at most x, or `low` if all are above x."""
     while high - low > 1:
         middle = (low + high) // 2
         if values[middle] <= x:

@@ -21,18 +21,12 @@ class Factors(NamedTuple):
     pivots: NDArray[np.int32]
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Return the solution x of matrix @ x = right.
-
-        The right side `right` is a vector, or a matrix with one column for each right side.
-        """
+        """Return the solution x of matrix @ x = right, for one vector `right` or several columns."""
         return np.asarray(dgetrs(self.triangles, self.pivots, right, trans=1)[0])
 
 
 def factorise(matrix: FloatArray) -> Factors | None:
-    """Return the factors of a square matrix, or None if the matrix is singular or not finite.
-
-    The matrix must be stored in C order, and is overwritten.
-    """
+    """Return the factors of a square matrix in C order, which is overwritten; None if it is singular or not finite."""
     triangles, pivots, status = dgetrf(matrix.T, overwrite_a=True)
     diagonal = np.diagonal(triangles)
     return Factors(triangles, pivots) if status == 0 and np.all(np.isfinite(diagonal)) else None

@@ -6,10 +6,7 @@ from enum import IntEnum
 
 
 class Outcome(IntEnum):
-    """How a solver ended.
-
-    Compiled functions return the number of a member. Messages to users contain its `sentence`.
-    """
+    """How a solver ended; compiled functions return the number of a member."""
 
     CONVERGED = 0
     DEPTH_NOT_FOUND = 1

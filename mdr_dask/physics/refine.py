@@ -1,17 +1,15 @@
 """Grid refinement: solve on a grid and on the next finer grid; the difference gives an estimate of the error.
 
-Sliding, velocity jumps and lubrication use `refine`. The number of cells doubles from one level to the next, so that
-the error of a solver of order p is divided by r = 2^p at each level. Take three successive levels. Let b be the
-relative change of a result from the first level to the second, and c the relative change from the second level to the
-third. The relative error on the third level is estimated as
+The number of cells doubles from one level to the next, so that the error of a solver of order p is divided by r = 2^p
+at each level. Take three successive levels. Let b be the relative change of a result from the first level to the
+second, and c the relative change from the second level to the third. The relative error on the third level is estimated
+as
 
     error = safety max( c / (r - 1),  b / (r (r - 1)) ) + e.
 
 The first term is Richardson's estimate, with the safety factor of the grid convergence index (Roache, J. Fluids Eng.
-116, 405, 1994). The second term is the same estimate with b / r instead of c, because after the change b the next
-change should be b / r. The second term is needed because the results on two grids may agree by chance. If there are
-only two levels, the second term is left out. The last term e (`Solution.unseen`) is an error that may be the same on
-two grids, so that the difference of their results does not contain it.
+116, 405, 1994). The second term is needed because the results on two grids may agree by chance: after the change b, the
+next change should be b / r. The last term e (`Solution.unseen`) is an error that may be the same on two grids.
 """
 
 from __future__ import annotations
@@ -32,16 +30,9 @@ SAFETY = 3.0
 class Solution(NamedTuple):
     """Results of some cases on one grid.
 
-    Parameters
-    ----------
-    values : sequence of array, shape (cases, ...)
-        One array per output, with one number or one profile per case. The positions of a profile are the same on every
-        grid. NaN marks positions where the output does not exist.
-    outcome : int8 array, shape (cases,)
-        Values of `Outcome`.
-    unseen : float or array, shape (outputs, cases)
-        Relative errors that may be the same on two grids, so that the difference of the results does not contain these
-        errors. The values of `unseen` are added to the estimate.
+    `values` contains one array per output, with one number or one profile per case. NaN in a profile marks positions
+    where the output does not exist. `outcome` contains values of `Outcome`. `unseen` is a relative error that is added
+    to the estimate, because it may be the same on two grids: one number, or shape (outputs, cases).
     """
 
     values: Sequence[FloatArray] | FloatArray
@@ -52,19 +43,9 @@ class Solution(NamedTuple):
 class Refined(NamedTuple):
     """Results of all cases, each on the coarsest grid that meets the accuracy.
 
-    Parameters
-    ----------
-    values : list of array, shape (cases, ...)
-        One array per output; NaN where a case has no solution.
-    errors : array, shape (outputs, cases)
-        Estimated absolute errors in the unit of the output; for a profile, the largest error along the profile. An
-        error is infinite where no estimate is possible.
-    met : bool array, shape (cases,)
-        Whether every output meets the accuracy.
-    level : int array, shape (cases,)
-        Level of the grid on which the result was computed.
-    outcome : int8 array, shape (cases,)
-        Values of `Outcome`; ``Outcome(number).sentence`` gives the reason for a failure.
+    `values` is NaN where a case has no solution. `errors`, shape (outputs, cases), are absolute, and infinite where no
+    estimate is possible; the error of a profile is the largest error along it. `met` is True if every output of a case
+    meets the accuracy. `level` is the level of the grid on which the result was computed.
     """
 
     values: list[FloatArray]
@@ -86,63 +67,20 @@ def refine(
     shared: bool = True,
     requested: int | None = None,
 ) -> Refined:
-    """Solve every case on the coarsest grid on which all outputs meet an accuracy.
+    """Solve every case on the coarsest grid on which all requested outputs meet an accuracy.
 
-    Parameters
-    ----------
-    solve : callable, (level, cases) -> Solution
-        Function that solves the cases with the given indices on the grid of a level. The function must not raise an
-        exception for a case that fails. A case is refined until all outputs that the function returns meet the
-        accuracy.
-    cases : int
-        Number of cases.
-    levels : sequence of int
-        Increasing levels, such as numbers of cells. The cell size is halved from each level to the next. Every case is
-        solved on at least two levels, unless it fails because of its parameters. If only one level is given, the errors
-        are infinite.
-    accuracy : float
-        Allowed error of every output, divided by the largest absolute value of the output, or by the floor of the
-        output if the floor is larger. If the accuracy is infinite, a case that is solved on the second level is not
-        refined further.
-    order : float
-        Order of convergence p of the dominant part of the error of the solver.
-    safety : float
-        Safety factor of the estimate.
-    floors : float or array, shape (outputs,)
-        One floor for all outputs, or one floor for each. If the absolute value of an output is below its floor, the
-        error is divided by the floor instead of the value. Outputs that can be zero, such as a probability, need a
-        floor.
-    shared : bool
-        If True, the largest relative change among the outputs of a case is used for all outputs of this case. The
-        reason: one output may be the same on two grids by chance, but hardly all outputs at once. Choose False for
-        outputs that converge at different rates.
-    requested : int or None
-        Number of outputs that must meet the accuracy; None for all outputs. The other outputs come last. Their errors
-        are infinite.
+    The function `solve(level, cases)` solves the cases with the given indices on the grid of a level. It must not raise
+    an exception for a case that fails. Every case is solved on at least two levels, unless it fails because of its
+    parameters. If a case fails on fine grids only, the solution on the finest of the coarser grids is returned.
 
-    Returns
-    -------
-    Refined
-        If a case fails on fine grids but was solved on coarser grids, the result is the solution on the finest of these
-        coarser grids.
+    The accuracy of an output is relative to the largest absolute value of the output, or to its floor if the floor is
+    larger. With an infinite accuracy, the second level is accepted. `order` is the order of convergence of the dominant
+    part of the error. `requested` is the number of outputs that must meet the accuracy, or None for all outputs. The
+    other outputs come last; their errors are infinite.
 
-    Notes
-    -----
-    A case is not refined if it fails because of its parameters (`Outcome.is_impossible`).
-
-    Examples
-    --------
-    The integral of x^a from 0 to 1 by the trapezium rule, for two exponents:
-
-    >>> def integral(cells, cases):
-    ...     x = np.linspace(0.0, 1.0, cells + 1)
-    ...     areas = np.array([np.trapezoid(x**a, x) for a in np.array([2.0, 9.0])[cases]])
-    ...     return Solution([areas], np.zeros(cases.size, np.int8))
-    >>> found = refine(integral, 2, [4, 8, 16, 32, 64], 0.01, order=2)
-    >>> found.level, found.met
-    (array([16, 64]), array([ True,  True]))
-    >>> bool(np.all(np.abs(found.values[0] - [1 / 3, 1 / 10]) < found.errors[0]))
-    True
+    If `shared` is True, the largest relative change among the requested outputs of a case is used for all outputs of
+    this case, because one output alone may be the same on two grids by chance. Choose False for outputs that converge
+    at different rates.
     """
     reduction = 2.0**order
     left = np.arange(cases)
@@ -184,8 +122,8 @@ def refine(
 def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> FloatArray:
     """Return the relative change of every output from one grid to the next, shape (outputs, cases).
 
-    For a profile the relative change is the largest change divided by the largest value. If a case has no solution on
-    one of the grids, its change is infinite.
+    The change of a profile is the largest change divided by the largest value. The change is infinite if a case has no
+    solution on one of the grids.
     """
     solved = (coarse.outcome == Outcome.CONVERGED) & (fine.outcome == Outcome.CONVERGED)
     changes = np.empty((len(fine.values), solved.size))

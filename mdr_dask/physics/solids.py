@@ -1,10 +1,7 @@
-"""Linear viscoelastic solids, which consist of a spring, Prony terms and a dashpot in parallel.
-
-The functions compute moduli, fit Prony series to data, and shift solids to other temperatures.
+"""Linear viscoelastic solids: moduli, Prony series fitted to data, and shifts to other temperatures.
 
 The stress due to a shear strain u is ``G_inf u + sum G_m (u - a_m) + eta du/dt``. Here a_m is the strain of the dashpot
-of Prony term m, with ``da_m/dt = (u - a_m) / tau_m``. A solid without Prony terms is a Kelvin solid. A solid with one
-Prony term and no dashpot is a standard solid.
+of Prony term m, with ``da_m/dt = (u - a_m) / tau_m``.
 """
 
 from __future__ import annotations
@@ -25,18 +22,10 @@ GAS_CONSTANT = 8.31446261815324
 
 @dataclass(frozen=True)
 class LinearSolid:
-    """A linear viscoelastic solid.
+    """A linear viscoelastic solid: a spring, Prony terms and a dashpot in parallel.
 
-    Parameters
-    ----------
-    static_modulus : float
-        Shear modulus G_inf at zero frequency, Pa.
-    moduli : array, shape (terms,)
-        Shear modulus G_m of each Prony term, Pa, not negative.
-    times : array, shape (terms,)
-        Relaxation time tau_m of each term, s, ascending and distinct.
-    viscosity : float
-        Viscosity eta of the parallel dashpot, Pa s.
+    Moduli are shear moduli in Pa, `times` are the ascending and distinct relaxation times of the Prony terms in s, and
+    `viscosity` is that of the dashpot in Pa s.
     """
 
     static_modulus: float
@@ -56,19 +45,9 @@ def kelvin(shear_modulus: float, relaxation_time: float) -> LinearSolid:
 
 
 def standard_solid(static_modulus: float, glass_modulus: float, relaxation_time: float) -> LinearSolid:
-    """Return the standard solid: a spring and one Prony term.
+    """Return the standard solid: a spring and one Prony term (Pa, s).
 
-    Parameters
-    ----------
-    static_modulus, glass_modulus : float
-        Shear modulus in very slow deformation, and shear modulus in sudden deformation, Pa.
-    relaxation_time : float
-        Relaxation time of the Prony term, s.
-
-    Raises
-    ------
-    ValueError
-        If the glass modulus is below the static one.
+    The moduli are those of very slow and of sudden deformation.
     """
     if not glass_modulus >= static_modulus:
         raise ValueError(f"the glass modulus must not be below the static one, got {glass_modulus!r}")
@@ -143,18 +122,9 @@ def relaxation_modulus(solid: LinearSolid, time: ArrayLike) -> FloatArray:
 class SeriesFit:
     """A Prony series fitted to moduli, and its errors.
 
-    Parameters
-    ----------
-    solid : LinearSolid
-        The series.
-    storage_error, loss_error : float
-        Root mean square of the relative errors of G', and of G''. If there are no data of a modulus, its error is NaN.
-    largest_error : float
-        Largest relative error of G' or G''.
-    worst_frequency : float
-        Angular frequency at which the relative error is largest, rad/s.
-    range : tuple of float
-        Lowest and highest angular frequency of the data, rad/s.
+    `storage_error` and `loss_error` are root mean squares of the relative errors of G' and of G'', or NaN without data.
+    `largest_error` is the largest relative error of both, at the angular frequency `worst_frequency` (rad/s). `range`
+    is the range of angular frequency of the data.
     """
 
     solid: LinearSolid
@@ -181,25 +151,9 @@ def power_law_series(
 ) -> SeriesFit:
     """Return a Prony series for the law G'' = loss_modulus (omega / frequency)^exponent (thesis eq. 3.45).
 
-    Parameters
-    ----------
-    static_modulus, loss_modulus : float
-        G_inf, and G'' at `frequency`, Pa.
-    frequency : float
-        Angular frequency of `loss_modulus`, rad/s.
-    exponent : float
-        beta, between 0 and 1.
-    lowest, highest : float
-        Ends of the range of angular frequency in which the series follows the law, rad/s. The relaxation times extend
-        one decade beyond 1 / `highest` and 1 / `lowest`.
-    terms_per_decade : int
-        Number of terms per decade of relaxation time. With two terms per decade, the error of G'' is below 1 % inside
-        the range of frequency.
-
-    Raises
-    ------
-    ValueError
-        If the exponent is outside (0, 1) or the range is empty.
+    `loss_modulus` is G'' in Pa at the angular frequency `frequency` in rad/s. The series follows the law at angular
+    frequencies from `lowest` to `highest`; its relaxation times extend one decade beyond this range. With two terms per
+    decade, the error of G'' in the range is below 1 %.
     """
     if not 0 < exponent < 1:
         raise ValueError(f"the exponent of a power-law spectrum must lie between 0 and 1, got {exponent!r}")
@@ -320,13 +274,7 @@ def wlf_factor(temperature: ArrayLike, reference: float, c1: float, c2: float) -
 
 
 def arrhenius_factor(temperature: ArrayLike, reference: float, activation_energy: float) -> FloatArray:
-    """Return a_T = exp(E / R (1/T - 1/T_ref)) for temperatures in K and an activation energy in J/mol.
-
-    Raises
-    ------
-    ValueError
-        If a temperature is not positive.
-    """
+    """Return a_T = exp(E / R (1/T - 1/T_ref)) for temperatures in K and an activation energy in J/mol."""
     absolute = np.asarray(temperature, dtype=np.float64)
     if np.any(absolute <= 0) or reference <= 0:
         raise ValueError(f"absolute temperatures must be positive, got {temperature!r}")
@@ -342,18 +290,9 @@ def at_temperature(solid: LinearSolid, factor: float) -> LinearSolid:
 class Recovery:
     """Free recovery (zero stress) of a solid as a sum of decaying modes.
 
-    In mode k, the strain at the time t is u = c_k exp(-t / lambda_k). The stretch of Prony term m in this mode is
-    u - a_m = stretch[m, k] u, where a_m is the strain of the dashpot of the term.
-
-    Parameters
-    ----------
-    times : array, shape (terms,)
-        lambda_k, s, ascending: lambda_k is between tau_k and tau_(k+1), and the largest lambda_k is above the largest
-        tau.
-    stretch : array, shape (terms, terms)
-        Element (m, k) is tau_m / (tau_m - lambda_k).
-    amplitude : array, shape (terms, terms)
-        The strain of mode k is c_k = amplitude[k] @ (u - a) if the stretches u - a belong to a state of zero stress.
+    In mode k, the strain at the time t is u = c_k exp(-t / lambda_k), with lambda_k = ``times[k]``. The stretch of
+    Prony term m in this mode is u - a_m = stretch[m, k] u, where a_m is the strain of the dashpot of the term. The
+    strain of mode k is c_k = amplitude[k] @ (u - a) if the stretches u - a belong to a state of zero stress.
     """
 
     times: FloatArray
@@ -362,20 +301,10 @@ class Recovery:
 
 
 def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
-    """Return the modes of free recovery of a solid with the static modulus 1 and Prony terms.
+    """Return the modes of free recovery of a solid with the static modulus 1 and ascending, distinct relaxation times.
 
-    Parameters
-    ----------
-    moduli : array, shape (terms,)
-        G_m / G_inf, positive.
-    times : array, shape (terms,)
-        tau_m, ascending and distinct, in any unit of time.
-
-    Notes
-    -----
-    The times lambda_k are computed by :func:`recovery_times`. If the complex modulus is written as a function of s = i
-    omega, it is zero at s = -1 / lambda_k. The modes are orthogonal with the weights G_m / tau_m. Therefore
-    `amplitude`, the inverse of `stretch`, has a closed form.
+    The modes are orthogonal with the weights G_m / tau_m. Therefore `amplitude`, the inverse of `stretch`, has a closed
+    form.
     """
     zeros, distance = recovery_times(moduli * times, times)
     stretch = times[:, None] / distance
@@ -399,20 +328,10 @@ def _imbalance(k: int, offset: float, weight: FloatArray, times: FloatArray) -> 
 def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the decay times lambda_k of free recovery, which are the zeros of 1 + sum weight_m / (tau_m - lambda).
 
-    Parameters
-    ----------
-    weight : array, shape (modes,)
-        G_m tau_m / G_inf for a Prony term, eta / G_inf for a dashpot; positive.
-    times : array, shape (modes,)
-        tau_m for a Prony term, 0 for a dashpot; ascending and distinct.
-
-    Returns
-    -------
-    times : array, shape (modes,)
-        lambda_k, ascending: lambda_k is between tau_k and tau_(k+1), and the largest lambda_k is above the largest tau.
-    distance : array, shape (modes, modes)
-        Element (m, k) is tau_m - lambda_k. Each lambda_k is computed as a distance from the nearest tau_m. These
-        differences are therefore precise even if the times cover many decades.
+    The weight is G_m tau_m / G_inf for a Prony term. A dashpot has the weight eta / G_inf and the time 0. The times are
+    ascending and distinct. Then lambda_k is between tau_k and tau_(k+1), and the largest lambda_k is above the largest
+    tau. The second result contains tau_m - lambda_k in row m and column k. These differences are precise even if the
+    times cover many decades, because each lambda_k is computed as a distance from the nearest tau_m.
     """
     terms = times.size
     zeros, distance = np.empty(terms), np.empty((terms, terms))
@@ -430,10 +349,7 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
 
 @jit
 def _distance_to_zero(pole: int, sign: float, gap: float, weight: FloatArray, times: FloatArray) -> float:
-    """Return the distance of a zero lambda_k from the nearest tau_m.
-
-    The logarithm of the distance is found by Newton's method and bisection.
-    """
+    """Return the distance of a zero lambda_k from the nearest tau_m."""
     high = np.log(gap)
     low = high - 80.0
     place = 0.5 * (low + high)

@@ -1,6 +1,4 @@
-"""Steady state of a Kelvin foundation by backward Euler, the method of the papers.
-
-Many cases on one line are solved at once.
+"""Steady state of a Kelvin foundation by backward Euler, the method of the papers, for many cases on one line.
 
 The displacement at node i is u_i = max(w_i, lambda u_(i-1)), with the penetration w = depth + height. The decay per
 step is lambda = 1 / (1 + dt / tau), where dt is the time in which the body travels the distance dx between two nodes.
@@ -9,9 +7,8 @@ As u is periodic, the forces are sums over the nodes:
     F_N / (4 G dx) = sum of u_i
     F_x / (4 G) = sum of (u_i - lambda u_(i-1)) / (1 - lambda) (w_i - w_(i-1))
 
-Blocks of nodes that are entirely in contact or entirely free are summed in closed form. In the other blocks the inner
-loops run over cases, so that one vector instruction treats several cases. The results of a case do not depend on the
-other cases.
+Blocks of nodes that are entirely in contact or entirely free are summed in closed form. In the other blocks, one vector
+instruction treats several cases.
 """
 
 from __future__ import annotations
@@ -52,16 +49,9 @@ ROWS = 7
 
 
 class Nodal(NamedTuple):
-    """Heights of a line at its nodes.
+    """Heights of a line at its nodes, and the rise from the previous node to each node.
 
-    Parameters
-    ----------
-    height, rise : array, shape (n,)
-        Height of each node, and the rise from the previous node to this node.
-    blocks : array, shape (n // BLOCK, 8)
-        Bounds and sums of every block, from `_blocks`.
-    periodic : bool
-        Whether the line is periodic. A periodic line ends at its highest node.
+    The bounds and sums of every block are those of `_blocks`. A periodic line ends at its highest node.
     """
 
     height: FloatArray
@@ -81,18 +71,10 @@ class Moving(NamedTuple):
 class Lanes(NamedTuple):
     """Work arrays of a sweep over cases.
 
-    Parameters
-    ----------
-    state : array, shape (ROWS, cases)
-        State of each case during the sweep. After the sweep, `U` is the displacement u at the end of the line, and
-        `FADE` the derivative of u with respect to the depth.
-    packed : array, shape (ROWS + 2, cases + LANES)
-        State, decay and depth of the cases in the queue, in neighbouring columns.
-    queue : array, shape (cases,)
-        Cases in which contact begins or ends in the current block.
-    sums : array, shape (SUMS, cases)
-        Results of the sweep: the sum of u, the derivative of this sum with respect to the depth, and the drag
-        (1 - lambda) F_x / (4 G).
+    `state`, shape (ROWS, cases), is the state of each case; after the sweep its rows `U` and `FADE` belong to the end
+    of the line. `packed` contains state, decay and depth of the cases in the queue in neighbouring columns. `queue`
+    contains the cases in which contact begins or ends in the current block. `sums`, shape (SUMS, cases), contains the
+    sum of u, its derivative with respect to the depth, and (1 - lambda) F_x / (4 G).
     """
 
     state: FloatArray
@@ -110,10 +92,9 @@ def lanes_for(cases: int) -> Lanes:
 
 @jit
 def _step(h: float, t: float, decay: float, depth: float, u: float, fade: float) -> tuple[float, float, float]:
-    """Return u and du/d(depth) at a node, and the contribution of this node to (1 - lambda) F_x / (4 G).
+    """Return u and du/d(depth) at a node of height h, and the contribution of this node to (1 - lambda) F_x / (4 G).
 
-    The node has the height `h`, and the rise from the previous node is `t`. At the previous node the displacement is
-    `u`, and the derivative of `u` with respect to the depth is `fade`.
+    The rise from the previous node is t. At the previous node the displacement is `u`, and du/d(depth) is `fade`.
     """
     free = decay * u
     w = h + depth
@@ -137,7 +118,7 @@ def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
 def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) -> int:
     """Add the sums of a block for every case in which the whole block is in contact or the whole block is free.
 
-    The indices of the other cases are written to the queue, and the number of these cases is returned.
+    The other cases are written to the queue; their number is returned.
     """
     peak, lowest, steepest, before = block[PEAK], block[LOWEST], block[STEEPEST], block[BEFORE]
     heights, rises, work, squares = block[HEIGHTS], block[RISES], block[WORK], block[SQUARES]
@@ -213,10 +194,10 @@ def _walk_some(height: FloatArray, rise: FloatArray, moving: Moving, lanes: Lane
 
 @jit
 def _sweep(line: Nodal, moving: Moving, lanes: Lanes) -> None:
-    """For every case, move one element along the line and write the sums.
+    """Move one element of every case along the line, and write the sums.
 
-    On a periodic line the element starts and ends at the highest node. On any other line the element starts undeformed
-    at the first node.
+    On a periodic line the element starts and ends at the highest node. On any other line it starts undeformed at the
+    first node.
     """
     height, rise, blocks, periodic = line
     deborah, depth = moving.deborah, moving.depth
@@ -247,12 +228,10 @@ def _newton(
     drags: FloatArray,
     outside: NDArray[np.bool_],
 ) -> None:
-    """Find the depth and the drag of every case.
+    """Find the depth and the drag of every case; the guesses in `depths` are replaced by the solutions.
 
-    The guesses in `depths` are replaced by the solutions. If no depth is found, the drag of the case is NaN. The load
-    is a convex, increasing, piecewise linear function of the depth. Therefore every depth after the first step of
-    Newton's method is at or above the solution. There is no sweep at the final depth. Instead, the drag is extrapolated
-    linearly from the last two sweeps to the final depth.
+    The load is a convex, increasing function of the depth, so that Newton's method approaches the solution from above.
+    The drag is extrapolated from the last two sweeps to the final depth. If no depth is found, the drag is NaN.
     """
     count = depths.size
     active, lanes, before = np.arange(count), lanes_for(count), np.full((2, count), np.nan)
@@ -295,11 +274,7 @@ def contact(
     touched: FloatArray,
     slope: FloatArray,
 ) -> None:
-    """For every case, write the number of nodes in contact to `touched`, and their rms rise to `slope`.
-
-    The rise of a node is measured from the previous node. The parameter `depths` is a result of
-    :func:`steady_by_steps`; the other parameters are described there.
-    """
+    """Write the number of nodes in contact of every case to `touched`, and the rms rise at these nodes to `slope`."""
     for k in range(depths.size):
         decay, count, square = deborah[k] / (1 + deborah[k]), 0, 0.0
         u = depths[k] if periodic else 0.0
@@ -321,18 +296,8 @@ def steady_by_steps(
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
     """Return three arrays: depth of the highest node, F_x / (4 G), and whether an end of the line is in contact.
 
-    The depth is found on a coarse grid first, then on finer grids, each with `COARSENING` times as many nodes as the
-    previous grid. The first guess of a case does not depend on the other cases, and neither does the result.
-
-    Parameters
-    ----------
-    height : array, shape (n,)
-        Heights. A periodic line starts at the node after the highest node and ends at the highest node.
-    periodic : bool
-        Whether the line is periodic. On any other line, elements enter undeformed at the first node.
-    deborah, loads : array, shape (cases,)
-        Deborah numbers v tau / dx, and loads F_N / (4 G dx) in the unit of height. All values must be positive and
-        finite.
+    A periodic line starts at the node after the highest node and ends at the highest node. On any other line, elements
+    enter undeformed at the first node. Deborah numbers are v tau / dx, and loads F_N / (4 G dx) in the unit of height.
     """
     strides = [1]
     while height.size > COARSEST * strides[-1]:

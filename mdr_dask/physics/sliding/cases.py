@@ -1,7 +1,4 @@
-"""Cases of steady sliding on one line, and their steady states.
-
-The cases are the input of every solver, and the steady states are its output.
-"""
+"""Cases of steady sliding on one line (the input of every solver), and their steady states (the output)."""
 
 from __future__ import annotations
 
@@ -62,10 +59,7 @@ class Steady:
 
     @classmethod
     def of(cls, columns: FloatArray, status: NDArray[np.int8]) -> Steady:
-        """Return steady states whose results are the rows of an array.
-
-        If a case has not converged, its results become NaN.
-        """
+        """Return steady states from an array with one row per result; results of failed cases become NaN."""
         drag, depth, fraction, slope = np.where(status == Outcome.CONVERGED, columns, np.nan)
         return cls(drag, depth, fraction, slope, status)
 

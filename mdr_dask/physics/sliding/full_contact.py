@@ -1,14 +1,12 @@
-"""Full contact of any linear solid with a rough plane.
-
-The problem is linear, so that each wave of the line can be solved separately.
+"""Full contact of any linear solid with a rough plane; the problem is linear, so that each wave is solved separately.
 
 The displacement is u = d + h, with the depth d and the height h. The pressure of wave k is G*(q_k v) c_k, with the
 complex modulus G*, the wavenumber q_k and the amplitude c_k (thesis eq. 3.14 for the Kelvin solid). The drag is
 therefore a sum over the spectrum and does not depend on the phases.
 
 Contact is full if the pressure is positive everywhere. The pressure is computed at m nodes, two for each Nyquist point.
-The pressure is a sum of waves with at most k periods on the line. Between the nodes, such a sum is at most 1 / cos(pi k
-/ m) times as large as its largest value at the nodes (Ehlich and Zeller, Z. Angew. Math. Mech. 44, T22, 1964).
+Between the nodes, a sum of waves with at most k periods on the line is at most 1 / cos(pi k / m) times as large as its
+largest value at the nodes (Ehlich and Zeller, Z. Angew. Math. Mech. 44, T22, 1964).
 """
 
 from __future__ import annotations
@@ -24,27 +22,11 @@ from mdr_dask.physics.surfaces.waves import series
 
 
 def steady_full_contact(line: RoughLine, terms: Sequence[tuple[float, float]], cases: Cases) -> Steady:
-    """Return the steady states of the cases in full contact.
+    """Return the steady states of the cases in full contact with a plane; all other cases get `Outcome.INVALID`.
 
-    If the contact of a case is not full, its status is `Outcome.INVALID`.
-
-    Parameters
-    ----------
-    line : RoughLine
-        A plane.
-    terms : sequence of (float, float)
-        G_m / G_inf and tau_m v / L of the Prony terms; empty for a Kelvin solid.
-    cases : Cases
-        Deborah numbers eta v / (G_inf L) of the dashpot, and loads F_N / (4 G_inf L), in the unit of height. In full
-        contact the load in this unit is equal to the mean displacement.
-
-    Examples
-    --------
-    >>> from mdr_dask.physics.surfaces.waves import Waves
-    >>> line = RoughLine(Waves(np.array([0.5 + 0j]), 2))
-    >>> found = steady_full_contact(line, [], Cases(np.array([0.1]), np.array([5.0])))
-    >>> print((found.drag / 0.1).round(4), found.depth)  # De <h'^2>
-    [19.7392] [5.]
+    The terms are pairs of G_m / G_inf and tau_m v / L; a Kelvin solid has none. The Deborah number is eta v / (G_inf L)
+    of the dashpot, and the load F_N / (4 G_inf L) in the unit of height. In full contact this load is equal to the mean
+    displacement.
     """
     deborah, loads = cases
     pressure, slope = line.nodes

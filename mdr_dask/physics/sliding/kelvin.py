@@ -1,11 +1,10 @@
 """One sweep along a line of cubic cells: the steady state of a Kelvin foundation at a given depth.
 
-All lengths are in cells: a cell has the length 1, a slope is the rise over one cell, and ``deborah`` is v tau / dx with
-the length dx of a cell. Heights are positive towards the elastomer. Heights are measured from the highest point of the
-line, so that the penetration is w = depth + height with depth > 0. The displacement of an element is u = w in contact;
-after contact ends, u decays as exp(-s / deborah) with the distance s. In contact, the derivative of u with respect to
-the depth is 1; after contact ends, this derivative decays exponentially like u. If the depth changes, the places where
-contact begins and ends are shifted, but the effect of this shift on the load is of second order.
+All lengths are in cells, a slope is the rise over one cell, and ``deborah`` is v tau in cells. Heights are measured
+from the highest point of the line, so that the penetration is w = depth + height with depth > 0. The displacement of an
+element is u = w in contact; after contact ends, u and du/d(depth) decay as exp(-s / deborah) with the distance s. A
+change of the depth also shifts the places where contact begins and ends, but this changes the load only to second
+order.
 """
 
 from __future__ import annotations
@@ -47,10 +46,7 @@ def _four(column: FloatArray, i: int) -> float:
 
 @jit
 def blocks_of(cells: Cells) -> Blocks:
-    """Return the complete blocks of a line.
-
-    At the end of the line, cells that do not fill a block belong to no block.
-    """
+    """Return the complete blocks of a line; the cells that remain at the end of the line belong to no block."""
     blocks = (cells.mean.size - 1) // BLOCK
     peak, mean, stretch = np.empty(blocks), np.empty(blocks), np.empty(blocks)
     for block in range(blocks):
@@ -67,9 +63,9 @@ def blocks_of(cells: Cells) -> Blocks:
 class Barriers(NamedTuple):
     """Limits of the depth for each cell and each block, at one Deborah number.
 
-    The force is the force on elements in contact. If the depth is above the limit `cell`, the force is positive
-    everywhere in the cell; the limit `block` has the same meaning for a block. If the depth is at most `idle`, the
-    force is positive nowhere in the cell. The limit of a block is NaN until the limits of its cells are computed.
+    If the depth is above the limit `cell`, the force on elements in contact is positive everywhere in the cell; the
+    limit `block` has the same meaning for a block. If the depth is at most `idle`, this force is positive nowhere in
+    the cell. The limit of a block is NaN until the limits of its cells are computed.
     """
 
     cell: FloatArray
@@ -102,8 +98,7 @@ def write_barriers(
 ) -> None:
     """Write the barriers of a block and of its cells, computed from the force w + deborah w'.
 
-    The barrier of the block is the largest barrier of its cells. The values `idle` are computed from the Bernstein
-    coefficients of the force: in the cell, the force is at most the largest coefficient.
+    The values `idle` follow from the Bernstein coefficients of the force: the largest coefficient is an upper bound.
     """
     every, written, idle = -np.inf, barriers.cell, barriers.idle
     for i in range(block * BLOCK, min((block + 1) * BLOCK, written.size)):
@@ -126,10 +121,7 @@ def write_barriers(
 
 @jit
 def _decayed(x: float) -> float:
-    """Return 1 - exp(-x) for x >= 0.
-
-    For small x a series is used, which is faster and exact to rounding.
-    """
+    """Return 1 - exp(-x) for x >= 0; for small x by a series, which is faster and exact to rounding."""
     if x > 1 / 32:
         return -math.expm1(-x)
     # multiply by 1 / 5 instead of dividing by 5, because divisions would make a sweep 10 % slower
@@ -141,8 +133,7 @@ def _decayed(x: float) -> float:
 def contact_end(w0: float, a: float, b: float, c: float, deborah: float, start: float) -> float:
     """Return the first place between `start` and 1 where the force falls to 0, or `NONE`.
 
-    The force is w + deborah w', with the penetration w = w0 + a x + b x^2 + c x^3. The force must not be negative at
-    `start`.
+    The force is w + deborah w', with w = w0 + a x + b x^2 + c x^3; it must not be negative at `start`.
     """
     # search each monotone piece of the cubic force; because of rounding, the force at `start` may be negative
     p, q, r = w0 + deborah * a, a + 2 * deborah * b, b + 3 * deborah * c
@@ -182,12 +173,7 @@ def _falling(p: float, q: float, r: float, c: float, low: float, high: float) ->
 
 
 class FreeElement(NamedTuple):
-    """A free element in a cell.
-
-    The displacement of the element at the place `start` is u.
-
-    In the cell, the penetration of the line is w = w0 + a x + b x^2 + c x^3.
-    """
+    """A free element with the displacement u at the place `start` of a cell with w = w0 + a x + b x^2 + c x^3."""
 
     w0: float
     a: float
@@ -201,8 +187,7 @@ class FreeElement(NamedTuple):
 def _contact_begin_between(element: FreeElement, deborah: float, low: float, high: float) -> float:
     """Return the place x between `low` and `high` where the line reaches a free element.
 
-    At this place the penetration w is equal to the displacement u exp(-(x - start) / deborah) of the element. At the
-    place `high`, w must be larger than this displacement.
+    The displacement of the element is u exp(-(x - start) / deborah). At `high` the line must be above the element.
     """
     w0, a, b, c, u, start = element
     if w0 + low * (a + low * (b + low * c)) >= u - u * _decayed((low - start) / deborah):
@@ -227,8 +212,8 @@ def _contact_begin_between(element: FreeElement, deborah: float, low: float, hig
 def _contact_begin(element: FreeElement, deborah: float, low: float, stop: float) -> float:
     """Return the first place between `low` and `stop` where contact with a free element begins, or `NONE`.
 
-    The displacement of the free element is u_free. The product (w - u_free) exp(x / deborah) increases with x wherever
-    the force w + deborah w' is positive. In each interval of positive force, contact therefore begins at most once.
+    With the displacement u_free of the element, (w - u_free) exp(x / deborah) increases wherever the force w + deborah
+    w' is positive. In each interval of positive force, contact therefore begins at most once.
     """
     w0, a, b, c, u, start = element
     for _ in range(3):
@@ -262,12 +247,11 @@ def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) 
 
 @jit
 def _over_recovery(u: float, travelled: float, deborah: float, slope: float) -> tuple[float, float, float, float]:
-    """Return two integrals over a free recovery, and the derivatives of both with respect to the depth.
+    """Return four integrals over a free recovery: of u, of du/d(depth), the drag, and the derivative of the drag.
 
-    The element is free over the length `travelled`. The order of the results is: integral of u, derivative of this
-    integral, drag, derivative of the drag. The integral of u is deborah times the decrease of u, and the drag is half
-    the decrease of u^2. At the place where contact begins again, `slope` is the slope of the line. The derivative of
-    the drag includes the shift of this place.
+    The integral of u is deborah times the decrease of u, and the drag is half the decrease of u^2. The derivative of
+    the drag with respect to the depth includes the shift of the place where contact begins again; the line has the
+    slope `slope` there.
     """
     lost = _decayed(travelled / deborah) if u > 0 else 1.0
     memory = deborah * lost
@@ -298,24 +282,10 @@ def sweep_cells(
 ) -> int:
     """Move one element once along the line; return the number of contact patches.
 
-    Parameters
-    ----------
-    cells, every : Cells, Blocks
-        The line, and its blocks.
-    barriers : Barriers, input and output
-        If the element is in contact when it reaches a block whose barriers are still NaN, the barriers of this block
-        are written.
-    deborah : float
-        v tau in cells.
-    depth : float
-        Penetration of the highest point.
-    sums : array, shape (SUMS,), output
-        The integral of u, which equals F_N / (4 G dx); the derivative of this integral with respect to the depth;
-        F_x / (4 G); the derivative of F_x / (4 G) with respect to the depth; the length in contact; the integral of
-        w'^2 over the length in contact; and 1 if an end of a line that is not periodic is in contact, otherwise 0.
-    places : Places, output
-        The positions where each patch begins and ends. If the arrays are too short for all patches, the positions of
-        the last patches are not written.
+    The limits of a block that are still NaN are written to `barriers` when they are needed. The entries of `sums` are:
+    the integral of u, which equals F_N / (4 G dx), and its derivative with respect to the depth; F_x / (4 G) and its
+    derivative; the length in contact; the integral of w'^2 over this length; and 1 if an end of a line that is not
+    periodic is in contact, otherwise 0. `places` receives the ends of as many patches as its arrays can hold.
     """
     # local names, because reading an array from a tuple takes more time than computing a cell
     height, enter, leave, peak, mean, stretches = (

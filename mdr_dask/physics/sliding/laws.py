@@ -21,10 +21,7 @@ def force_number(force: Any, shear_modulus: Any, rms: Any, length: Any) -> Any:
 
 
 def velocity_number(velocity: Any, relaxation_time: Any, slope: Any, rms: Any) -> Any:
-    """Return v tau slope / (sqrt 2 h) (eq. 3.19).
-
-    If this number is about 1, only the fronts of the asperities are in contact.
-    """
+    """Return v tau slope / (sqrt 2 h) (eq. 3.19); at about 1, only the fronts of the asperities are in contact."""
     return velocity * relaxation_time * slope / (math.sqrt(2) * rms)
 
 
@@ -36,12 +33,7 @@ def alpha(hurst: Any) -> Any:
 def zone_one(force: Any, velocity: Any, exponent: Any, beta: Any) -> Any:
     """Return mu / slope at low velocity and low force (eq. 3.11).
 
-    Parameters
-    ----------
-    force, velocity : array_like
-        Results of `force_number` and `velocity_number`.
-    exponent, beta : array_like
-        Constants alpha and beta of the law.
+    The arguments are `velocity_number`, `force_number`, and the constants alpha and beta of the law.
     """
     return math.sqrt(2) * beta * velocity * force**-exponent
 
@@ -68,13 +60,8 @@ def crossover(force: Any, exponent: Any, beta: Any) -> Any:
 def regions(force: Any, exponent: Any, beta: Any, share: float = 0.9) -> tuple[Any, Any]:
     """Return two velocity numbers for eq. 3.18: at the end of region I, and at the start of region III.
 
-    Parameters
-    ----------
-    force, exponent, beta : array_like
-        As in `zone_one`.
-    share : float
-        Fraction that defines the two ends. Region I ends where mu is `share` times the value of the linear law. Region
-        III begins where mu is `share` times the value of the plateau.
+    Region I ends where mu is `share` times the value of the linear law. Region III begins where mu is `share` times the
+    plateau. The other arguments are those of `zone_one`.
     """
     width = math.sqrt(share**-2 - 1)
     middle = crossover(force, exponent, beta)
@@ -91,12 +78,7 @@ def indenter_low(
 def indenter(xi: Any, exponent: Any = INDENTER_EXPONENT) -> Any:
     """Return mu / (sqrt 2 slope) of a rough indenter (eq. 3.40, 3.43).
 
-    Parameters
-    ----------
-    xi : array_like
-        mu / (sqrt 2 slope) from the law for low velocity.
-    exponent : array_like
-        Exponent alpha of the law.
+    The argument `xi` is this ratio from the law for low velocity.
     """
     return np.exp(-np.logaddexp(0.0, -exponent * np.log(xi)) / exponent)
 
@@ -104,15 +86,8 @@ def indenter(xi: Any, exponent: Any = INDENTER_EXPONENT) -> Any:
 def single_tip(curvature: Any, force: Any, viscosity: Any, velocity: Any) -> Any:
     """Return mu of a viscous foundation at very high velocity, (2/3) sqrt(kappa F_N / (2 eta v)).
 
-    Only one parabolic tip is in contact. The contact extends from the summit of the tip to the distance a = sqrt(F_N /
-    (2 eta v kappa)) ahead of the summit. The rms slope in contact is kappa a / sqrt 3 = mu sqrt(3) / 2. The derivation
-    is in docs/high-speed.md.
-
-    Parameters
-    ----------
-    curvature : array_like
-        Curvature kappa of the highest point of the line, 1/m.
-    force, viscosity, velocity : array_like
-        F_N, viscosity eta of the dashpot (G tau of a Kelvin solid), and v.
+    Only one parabolic tip is in contact; kappa is its curvature at the summit, in 1/m. The contact extends from the
+    summit to the distance a = sqrt(F_N / (2 eta v kappa)) ahead of it. The rms slope in contact is kappa a / sqrt 3 =
+    mu sqrt(3) / 2. The derivation is in docs/high-speed.md.
     """
     return 2 / 3 * np.sqrt(curvature * force / (2 * viscosity * velocity))

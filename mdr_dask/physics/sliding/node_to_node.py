@@ -1,19 +1,13 @@
 """Steady sliding of a Kelvin foundation along a periodic line: a fast, approximate solver for many cases at once.
 
-All lengths are in cells: neighbouring nodes have the distance 1, and De = v tau is the Deborah number in cells. The
-penetration is w = d + h, with the depth d and the height h of the line. Inside a cell, w is a cubic that is computed
-from the heights and slopes at the two nodes of the cell. Contact ends where the force w + De w' falls to 0. Contact
-begins where the line reaches the displacement u of the free element. The places where contact begins and ends are
-computed approximately.
+All lengths are in cells: neighbouring nodes have the distance 1, and De = v tau is the Deborah number in cells. Inside
+a cell, the penetration w (depth plus height) is a cubic. The places where contact begins and ends are computed
+approximately. The load is the integral of w in contact and of u out of contact. The drag is the integral of De w'^2 in
+contact and of u^2 / De out of contact. All terms are positive, so that there is no cancellation in slow sliding. In
+full contact the results are exact on any grid.
 
-The load is the integral of w in contact and of u out of contact. The drag is the integral of De w'^2 in contact and of
-u^2 / De out of contact. All terms are positive, so that there is no cancellation in slow sliding. The integrals over
-cells that are entirely in contact are exact. In full contact the results are therefore exact on any grid.
-
-One sweep moves one element of every case along the line, block by block. If a block is entirely in contact or entirely
-free in a case, the sums over this block have closed forms. Otherwise the element moves from cell to cell. The results
-of a case do not depend on the other cases. Newton's method finds the depth at which the load is carried, first on a
-coarse grid, then on finer grids.
+If a block of cells is entirely in contact or entirely free in a case, its sums have closed forms. Otherwise the element
+moves from cell to cell. The results of a case do not depend on the other cases.
 """
 
 from __future__ import annotations
@@ -51,21 +45,12 @@ IN_A_TILE = 5
 class Nodes(NamedTuple):
     """The heights and slopes of a periodic line at n nodes, with bounds and sums over blocks of cells.
 
-    Parameters
-    ----------
-    height, slope : array, shape (BEFORE + n + AFTER,)
-        Heights relative to the first node, and slopes as rises per cell. The arrays begin with the last `BEFORE` nodes
-        of the previous period, and end with the first `AFTER` nodes of the next period.
-    ends : array, shape (2, BEFORE + n + AFTER) or (2, 0)
-        The corrections of the trapezium rule from `ends_of`, at the same nodes as `height`.
-    blocks : array, shape (n // BLOCK, 5)
-        For every block: upper bound of the height, height of the lowest node, smallest slope at a node, integral of the
-        height, and integral of the squared slope.
-    top : float
-        Height of the first node.
-    rise : float
-        Height of the highest point of the line above the first node. The highest point is in the cell before the first
-        node. On coarse grids the first node is the highest node, and `rise` is 0.
+    `height` (relative to the first node), `slope` (rise per cell) and `ends` (from `ends_of`, or empty) begin with the
+    last `BEFORE` nodes of the previous period, and end with the first `AFTER` nodes of the next period. A row of
+    `blocks` contains, for one block: upper bound of the height, height of the lowest node, smallest slope at a node,
+    integral of the height, and integral of the squared slope. `top` is the height of the first node. `rise` is the
+    height of the highest point, in the cell before the first node, above the first node. On coarse grids the first node
+    is the highest node, and `rise` is 0.
     """
 
     height: FloatArray
@@ -84,7 +69,7 @@ def _end_factors(n: int) -> NDArray[np.complex128]:
 
 
 def ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
-    """Return corrections of the trapezium rule for two integrals: of the height and of the squared slope, shape (2, n).
+    """Return corrections of the trapezium rule for the integrals of the height and of the squared slope, shape (2, n).
 
     The integral from node i to node j is exactly the trapezium sum, plus the correction at node i, minus the correction
     at node j. Slopes are rises per cell. Corrections from local derivatives would miss the shortest waves, which are
@@ -97,22 +82,11 @@ def ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
 
 
 def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolved: bool, ends: FloatArray) -> Nodes:
-    """Return a coarser line that consists of every stride-th node of a line.
+    """Return a coarser line that consists of every stride-th node of a line, from node `first` on.
 
-    Parameters
-    ----------
-    height, slope : array, shape (n,)
-        Heights, and their derivatives with respect to the position x / L, where L is the length of the line.
-    first : int
-        Index of the first node, whose height is subtracted from all heights.
-    stride : int
-        Distance of two neighbouring nodes of the coarser line, in cells of the given line.
-    resolved : bool
-        Whether the coarser line uses the given slopes. If False, its slopes are computed from differences of its
-        heights, because its nodes are too far apart.
-    ends : array, shape (2, n) or (2, 0)
-        The corrections of `ends_of`. If this array is empty, integrals over cells are computed from heights and slopes
-        at neighbouring nodes.
+    Slopes are derivatives with respect to x / L. If `resolved` is False, the slopes of the coarser line are differences
+    of its heights, because its nodes are too far apart. `ends` contains the corrections of `ends_of`. If it is empty,
+    integrals over cells are computed from heights and slopes at neighbouring nodes.
     """
     n = height.size // stride
 
@@ -161,14 +135,11 @@ def _integrals(
     mean: FloatArray,
     square: FloatArray,
 ) -> None:
-    """For each cell, write the integral of the height to `mean` and the integral of the squared slope to `square`.
+    """Write the integrals over each cell: of the height to `mean`, and of the squared slope to `square`.
 
-    The array `square` has one element more than there are cells.
-
-    The input arrays begin one node before the first cell. The trapezium rule is corrected with `of_height` and
-    `of_square`, which are computed by `ends_of`. If `of_height` and `of_square` are empty, the corrections are computed
-    by the Euler-Maclaurin formula. The derivatives in this formula are computed from heights and slopes at neighbouring
-    nodes.
+    The input arrays begin one node before the first cell; `square` needs one entry more than there are cells. The
+    trapezium rule is corrected with the results of `ends_of`. If these are empty, the rule is corrected by the
+    Euler-Maclaurin formula, with derivatives from heights and slopes at neighbouring nodes.
     """
     if of_height.size > 0:
         for k in range(cells):
@@ -203,19 +174,10 @@ def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
 
 @jit_inline
 def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatArray) -> int:
-    """Write a tile (a part of a line on a finer grid), and return the number of its cells.
+    """Write a tile, and return the number of its cells; the tile covers `cells` cells of the line from node `first` on.
 
-    Parameters
-    ----------
-    line : Nodes
-    first, cells : int
-        The tile begins at the node `first` of the line, and covers `cells` cells of the line.
-    weights : array, shape (2, refinement, 4 WING)
-        Interpolation weights from :func:`weights`. Each cell of the line is divided into `refinement` cells of the
-        tile.
-    tile : array, shape (IN_A_TILE, cells refinement + 3), output
-        At the nodes, including one node before and one node after the tile: height and slope. For each cell: integral
-        of the height, integral of the squared slope, and largest height.
+    Each cell of the line is divided into ``weights.shape[1]`` cells of the tile. The nodes of a tile include one node
+    before and one node after these cells.
     """
     refinement, h, s = weights.shape[1], tile[HEIGHT], tile[SLOPE]
     # the exact corrections in `ends` are known only at the nodes of the line, not at the nodes of a finer tile
@@ -235,11 +197,10 @@ def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatAr
 def weights(refinement: int) -> FloatArray:
     """Return the weights that interpolate a line to a finer grid, shape (2, refinement, 4 WING).
 
-    Each cell is divided into `refinement` cells. The first index is 0 for the interpolated height and 1 for the
-    interpolated slope. The second index numbers the nodes of the finer grid inside a cell. The third index runs over
-    the heights at the `WING` nodes on each side of the cell, and then over the slopes at these nodes. The Hermite
-    polynomial through these values has degree 15. With two nodes per Nyquist point, the error is below 1e-7 times the
-    amplitude of the shortest wave.
+    The first index is 0 for the interpolated height and 1 for the slope. The second index numbers the finer nodes
+    inside a cell. The third index runs over the heights at the `WING` nodes on each side of the cell, and then over the
+    slopes at these nodes. The Hermite polynomial through these values has degree 15. With two nodes per Nyquist point,
+    the error is below 1e-7 times the amplitude of the shortest wave.
     """
     places, x = np.arange(1.0 - WING, 1.0 + WING), np.arange(refinement) / refinement
     table = np.empty((2, refinement, 4 * WING))
@@ -353,10 +314,9 @@ def _contact_end(
 ) -> tuple[float, float, float]:
     """Return the place in a cell where the force falls to 0, the penetration w there, and the remaining fraction of w.
 
-    From this place on the element is free. The remaining fraction is the displacement of the element at the end of the
-    cell, divided by w. The Deborah number is `r`, and `inverse` is 1 / r. At the place `begins` the force begins to
-    fall and has the value `force`; at the end of the cell the force has the value `force_end`. Linear interpolation
-    between these two values gives a first estimate of the place. One Newton step improves the estimate.
+    The remaining fraction is the displacement at the end of the cell, where the element is free, divided by w. The
+    Deborah number is `r`, and `inverse` is 1 / r. The force falls from `force` at `begins` to `force_end` at the end of
+    the cell. Linear interpolation gives a first estimate of the place, which one Newton step improves.
     """
     fall = (1 - begins) / (force - force_end)
     x = begins + force * fall
@@ -375,10 +335,9 @@ def _contact_end(
 def _contact_begin(cell: Cell, u: float, inverse: float, last: float, gap_last: float) -> tuple[float, float]:
     """Return the place where a free element meets the line, and the remaining fraction of the displacement u.
 
-    The element has the displacement u at the start of the cell, and the remaining fraction of u at the returned place.
-    The gap between element and line is zero at the returned place and negative at the place `last`. The argument
-    `inverse` is one divided by the Deborah number. A parabola through the gaps at the start of the cell and at `last`
-    gives a first estimate of the place. One Newton step improves this estimate.
+    The displacement is u at the start of the cell; `inverse` is 1 / De. At the place `last` the gap between element and
+    line is `gap_last` < 0. A parabola through the gaps at the start of the cell and at `last` gives a first estimate of
+    the place, which one Newton step improves.
     """
     gap, closing = u - cell.w0, cell.s0 + u * inverse
     bow = (gap - closing * last - gap_last) / (last * last + SMALL)
@@ -400,10 +359,9 @@ def _contact_in_cell(
 ) -> tuple[bool, float, float, float, float]:
     """Return whether a free element comes into contact in a cell, and four numbers about the end of the contact.
 
-    The displacement of the free element is u at the start of the cell. Without contact the displacement would be `kept`
-    at the end of the cell. The four numbers are: the place where the contact ends (1 if contact continues in the next
-    cell); the penetration w at this place; the fraction of w that remains at the end of the cell; and the gap between
-    the line and an element without contact at this place.
+    The displacement is u at the start of the cell, and would be `kept` at its end without contact. The four numbers
+    are: the place where the contact ends (1 if contact continues in the next cell); w at this place; the fraction of w
+    that remains at the end of the cell; and the gap between the line and an element without contact at this place.
     """
     force, gap = cell.w1 + r * cell.s1, kept - cell.w1
     if force > 0:
@@ -490,8 +448,7 @@ def _pass_block(
 ) -> int:
     """Add the sums of a block for every case in which the whole block is in contact or the whole block is free.
 
-    The indices of the cases in which the block is partly in contact are written to the queue. The number of these cases
-    is returned.
+    The other cases are written to the queue; their number is returned.
     """
     peak, lowest, steepest = block[PEAK], block[LOWEST], block[STEEPEST]
     steepest /= refinement
@@ -534,10 +491,9 @@ def sweep(
     queue: NDArray[np.int64],
     count: int,
 ) -> None:
-    """For every case, move one element along one period of the line, from the summit to the next summit.
+    """Move one element of every case along one period of the line, from the summit to the next summit.
 
-    Blocks in which contact begins or ends are computed on a finer grid. The heights and slopes of this grid are
-    interpolated with `weights`.
+    Blocks in which contact begins or ends are computed on a finer grid, which is interpolated with `weights`.
     """
     refinement, blocks = weights.shape[1], line.blocks
     n = line.height.size - BEFORE - AFTER
@@ -588,27 +544,13 @@ def _search(
     rates: FloatArray,
     results: FloatArray,
 ) -> None:
-    """Find the depths of cases on a grid by Newton's method.
+    """Find the depths of cases on a grid by Newton's method; extrapolate the results over the last step of the depth.
 
-    After the last step of the depth there is no sweep; the results are extrapolated to the final depth.
-
-    Parameters
-    ----------
-    line : Nodes
-        The line on a grid.
-    weights : array, shape (2, refinement, 4 WING)
-        Interpolation weights from :func:`weights`.
-    cases : Cases
-        v tau / L, and F_N / (4 G L) in the unit of height.
-    last_step, error : float
-        The search ends after a step of at most `last_step` times the depth, if the extrapolation over this step changes
-        the drag so little that its estimated relative error is at most `error`.
-    depths : array, shape (cases,)
-        Penetrations of the summit; the first guesses are replaced by the solutions.
-    rates : array, shape (cases, SECANTS), input and output
-        Derivatives of the logarithms of the results with respect to the depth; NaN if a derivative is not known yet.
-    results : array, shape (cases, SECANTS), output
-        Drag, contact fraction and contact slope. If the depth of a case is not found, its results are not changed.
+    The search ends after a step of at most `last_step` times the depth, if the extrapolation changes the drag so little
+    that its estimated relative error is at most `error`. `depths` are penetrations of the summit: first guesses,
+    replaced by solutions. `rates`, shape (cases, SECANTS), are derivatives of the logarithms of the results with
+    respect to the depth, or NaN if unknown; they are updated. `results`, shape (cases, SECANTS), receives drag, contact
+    fraction and contact slope, and is not changed if no depth is found.
     """
     (deborah, loads), rise = cases, line.rise
     refinement = weights.shape[1]
@@ -658,16 +600,9 @@ def _search(
 
 
 class NodeToNode:
-    """Cases on one line, for a solution on a sequence of finer and finer grids.
+    """Cases on a rough plane, for a solution on a sequence of finer and finer grids.
 
-    Parameters
-    ----------
-    line : RoughLine
-        A plane.
-    cases : Cases
-        v tau / L and F_N / (4 G L), positive and finite.
-    error : float
-        Largest relative error of the drag due to the search for the depth.
+    `error` is the largest relative error of the drag due to the search for the depth.
     """
 
     def __init__(self, line: RoughLine, cases: Cases, error: float) -> None:
@@ -680,9 +615,8 @@ class NodeToNode:
     def solve(self, level: int, cases: IntArray) -> Solution:
         """Solve cases on a grid of `level` nodes per Nyquist point.
 
-        The first call must be for level 1, and solves all cases. The calls for the levels 2, 4, 8, ... solve the given
-        cases. Above level 2, the grid is finer only in blocks in which contact begins or ends. There, heights and
-        slopes are interpolated from 2 nodes per Nyquist point.
+        The first call must be for level 1, and solves all cases. Above level 2, the grid is finer only in blocks in
+        which contact begins or ends. There, heights and slopes are interpolated from 2 nodes per Nyquist point.
         """
         if level == 1:
             return self._start()
@@ -698,10 +632,7 @@ class NodeToNode:
         return self._solution(results, depths - top, level)
 
     def _start(self) -> Solution:
-        """Solve all cases on finer and finer grids, and return the results on the finest of these grids.
-
-        The finest grid has one node per Nyquist point.
-        """
+        """Solve all cases on finer and finer grids; the last grid has one node per Nyquist point."""
         height, loads = self._height, self._cases.loads
         strides = [2]
         while height.size > COARSENING * COARSEST * strides[-1]:
@@ -718,11 +649,9 @@ class NodeToNode:
     def _solution(self, results: FloatArray, depth: FloatArray, level: int) -> Solution:
         """Return the results on a grid.
 
-        A small contact patch between two nodes may be missing on two successive grids. The missing patch is at most
-        about one cell long, because a longer patch contains nodes. With this patch, the length in contact would be
-        larger by at most one cell. The patch would decrease the rms slope of the contact, because the slope is small
-        near the summit of an asperity. The relative decrease of the rms slope is at most half the relative increase of
-        the length.
+        A contact patch between two nodes may be missing on two successive grids. It is at most about one cell long,
+        because a longer patch contains nodes. It decreases the rms slope of the contact, because the slope is small
+        near a summit; the relative decrease is at most half the relative increase of the length.
         """
         drag, fraction, slope = results.T
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -1,8 +1,8 @@
 """Steady sliding of a solid over a line, in dimensionless quantities; a case is a pair of speed and load.
 
 Closed forms are used for a Kelvin solid on a smooth indenter or a smooth plane. If `oversampling` is "auto", a closed
-form is also used for full contact of any solid with a rough plane. All other cases are solved on finer and finer grids
-by :func:`mdr_dask.physics.refine.refine`, which estimates the errors. The solvers are:
+form is also used for full contact of any solid with a rough plane. All other cases are solved on finer and finer grids,
+by one of these solvers:
 
 * `node_to_node`, the fastest solver, for a Kelvin solid on a rough plane;
 * `steady` (sweeps over cubic cells) for a Kelvin solid under an indenter, and for cases in which `node_to_node` misses
@@ -56,21 +56,11 @@ class PronyTerms:
 class Request:
     """The requested accuracy or the given grid, and the requested results.
 
-    Parameters
-    ----------
-    accuracy : float
-        Allowed relative error of drag, contact fraction, contact slope and depth. If the depth is smaller than the rms
-        height, the error of the depth is divided by the rms height instead of the depth.
-    oversampling : int or "auto"
-        Nodes per Nyquist point; "auto" selects the smallest number that meets the accuracy.
-    scheme : {"hermite", "backward_euler"}
-        Scheme for a Kelvin solid: cubic cells, or the time steps of the papers.
-    with_errors : bool
-        Only used for a Kelvin solid on a given grid: whether to estimate the errors. In all other cases the errors are
-        always estimated.
-    contact : bool
-        Whether contact fraction and contact slope are requested. These two results need finer grids than the other
-        results.
+    `accuracy` is relative, as in `FLOORS`. `oversampling` is the number of nodes per Nyquist point; "auto" selects the
+    smallest number that meets the accuracy. The scheme for a Kelvin solid is "hermite" (cubic cells) or
+    "backward_euler" (the time steps of the papers). `with_errors` is only used for a Kelvin solid on a given grid; in
+    all other cases the errors are always estimated. `contact` states whether contact fraction and contact slope are
+    requested, which need finer grids than the other results. The errors of results that are not requested are infinite.
     """
 
     accuracy: float = 0.01
@@ -88,29 +78,14 @@ class Request:
 def solve(
     line: RoughLine, terms: PronyTerms | None, deborah: FloatArray, loads: FloatArray, request: Request
 ) -> tuple[Steady, FloatArray]:
-    """Return the steady states of a solid that slides over a line, and their errors.
+    """Return the steady states of a solid that slides over a line, and their errors, shape (4, cases).
 
-    Parameters
-    ----------
-    line : RoughLine
-        The line; positions are in units of its length, heights in any unit.
-    terms : PronyTerms or None
-        Prony terms of the solid; None for a Kelvin solid.
-    deborah : array, shape (cases,)
-        eta v / (G_inf L) of the dashpot. For a Kelvin solid this is the Deborah number v tau / L.
-    loads : array, shape (cases,)
-        F_N / (4 G_inf L), in the unit of height.
-    request : Request
-        Accuracy or grid. The grid is refined until all results of a case meet the accuracy. One result alone, such as
-        the drag, may be the same on two grids by chance.
+    Positions on the line are in units of its length. A Kelvin solid has no `terms`. The Deborah number is eta v /
+    (G_inf L) of the dashpot; for a Kelvin solid this is v tau / L. The load is F_N / (4 G_inf L), in the unit of
+    height.
 
-    Returns
-    -------
-    Steady
-        If a case does not meet the accuracy even on the finest grid, its results and errors are returned nevertheless.
-    array, shape (4, cases)
-        Estimated absolute discretisation errors of `Steady.columns`. The errors are infinite for a Kelvin solid on a
-        given grid if `with_errors` is False.
+    The errors are the absolute discretisation errors of `Steady.columns`, infinite if they are not estimated. A case
+    that misses the accuracy on the finest grid is returned with its errors.
     """
     cases = Cases(deborah, loads)
     if terms is not None:
@@ -158,10 +133,7 @@ def _to_accuracy(line: RoughLine, cases: Cases, request: Request) -> tuple[Stead
 
 
 def _swept(line: RoughLine, cases: Cases, request: Request, levels: tuple[int, ...], accuracy: float) -> Refined:
-    """Solve cases by sweeps over whole lines.
-
-    The search for the depth starts from the depth on the previous grid.
-    """
+    """Solve cases by sweeps over whole lines; the search for the depth starts from the depth on the previous grid."""
     depths = np.full(cases.loads.size, np.nan)
 
     def solve(level: int, some: IntArray) -> Solution:
@@ -185,8 +157,7 @@ def _on_grid(line: RoughLine, cases: Cases, request: Request, oversampling: int,
 def _write(results: tuple[FloatArray, FloatArray, NDArray[np.int8]], cases: IntArray, found: Refined) -> None:
     """Store the results of cases that have no results yet.
 
-    If a case has results already, the new results replace the old results in two situations: the new results meet the
-    accuracy, or their error of the drag is smaller.
+    Older results are replaced if the new results meet the accuracy, or if their error of the drag is smaller.
     """
     columns, errors, status = results
     better = (status[cases] != Outcome.CONVERGED) | found.met | (found.errors[0] < errors[0, cases])
@@ -202,10 +173,7 @@ def _steady(found: Refined) -> tuple[Steady, FloatArray]:
 def _in_full_contact(
     line: RoughLine, terms: PronyTerms, cases: Cases
 ) -> tuple[FloatArray, FloatArray, NDArray[np.int8]]:
-    """Return results, errors and status of cases on a plane.
-
-    If the contact of a case is not full, its status is `Outcome.INVALID`.
-    """
+    """Return results, errors and status of cases on a plane; without full contact the status is `Outcome.INVALID`."""
     pairs = tuple(zip(terms.moduli, terms.deborah, strict=True))
     full = steady_full_contact(line, pairs, cases)
     errors = ROUNDING * np.abs(full.columns)

@@ -67,8 +67,8 @@ def _begin(trail: FloatArray, depth: float, load: float) -> None:
 def _follow(sums: FloatArray, depth: float, deborah: float, trail: FloatArray) -> None:
     """Update a `trail` (see `TRAIL`) after a sweep at a depth.
 
-    The derivative of the slope is computed from the last two sweeps. If the Deborah number has changed since the last
-    sweep, the derivative is not changed, because the derivative hardly depends on the Deborah number.
+    The derivative of the slope follows from the last two sweeps. It hardly depends on the Deborah number, and is not
+    changed if the Deborah number is new.
     """
     carried = sums[DISPLACEMENT]
     load, slope = np.log(carried), carried / (sums[STIFFNESS] * depth)
@@ -101,13 +101,11 @@ def _solve(
 ) -> tuple[float, bool]:
     """Return the largest lattice depth at which the carried load is at most `load`, and whether the depth was found.
 
-    The sums at this depth are written to `sums`.
-
-    The carried load is a convex, increasing function of the depth. Therefore the depth at which a tangent of this
-    function reaches `load` is an upper bound of the solution. Another upper bound is the depth at which full contact
-    carries the load. The search may end at a lattice depth if two conditions are met: the carried load is at most
-    `load`, and the tangent reaches `load` before the next lattice depth. The next lattice depth then carries more than
-    `load`. The result is the same for every guess in `trail`, because only one lattice depth is the largest.
+    The carried load is a convex, increasing function of the depth. Therefore the depth at which a tangent reaches
+    `load` is an upper bound of the solution, and so is the depth at which full contact carries the load. The search
+    ends at a lattice depth that carries at most `load` if the tangent reaches `load` before the next lattice depth. The
+    result does not depend on the guess in `trail`, because only one lattice depth is the largest. `sums` receives the
+    sums at this depth.
     """
     cells, blocks, barriers, mean = line
     low, high = 0.0, np.inf
@@ -156,9 +154,9 @@ def _states(
 ) -> None:
     """Solve cases on one line at one Deborah number, in ascending order of the load.
 
-    The columns of `results` are in the order of `cases.COLUMNS`. The search for the depth of a case starts from the
-    guess for this case. If the guess is NaN, the search starts from the trail of the previous case; for the first case
-    this is the trail `first`. Afterwards, `first` contains the trail of the first case that was solved.
+    The columns of `results` are in the order of `cases.COLUMNS`. The search for the depth starts from the guess for the
+    case, or, if the guess is NaN, from the trail of the previous case. The first case starts from the trail `first`,
+    which is replaced by the trail of the first case that was solved.
     """
     (cells, _, _, _), (deborahs, loads) = line, cases
     n, places = cells.mean.size - 1, places_for(0)
@@ -238,15 +236,9 @@ def steady_on_cells(
 def stepped_sliding(line: CubicLine, deborah: FloatArray, loads: FloatArray, contact: bool = True) -> Steady:
     """Return the steady states by backward Euler, the time-stepping method of the papers.
 
-    Only the heights of the nodes are used. In each time step the body travels one cell. The method is of first order in
-    the length of a cell.
-
-    Parameters
-    ----------
-    line, deborah, loads
-        As in :func:`steady_sliding`.
-    contact : bool
-        Whether contact fraction and contact slope are computed, which takes extra time.
+    The arguments are those of `steady_sliding`. Only the heights of the nodes are used. In each time step the body
+    travels one cell; the method is of first order in this length. Contact fraction and contact slope take extra time,
+    and are computed only if `contact` is True.
     """
     return _solved(line, deborah, loads, lambda _, cases: _stepped(line, cases, contact))
 
@@ -297,10 +289,10 @@ def _swept(cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray) -> t
 def _is_lost(cases: Cases, near: FloatArray, depth: FloatArray) -> NDArray[np.bool_]:
     """Return for each case whether rounding errors dominate.
 
-    Rounding errors dominate if the line rises very little from the place where contact begins to the highest point.
+    They do if the line rises very little from the place where contact begins to the highest point.
 
-    If the dashpots carry the load, the rise is F_N / (4 G dx) divided by v tau / dx. `near` contains the heights of the
-    two nodes next to the highest point, relative to the highest point.
+    If the dashpots carry the load, this rise is F_N / (4 G dx) divided by v tau / dx. `near` contains the heights of
+    the two nodes next to the highest point, relative to the highest point.
     """
     fall = -np.min(near)
     with np.errstate(over="ignore"):

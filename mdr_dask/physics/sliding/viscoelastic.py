@@ -1,9 +1,8 @@
 """Steady sliding of any linear viscoelastic foundation along a rough line or under an indenter.
 
-The module `viscoelastic_sweep` moves an element once along the line. This module finds the depth by Newton's method.
 The stretch of Prony term m is e_m = u - a_m, where u is the displacement of the element and a_m the displacement of the
-dashpot of the term. On a periodic line the stretches must repeat after one period. Newton's method then also finds the
-stretches at the start of the line.
+dashpot of the term. Newton's method finds the depth. On a periodic line it also finds the stretches at the start of the
+line, which must repeat after one period.
 """
 
 from __future__ import annotations
@@ -36,17 +35,9 @@ DRAG, DEPTH, FRACTION, SLOPE = range(4)
 class ViscoelasticSteady:
     """A steady state; if the solver did not converge, all values are NaN.
 
-    Parameters
-    ----------
-    values : array, shape (4,)
-        F_x / (4 G_inf), in the unit of height squared; penetration of the mean line (for an indenter: of the points of
-        height 0); fraction of the line in contact; rms slope of the part of the line in contact.
-    errors : array, shape (4,)
-        Estimated absolute discretisation errors of the values.
-    status : Outcome
-        How the solver ended.
-    sweeps : int
-        Number of sweeps on the finest line.
+    The four values are F_x / (4 G_inf), in the unit of height squared; penetration of the mean line (for an indenter:
+    of the points of height 0); fraction of the line in contact; and rms slope of the part of the line in contact. The
+    errors are absolute discretisation errors, and `sweeps` is the number of sweeps on the finest line.
     """
 
     values: FloatArray
@@ -106,13 +97,7 @@ def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float
 
 
 class ViscoelasticCase:
-    """One case, solved on finer and finer lines; each line has twice as many cells as the previous one.
-
-    Parameters
-    ----------
-    solid, load
-        As in :func:`steady_viscoelastic_sliding`.
-    """
+    """One case, solved on finer and finer lines; each line has twice as many cells as the previous one."""
 
     def __init__(self, solid: LinearSolid, load: float) -> None:
         if not (np.isfinite(load) and load > 0):
@@ -125,21 +110,9 @@ class ViscoelasticCase:
         self.sweeps = 0
 
     def on(self, height: FloatArray, periodic: bool) -> Solution:
-        """Solve the case on the next finer grid.
+        """Solve the case on the next finer grid; all results except the first are extrapolated from the last two grids.
 
-        On all grids except the first, the result is extrapolated from this grid and the previous grid.
-
-        Parameters
-        ----------
-        height : array, shape (nodes,)
-            Heights. A periodic line begins and ends at its highest node, which must be a node of every grid.
-        periodic : bool
-            Whether the line is periodic.
-
-        Returns
-        -------
-        Solution
-            The four results of the case.
+        A periodic line begins and ends at its highest node, which must be a node of every grid.
         """
         cells = height.size - 1
         summit = float(np.max(height))
@@ -167,8 +140,8 @@ class ViscoelasticCase:
     ) -> tuple[Outcome, FloatArray, FloatArray]:
         """Solve the case on one grid; return the outcome, the state and the four results.
 
-        The search starts from the state `start` on the previous grid. If `start` is None, the search starts from the
-        static contact. The computed depth is the penetration of the highest node.
+        The computed depth is the penetration of the highest node. The search starts from the state `start` on the
+        previous grid, or from the static contact.
         """
         terms, cells = solid.moduli.size, below.size - 1
         if start is None or start.size != terms + 1:
@@ -189,8 +162,7 @@ def _travelling(solid: LinearSolid, cell: float) -> Travelling:
     """Return a solid with lengths in cells and stresses divided by the static modulus.
 
     The dashpot, and all Prony terms that relax within a very small fraction of a cell, are replaced by one Prony term
-    with a very short relaxation time. The viscosity of this term is the sum of the viscosities of the dashpot and of
-    the replaced terms.
+    with a very short relaxation time and the same viscosity.
     """
     static = solid.static_modulus
     fast = solid.times < SHORTEST * cell
@@ -205,17 +177,10 @@ def _travelling(solid: LinearSolid, cell: float) -> Travelling:
 
 
 class Swept(NamedTuple):
-    """The contacts and free recoveries (pieces) of a sweep, and the solid.
+    """The solid, and the alternating free recoveries and contacts (pieces) of a sweep.
 
-    Parameters
-    ----------
-    decayed : array, shape (pieces, terms)
-        1 - exp(-length / decay length). In a free recovery the decay lengths belong to the recovery modes, and in a
-        contact to the Prony terms.
-    lengths : array, shape (pieces,)
-        Lengths of the pieces, as in `Passage`: free recoveries and contacts alternate.
-    solid : Travelling
-        The solid.
+    `decayed`, shape (pieces, terms), is 1 - exp(-length / decay length). The decay lengths belong to the recovery modes
+    in a free recovery, and to the Prony terms in a contact. The lengths are those of `Passage`.
     """
 
     decayed: FloatArray
@@ -229,23 +194,10 @@ def follow(
 ) -> None:  # pragma: no cover
     """Multiply the matrix of derivatives of a Newton step by given changes of the unknowns.
 
-    The product contains the resulting changes of two kinds of integrals over the line: of the stretches e_m, and of u.
-    The changes are propagated through contacts and free recoveries of fixed lengths, which is a linear problem. In fact
-    the places where contact begins and ends shift as well. The effect of this shift is of second order, because u is
-    continuous at these places.
-
-    Parameters
-    ----------
-    direction : array, shape (terms + 1,)
-        Changes of the stretches e_m at the start of the line, and change of the depth.
-    swept : Swept
-        Contacts and free recoveries.
-    periodic : bool
-        Whether the line is periodic; otherwise the recovery behind the line is included.
-    product : array, shape (terms + 1,), output
-        Changes of the integrals of e_m, and of the integral of u.
-    workspace : array, shape (3, terms)
-        Overwritten.
+    The entries of `direction` are changes of the stretches e_m at the start of the line, and of the depth. `product`
+    receives the changes of the integrals of e_m, and of u. The places where contact begins and ends are kept fixed,
+    because u is continuous there and their shift is of second order. If the line is not periodic, the recovery behind
+    the line is included. `workspace`, shape (3, terms), is overwritten.
     """
     decayed, lengths, solid = swept
     moduli, deborah, times, stretch_of, amplitude_of = solid
@@ -278,9 +230,9 @@ def follow(
 
 @jit
 def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: float) -> None:  # pragma: no cover
-    """Change the strain suddenly to the value at which the stress is 0, as at the start of free recovery.
+    """Propagate a change of state through the sudden change of strain to zero stress, at the start of free recovery.
 
-    The strains of the dashpots stay the same. Each quantity in this function is a change that `follow` propagates.
+    The strains of the dashpots stay the same.
     """
     if stretch.size == 0:
         return
@@ -311,20 +263,10 @@ def newton_step(
 ) -> None:  # pragma: no cover
     """Solve the linear system of a Newton step on a periodic line by the method of generalised conjugate residuals.
 
-    Each row of the matrix of derivatives is divided by its entry of `scale`. The matrix is then the identity plus an
-    operator whose entries are smooth functions of the relaxation times. The singular values of such an operator
-    decrease fast, so that four to seven products of the matrix and a vector are enough for any number of terms.
-
-    Parameters
-    ----------
-    residual, scale : array, shape (n,)
-        `residual` contains the required changes of the integrals of e_m and of u, `scale` the magnitudes of the
-        derivatives of these integrals; n is terms + 1. The residual is overwritten.
-    swept : Swept
-        Contacts and free recoveries.
-    workspace : array, shape (3, n - 1)
-        The workspace of `follow`.
-    step : array, shape (n,), output
+    `residual`, which is overwritten, contains the required changes of the integrals of e_m and of u, and `scale` the
+    magnitudes of their derivatives. With every row divided by its scale, the matrix is the identity plus an operator
+    whose entries are smooth functions of the relaxation times. Its singular values decrease fast, so that four to seven
+    products of the matrix and a vector are enough for any number of terms.
     """
     n = residual.size
     directions, products, norms = np.empty((n, n)), np.empty((n, n)), np.empty(n)
@@ -361,11 +303,7 @@ def _dot(one: FloatArray, other: FloatArray) -> float:  # pragma: no cover
 
 @jit
 def static_depth(profile: FloatArray, strain_area: float) -> float:  # pragma: no cover
-    """Return the depth at which the sum of the penetrations of all nodes in contact is `strain_area`.
-
-    A node is in contact if its penetration depth + profile is positive. Newton's method approaches the depth from
-    above.
-    """
+    """Return the depth at which the sum of all positive penetrations depth + profile is `strain_area`."""
     depth = 0.0
     for value in profile:
         depth -= value
@@ -399,34 +337,15 @@ def solve_sliding(
     """Find the depth at a given load, and on a periodic line also the stretches that repeat after one period.
 
     In the steady state the integral of the stress is equal to the integral of u, so that the load prescribes the
-    integral of u. At every place the displacement is the larger of two functions of the unknowns: the penetration and
-    the displacement of a free element. Both functions are convex and increasing, and so is the displacement. Therefore,
-    after the first step, Newton's method approaches the solution from above.
+    integral of u: `strain_area` = F_N / (4 G_inf dx). The displacement is a convex, increasing function of the
+    unknowns. Therefore, after the first step, Newton's method approaches the solution from above. The iteration ends
+    after a step of at most `tolerance` times the depth.
 
-    Parameters
-    ----------
-    profile : array, shape (nodes,)
-        Heights relative to the highest node, positive towards the elastomer. The first and the last node of a periodic
-        line are both the highest node.
-    strain_area : float
-        F_N / (4 G_inf dx) with the length dx of a cell. This is the required integral of u over the line, with lengths
-        in cells.
-    periodic : bool
-        Whether the line is periodic. On any other line, elements enter undeformed and recover behind the end of the
-        line, so that the depth is the only unknown.
-    solid : Travelling
-        The solid.
-    tolerance : float
-        The iteration ends after a step of at most `tolerance` times the depth.
-    unknown : array, shape (terms + 1,), input and output
-        First guess, replaced by the solution: the stretches e_m at the first node, then the depth.
-    totals : array, shape (6,), output
-        See `sweep_line`.
-
-    Returns
-    -------
-    converged, sweeps, inside : bool, int, bool
-        `inside` is False if an element is in contact at the end of a line that is not periodic.
+    Heights are relative to the highest node, which is the first and the last node of a periodic line. On any other
+    line, elements enter undeformed and recover behind the end of the line, so that the depth is the only unknown.
+    `unknown` contains the stretches e_m at the first node, then the depth: first guesses, replaced by the solution.
+    `totals` is that of `Passage`. The results are: whether the method converged, the number of sweeps, and False if an
+    element is in contact at the end of a line that is not periodic.
     """
     moduli, deborah, times = solid.moduli, solid.deborah, solid.times
     terms, nodes = moduli.size, profile.size

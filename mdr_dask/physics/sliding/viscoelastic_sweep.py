@@ -1,10 +1,8 @@
 """Exact sweep of a linear viscoelastic foundation along a line of straight cells.
 
-Lengths are in cells of the length dx, and stresses are divided by the static modulus. In contact, the displacement u of
-an element is equal to the penetration w. The stretch of Prony term m is e_m = u - a_m, where a_m is the displacement of
-the dashpot of this term. The stretch obeys de_m/ds = du/ds - e_m / deborah_m, with deborah_m = tau_m v / dx and the
-travelled distance s. In contact the stretches have closed forms. A free element recovers as a sum of exponential modes.
-Contact can begin and end at any place inside a cell.
+Lengths are in cells, and stresses are divided by the static modulus. The stretch e_m of Prony term m obeys de_m/ds =
+du/ds - e_m / deborah_m, with deborah_m = tau_m v in cells and the travelled distance s. In contact, u is the
+penetration w, and the stretches have closed forms. A free element recovers as a sum of exponential modes.
 """
 
 from __future__ import annotations
@@ -22,16 +20,10 @@ CLOSED, OPEN_END = 0, 1
 class Travelling(NamedTuple):
     """A sliding solid and its recovery modes; stresses are divided by the static modulus, lengths by that of a cell.
 
-    Parameters
-    ----------
-    moduli, deborah : array, shape (terms,)
-        G_m / G_inf and the Deborah number tau_m v / dx of the Prony terms, in ascending order of the Deborah number.
-    times : array, shape (terms,)
-        Decay lengths of the recovery modes, in cells.
-    stretch_of, amplitude_of : array, shape (terms, terms)
-        Row k of `stretch_of` contains the stretches of all Prony terms if recovery mode k has the strain 1 and all
-        other modes are zero. Row m of `amplitude_of` contains the strains of all recovery modes if Prony term m has the
-        stretch 1 and all other stretches are zero.
+    The Prony terms are in ascending order of the Deborah number tau_m v / dx. `times` are the decay lengths of the
+    recovery modes. Row k of `stretch_of` contains the stretches of all Prony terms if recovery mode k alone has the
+    strain 1. Row m of `amplitude_of` contains the strains of all recovery modes if Prony term m alone has the stretch
+    1.
     """
 
     moduli: FloatArray
@@ -55,10 +47,10 @@ def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> No
 def step_factors(
     length: float, deborah: FloatArray, decay: FloatArray, gain: FloatArray, area: FloatArray
 ) -> None:  # pragma: no cover
-    """Write the factors `decay`, `gain` and `area` of every Prony term over a straight piece of the line.
+    """Write the factors `decay`, `gain` and `area` of every Prony term over a straight piece of the given length.
 
-    The piece has the given length and a constant slope. If the stretch is e at the start of the piece, it is decay * e
-    + gain * slope at the end. The integral of the stretch over the piece is gain * e + area * slope.
+    From the stretch e at the start of the piece follow the stretch decay * e + gain * slope at its end, and the
+    integral of the stretch gain * e + area * slope.
     """
     for m in range(deborah.size):
         x = length / deborah[m]
@@ -114,8 +106,8 @@ def contact_point(
 ) -> float:  # pragma: no cover
     """Return the place t where a free element meets the straight line start + slope (t - low), with low <= t <= high.
 
-    Newton's method converges from `low` without overshooting, because the strain of a free element is a convex function
-    of t.
+    The strain of a free element is a convex function of t. Newton's method therefore converges from `low` without
+    overshooting.
     """
     point = low
     for _ in range(60):
@@ -150,15 +142,12 @@ def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[f
 def _next_contact(
     place: float, node: int, modes: FloatArray, times: FloatArray, penetration: FloatArray, last: int
 ) -> float:  # pragma: no cover
-    """Return the position where a free element meets the line again, or -1 if the element stays free.
+    """Return the position where an element that is free from `place` on meets the line again, or -1.
 
-    The element is free from the position `place` on. The search begins in the cell that ends at `node`. If contact has
-    ended inside a cell, the search must begin in the next cell. The reason: the strain of the element is a convex
-    function, and after its separation from a straight cell it does not meet the same cell again.
-
-    The logarithm of a sum of decaying exponentials is convex. An exponential function that is tangent to the sum is
-    therefore a lower bound of the sum. Nodes whose penetration is below this bound are skipped, and the sum is not
-    evaluated there.
+    The search begins in the cell that ends at `node`. After contact has ended inside a cell this must be the next cell,
+    because the strain is convex and does not meet the same straight cell again. The logarithm of a sum of decaying
+    exponentials is convex as well, so that a tangent exponential is a lower bound of the strain. Nodes below this bound
+    are skipped.
     """
     strain, rate = _strain_of(0.0, modes, times)
     bound = strain
@@ -182,16 +171,10 @@ def _next_contact(
 class Passage(NamedTuple):
     """The results of a sweep.
 
-    Parameters
-    ----------
-    lengths : array, shape (>= 2 nodes + 2,)
-        Lengths of free recoveries and contacts, which alternate. The first entry is the length of a free recovery and
-        may be 0.
-    imbalance : array, shape (terms,)
-        Integral of e_m over the line.
-    totals : array, shape (6,)
-        Integral of u; integral of the stress; integral of the stress times the slope; length in contact; integral of
-        slope^2 over the length in contact; integral of u behind the end of the line.
+    `lengths`, with at least 2 nodes + 2 entries, are the alternating lengths of free recoveries and contacts; the first
+    is that of a free recovery and may be 0. `imbalance` contains the integral of each e_m over the line. The six
+    entries of `totals` are: integral of u; integral of the stress; integral of the stress times the slope; length in
+    contact; integral of slope^2 over the length in contact; integral of u behind the end of the line.
     """
 
     lengths: FloatArray
@@ -208,29 +191,12 @@ def sweep_line(
     passage: Passage,
     workspace: FloatArray,
 ) -> tuple[int, int]:  # pragma: no cover
-    """Move an element once along the line.
+    """Move an element once along the line, and write the lengths and integrals to `passage`.
 
-    The lengths of contacts and free recoveries, and the integrals, are written to `passage`.
-
-    Parameters
-    ----------
-    penetration : array, shape (nodes,)
-        Penetration w at each node. The last node of a periodic line is the same point as the first node.
-    start : array, shape (terms,)
-        Stretches e_m at the first node, for an element whose displacement is the penetration there. Not used if
-        `undeformed` is True.
-    solid : Travelling
-        The solid.
-    undeformed : bool
-        Whether the elements enter undeformed and out of contact.
-    passage : Passage, output
-    workspace : array, shape (10, max(terms, 1))
-
-    Returns
-    -------
-    pieces, end : int
-        Number of lengths that were written. The value `end` is CLOSED if the element is free at the last node, and
-        OPEN_END if the element is in contact at the last node.
+    `start` contains the stretches e_m at the first node, for an element whose displacement is the penetration there. If
+    `undeformed` is True, elements enter undeformed and out of contact instead. `workspace` has the shape (10,
+    max(terms, 1)). Return the number of lengths, and whether the element is free (CLOSED) or in contact (OPEN_END) at
+    the last node.
     """
     # local names, because reading an array from a tuple takes more time than computing a cell
     moduli, deborah, times, stretch_of, amplitude_of = solid
@@ -285,12 +251,9 @@ def _contact(
 ) -> tuple[float, float, float, bool]:  # pragma: no cover
     """Move an element in contact from `begin` until the stress falls to zero or the line ends; see `sweep_line`.
 
-    Returns
-    -------
-    place, strain, pressure, left
-        The place where the contact or the line ends; the strain and the remaining stress at this place; True if the
-        contact ends, False if the line ends. The stretches are written to ``workspace[0]``. The next contact begins in
-        the next cell at the earliest. The index of the node at the end of that cell is ``workspace[2, 0]``.
+    Return the place, strain and remaining stress there, and True if the contact ends, False if the line ends. The
+    stretches are written to ``workspace[0]``. The node at which the search for the next contact begins is
+    ``workspace[2, 0]``.
     """
     terms, last = moduli.size, penetration.size - 1
     e, following = workspace[0], workspace[9]
@@ -372,7 +335,7 @@ def _add_recovery(
     imbalance: FloatArray,
     totals: FloatArray,
 ) -> None:  # pragma: no cover
-    """Advance the modes over a free recovery of the given length.
+    """Advance the modes over a free recovery.
 
     The integral of u is added to `totals`, the integrals of the stretches are added to `imbalance`, and the final
     stretches are written to `e`.

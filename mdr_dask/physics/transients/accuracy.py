@@ -1,10 +1,9 @@
 """Velocity jumps solved to a requested accuracy, with estimated errors.
 
 The steady states before and after a jump, and the instant of the jump, are solved on finer and finer grids
-(:mod:`mdr_dask.physics.refine`). The transient between them is marched on one grid. The transient is the difference
-between the march and the steady state on the grid of the march. This difference is added to the accurate steady state.
-The transient is therefore accurate even if it is much smaller than the friction. The error of the transient is
-estimated by a second march on half as many nodes with half as many steps.
+(:mod:`mdr_dask.physics.refine`). The transient is the difference between a march on one grid and the steady state on
+the same grid, added to the accurate steady state. It is therefore accurate even if it is much smaller than the
+friction. Its error is estimated by a second march on half as many nodes with half as many steps.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ TRANSIENT = SAFETY
 class Levels(NamedTuple):
     """Steady drag before the jump, change of the drag at the jump, steady drag and steady depth after the jump.
 
-    Each array has the shape (cases,). The same class holds the errors of these quantities.
+    The same class holds the errors of these quantities.
     """
 
     before: FloatArray
@@ -49,20 +48,10 @@ class Levels(NamedTuple):
 class Jumps(NamedTuple):
     """Results of the velocity jumps on a line.
 
-    Drags are F_x / (4 G L h) in units of h / L, and depths are in units of h, where h is the unit of height.
-
-    Parameters
-    ----------
-    levels, errors : Levels
-        Steady drags and depths, and their estimated absolute errors.
-    trace, depth : array, shape (cases, times)
-        Drag and depth at the requested times: the steady value after the jump plus the transient of the march.
-    trace_error, depth_error : array, shape (cases, times)
-        Estimated absolute errors of `trace` and `depth`; NaN if they are not requested.
-    contact : array, shape (cases,)
-        Fraction of the line in contact in steady sliding, before or after the jump, whichever is larger.
-    outcome : array, shape (cases,)
-        Values of `Outcome`.
+    Drags are F_x / (4 G L h) in units of h / L, and depths are in units of h, where h is the unit of height. `trace`
+    and `depth`, shape (cases, times), are drag and depth at the requested times. All errors are absolute; those of
+    `trace` and `depth` are NaN if they are not requested. `contact` is the fraction of the line in contact in steady
+    sliding, before or after the jump, whichever is larger.
     """
 
     levels: Levels
@@ -86,25 +75,11 @@ def solve_jumps(
 ) -> Jumps:
     """Return the velocity jumps on a line.
 
-    The steady limits have the requested accuracy; the transient is computed on the grid of the march.
-
-    Parameters
-    ----------
-    line : RoughLine
-    loads : array, shape (cases,)
-        F_N / (4 G L h), where h is the unit of height.
-    deborah : array, shape (cases, 2)
-        v_1 tau / L and v_2 tau / L.
-    accuracy : float or None
-        Allowed relative error of the quantities in `Levels`. If a depth is smaller than h, the error of the depth is
-        relative to h. If `accuracy` is None, the steady states are solved on one grid only, the grid of the march. No
-        error estimates can then be requested.
-    oversampling : int
-        Nodes per Nyquist point in the march, an even number; the steady states use at least as many nodes.
-    march : MarchRequest or None
-        Times and accuracy of the march; None if the transient is not requested.
-    with_errors : bool
-        Whether to estimate the error of the transient. This requires an accuracy.
+    Loads are F_N / (4 G L h), where h is the unit of height. `deborah`, shape (cases, 2), contains v_1 tau / L and v_2
+    tau / L. The accuracy is relative; for depths below h it is relative to h. Without an accuracy, the steady states
+    are solved on the grid of the march only, and no errors can be requested. `oversampling` is the number of nodes per
+    Nyquist point in the march, an even number; the steady states use at least as many. Without a `march`, the transient
+    is not computed. `with_errors` states whether the error of the transient is estimated.
     """
     cases, grid = loads.size, oversampling
     guesses = np.full((cases, 2), np.nan)
@@ -151,10 +126,7 @@ def solve_jumps(
 
 
 def _left_out(jump: Jump, limits: SteadyLimits, request: MarchRequest) -> FloatArray:
-    """Return the errors of drag and depth of a jump that was not marched.
-
-    The errors are the neglected changes of drag and depth. In full contact they are 0.
-    """
+    """Return the errors of drag and depth of a jump that was not marched: the neglected changes."""
     changes = np.array([jump.left_out, abs(limits.depth[1] - limits.depth[0]) if jump.left_out > 0 else 0.0])
     return np.repeat(changes[:, None], request.times.size, axis=1)
 
@@ -162,11 +134,10 @@ def _left_out(jump: Jump, limits: SteadyLimits, request: MarchRequest) -> FloatA
 def _change(
     fine: Path, limits: SteadyLimits, coarse: Path | None, others: SteadyLimits, times: FloatArray
 ) -> FloatArray:
-    """Return the largest differences of drag and of depth between two paths from each given time to the end.
+    """Return the largest differences of drag and of depth between two paths, from each given time to the end.
 
-    The paths are the same march on two grids. The steady state on the same grid is subtracted from each path. The paths
-    are compared at the given times and at all time steps of the fine path. If there is no path on the coarse grid, the
-    differences are infinite.
+    The paths are the same march on two grids. The steady state on the same grid is subtracted from each path. If there
+    is no path on the coarse grid, the differences are infinite.
     """
     if coarse is None:
         return np.full((2, times.size), np.inf)

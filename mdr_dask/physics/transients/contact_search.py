@@ -1,28 +1,11 @@
 """Find the contact patches at one instant after a velocity jump.
 
-The search visits the cells of the line one by one. The search starts at the highest point and follows the direction in
-which the elements move. It records where contact last ended and where free elements may have separated
-(`FreeRecovery`). The force on an element in contact is lift + h + D h'. Here h is the height of the line, D is the
-Deborah number v tau in cells, and the lift is the sum of the depth and the rate of the depth. In each cell that is
-examined:
-
-* Inside a patch, contact ends where the force falls through zero, or where free elements arrive with a displacement
-  larger than the depth plus the height of the line (contact is then lost although the contact force is positive).
-* Outside a patch, contact begins where the line rises above the free elements and the force would be positive.
-
-When the end of a patch is found, the forces on the patch are added to the total load and drag. Most cells can be
-skipped because of three bounds. The bounds are rigorous, so that no contact is missed.
-
-* A cell in contact is skipped if two conditions are met. First, the elements that are now further along the line were
-  under a positive force while they passed the cell. Second, the displacement u of free elements cannot exceed
-  w = depth + h in the cell. Along the line u' = (drift - u) / D, so that u stays below w wherever w + D h' exceeds the
-  largest drift (see `free_recovery`).
-* A cell out of contact is skipped if depth + h is smaller everywhere in the cell than a lower bound of the displacement
-  of the free elements. The bound is computed along the line from the last known displacement and the least drift.
-* A cell out of contact is also skipped if its gap is wider than any gap that can have opened since the free elements
-  separated. In this case there was a gap in the cell all the time. The cell is skipped until the line has approached by
-  the width of the gap. The gap closes at most at the rate of the depth plus the largest drift. The integral of this
-  rate over time is called the *approach*.
+The search visits the cells of the line in the direction in which the elements move, from the highest point on. The
+force on an element in contact is lift + h + D h'. Here h is the height of the line, D is the Deborah number v tau in
+cells, and the lift is the sum of the depth and the rate of the depth. Contact ends where the force falls through zero,
+or where free elements arrive with a displacement larger than the depth plus the height of the line. Contact begins
+where the line rises above the free elements and the force would be positive. Most cells are skipped because of bounds
+(`_skip_pressed`, `_skip_free`); the bounds are rigorous, so that no contact is missed.
 
 Free elements may pass the highest point without contact, and travel more than a whole period of the line. If there may
 be such elements, the search is repeated with the places of separation of the previous period.
@@ -86,14 +69,10 @@ APPROACH, LARGEST, TIME, DEPTH, DRIFT = range(5)
 
 
 class Reachable(NamedTuple):
-    """The cells in which elements can be in contact at depths between two limits.
+    """Runs of cells in which contact is possible at depths between two limits.
 
-    Parameters
-    ----------
-    runs : int array, shape (m, 2)
-        First and last node of each run of cells in which contact is possible.
-    second : float
-        Largest height outside the patch that contains the highest point of the line.
+    Each row of `runs` contains the first and the last node of a run. `second` is the largest height outside the patch
+    that contains the highest point of the line.
     """
 
     runs: IntArray
@@ -101,14 +80,10 @@ class Reachable(NamedTuple):
 
 
 class SkipBounds(NamedTuple):
-    """For each cell out of contact, the approach (defined above) up to which the cell can be skipped.
+    """For each cell out of contact, the approach (see `_skip_free`) up to which the cell can be skipped.
 
-    Parameters
-    ----------
-    skip_until : array, shape (n + 2,)
-        For each cell, the approach up to which the cell is certainly out of contact.
-    state : array, shape (5,)
-        Approach so far, the largest entry of `skip_until`, and time, depth and largest drift at the last search.
+    The entries of `state` are: approach so far, the largest entry of `skip_until`, and time, depth and largest drift at
+    the last search.
     """
 
     skip_until: FloatArray
@@ -116,23 +91,12 @@ class SkipBounds(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Work arrays of a search, and its results.
+    """Work arrays of a search, and its results: the patches, and the sums over the patches with their derivatives.
 
-    Parameters
-    ----------
-    start, end : array
-        Places where the patches begin and end.
-    sums : array, shape (SUMS,)
-        Sums over the patches, and their derivatives.
-    scan : array
-        State of the search, in this order: place where the current patch begins; place where contact last ended; place
-        up to which contact is certain; limit of the barrier (a cell in contact can be skipped if the barrier of the
-        cell is below this limit); place up to which this limit is valid; and least displacement of free elements at the
-        end of the previous cell.
-    recovery : FreeRecovery
-    skip : SkipBounds
-    barriers : Barriers
-        Barriers of the cells at the Deborah number after the jump.
+    The entries of `scan` are: place where the current patch begins; place where contact last ended; place up to which
+    contact is certain; limit of the barrier (a cell in contact can be skipped if its barrier is below this limit);
+    place up to which this limit is valid; and least displacement of free elements at the end of the previous cell. The
+    barriers of the cells belong to the Deborah number after the jump.
     """
 
     start: FloatArray
@@ -145,7 +109,7 @@ class Workspace(NamedTuple):
 
 
 def workspace_for(patches: int, barriers: Barriers, below: FloatArray) -> Workspace:
-    """Return a workspace with a capacity of four times the given number of patches, plus 4096.
+    """Return a workspace for four times the given number of patches, plus 4096.
 
     For each cell, `below` is the increase of the depth up to which the cell certainly stays out of contact.
     """
@@ -161,16 +125,9 @@ def workspace_for(patches: int, barriers: Barriers, below: FloatArray) -> Worksp
 class Motion(NamedTuple):
     """Changes of the depth up to an instant.
 
-    Parameters
-    ----------
-    rise : float
-        Largest mean rate of the lift from an earlier moment until now, among all earlier moments.
-    fall : float
-        Largest rate at which the lift has fallen from one moment to the next.
-    deepest, highest : float
-        Largest depth and largest lift so far.
-    passes_top : bool
-        Whether free elements may have passed the highest point of the line without contact.
+    `rise` is the largest mean rate of the lift from an earlier moment until now, and `fall` the largest rate at which
+    the lift has fallen from one moment to the next. `deepest` is the largest depth and `highest` the largest lift so
+    far. `passes_top` is True if free elements may have passed the highest point of the line without contact.
     """
 
     rise: float
@@ -181,10 +138,7 @@ class Motion(NamedTuple):
 
 
 class Search(NamedTuple):
-    """Quantities that are constant during a search: the instant, its depth and lift, and the arrays that are written.
-
-    `n` is the number of cells of the line.
-    """
+    """Quantities that are constant during a search, and the arrays that are written; the line has n cells."""
 
     now: Instant
     motion: Motion
@@ -195,21 +149,11 @@ class Search(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """A cell that is examined.
+    """Cell i of the line, with the coefficients of the cubic that is the height of the line.
 
-    Parameters
-    ----------
-    i : int
-    line : tuple of float
-        Coefficients of the cubic that is the height of the line in the cell.
-    stop : float
-        End of the cell, or of the period if the period ends in this cell.
-    pressed : bool
-        Whether the force on elements in contact would be positive everywhere in the cell.
-    weak : bool
-        Whether this force may have been negative at an earlier moment.
-    separated : bool
-        Whether elements may have separated in the cell although the force is positive now.
+    `stop` is the end of the cell, or of the period if the period ends in this cell. `pressed` is True if the force on
+    elements in contact would be positive everywhere in the cell; `weak`, if it may have been negative at an earlier
+    moment; `separated`, if elements may have separated in the cell although the force is positive now.
     """
 
     i: int
@@ -222,24 +166,12 @@ class Cell(NamedTuple):
 
 @jit_uncounted
 def find_contact(now: Instant, reachable: Reachable, work: Workspace) -> int:
-    """Find the contact patches at an instant, and add up their forces.
+    """Find the contact patches at the last moment of the history; return their number, or `FULL`.
 
-    The depth and the rate of the depth are the last ones of the history.
-
-    Parameters
-    ----------
-    now : Instant
-    reachable : Reachable
-        Its runs must contain all patches at this depth.
-    work : Workspace
-        The patches and `sums` are written to it. The sums are: load and drag, divided by 4 G dx; length in contact;
-        integral of the slope over the length in contact; derivatives of load and drag with respect to the depth; and
-        the rates at which load and drag change because patches grow.
-
-    Returns
-    -------
-    int
-        Number of patches, or `FULL`.
+    The runs must contain all patches at this depth. The patches and their `sums` are written to the workspace. The sums
+    are: load and drag, divided by 4 G dx; length in contact; integral of the slope over the length in contact;
+    derivatives of load and drag with respect to the depth; and the rates at which load and drag change because patches
+    grow.
     """
     last, recovery = now.history.count - 1, work.recovery
     motion = _motion_until(now, reachable.second)
@@ -313,8 +245,8 @@ def _add_approach(now: Instant, bounds: PathBounds, state: FloatArray) -> None:
 def _search_period(search: Search, runs: IntArray) -> int:
     """Search one period of the line; return the number of patches, or `FULL`.
 
-    Places of separation that the workspace already contains belong to the previous period. If the workspace contains no
-    such place, the highest point is assumed to be in contact.
+    Places of separation that the workspace already contains belong to the previous period. If there are none, the
+    highest point is assumed to be in contact.
     """
     now, work, scan, sums = search.now, search.work, search.work.scan, search.work.sums
     track, origin, lift = now.track, now.track.origin, search.lift
@@ -349,16 +281,18 @@ def _search_period(search: Search, runs: IntArray) -> int:
 
 @jit_inline_uncounted
 def _oldest(recovery: FreeRecovery, otherwise: float) -> float:
-    """Return the first place at which elements that are now further along the line can have separated.
-
-    If `recovery` contains no place, return `otherwise`.
-    """
+    """Return the first place at which elements now further along the line can have separated, or `otherwise`."""
     return recovery.earliest[0] if recovery.count[0] > 0 else otherwise
 
 
 @jit_inline_uncounted
 def _skip_pressed(search: Search, i: int, stop: int) -> int:
-    """Return the first cell from cell i on in which contact may end or elements may have separated."""
+    """Return the first cell from cell i on in which contact may end or elements may have separated.
+
+    A cell is skipped if the elements that are now further along the line passed it under a positive force, and if u of
+    free elements cannot exceed w = depth + h in the cell. Along the line u' = (drift - u) / D, so that u stays below w
+    wherever w + D h' exceeds the largest drift (see `free_recovery`).
+    """
     now, work, scan, barriers = search.now, search.work, search.work.scan, search.work.barriers
     bounds, begin = work.recovery.bounds, scan[BEGIN]
     firm, until = scan[FIRM_LIFT], scan[FIRM_UNTIL]
@@ -378,7 +312,14 @@ def _skip_pressed(search: Search, i: int, stop: int) -> int:
 
 @jit_inline_uncounted
 def _skip_free(search: Search, i: int, stop: int) -> int:
-    """Return the first cell from cell i on in which contact may begin."""
+    """Return the first cell from cell i on in which contact may begin.
+
+    The displacement of free elements has a lower bound, computed along the line from the last known displacement and
+    the least drift. The *gap* is this bound minus the largest depth + h in the cell. If the gap is wider than any gap
+    that can have opened since the elements separated, there was a gap all the time, and the cell is skipped until the
+    line has approached by the gap. The gap closes at most at the rate of the depth plus the largest drift. The integral
+    of this rate over time is the *approach*.
+    """
     now, work, scan, barriers = search.now, search.work, search.work.scan, search.work.barriers
     track, bounds, skip, lift = now.track, work.recovery.bounds, work.skip, search.lift
     approach, oldest = skip.state[APPROACH], _oldest(work.recovery, scan[FREE_FROM])
@@ -454,9 +395,9 @@ def _examine(search: Search, i: int, contact: bool, found: int) -> tuple[bool, i
 def _contact_end(search: Search, cell: Cell, x: float) -> tuple[float, float, bool, bool]:
     """Find where contact ends in a cell beyond x; return two places and two flags.
 
-    Contact ends at the first place. At the second place, the search for the next contact starts. The first flag is True
-    if contact ends because free elements arrive that have a larger displacement than the line. The second flag is True
-    if the force falls to zero. If contact does not end in the cell, both flags are False.
+    Contact ends at the first place; the search for the next contact starts at the second. The first flag is True if
+    free elements arrive that have a larger displacement than the line, the second if the force falls to zero. If
+    contact does not end in the cell, both flags are False.
     """
     now, scan, recovery, (c0, c1, c2, c3) = search.now, search.work.scan, search.work.recovery, cell.line
     place = NONE
@@ -485,8 +426,8 @@ def _contact_end(search: Search, cell: Cell, x: float) -> tuple[float, float, bo
 def _overtaking(search: Search, held: float, x: float, w: float) -> float:
     """Return the displacement at x of free elements that may arrive inside a patch, or 0 if no such element exists.
 
-    An element in contact at x has the displacement w. The patch is certainly in contact up to the place `held`. Between
-    `held` and x no element of the patch has separated.
+    An element in contact at x has the displacement w. The patch is certainly in contact up to `held`, and no element of
+    the patch has separated between `held` and x.
     """
     now, recovery = search.now, search.work.recovery
     if x > held:
@@ -523,9 +464,9 @@ def _lowest_behind(search: Search, u: float) -> float:
 def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[bool, float]:
     """Return whether contact begins in a cell from x on, and where it begins (or else where the search continues).
 
-    Contact can begin only between the place `low`, where the force becomes positive, and the place `high`, where the
-    force falls to zero again. Even if there is no contact now, elements may have separated near the place `high` at an
-    earlier time. If `ended` is True, contact or a positive force has just ended at x.
+    Contact can begin only between `low`, where the force becomes positive, and `high`, where it falls to zero again.
+    Elements may have separated near `high` earlier, even if there is no contact now. If `ended` is True, contact or a
+    positive force has just ended at x.
     """
     now, work, scan, recovery = search.now, search.work, search.work.scan, search.work.recovery
     i, lift, depth, (c0, c1, c2, c3) = cell.i, search.lift, search.depth, cell.line
@@ -567,10 +508,9 @@ def _contact_begin(search: Search, cell: Cell, x: float, ended: bool) -> tuple[b
 def _add_edge(search: Search, place: float, steep: float, by_depth: float, opening: float) -> None:
     """Add the changes of load and drag that are caused by the motion of one edge of a patch.
 
-    The edge moves if the depth or the time changes. The derivatives of load and drag with respect to depth and time are
-    added to the sums. The force at this edge is not zero. The gap is the height of the line above the free elements:
-    `steep` is the slope of the gap towards the inside of the patch, `by_depth` the derivative of the gap with respect
-    to the depth, and `opening` the rate at which the gap changes.
+    The force at this edge is not zero. The edge moves if the depth or the time changes. The gap is the height of the
+    line above the free elements: `steep` is its slope towards the inside of the patch, `by_depth` its derivative with
+    respect to the depth, and `opening` its rate.
     """
     sums = search.work.sums
     h, slope, _ = height_at(search.now.track, place)
@@ -604,10 +544,7 @@ def _add_separation(search: Search, place: float) -> None:
 
 @jit_inline_uncounted
 def _add_stretch(recovery: FreeRecovery, cell: float, barrier: float) -> None:
-    """Add a cell in which elements can have separated although the force is positive now.
-
-    If the last stretch ends at this cell, extend the stretch.
-    """
+    """Add a cell in which elements can have separated although the force is positive now."""
     k, last = recovery.count[0], recovery.count[0] - 1
     if k > 0 and recovery.earliest[last] < recovery.place[last] and recovery.place[last] == cell:
         recovery.place[last] = recovery.farthest[last] = cell + 1
@@ -620,10 +557,7 @@ def _add_stretch(recovery: FreeRecovery, cell: float, barrier: float) -> None:
 
 @jit_inline_uncounted
 def _force_slopes(track: Track, deborah: float, i: int) -> tuple[float, float, float]:
-    """Return three Bernstein coefficients of the slope of the force in a cell.
-
-    The slope lies between the smallest and the largest coefficient.
-    """
+    """Return three Bernstein coefficients of the slope of the force in a cell; they enclose the slope."""
     _, c1, c2, c3 = cubic(track.height, track.enter, track.leave, i)
     enter, bend, turn = c1 + 2 * deborah * c2, c2 + 3 * deborah * c3, 3 * c3
     return enter, enter + bend, enter + 2 * bend + turn

@@ -1,18 +1,17 @@
 """The displacement of elements that recover freely after a velocity jump.
 
-An element that is now at x was at x' = x - D (t - t') at the time t', with the Deborah number D = v tau in cells. The
-displacement of the element is the largest of the displacements that the line imposed on it earlier, each reduced by the
-decay since then:
+An element that is now at x was at x' = x - D (t - t') at the time t', with the Deborah number D = v tau in cells. Its
+displacement is the largest of the displacements that the line imposed on it earlier, each reduced by the decay since
+then:
 
     u(x, t) = max over t' <= t of (d(t') + h(x')) exp(-(t - t'))
 
-This formula needs only the history of the depth d(t); no element is followed in time. The place where an element
-separated from the line is the place x' where the expression in the maximum is stationary. The force on the element was
-zero there. `FreeRecovery` contains the places near which elements can have separated.
+This formula needs only the history of the depth d(t). The element separated from the line where the expression in the
+maximum is stationary; there, the force on the element was zero.
 
-The *drift* of free elements is D u' + u, where u' is the derivative along the line. The drift is equal to minus the
-rate of the depth at the time of separation, reduced by the decay since then. The extremes of the drift over the recent
-past (`PathBounds`) bound how fast u can change along the line.
+The *drift* of free elements is D u' + u, where u' is the derivative along the line. It is equal to minus the rate of
+the depth at the time of separation, reduced by the decay since then. Its extremes over the recent past (`PathBounds`)
+bound how fast u can change along the line.
 """
 
 from __future__ import annotations
@@ -40,18 +39,10 @@ WINDOW, WINDOWS = 8.0, 16
 
 
 class Instant(NamedTuple):
-    """An instant after the jump.
+    """An instant after the jump: the line, the contact before the jump, and depth and rate up to this instant.
 
-    Parameters
-    ----------
-    track, first : Track, Patches
-        The line, and the contact before the jump.
-    history : History
-        Depth and rate up to this instant.
-    time, deborah : float
-        Time since the jump, and the Deborah number after the jump.
-    left : float
-        exp(-time), the decay of displacements since the jump.
+    `time` is the time since the jump, `deborah` belongs to the velocity after the jump, and `left` is exp(-time), the
+    decay of displacements since the jump.
     """
 
     track: Track
@@ -66,18 +57,9 @@ class PathBounds(NamedTuple):
     """Bounds over windows of time that end now, shape (WINDOWS,) each.
 
     During the shortest window the line travels `WINDOW` cells. Each further window is twice as long as the one before.
-
-    Parameters
-    ----------
-    spread : array
-        Range of the depth.
-    opened : array
-        Largest increase of the gap between line and free elements at one place.
-    least_lift : array
-        Least lift, the sum of depth and rate.
-    most_drift, least_drift : array
-        Largest and least drift of elements that separated within the window or have been free since before the jump.
-        The largest drift is at least 0, and the least drift at most 0.
+    `spread` is the range of the depth, `opened` the largest increase of the gap between line and free elements at one
+    place, and `least_lift` the least sum of depth and rate. `most_drift` (at least 0) and `least_drift` (at most 0) are
+    the extreme drifts of elements that separated within the window or have been free since before the jump.
     """
 
     spread: FloatArray
@@ -90,18 +72,10 @@ class PathBounds(NamedTuple):
 class FreeRecovery(NamedTuple):
     """Places or stretches of the line where elements can have separated, in order along the line.
 
-    Parameters
-    ----------
-    earliest, place, farthest : array
-        An entry is a place of separation if ``earliest == place``. The force on elements in contact falls to zero at
-        this place now. Since the jump, the places where the force fell to zero were between `place` and `farthest`.
-        All other entries are stretches: the force is positive now, but elements can have separated in the cells from
-        `earliest` to `place`.
-    barrier : array
-        Elements can have separated in a stretch only at times when the lift was below this value.
-    count : int array, shape (1,)
-        Number of places and stretches.
-    bounds : PathBounds
+    An entry is a place of separation if ``earliest == place``: there, the force on elements in contact falls to zero
+    now, and since the jump this happened between `place` and `farthest`. All other entries are stretches: the force is
+    positive now, but elements can have separated in the cells from `earliest` to `place`, at times when the lift was
+    below `barrier`.
     """
 
     earliest: FloatArray
@@ -145,7 +119,7 @@ def write_bounds(history: History, first: Patches, deborah: float, bounds: PathB
 
 @jit_inline_uncounted
 def window(distance: float) -> int:
-    """Return the index of the shortest window in which the line travels more than `distance`, in cells.
+    """Return the index of the shortest window in which the line travels more than `distance` cells.
 
     If even the longest window is too short, return the index of the longest.
     """
@@ -196,10 +170,9 @@ def _in_period(now: Instant, s: float) -> float:
 def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tuple[float, float, float]:
     """Return displacement, slope and du/d(depth) of an element at x that separated near a place.
 
-    The element separated after the jump, where the force on it vanished. This place is between `place`, where the force
-    vanishes now, and `farthest`, the farthest place where the force has vanished since the jump. At the place of
-    separation the displacement is stationary, so that few Newton steps are enough. The returned displacement is -1 if
-    the element at x did not separate between `place` and `farthest`.
+    The place of separation is between `place`, where the force vanishes now, and `farthest`, the farthest place where
+    the force has vanished since the jump. The displacement is stationary there, so that few Newton steps are enough. It
+    is -1 if the element did not separate between `place` and `farthest`.
     """
     deborah = now.deborah
     first = x - deborah * now.time
@@ -237,7 +210,7 @@ def _separated_near(now: Instant, x: float, place: float, farthest: float) -> tu
 def _separated_within(now: Instant, x: float, low: float, high: float) -> tuple[float, float, float]:
     """Return the results of `_separated_near` for an element at x that separated anywhere in a stretch of cells.
 
-    First the node of the stretch is found for which the displacement is largest.
+    The search starts at the node of the stretch for which the displacement is largest.
     """
     most, place, s = 0.0, x, min(high, np.ceil(x) - 1)
     low = max(low, x - now.deborah * now.time, s - FARTHEST)
@@ -253,10 +226,7 @@ def _separated_within(now: Instant, x: float, low: float, high: float) -> tuple[
 
 @jit_inline_uncounted
 def _from_separation(now: Instant, recovery: FreeRecovery, k: int, x: float) -> tuple[float, float, float]:
-    """Return displacement, slope and du/d(depth) of an element at x that separated in one place or stretch.
-
-    This place or stretch is entry k of `recovery`.
-    """
+    """Return displacement, slope and du/d(depth) of an element at x that separated in entry k of `recovery`."""
     if recovery.earliest[k] < recovery.place[k]:
         if recovery.bounds.least_lift[window(x - recovery.earliest[k])] > recovery.barrier[k]:
             return -1.0, 0.0, 0.0
@@ -301,9 +271,8 @@ def displacement_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[flo
 def gap_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float, float, float, float]:
     """Return the gap at x, and its slope, curvature, derivative with respect to the depth, and rate.
 
-    The gap is the height of the line above free elements. Free elements recover and move along the line, so that the
-    displacement at x changes at the rate -u - D u'. For the curvature, the displacement is approximated by an
-    exponential function along the line.
+    The gap is the height of the line above free elements. The displacement of free elements at x changes at the rate -u
+    - D u'. For the curvature it is approximated by an exponential function along the line.
     """
     u, u_slope, by_depth = displacement_at(now, recovery, x)
     last = now.history.count - 1
@@ -317,10 +286,9 @@ def gap_at(now: Instant, recovery: FreeRecovery, x: float) -> tuple[float, float
 def contact_begin(
     now: Instant, recovery: FreeRecovery, low: float, high: float, x: float
 ) -> tuple[float, float, float, float]:
-    """Return where the line rises above free elements, and three properties of the gap at this place.
+    """Return where the line rises above free elements, and slope, derivative by the depth and rate of the gap there.
 
-    The properties are the slope of the gap, its derivative with respect to the depth, and its rate. `x` is the first
-    guess, between `low` and `high`.
+    The first guess x is between `low` and `high`.
     """
     slope, by_depth, opening = 1.0, 1.0, 0.0
     for _ in range(ITERATIONS):
@@ -343,7 +311,7 @@ def contact_begin(
 
 @jit_uncounted
 def nearest_approach(now: Instant, recovery: FreeRecovery, low: float, high: float) -> tuple[float, float]:
-    """Return the place between `low` and `high` where the line is nearest to free elements, and the gap at this place.
+    """Return the place between `low` and `high` where the line is nearest to free elements, and the gap there.
 
     The search stops at the first place where the line is above the free elements.
     """

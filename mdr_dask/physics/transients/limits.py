@@ -38,8 +38,7 @@ NEARLY = 1e-6  # largest relative error of the load before the last Newton step;
 class PreparedLine(NamedTuple):
     """One periodic line, prepared for the steady sweep and for the march.
 
-    `known` contains the barriers for each Deborah number used so far. A barrier is the depth above which the force on
-    elements in contact is positive everywhere in a cell.
+    `known` contains the barriers of recent Deborah numbers.
     """
 
     cells: Cells
@@ -54,10 +53,7 @@ class PreparedLine(NamedTuple):
         return cls(cells, blocks_of(cells), track_of(cells), {})
 
     def barriers(self, deborah: float) -> Barriers:
-        """Return the barriers for a Deborah number v tau in cells.
-
-        The barriers are stored, because successive cases often have the same Deborah number.
-        """
+        """Return the barriers for a Deborah number v tau in cells, which successive cases often share."""
         if deborah not in self.known:
             if len(self.known) >= max(KEPT_CELLS // self.cells.mean.size, KEPT_SPEEDS):
                 self.known.clear()
@@ -65,10 +61,7 @@ class PreparedLine(NamedTuple):
         return self.known[deborah]
 
     def patches(self, depth: float, deborah: float) -> tuple[Patches, FloatArray]:
-        """Return the patches in steady sliding, and load, drag and other sums in the order of `sweep_cells`.
-
-        `depth` is the depth of the highest point.
-        """
+        """Return the patches in steady sliding at a depth of the highest point, and the sums of `sweep_cells`."""
         sums = np.empty(SWEEP_SUMS)
         start, end = patches_at(self.cells, self.blocks, self.barriers(deborah), deborah, depth, sums)
         pressed = _pressed(self.track, end, depth)
@@ -78,23 +71,11 @@ class PreparedLine(NamedTuple):
 class SteadyLimits(NamedTuple):
     """Steady states before and after a jump, and the instant of the jump.
 
-    Drags are F_x / (4 G L), in the unit of height squared divided by the unit of length.
-
-    Parameters
-    ----------
-    before, at, after : float
-        Drag in steady sliding at v_1, just after the jump, and in steady sliding at v_2.
-    rate, tilt : float
-        `rate` is the derivative of the depth with respect to t / tau just after the jump. `tilt` is the derivative of
-        the drag just after the jump (`at`) with respect to `rate`.
-    depth : array, shape (2,)
-        Steady depth before and after the jump.
-    first, slower : Patches or None
-        Contact before the jump, and contact in steady sliding at the lower of both velocities. `first` and `slower` are
-        None if a steady state was not found.
-    contact : array, shape (2,)
-        Fraction of the line in contact in steady sliding before and after the jump.
-    outcome : Outcome
+    `before`, `at` and `after` are the drags F_x / (4 G L) in steady sliding at v_1, just after the jump, and in steady
+    sliding at v_2, in the unit of height squared divided by the unit of length. Just after the jump, `rate` is the
+    derivative of the depth with respect to t / tau, and `tilt` that of the drag with respect to `rate`. `depth` and
+    `contact` (fraction of the line) are pairs of steady values. `first` is the contact before the jump, and `slower`
+    that in steady sliding at the lower of both velocities; both are None if a steady state was not found.
     """
 
     before: float
@@ -119,18 +100,11 @@ def steady_limits(
 ) -> list[SteadyLimits]:
     """Solve the steady states before and after jumps on one line, and the states just after the jumps.
 
-    At the instant of a jump the displacements and the depth do not change. The rate of the depth changes, and
-    elements whose force would become negative separate.
+    At the instant of a jump the displacements and the depth do not change. The rate of the depth changes, and elements
+    whose force would become negative separate.
 
-    Parameters
-    ----------
-    line : PreparedLine
-    loads : array, shape (cases,)
-        F_N / (4 G L), in the unit of height.
-    deborah : array, shape (cases, 2)
-        v_1 tau / L and v_2 tau / L.
-    guesses : array, shape (cases, 2), optional
-        Depths at which the searches start, such as the depths on another grid; they do not affect the results.
+    Loads are F_N / (4 G L), in the unit of height. `deborah`, shape (cases, 2), contains v_1 tau / L and v_2 tau / L.
+    The guesses are depths at which the searches start; they do not affect the results.
     """
     guess = None if guesses is None else guesses.ravel()
     steady = steady_on_cells(line.cells, line.blocks, deborah.ravel(), np.repeat(loads, 2), guess)
@@ -169,10 +143,7 @@ def _pressed(track: Track, end: FloatArray, depth: float) -> FloatArray:
 def _release(
     track: Track, first: Patches, barriers: Barriers, deborah: float, load: float
 ) -> tuple[float, float, float, int]:
-    """Return the numbers `at`, `rate` and `tilt` of `SteadyLimits`, and the outcome.
-
-    Newton's method finds the rate of the depth at which the load is carried.
-    """
+    """Return the numbers `at`, `rate` and `tilt` of `SteadyLimits`, and the outcome."""
     rate, sums = 0.0, np.empty(SUMS)
     for _ in range(NEWTON_STEPS):
         released(track, first, barriers, deborah, rate, sums)

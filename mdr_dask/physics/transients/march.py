@@ -37,18 +37,9 @@ LEFT_LIMITS = -1  # outcome of a march whose depth leaves the interval for which
 class Stepping(NamedTuple):
     """Sizes of the time steps of a march.
 
-    Parameters
-    ----------
-    first : float
-        First step.
-    growth : float
-        Largest ratio of a step to the previous one.
-    miss : float
-        Largest allowed difference between the extrapolated and the solved depth.
-    close : float
-        Newton's method ends when it changes the depth by less than this length.
-    until : float
-        Time at which the march ends at the latest.
+    `first` and `growth` are the first step and the largest ratio of a step to the previous one. `miss` is the largest
+    allowed difference between the extrapolated and the solved depth. Newton's method ends when it changes the depth by
+    less than `close`. The march ends at the time `until` at the latest.
     """
 
     first: float
@@ -61,8 +52,7 @@ class Stepping(NamedTuple):
 class Finish(NamedTuple):
     """Criterion for the end of a march: final depth and drag, and the allowed distances from these values.
 
-    `depth_distance` is a length. `drag_distance` is relative to the largest distance from the final drag during the
-    march.
+    `drag_distance` is relative to the largest distance from the final drag during the march.
     """
 
     depth: float
@@ -74,16 +64,9 @@ class Finish(NamedTuple):
 class Marching(NamedTuple):
     """Quantities that are constant during a march.
 
-    Parameters
-    ----------
-    track, first, reachable : Track, Patches, Reachable
-        The line, the contact before the jump, and the cells where contact is possible at depths from `low` to `high`.
-    deborah, load : float
-        Deborah number after the jump, and F_N / (4 G dx).
-    low, high : float
-        Limits of the depth.
-    onset : float
-        Time after which the steps grow in a constant ratio. The steps are equal in log(1 + t / onset).
+    `first` is the contact before the jump. `reachable` contains the cells where contact is possible at depths from
+    `low` to `high`. `deborah` belongs to the velocity after the jump, and `load` is F_N / (4 G dx). The steps are equal
+    in log(1 + t / onset).
     """
 
     track: Track
@@ -97,9 +80,9 @@ class Marching(NamedTuple):
 
 
 class Trajectory(NamedTuple):
-    """Time, log(1 + t / onset), depth and its rate, drag and its rate at every moment.
+    """Time, log(1 + t / onset), depth and its rate, drag and its rate at every moment, from just after the jump on.
 
-    The first moment is just after the jump. Rates are derivatives with respect to t / tau.
+    Rates are derivatives with respect to t / tau.
     """
 
     time: FloatArray
@@ -114,8 +97,8 @@ class Trajectory(NamedTuple):
 def _drag_rate(sums: FloatArray, stiff: float, step: float) -> float:
     """Return the rate of the drag at constant load.
 
-    Growing patches add load; the lift (the depth plus its rate) falls to compensate for it. `step` is the last Newton
-    step of the depth. This step also changes the rate of the depth, and therefore the growth of the patches.
+    Growing patches add load; the lift (the depth plus its rate) falls to compensate for it. The last Newton `step` of
+    the depth also changes the rate of the depth, and therefore the growth of the patches.
     """
     edges = sums[STIFFNESS] - sums[LENGTH] * (1 + stiff)
     edges_drag = sums[DRAG_STIFFNESS] - sums[TILT] * (1 + stiff)
@@ -130,11 +113,7 @@ def _balance(
 ) -> tuple[int, float, float]:
     """Find the depth at which the load is carried, at the last moment of the history, by Newton's method.
 
-    Returns
-    -------
-    outcome : int
-    drag, drag_rate : float
-        Drag, and its derivative with respect to t / tau.
+    Return the outcome (or `LEFT_LIMITS`), the drag, and its derivative with respect to t / tau.
     """
     now, load = history.count - 1, marching.load
     guess, (a, b), sums = history.depth[now], weights, work.sums
@@ -170,10 +149,10 @@ def _balance(
 
 @jit_uncounted
 def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
-    """Return two numbers a and b: at moment `now` of a march the rate of the depth is a d + b, where d is the depth.
+    """Return a and b: at moment `now` of a march the rate of the depth d is a d + b.
 
-    The numbers follow from backward differentiation with respect to log(1 + t / onset), because the relaxation is a
-    smooth function of this variable. In the first step, the numbers follow from the known rate just after the jump.
+    They follow from backward differentiation with respect to log(1 + t / onset), because the relaxation is a smooth
+    function of this variable. In the first step, they follow from the known rate just after the jump.
     """
     time, place, depth = found.time, found.place, found.depth
     if now == 1:
@@ -212,21 +191,8 @@ def march_depth(
 ) -> tuple[int, int]:
     """March the depth at constant load by backward differentiation of third order with respect to log(1 + t / onset).
 
-    Parameters
-    ----------
-    marching, pace, finish
-        The constant quantities, the steps, and the criterion for the end of the march.
-    found : Trajectory
-        Results of the march. The first moment is given; the others are written.
-    work : Workspace
-        Work arrays of the contact search, with the barriers at the Deborah number after the jump.
-
-    Returns
-    -------
-    count : int
-        Number of computed moments.
-    outcome : int
-        An `Outcome`, or `LEFT_LIMITS`.
+    Only the first moment of `found` is given; the others are written. Return the number of moments, and an `Outcome` or
+    `LEFT_LIMITS`.
     """
     time, place, depth, rate, drag, drag_rate = found
     near, step, now, farthest = 0.0, pace.first, 1, abs(drag[0] - finish.drag)

@@ -1,8 +1,8 @@
 """Contact patches on a line, and the forces on them.
 
-The unit of length is a cell of the line, and slopes are rises per cell, as in the steady sweep. Heights are in any
-unit, times in relaxation times. The Deborah number D is v tau in cells. The lift is the sum of the depth and its rate,
-so that the force on an element in contact, divided by 4 G dx, is lift + h + D h'.
+The unit of length is a cell of the line, and slopes are rises per cell. Times are in relaxation times. The Deborah
+number D is v tau in cells. The lift is the sum of the depth and its rate, so that the force on an element in contact,
+divided by 4 G dx, is lift + h + D h'.
 """
 
 from __future__ import annotations
@@ -25,20 +25,11 @@ SUMS = 8
 class Track(NamedTuple):
     """The cells of a periodic line, with integrals up to every node.
 
-    Parameters
-    ----------
-    height : array, shape (n + 2,)
-        Heights at the nodes minus the height of the highest point. These differences avoid rounding errors in light
-        contacts.
-    enter, leave, peak : array, shape (n + 1,)
-        Slope at the start and at the end of each cell, and largest height in the cell; the last cell repeats the first
-        cell.
-    area, square : array, shape (n + 2,)
-        Integrals of the height and of the square of the slope up to each node.
-    cells : float
-        Length n of the line.
-    origin : float
-        Place of the highest point, in the first cell. The period begins here.
+    Heights at the n + 2 nodes are relative to the highest point, which avoids rounding errors in light contacts.
+    `enter` and `leave` are the slopes at the start and at the end of each cell, and `peak` is the largest height in the
+    cell; the last of the n + 1 cells repeats the first. `area` and `square` are the integrals of the height and of the
+    squared slope up to each node. `cells` is the length n of the line. The period begins at `origin`, the place of the
+    highest point in the first cell.
     """
 
     height: FloatArray
@@ -59,10 +50,7 @@ def track_of(cells: Cells) -> Track:
 
 
 class Patches(NamedTuple):
-    """Patches of a steady state: patch k extends from ``start[k]`` to ``end[k]``.
-
-    ``pressed`` is the displacement of elements at the end of each patch.
-    """
+    """Patches of a steady state, with the displacements `pressed` of elements at the ends of the patches."""
 
     start: FloatArray
     end: FloatArray
@@ -73,10 +61,7 @@ class Patches(NamedTuple):
 
 
 class History(NamedTuple):
-    """Depth and its rate at ``count`` moments.
-
-    ``stiff`` is the derivative of the last rate with respect to the last depth.
-    """
+    """Depth and its rate at ``count`` moments; ``stiff`` is the derivative of the last rate by the last depth."""
 
     time: FloatArray
     depth: FloatArray
@@ -111,11 +96,7 @@ def _part(c0: float, c1: float, c2: float, c3: float, y: float) -> tuple[float, 
 
 @jit_inline_uncounted
 def add_patch(track: Track, start: float, end: float, lift: float, deborah: float, sums: FloatArray) -> None:
-    """Add the exact load, drag, length and rise (integral of the slope) of a patch in contact to `sums`.
-
-    The force on an element is lift + h + deborah h'. The integrals over whole cells are taken from `Track`. The
-    integrals over parts of cells are computed from the cubics.
-    """
+    """Add the exact load, drag, length and rise (integral of the slope) of a patch in contact to `sums`."""
     last = track.enter.size - 1
     i, j = min(int(start), last), min(int(end), last)
     c0, c1, c2, c3 = cubic(track.height, track.enter, track.leave, i)
@@ -196,21 +177,12 @@ def keeps_pressed(track: Track, barriers: Barriers, deborah: float, i: int, lift
 
 @jit_uncounted
 def released(track: Track, first: Patches, barriers: Barriers, deborah: float, rate: float, sums: FloatArray) -> None:
-    """Add up the forces just after a jump.
+    """Add up the forces just after a jump, from the contact before the jump and the new rate of the depth.
 
-    Contact continues only where the force is positive at the new velocity and the new rate of the depth.
-
-    Parameters
-    ----------
-    track, first : Track, Patches
-        The line, and the contact before the jump. Displacements and depth do not change at the jump.
-    barriers : Barriers
-        Barriers at the new Deborah number.
-    deborah, rate : float
-        New Deborah number, and new rate of the depth.
-    sums : array, shape (SUMS,)
-        Results: load and drag, divided by 4 G dx; length in contact, which is also the derivative of the load with
-        respect to the rate; and integral of the slope over the length in contact.
+    Displacements and depth do not change at the jump; contact continues only where the force is positive at the new
+    velocity and rate. `deborah` and `barriers` are those after the jump. `sums` receives load and drag, divided by 4 G
+    dx, length in contact (also the derivative of the load with respect to the rate), and integral of the slope over
+    this length.
     """
     sums[:] = 0.0
     lift, n = first.depth + rate, int(track.cells)

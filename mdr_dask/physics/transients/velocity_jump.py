@@ -1,9 +1,7 @@
 """Friction after a velocity jump at constant load, on one periodic line.
 
 The march (the sequence of time steps) starts from steady sliding at v_1 and ends when sliding is steady at v_2. The
-depth is found by the backward differentiation formula of third order, with the logarithm of the time as the variable.
-At every moment the edges of all contact patches are computed. The method is that of section 4.2 of the thesis, except
-that the velocity of the elements includes the rate of the depth.
+method is that of section 4.2 of the thesis, except that the velocity of the elements includes the rate of the depth.
 """
 
 from __future__ import annotations
@@ -49,18 +47,11 @@ STEEPEST = 3.0  # largest ratio of a slope to the smaller slope of the adjacent 
 class MarchRequest(NamedTuple):
     """Requested times and accuracy of a march.
 
-    Parameters
-    ----------
-    times : array, shape (m,)
-        Requested times after the jump, (t - t_0) / tau, increasing.
-    wavenumber : float
-        Largest wavenumber of the line times its length, q_max L; it determines the first step.
-    per_decade : float
-        Steps per factor of ten in time.
-    accuracy : float
-        Allowed error of the friction relative to the steady friction after the jump. A transient that is smaller than
-        this error is not marched. With ``accuracy = 0`` every transient is marched. A march ends when drag and depth
-        are close to the steady values. The larger this error, the earlier the march ends.
+    `times` are increasing times after the jump, (t - t_0) / tau. `wavenumber` is the largest wavenumber of the line
+    times its length, q_max L; it determines the first step. `per_decade` is the number of steps per factor of ten in
+    time. `accuracy` is the allowed error of the friction relative to the steady friction after the jump: a smaller
+    transient is not marched, and a march ends the earlier, the larger this error is. With ``accuracy = 0`` every
+    transient is marched.
     """
 
     times: FloatArray
@@ -70,16 +61,10 @@ class MarchRequest(NamedTuple):
 
 
 class Path(NamedTuple):
-    """Drag and depth at the moments of a march, and their rates.
+    """Drag and depth at the moments of a march, and their rates, shape (2, moments) each.
 
-    Parameters
-    ----------
-    time : array, shape (moments,)
-        Times after the jump, in relaxation times, from 0 on.
-    values, rates : array, shape (2, moments)
-        Drag and depth, and their derivatives with respect to time. The first rate of the drag is unknown and is NaN.
-    falls : bool
-        Whether the velocity falls.
+    Times are in relaxation times from the jump on. The first rate of the drag is unknown and is NaN. `falls` is True if
+    the velocity falls.
     """
 
     time: FloatArray
@@ -102,11 +87,11 @@ class Path(NamedTuple):
 
 
 def _limited_cubic(x: FloatArray, rows: FloatArray, slopes: FloatArray, places: FloatArray) -> FloatArray:
-    """Interpolate curves by piecewise cubics with given slopes; return the values at `places`.
+    """Return the values at `places` of piecewise cubics with given slopes; each row contains the points of one curve.
 
-    Each row contains the points of one curve. If the first slope of a row is NaN, the first piece of this row is a
-    parabola. A slope that is much steeper than the secants at its point is due to a single asperity that enters or
-    leaves contact. Such a slope is reduced, so that the cubic does not overshoot.
+    If the first slope of a row is NaN, the first piece is a parabola. A slope that is much steeper than the secants at
+    its point is due to a single asperity that enters or leaves contact. It is reduced, so that the cubic does not
+    overshoot.
     """
     secants = np.diff(rows) / np.diff(x)
     beside = np.abs(secants)[:, [0, *range(x.size - 1), -1]]
@@ -120,20 +105,10 @@ def _limited_cubic(x: FloatArray, rows: FloatArray, slopes: FloatArray, places: 
 class Jump(NamedTuple):
     """Friction before, at and after a velocity jump.
 
-    Drags are F_x / (4 G L), in the unit of height squared divided by the unit of length.
-
-    Parameters
-    ----------
-    before, at, after : float
-        Drag in steady sliding at v_1, just after the jump, and in steady sliding at v_2.
-    trace, depth : array, shape (times,)
-        Drag and depth at the requested times.
-    path : Path or None
-        Path of the march; None if there was no march.
-    left_out : float
-        Estimated size of the transient, if it was not marched because it is smaller than the allowed error; otherwise
-        0.
-    outcome : Outcome
+    Drags are F_x / (4 G L), in the unit of height squared divided by the unit of length. `before`, `at` and `after`
+    belong to steady sliding at v_1, to the time just after the jump, and to steady sliding at v_2. `trace` and `depth`
+    are drag and depth at the requested times. `path` is None if there was no march. `left_out` is the estimated size of
+    a transient that was not marched because it is smaller than the allowed error; otherwise 0.
     """
 
     before: float
@@ -154,15 +129,7 @@ class Jump(NamedTuple):
 def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], request: MarchRequest) -> Jump:
     """Return the friction of a Kelvin foundation on a periodic line before and after a velocity jump at constant load.
 
-    Parameters
-    ----------
-    line : CubicLine
-        A periodic line.
-    load : float
-        F_N / (4 G L), in the unit of height.
-    deborah : tuple of float
-        v_1 tau / L and v_2 tau / L.
-    request : MarchRequest
+    The load is F_N / (4 G L), in the unit of height. `deborah` contains v_1 tau / L and v_2 tau / L.
     """
     prepared, loads, numbers = PreparedLine.of(line), np.array([load]), np.array([deborah])
     return jump_between(prepared, load, numbers[0], steady_limits(prepared, loads, numbers)[0], request)
@@ -171,10 +138,7 @@ def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], re
 def jump_between(
     line: PreparedLine, load: float, deborah: FloatArray, limits: SteadyLimits, request: MarchRequest
 ) -> Jump:
-    """Return the friction before and after one jump, from the known steady states `limits` of this jump.
-
-    The other parameters are those of :func:`velocity_jump`.
-    """
+    """Return the friction before and after one jump, from the known steady states; arguments as in `velocity_jump`."""
     times = request.times
     if limits.outcome != Outcome.CONVERGED:
         return _failed(times, limits.outcome)
@@ -202,10 +166,7 @@ def _failed(times: FloatArray, outcome: Outcome) -> Jump:
 
 
 class _Relaxation(NamedTuple):
-    """One jump: the line, the load, the two Deborah numbers, and the steady states before and after.
-
-    Lengths are in cells.
-    """
+    """One jump: the line, the load, the two Deborah numbers, and the steady states; lengths are in cells."""
 
     line: PreparedLine
     load: float
@@ -228,9 +189,9 @@ class _Relaxation(NamedTuple):
     def stepping(self) -> Stepping:
         """Sizes of the time steps.
 
-        The steps grow in a constant ratio after `ONSET` times the time in which the line travels 1 / q_max, but at the
-        latest after `ONSET` relaxation times. The line travels at the speed v_2. If the velocity falls, contact behind
-        a patch grows at the speed v_1 - v_2; this speed replaces v_2 if it is larger than v_2.
+        The steps grow in a constant ratio after `ONSET` times the time in which the line travels 1 / q_max at the speed
+        v_2, but at the latest after `ONSET` relaxation times. If the velocity falls, contact behind a patch grows at
+        the speed v_1 - v_2; this speed replaces v_2 if it is larger.
         """
         before, after = self.deborah / self.line.track.cells
         growth = 10 ** (1 / self.request.per_decade)
@@ -244,9 +205,8 @@ class _Relaxation(NamedTuple):
     def transient(self) -> float:
         """Estimate the size of the transient, with a safety factor of two.
 
-        The difference between the drag just after the jump and the steady drag is not an upper bound, because the drag
-        may cross its steady value. Two terms are therefore added to this difference: the drag due to the rate of the
-        depth just after the jump, and the drag due to the change of depth.
+        The drag may cross its steady value. Therefore the drag due to the rate of the depth just after the jump, and
+        the drag due to the change of depth, are added to the change of the drag after the jump.
         """
         _, sums = self.line.patches(self.ends[1], self.deborah[1])
         by_depth = abs(sums[DRAG_RATE] * (self.ends[1] - self.ends[0]))
@@ -286,7 +246,7 @@ class _Relaxation(NamedTuple):
         return path, Outcome.CONVERGED
 
     def begun(self, interval: tuple[float, float]) -> tuple[Marching, Trajectory, Workspace]:
-        """Prepare a march whose depth stays in an interval; return its constants, its trajectory and its workspace.
+        """Return the constants, trajectory and workspace of a march whose depth stays in an interval.
 
         Only the first moment of the trajectory is filled in.
         """
@@ -309,8 +269,8 @@ def _runs(track: Track, slower: Patches, low: float, high: float) -> tuple[IntAr
     """Return the runs of cells where contact is possible at depths from `low` to `high`, and a bound for each cell.
 
     A run is given by its first and last node. The bound is the largest depth at which the cell is certainly out of
-    contact. The bound follows from the steady state at the lower velocity. At a depth that is smaller than in this
-    state, the displacements are smaller by at most the difference of the two depths.
+    contact. It follows from the steady state at the lower velocity: at a smaller depth, the displacements are smaller
+    by at most the difference of the two depths.
     """
     cells, decay = track.peak.size, np.exp(-1 / slower.deborah)
     bound = np.full(cells + 1, -np.inf)

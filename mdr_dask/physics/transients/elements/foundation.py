@@ -1,9 +1,8 @@
 """One element of a viscoelastic foundation during one step: moved at constant speed, or recovering without force.
 
 In all functions, `terms` contains the strains of the dashpots of the Prony terms of all elements, shape (n, terms), and
-i is the index of one element. Functions take the index, because slicing an array would take longer.
-
-The static modulus is 1. Heights are in any unit, lengths in units of the length of the line, and times in any unit.
+i is the index of one element. Functions take the index, because slicing an array would take longer. The static modulus
+is 1, and the line has the length 1.
 """
 
 from __future__ import annotations
@@ -21,19 +20,11 @@ from mdr_dask.physics.solids import recovery_times
 class Foundation(NamedTuple):
     """A solid with the static modulus 1, and the modes in which its elements recover without force.
 
-    Parameters
-    ----------
-    moduli, times : array, shape (terms,)
-        G_m / G_inf and tau_m.
-    viscosity : float
-        eta / G_inf of the dashpot; 0 without a dashpot.
-    rates : array, shape (modes,)
-        Decay rates of the modes, positive. There is one mode for each Prony term, and one more for a dashpot.
-    outward, inward : array, shape (modes, modes)
-        Transformation from the modes to the state of an element, and back. The state consists of the strains a_m of
-        the dashpots of the Prony terms. If the solid has a dashpot of its own, the displacement u precedes them.
-    push : array, shape (modes,)
-        Rates at which the modes grow under a unit load, for the mean state of all elements.
+    `moduli` and `times` are G_m / G_inf and tau_m; `viscosity` is eta / G_inf, or 0 without a dashpot. `rates` are the
+    decay rates of the modes: one for each Prony term, and one more for a dashpot. The matrix `outward` transforms the
+    modes to the state of an element, and `inward` transforms back. The state consists of the strains a_m of the
+    dashpots of the Prony terms; with a dashpot of the solid, the displacement u precedes them. `push` contains the
+    rates at which the modes of the mean state grow under a unit load.
     """
 
     moduli: FloatArray
@@ -46,20 +37,9 @@ class Foundation(NamedTuple):
 
 
 def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundation:
-    """Return the foundation of a solid, with the modes in which it recovers without force.
+    """Return the foundation of a solid with G_m / G_inf, distinct tau_m, and eta / G_inf, in any unit of time.
 
-    Parameters
-    ----------
-    moduli, times : array_like, shape (terms,)
-        G_m / G_inf, positive, and tau_m, distinct, in any unit of time.
-    viscosity : float
-        eta / G_inf in the same unit of time. For a Kelvin solid (no terms) the viscosity is 1 if the unit of time is
-        tau.
-
-    Raises
-    ------
-    ValueError
-        If the solid is elastic, so that nothing relaxes.
+    For a Kelvin solid (no terms) the viscosity is 1 if the unit of time is tau.
     """
     g, tau = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (moduli, times))
     if g.size == 0 and not viscosity > 0:
@@ -82,15 +62,8 @@ KELVIN = foundation([], [], 1.0)
 class Lapse(NamedTuple):
     """A duration, the decay during it, and work arrays for one element.
 
-    Parameters
-    ----------
-    time : float
-    decay, fades : array, shape (modes,) and (terms,)
-        Factors by which the modes and the strains of the Prony terms decay during the duration.
-    part_decay, part_fades : array, shape (modes,) and (terms,)
-        The same factors for a part of the duration; overwritten.
-    modes, strains : array, shape (modes,) and (1, terms)
-        Amplitudes of the modes, and strains of the terms, of one element; overwritten.
+    `decay` and `fades` are the factors by which the modes and the strains of the Prony terms decay; `part_decay` and
+    `part_fades` are those for a part of the duration. `modes` and `strains`, shape (1, terms), belong to one element.
     """
 
     time: float
@@ -185,9 +158,8 @@ def release(
 ) -> tuple[float, float]:
     """Return the fraction of a duration after which an element in contact separates, and its displacement at that time.
 
-    The element follows the line. The displacement of the element changes from w0 to w1; the rates at the start and at
-    the end are `rise0` and `rise1`. The fraction is 1 if the element does not separate. The force is taken as linear in
-    time, and the displacement as cubic.
+    The displacement changes from w0 to w1; its rates at the start and at the end are `rise0` and `rise1`. The force is
+    taken as linear in time, and the displacement as cubic. The fraction is 1 if the element does not separate.
     """
     begin = pull(solid, w0, terms, i) + solid.viscosity * rise0
     if begin <= 0:
@@ -210,8 +182,8 @@ def free_after(
 ) -> float:
     """Return the displacement of an element at the end of a duration.
 
-    First, during the fraction `part` of the duration, the element is moved to the displacement `leaves`. Then the
-    element is free. The strains of the element at the end are written to `lapse.strains`; `terms` is not changed.
+    During the fraction `part` of the duration, the element is moved to the displacement `leaves`. Then it is free. Its
+    strains at the end are written to `lapse.strains`; `terms` is not changed.
     """
     strains, decay, fades = lapse.strains, lapse.part_decay, lapse.part_fades
     for m in range(solid.times.size):
@@ -238,21 +210,11 @@ def advance(
     terms: FloatArray,
     i: int,
 ) -> tuple[float, bool]:
-    """Move one element through a duration; return its displacement and contact at the end of the duration.
+    """Move one element through a duration; return its displacement and contact at the end. Its strains are overwritten.
 
-    The strains `terms` of the element are overwritten.
-
-    Parameters
-    ----------
-    w0, w1 : float
-        Displacement at the line (depth plus height) at the start and at the end.
-    u0, touching
-        Displacement and contact of the element at the start.
-    part, leaves : float
-        Results of :func:`release` for an element in contact.
-    after : float
-        Displacement of the element at the end if it separates at the time returned by :func:`release`, or if it is free
-        all the time.
+    The depth plus height of the line changes from w0 to w1; u0 and `touching` are displacement and contact at the
+    start. `part` and `leaves` are results of :func:`release` for an element in contact. `after` is the displacement at
+    the end if the element separates then, or if it is free all the time.
     """
     if w1 > after:
         rest, fades = lapse.time, lapse.fades

@@ -1,8 +1,7 @@
 """Friction under any loading history, from the motion of every element; second-order accurate in the time step.
 
 Times are in the unit of time of the solid. Travel is divided by the length of the line. Loads are F_N / (4 G_inf L) in
-the unit of height. A single velocity jump of a Kelvin solid on a periodic line is solved much faster by
-`velocity_jump`.
+the unit of height.
 """
 
 from __future__ import annotations
@@ -37,17 +36,9 @@ LOAD_MISSED = 1e-6  # largest relative error of the load in the steady state at 
 class Response(NamedTuple):
     """Forces and depth at every moment of a loading history, and the state of the elements at the end.
 
-    Parameters
-    ----------
-    drag : array, shape (moments,)
-        F_x / (4 G L), in the unit of height squared divided by the unit of length.
-    depth, rate : array, shape (moments,)
-        Depth, and its derivative with respect to time.
-    contact : array, shape (moments,)
-        Fraction of the line in contact.
-    status : Outcome
-    state : State
-        State of every element at the end, from which another history can continue.
+    The drag is F_x / (4 G L), in the unit of height squared divided by the unit of length. `rate` is the derivative of
+    the depth with respect to time, and `contact` the fraction of the line in contact. Another history can continue from
+    `state`.
     """
 
     drag: FloatArray
@@ -67,17 +58,11 @@ def untouched(elements: int, terms: int) -> State:
 
 
 def steady_start(line: CubicLine, solid: Foundation, deborah: float, load: float) -> tuple[State, float, Outcome]:
-    """Return the steady state of the elements at the nodes, for a constant speed and a constant load.
+    """Return state, depth and outcome of steady sliding of the elements at the nodes, at constant speed and load.
 
-    One element is moved along the line, period after period, until its state repeats. The element moves in steps of
-    half a cell, by the method of :func:`follow_line`. The depth is found from the mean displacement, which increases
-    with the depth. At ``deborah = 0`` the elements are in equilibrium at rest under the load.
-
-    Returns
-    -------
-    state : State
-    depth : float
-    status : Outcome
+    One element is moved along the line in steps of half a cell, by the method of :func:`follow_line`, until its state
+    repeats. The depth is found from the mean displacement, which increases with the depth. At ``deborah = 0`` the
+    elements are in equilibrium at rest under the load.
     """
     n, terms = line.height.size - 1, solid.times.size
     state = untouched(n, terms)
@@ -189,28 +174,13 @@ def follow_line(
     state: State,
     depth: float,
 ) -> Response:
-    """Compute the motion of every element of a linear foundation under a line during a loading history.
+    """Compute the motion of every element of a linear foundation under a line.
 
     During a step an element in contact moves at constant speed, and a free element recovers by the modes of the solid.
-    Contact begins inside a step when the gap vanishes, and ends when the force vanishes. The load alone determines the
-    mean displacement; it does not matter which elements are in contact. Therefore the depth is the root of a convex
-    function.
-
-    Parameters
-    ----------
-    line : CubicLine
-        If the line is not periodic, elements enter undeformed. Forces are interpolated linearly between elements. The
-        interpolation is most accurate for a line without kinks
-        (:func:`~mdr_dask.physics.surfaces.cubic_line.without_kinks`).
-    solid : Foundation
-    schedule : Schedule
-        Travel, velocity and load at every moment.
-    state, depth
-        State and depth at the first moment, from :func:`steady_start` or an earlier `Response`; they are not changed.
-
-    Returns
-    -------
-    Response
+    The load alone determines the mean displacement; it does not matter which elements are in contact. Therefore the
+    depth is the root of a convex function. If the line is not periodic, elements enter undeformed. Forces are
+    interpolated linearly between elements, which is most accurate for a line without kinks. `state` and `depth` belong
+    to the first moment; they are not changed.
     """
     now, out = deepcopy(state), np.full((4, schedule.moments.size), np.nan)
     status = follow_elements(solid, line, schedule, now, depth, out)
@@ -229,10 +199,7 @@ ROUNDING = 1e-12  # relative difference of times that counts as a rounding error
 
 @dataclass(frozen=True)
 class Piece:
-    """Velocity and load between the times `start` and `end`.
-
-    Both are linear in time. An optional sine, which begins at the time `start`, is added.
-    """
+    """Velocity and load between the times `start` and `end`: linear in time, plus an optional sine from `start` on."""
 
     start: float
     end: float
@@ -301,18 +268,10 @@ class Trace(NamedTuple):
     """Friction during a history.
 
     The friction is the drag F_x / (4 G L) divided by the load F_N / (4 G_inf L), in the unit of height divided by the
-    unit of length. Depths are in the unit of height.
-
-    Parameters
-    ----------
-    before, at, after : float
-        Friction in the steady state before t = 0, just after t = 0, and in the final steady state. `after` is NaN if
-        the history does not end in steady sliding.
-    friction, depth : array, shape (times,)
-        Friction and depth at the requested times; at a jump, the value just after the jump.
-    contact : float
-        Largest fraction of the line in contact from t = 0 to the last requested time.
-    outcome : Outcome
+    unit of length. `before`, `at` and `after` are the friction in the steady state before t = 0, just after t = 0, and
+    in the final steady state, or NaN if the history does not end in steady sliding. At a jump, `friction` and `depth`
+    are the values just after the jump. `contact` is the largest fraction of the line in contact from t = 0 to the last
+    requested time.
     """
 
     before: float
@@ -334,19 +293,10 @@ def trace(
 ) -> Trace:
     """Compute the friction of a body during a history, from the motion of every element.
 
-    Parameters
-    ----------
-    line, solid
-        As in :func:`~mdr_dask.physics.transients.elements.loading_history.follow_line`.
-    before : tuple of float
-        Velocity and load until t = 0. The body slides steadily until then, or is at rest if the velocity is 0. Velocity
-        and load may jump at t = 0.
-    pieces : sequence of Piece
-        Velocity and load from t = 0 on, in the order of time; the end of the last piece is infinite.
-    times : array, shape (m,)
-        Requested times, increasing.
-    per_decade : float
-        Number of steps per factor of ten in the time since the start of a piece.
+    `before` contains velocity and load until t = 0. The body slides steadily until then, or is at rest if the velocity
+    is 0. Velocity and load may jump at t = 0. The pieces are in the order of time, and the end of the last one is
+    infinite. The requested times increase. `per_decade` is the number of steps per factor of ten in the time since the
+    start of a piece.
     """
     times = _snapped(times, np.array([piece.start for piece in pieces]))
     velocity, load_before = before

@@ -1,6 +1,6 @@
 """Motion of all elements of a viscoelastic foundation through the moments of a loading history.
 
-The static modulus is 1. Heights are in any unit, lengths in units of the length of the line, and times in any unit.
+The static modulus and the length of the line are 1.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from mdr_dask.physics.transients.elements.foundation import (
 class Edges(NamedTuple):
     """The last known edges of contact, at most one in the cell before each element.
 
-    The force is zero at such an edge. One of the two elements of the cell is in contact. `place` is the distance of the
-    edge from this element, in cells, or -1 if there is no edge. `gap` is the gap of the other element at the moment at
-    which the edge was found.
+    The force is zero at such an edge, and one of the two elements of the cell is in contact. `place` is the distance of
+    the edge from this element, in cells, or -1 if there is no edge. `gap` is the gap of the other element at the moment
+    at which the edge was found.
     """
 
     place: FloatArray
@@ -42,17 +42,10 @@ class Edges(NamedTuple):
 class Contact(NamedTuple):
     """Elements under a line at one moment, shape (n,) each, and the edges of their contact.
 
-    Parameters
-    ----------
-    gaps, slope : array
-        Height of the line above the position that an element would have without contact, and slope of the line. Without
-        a dashpot, `gaps` contains the same numbers as `pulls`.
-    pulls : array
-        Force of spring and Prony terms of an element that follows the line.
-    force, power : array, output
-        Total force of this element, and the product of this force and the slope.
-    touching : bool array
-    edges : Edges
+    `gaps` is the height of the line above the position that an element would have without contact; without a dashpot,
+    it contains the same numbers as `pulls`. `pulls` is the force of spring and Prony terms of an element that follows
+    the line, and `slope` the slope of the line. `force` and `power` are results: the total force, and its product with
+    the slope.
     """
 
     gaps: FloatArray
@@ -77,10 +70,9 @@ class Drive(NamedTuple):
 
 @jit
 def under_elements(line: CubicLine, travel: float, under: FloatArray, slope_under: FloatArray) -> int:
-    """Write the height and the slope of the line at every element, when the line has travelled by `travel`.
+    """Write height and slope (d/d(x / L)) of the line at every element, when the line has travelled by `travel`.
 
-    Return the number of whole cells that the line has travelled. Slopes are derivatives with respect to x / L, where L
-    is the length of the line.
+    Return the number of whole cells that the line has travelled.
     """
     n = under.size
     cells = travel * n
@@ -102,8 +94,8 @@ def under_elements(line: CubicLine, travel: float, under: FloatArray, slope_unde
 def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) -> tuple[float, bool]:
     """Return the depth d at which the mean displacement is `mean`, and whether this depth was found.
 
-    The displacement of an element is max(d + h, free). Here h is the height of the line at the element (`under`), and
-    `free` is the displacement of the element without contact. The mean is a convex, increasing function of d.
+    The displacement of an element is max(d + h, free), with the height h of the line (`under`), and the displacement
+    `free` of the element without contact. The mean is a convex, increasing function of d.
     """
     n = under.size
     for _ in range(200):
@@ -182,9 +174,9 @@ def _cell(
 
 @jit
 def _forces(contact: Contact, first: int, keep: bool) -> tuple[float, float, float]:
-    """Return the mean load, the mean drag and the fraction of the line in contact.
+    """Return the mean load, the mean drag and the fraction of the line in contact; write the edges if `keep` is True.
 
-    If `keep` is True, write the edges of contact. The cell before the element `first` does not exist.
+    The cell before the element `first` does not exist.
     """
     force, power, slope, touching, edges = contact.force, contact.power, contact.slope, contact.touching, contact.edges
     n = force.size
@@ -249,18 +241,10 @@ CORRECTIONS = 2  # number of corrections of the times of separation and of the d
 
 
 class State(NamedTuple):
-    """State of all elements at one moment.
+    """State of all elements at one moment: displacement u, strains of the dashpots of the Prony terms, and contact.
 
-    Parameters
-    ----------
-    displacement, terms : array, shape (n,) and (n, terms)
-        Displacement u, and strains of the dashpots of the Prony terms.
-    free, free_terms : array, shape (n,) and (n, terms)
-        Values of `displacement` and `terms` that an element in contact would have if its contact had not begun. For a
-        free element, `free` is its displacement, and `free_terms` is not used.
-    touching : array, shape (n,)
-        Whether an element is in contact.
-    edges : Edges
+    `free` and `free_terms` are the displacement and the strains that an element in contact would have if its contact
+    had not begun. For a free element, `free` is its displacement, and `free_terms` is not used.
     """
 
     displacement: FloatArray
@@ -333,14 +317,8 @@ def _renew(state: State, old: int, new: int) -> None:
 class Schedule(NamedTuple):
     """Travel, velocity and load at the moments of a loading history, shape (moments,) each.
 
-    Parameters
-    ----------
-    moments : array
-        Increasing times, in the unit of time of the solid. Velocity and load may jump at the first time.
-    travels, deborahs : array
-        Travelled distance divided by L, and its derivative with respect to time; both may be negative.
-    loads : array
-        F_N / (4 G_inf L), positive; between the moments the load is interpolated linearly.
+    Velocity and load may jump at the first time. Travel and velocity are divided by L, and may be negative. Loads are
+    F_N / (4 G_inf L), positive, and linear between the moments.
     """
 
     moments: FloatArray
@@ -352,16 +330,9 @@ class Schedule(NamedTuple):
 class StepWorkspace(NamedTuple):
     """Work arrays of one step, shape (n,) each, except `after_terms` with the shape (n, terms).
 
-    Parameters
-    ----------
-    under, slope, old_under, old_slope : array
-        Height and slope of the line at the elements, at the end and at the start of the step.
-    after, after_terms : array
-        Displacements without contact, and strains of the Prony terms, at the end of the step.
-    parts, leaves : array
-        Time of separation, as a fraction of the step, and displacement at this time; see :func:`release`.
-    gaps, pulls, force, power : array
-        As in `Contact`.
+    Heights (`under`) and slopes of the line belong to the end of the step, or, with the prefix `old_`, to its start.
+    `after` is the displacement without contact at the end of the step. `parts` and `leaves` are results of
+    :func:`release`. The others are those of `Contact`.
     """
 
     under: FloatArray
@@ -394,10 +365,7 @@ def _separate(
     depth: float,
     deborah: tuple[float, float],
 ) -> None:
-    """Write the times at which elements separate during a step, and the displacements at the end of the step.
-
-    The depth at the end of the step is `depth`.
-    """
+    """Write the times at which elements separate during a step, and the displacements at the end of the step."""
     parts, leaves, fall = workspace.parts, workspace.leaves, (depth - old_depth) / lapse.time
     for j in range(workspace.under.size):
         if state.touching[j]:
@@ -447,10 +415,10 @@ def _step(
     guess: float,
     deborah: tuple[float, float],
 ) -> tuple[float, bool]:
-    """Move all elements through a step; return the depth at the end of the step, and whether the depth was found.
+    """Move all elements through a step; return the depth at its end, and whether this depth was found.
 
-    At the end of the step the mean displacement of the elements is `mean`. The pair `deborah` contains v tau / L at the
-    start and at the end of the step.
+    At the end of the step the mean displacement is `mean`. The pair `deborah` contains v tau / L at the start and at
+    the end.
     """
     for j in range(workspace.under.size):
         workspace.parts[j] = 1.0 if state.touching[j] else 0.0
@@ -473,9 +441,9 @@ def forces_now(
 ) -> tuple[float, float, float, float]:
     """Return the depth, the rate of the depth, the drag and the fraction of the line in contact.
 
-    With a dashpot the rate of the depth is found at which the elements carry the load. Without a dashpot the depth is
-    corrected until the elements carry the load. The depth that follows from the mean displacement is less accurate,
-    because this mean is taken over the elements only. The edges of contact are written to `state`.
+    The edges of contact are written to `state`. With a dashpot the rate of the depth is found at which the elements
+    carry the load. Without a dashpot the depth is corrected until the elements carry the load. The depth that follows
+    from the mean displacement is less accurate, because this mean is taken over the elements only.
     """
     gaps, pulls = workspace.gaps, workspace.pulls
     for j in range(workspace.under.size):
