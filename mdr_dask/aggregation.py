@@ -1,8 +1,6 @@
 """Reduce results over realisations to means, standard deviations, quantiles and intervals.
 
-An output may have a companion: a second variable with the discretisation errors of the output. A mean has two errors,
-which are stored separately: ``standard_error`` from the scatter of the realisations, and ``grid_error`` from the
-discretisation. The interval of the mean combines both.
+An output may have a companion: a second variable with the discretisation errors of the output.
 """
 
 from __future__ import annotations
@@ -26,8 +24,7 @@ _STEP = 2**20
 class Statistic:
     """One reduction over ``realisation``: its name, its meaning and the function that computes it.
 
-    `compute` takes an output and its companion with discretisation errors, or None if the output has no companion. It
-    returns None if the statistic needs these errors and there is no companion.
+    The function takes an output and its companion, if any. It returns None if it needs the companion and there is none.
     """
 
     name: str
@@ -61,22 +58,12 @@ def standard_error(array: xr.DataArray) -> xr.DataArray:
 
 
 def grid_error(error: xr.DataArray) -> xr.DataArray:
-    """Return the discretisation error of the mean.
-
-    It is the mean of the absolute errors, because the errors of different realisations need not cancel.
-    """
+    """Return the discretisation error of the mean: the mean of the absolute errors, which need not cancel."""
     return mean(abs(error))
 
 
 def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
-    """Return the bootstrap interval of the mean, widened by the discretisation error on both sides.
-
-    Returns
-    -------
-    DataArray
-        The ends of the intervals. The dimension ``bound`` (``low``, ``high``) replaces ``realisation``. For the method
-        see `mdr_dask.bootstrap.interval`.
-    """
+    """Return the bootstrap interval of the mean with its discretisation error, along the new dimension ``bound``."""
     count = array.sizes["realisation"]
     if error is not None:
         array = xr.concat([array.drop_vars("realisation", errors="ignore"), grid_error(error)], "realisation")
@@ -87,8 +74,8 @@ def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
 def mean_and_ends(array: xr.DataArray, error: xr.DataArray | None) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
     """Return the mean and both ends of its `interval`.
 
-    If the scatter is unknown, for example with one realisation, the ends are the mean minus and plus the discretisation
-    error of the mean. If the discretisation error is unknown too, the ends are NaN.
+    If the scatter is unknown, for example with one realisation, the ends are the mean minus and plus its discretisation
+    error, or NaN.
     """
     known = (array,) if error is None else xr.broadcast(array, abs(error))
     found: tuple[xr.DataArray, xr.DataArray, xr.DataArray] = xr.apply_ufunc(
@@ -120,10 +107,9 @@ def _mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _interval(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Return the ends of intervals, shape (..., 2).
+    """Return the ends of intervals, shape (..., 2), from `count` realisations along the last axis.
 
-    The last axis of `values` has `count` realisations. If the discretisation error of the mean is known, this error is
-    one further entry at the end of the axis.
+    If the discretisation error of the mean is known, it is one further entry at the end of this axis.
     """
     flat = values.reshape(-1, values.shape[-1])
     bounds = np.full((len(flat), 2), np.nan)
@@ -187,29 +173,15 @@ NAMES = tuple(statistic.name for statistic in STATISTICS)
 
 
 def companion(dataset: xr.Dataset, output: str) -> xr.DataArray | None:
-    """Return the discretisation errors of an output, or None if the dataset has none.
-
-    The attribute ``ancillary_variables`` of the output contains the name of the variable with its errors.
-    """
+    """Return the discretisation errors of an output, or None if the dataset has none."""
     name = dataset[output].attrs.get("ancillary_variables")
     return dataset[name] if name in dataset.data_vars else None
 
 
 def aggregate(dataset: xr.Dataset, statistics: Sequence[str] = NAMES) -> xr.Dataset:
-    """Reduce a group of a store over its realisations.
+    """Reduce a group of a store over its realisations, to variables ``<output>_<statistic>``.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        A group as opened by :func:`mdr_dask.store.datasets`. If its arrays are lazy, the result is lazy.
-    statistics : sequence of str
-        Some of `NAMES`.
-
-    Returns
-    -------
-    Dataset
-        A variable ``<output>_<statistic>`` for every output and statistic, with units and meaning in attrs. The
-        statistic ``grid_error`` exists only for outputs with known discretisation errors.
+    If the arrays are lazy, the result is lazy.
     """
     for name in statistics:
         if name not in NAMES:

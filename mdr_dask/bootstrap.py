@@ -1,9 +1,8 @@
 """Bootstrap intervals from the scatter of realisations and from the discretisation errors of results.
 
-A *stack* is an array with three kinds of rows. The first row is the mean. The next `RESAMPLES` rows are the means of
-resampled realisations. In the remaining rows, the mean is shifted by its discretisation errors. A fit is applied to
-every row. The result is a stack of the fitted constants, from which `interval` computes an interval. A resample that
-contains only failed realisations is NaN and is left out.
+A *stack* is an array with three kinds of rows: first the mean, then `RESAMPLES` means of resampled realisations, then
+the mean shifted by its discretisation errors. A fit is applied to every row, and `interval` computes the interval of a
+constant from the stack of fitted constants. A resample that contains only failed realisations is NaN.
 """
 
 from __future__ import annotations
@@ -16,11 +15,9 @@ from numpy.typing import ArrayLike
 from mdr_dask.arrays import FloatArray
 
 CONFIDENCE = 0.95
-#: Number of resamples. With this number, the ends of an interval are accurate to about 5 % of the width of the
-#: interval.
+#: Number of resamples; the ends of an interval are then accurate to about 5 % of its width.
 RESAMPLES = 400
-#: Neighbouring values are put into groups; this is the largest number of groups. In each shifted row, the values of one
-#: group are shifted by their errors, all with the same sign.
+#: Largest number of groups of neighbouring values. The values of a group are shifted together by their errors.
 GROUPS = 32
 #: Probabilities of the ends of an interval.
 TAILS = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
@@ -34,8 +31,7 @@ NOTHING = -1000.0
 def weights(count: int) -> FloatArray:
     """Return how often each resample draws each realisation, shape (1 + RESAMPLES, count); the first row is all ones.
 
-    All cases use the same resamples, because realisation number k has the same rough line in all cases. The difference
-    between two cases is then computed for each resample.
+    All cases use the same resamples, because realisation number k has the same rough line in all cases.
     """
     generator = np.random.Generator(np.random.Philox(0))
     drawn = generator.multinomial(count, np.full(count, 1 / count), RESAMPLES)
@@ -45,10 +41,9 @@ def weights(count: int) -> FloatArray:
 
 
 def means(values: FloatArray) -> FloatArray:
-    """Return the stack of means over the first axis (realisations).
+    """Return the stack of means over the first axis (realisations), without the values that are not finite.
 
-    Values that are not finite are left out. Without any finite value, the mean and its resamples are NaN. With one
-    finite value, only the resamples are NaN.
+    With one finite value, the resamples are NaN.
     """
     flat = values.reshape(values.shape[0], -1)
     known = np.isfinite(flat)
@@ -62,19 +57,13 @@ def means(values: FloatArray) -> FloatArray:
 
 
 def complete(values: FloatArray) -> FloatArray:
-    """Return the values without incomplete realisations.
-
-    If a realisation (first axis) has a value that is not finite, all values of this realisation become NaN.
-    """
+    """Return the values, with NaN for every realisation (first axis) in which any value is not finite."""
     known = np.all(np.isfinite(values.reshape(values.shape[0], -1)), axis=1)
     return np.where(known.reshape(-1, *(1 for _ in values.shape[1:])), values, np.nan)
 
 
 def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
-    """Return values shifted up and down by their errors.
-
-    The result has two rows for each group of neighbouring values. In the first row, only the values of this group are
-    shifted up; in the second row, only these values are shifted down.
+    """Return values shifted up and down by their errors, in two rows for each group of neighbouring values.
 
     A value with an infinite error is shifted by its own absolute value.
     """
@@ -96,8 +85,7 @@ def with_errors(stack: FloatArray, errors: FloatArray) -> FloatArray:
 def difference(one: FloatArray, other: FloatArray) -> FloatArray:
     """Return the stack of the difference of two stacks with the same resamples.
 
-    The shifted rows of the difference have two parts. In the first part, the errors of `one` shift the difference; in
-    the second part, the errors of `other` do.
+    Its shifted rows contain first the errors of `one`, then those of `other`.
     """
     plain = 1 + RESAMPLES
     rows = [one[:plain] - other[:plain], one[plain:] - other[0], one[0] - other[plain:]]
@@ -113,43 +101,25 @@ def logarithms(stack: FloatArray) -> FloatArray:
 
 
 def _reach(shifts: FloatArray) -> FloatArray:
-    """Return the sum of the largest upward shifts of all groups.
-
-    Each group has two shifts, one for each sign of the errors; the larger one is used. A shift that is negative or NaN
-    counts as 0.
-    """
+    """Return the sum of the largest upward shifts of all groups; the rows are two shifts for each group."""
     known = np.where(np.isnan(shifts), 0.0, shifts)
     reach: FloatArray = np.maximum(np.maximum(known[0::2], known[1::2]), 0.0).sum(axis=0)
     return reach
 
 
 def regrouped(stack: FloatArray) -> FloatArray:
-    """Return a stack with new shifted rows: in each of these rows, a whole group of neighbouring cases is shifted.
-
-    All cases of the group are shifted in the same direction. In the shifted rows of the given stack, only one case is
-    shifted in each row.
-    """
+    """Return a stack whose shifted rows each shift a group of neighbouring cases, instead of a single case."""
     shifts = stack[1 + RESAMPLES :] - stack[0]
     own = np.maximum(_reach(shifts), _reach(-shifts))
     return with_errors(stack[: 1 + RESAMPLES], own)
 
 
 def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tuple[FloatArray, FloatArray]:
-    """Return 95 % intervals from a stack, along its first axis.
+    """Return 95 % intervals from a stack, along its first axis; with `positive`, computed in logarithms.
 
     With few realisations, the percentiles of a bootstrap lie too close to the value. Their distances from the value are
-    therefore multiplied by sqrt(n / (n - 1)) t / z. Here t is the 97.5 % quantile of Student's distribution with n - 1
-    degrees of freedom, and z is that of the normal distribution. The shifts by discretisation errors are added to these
-    distances. They are added linearly, because an error that is the same in every realisation does not average out.
-
-    Parameters
-    ----------
-    stack : array, shape (1 + RESAMPLES + 2 groups, ...)
-        The value, its resamples, and the value shifted up and down by its errors.
-    count : int or array
-        Number n of realisations that were resampled.
-    positive : bool
-        Whether to compute the interval in logarithms, for positive quantities.
+    therefore multiplied by `widening` for the number `count` of realisations. The shifts by discretisation errors are
+    added linearly, because an error that is the same in every realisation does not average out.
     """
     values = logarithms(stack) if positive else stack
     enough = np.count_nonzero(np.isfinite(values[1 : 1 + RESAMPLES]), axis=0) >= FEWEST
@@ -165,7 +135,7 @@ def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tup
 
 
 def widening(count: ArrayLike) -> FloatArray:
-    """Return the factor sqrt(n / (n - 1)) t / z for n = `count` realisations (see `interval`)."""
+    """Return sqrt(n / (n - 1)) t / z for n = `count`, with the 97.5 % quantiles t (Student, n - 1) and z (normal)."""
     from scipy.special import ndtri, stdtrit
 
     number = np.maximum(np.asarray(count, dtype=np.float64), 2.0)
@@ -176,31 +146,24 @@ def widening(count: ArrayLike) -> FloatArray:
 def chance(residuals: FloatArray, count: int, draws: int = RESAMPLES) -> float:
     """Return the probability that scatter and errors alone cause an rms residual at least as large as that of the data.
 
-    `residuals`, shape (1 + RESAMPLES + 2 groups, ...), is a stack of the differences between data and law; those of the
-    data are in its first row. The next `draws` rows are resamples. If the law holds, the numbers in the first row are
-    about as large as the differences between the resamples and the first row. `count` is the number of realisations
-    that were resampled. The probability is NaN if there are too few resamples, for example with one realisation.
+    `residuals` is a stack of the differences between data and law, with `draws` resamples. If the law holds, the first
+    row is about as large as the differences between the resamples and the first row. The result is NaN if there are too
+    few resamples, for example with one realisation.
     """
     caused = _caused(residuals, count, draws)
     return float(np.mean(caused >= np.sqrt(np.mean(residuals[0] ** 2)))) if caused.size else np.nan
 
 
 def scatter(residuals: FloatArray, count: int) -> float:
-    """Return the rms residual that scatter and errors alone exceed with a probability of 5 %; NaN if unknown.
-
-    `residuals` and `count` are as for `chance`.
-    """
+    """Return the rms residual that scatter and errors alone exceed with a probability of 5 %; NaN if unknown."""
     caused = _caused(residuals, count, RESAMPLES)
     return float(np.quantile(caused, CONFIDENCE, method="higher")) if caused.size else np.nan
 
 
 def _caused(residuals: FloatArray, count: int, draws: int) -> FloatArray:
-    """Return the rms residuals that scatter and errors alone cause, one per resample.
+    """Return the rms residuals that scatter and errors alone cause, one per resample; empty for too few resamples.
 
-    The array is empty if there are too few resamples.
-
-    Errors of different groups affect different cases. The residuals that the groups cause are therefore combined as the
-    root of the sum of their squares.
+    The residuals that errors cause are added as the root of the sum of squares, because groups affect different cases.
     """
     flat = residuals.reshape(residuals.shape[0], -1)
     away = np.sqrt(np.mean((flat[1:] - flat[0]) ** 2, axis=1))

@@ -12,20 +12,15 @@ from numpy.typing import NDArray
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.models.base import Model, Status
 
-#: A round multiplies the number of realisations by a factor. With this factor, about half of the unfinished cases
-#: should have enough realisations after the round. The factor is at least `LEAST_GROWTH`, so that there are few rounds,
-#: and at most `MOST_GROWTH`, because few results estimate their scatter poorly.
+#: Least and largest factor by which a round multiplies the number of realisations: there should be few rounds, and few
+#: results estimate their scatter poorly.
 LEAST_GROWTH, MOST_GROWTH = 1.25, 4.0
-#: Factor by which a round for a fitted constant multiplies the number of realisations. It is fixed, because the number
-#: of realisations that such a constant needs cannot be estimated.
+#: The same factor for a fitted constant, whose required number of realisations cannot be estimated.
 GROWTH = 1.5
-#: A case with `FEWEST` or more results stops if its estimated standard error meets the tolerance. With fewer results
-#: the standard error is estimated poorly: if cases stopped on this estimate alone, only 89 % of the 95 % intervals
-#: might contain the true mean. `growth_needed` lists two further conditions. The coverage was measured with
-#: ``python -m benchmarks campaigns``.
+#: Least number of results from which the estimated standard error alone decides. If cases stopped earlier, only 89 % of
+#: the 95 % intervals might contain the true mean (``python -m benchmarks campaigns``).
 FEWEST = 12
-#: A case with two or more results also stops if its standard error is below this fraction of the tolerance, because its
-#: results are then practically equal.
+#: A case also stops if its standard error is below this fraction of the tolerance: its results are practically equal.
 NEGLIGIBLE = 1e-3
 
 
@@ -47,18 +42,13 @@ def growth_needed(
     until: Mapping[str, Tolerance],
     scatter: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> NDArray[np.float64]:
-    """Return the factor by which the number of results of each case must grow.
+    """Return the factor by which the number of results of each case must grow: at most 1 if the case has enough.
 
-    `values` are the outputs that have a tolerance, shape (..., realisations), and `status` the ledger; only results
-    that are done are used. `until` is the largest allowed standard error of the mean of each output. `scatter`
-    contains, for some outputs, the standard error that was estimated within each single realisation.
-
-    The factor is at most 1 if the case has enough results for every tolerance, and 0 if the case has no successful
-    result. A case has enough results for a tolerance if at least one of these conditions holds:
-
-    * There are at least `FEWEST` results, and the standard error is within the tolerance.
-    * The standard error is below the fraction `NEGLIGIBLE` of the tolerance.
-    * The standard error is within the tolerance, and so is the standard error that follows from `scatter`.
+    `values` and `scatter` (the standard error estimated within each realisation) have the shape (..., realisations).
+    `until` limits the standard error of the mean of each output. A case has enough results if the standard error is
+    within the tolerance and, in addition, there are `FEWEST` results, or the standard error that follows from `scatter`
+    is within the tolerance, or the standard error is below the fraction `NEGLIGIBLE` of the tolerance. The factor is 0
+    for a case without a successful result.
     """
     done = status == Status.DONE
     count = np.maximum(done.sum(axis=-1), 1)
@@ -76,20 +66,13 @@ def growth_needed(
 
 
 def known_scatter(model: Model[Any], until: Collection[str], outputs: Collection[str]) -> dict[str, str]:
-    """Return the outputs that estimate the scatter of other outputs from one realisation.
-
-    The keys are the outputs with a tolerance whose scatter is estimated in this way. An output is left out if no such
-    estimate exists or if the study does not compute the estimate.
-    """
+    """Return, for outputs with a tolerance, the output that estimates their scatter from one realisation, if any."""
     scatter = {output: model.output(output).scatter for output in until}
     return {output: own for output, own in scatter.items() if own in outputs}
 
 
 def _times(error: NDArray[np.float64], allowed: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the factor by which the number of results must grow to reach the allowed error.
-
-    The factor is infinite if the error is NaN.
-    """
+    """Return the factor by which the number of results must grow to reach the allowed error."""
     known = np.where(error > 0, error, 0.0)
     with np.errstate(divide="ignore", over="ignore"):
         found = np.divide(known, allowed, out=np.zeros(known.shape), where=known > 0) ** 2
@@ -107,7 +90,7 @@ def mean_and_error(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return mean and standard error of the valid values along the last axis.
 
-    The mean is NaN if there is no valid value. The standard error is NaN if there are fewer than two.
+    The standard error is NaN if there are fewer than two valid values.
     """
     count = valid.sum(axis=-1)
     mean = np.where(valid, values, 0.0).sum(axis=-1) / np.maximum(count, 1)

@@ -7,8 +7,7 @@ from importlib.metadata import entry_points
 
 from mdr_dask.fits.base import Fit
 
-#: Modules of this package that have a tuple ``FITS``, and the models to whose stores these fits apply; an empty tuple
-#: means all models. A module is imported only if its fits apply.
+#: Modules with a tuple ``FITS``, and the models to whose stores these fits apply (empty: all).
 SUBJECTS: dict[str, tuple[str, ...]] = {
     "calibration": (),
     "ehl": ("ehl_line",),
@@ -25,10 +24,7 @@ GROUP = "mdr_dask.fits"
 
 
 def available(model: str) -> dict[str, Fit]:
-    """Return the fits for stores of a model, indexed by name.
-
-    The fits that other packages offer in `GROUP` are included.
-    """
+    """Return the fits for stores of a model, indexed by name, including those that other packages offer in `GROUP`."""
     subjects = [subject for subject, models in SUBJECTS.items() if model in models or not models]
     own = (import_module(f"mdr_dask.fits.{subject}").FITS for subject in subjects)
     others = (entry.load() for entry in entry_points(group=GROUP))

@@ -12,27 +12,20 @@ from mdr_dask.errors import CampaignError, FitError, did_you_mean
 from mdr_dask.fits import available
 from mdr_dask.fits.base import Fit
 
-#: To find out whether a constant depends on a case, the results of the case are shifted by this fraction of their
-#: standard error. The shift is so small that the fit still selects the same cases.
+#: Shift of the results of a case, in standard errors, that shows whether a constant depends on the case. It is so small
+#: that the fit still selects the same cases.
 STEP = 1e-3
 #: Largest number of groups into which the values along a dimension are divided. One group is shifted at a time.
 GROUPS = 32
-#: A group of cases needs no more realisations if the constant hardly depends on this group: a shift of the results by
-#: one standard error changes the constant by less than this fraction of the half width of its interval.
+#: A group of cases needs no more realisations if a shift of its results by one standard error changes the constant by
+#: less than this fraction of the half width of its interval.
 NEGLIGIBLE = 0.01
 #: To extrapolate to zero scatter, the fit is repeated with the scatter changed by this fraction.
 LESS = 0.01
 
 
 def require_known(campaign: Campaign) -> None:
-    """Check the constants that a campaign names in ``until``.
-
-    Raises
-    ------
-    CampaignError
-        If no fit of the model gives a named constant, or if a campaign with an adaptive axis names both outputs and
-        constants. The message has one sentence for each wrong name.
-    """
+    """Raise CampaignError if no fit gives a constant that a campaign names in ``until``."""
     known = available(campaign.model) if campaign.replication.answers else {}
     is_adaptive = any(axis.refinement for one in campaign.series for axis in one.axes)
     problems = []
@@ -55,13 +48,7 @@ def require_known(campaign: Campaign) -> None:
 def half_widths(
     fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]
 ) -> dict[str, tuple[xr.DataArray, xr.DataArray]]:
-    """Return, for each series, a constant and the half width of its 95 % interval.
-
-    Raises
-    ------
-    FitError
-        If the law cannot be fitted, or the fit does not give this constant.
-    """
+    """Return, for each series, a constant and the half width of its 95 % interval."""
     found = {}
     for name, result in fit.results(groups).items():
         if constant not in result:
@@ -83,10 +70,9 @@ def _allowed(value: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
 def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.DataArray]:
     """Return, for each series, the half width that the interval of a constant would have without scatter.
 
-    This half width is due to grid errors and to the misfit of the law. More realisations do not reduce this half width.
-    The fit is repeated with the scatter multiplied by ``1 - LESS`` and by ``1 + LESS``. From each of these fits, the
-    half width is extrapolated linearly to zero scatter. The smaller of the two results is returned. The two results
-    differ greatly if a change of the scatter alters the verdict on the law, because the half width then jumps.
+    This part is due to grid errors and to the misfit of the law. The fit is repeated with slightly less and slightly
+    more scatter, and each result is extrapolated linearly to zero scatter. The smaller one is used, because the half
+    width jumps if a change of the scatter alters the verdict on the law.
     """
     now = half_widths(fit, constant, groups)
 
@@ -112,14 +98,8 @@ def still_wide(
 ) -> dict[str, xr.DataArray]:
     """Return, for each series, where the interval of a constant is too wide and more realisations are worth while.
 
-    The half width of an interval has a part due to scatter, and a part due to grid errors and misfit. More realisations
-    are not worth while if two conditions are met: the part due to scatter is already within the tolerance, and the
-    total half width would exceed the tolerance even with `at_most` realisations.
-
-    Raises
-    ------
-    FitError
-        If the law cannot be fitted, or the fit does not give this constant.
+    More realisations are not worth while if the part of the half width that is due to scatter is within the tolerance,
+    and the total half width would exceed the tolerance even with `at_most` realisations.
     """
     found = half_widths(fit, constant, groups)
     wide = {name: is_wide(*both, tolerance) for name, both in found.items()}
@@ -137,28 +117,11 @@ def still_wide(
 def cases_behind(
     fit: Fit, constant: str, groups: Mapping[str, xr.Dataset], name: str, wide: xr.DataArray
 ) -> xr.DataArray:
-    """Return the cases of a series that affect a constant whose interval is too wide.
+    """Return the cases of the series `name` that affect a constant, where `wide` says that its interval is too wide.
 
     Along each dimension over which the constant is fitted, neighbouring cases form groups. The results of one group at
-    a time are shifted by a small fraction of their standard error, and the fit is repeated. If the constant changes,
-    the constant depends on this group. A case is chosen if, along each of these dimensions, the constant depends on the
-    group that contains the case.
-
-    Parameters
-    ----------
-    fit, constant : Fit, str
-        The law and one of its constants.
-    groups : mapping of str to Dataset
-        The series that are fitted.
-    name : str
-        Name of the series whose cases are returned.
-    wide : bool array
-        Where the interval of the constant is too wide.
-
-    Returns
-    -------
-    bool array
-        Whether each case is chosen.
+    a time are shifted, and the fit is repeated. A case is chosen if the constant depends on its group along each of
+    these dimensions.
     """
     data = groups[name]
     sizes = {str(dim): size for dim, size in data["status"].sizes.items() if dim != "realisation"}
@@ -193,10 +156,7 @@ def cases_behind(
 
 
 def _over(dims: list[str], flags: xr.DataArray) -> xr.DataArray:
-    """Return flags that have the dimensions `dims` only.
-
-    A returned flag is set if any flag along the other dimensions is set.
-    """
+    """Return flags along the dimensions `dims` only, set if any flag along the other dimensions is set."""
     bare = flags.drop_vars(flags.coords)
     return bare.any([dim for dim in bare.dims if dim not in dims])
 
@@ -204,8 +164,7 @@ def _over(dims: list[str], flags: xr.DataArray) -> xr.DataArray:
 def _steps(data: xr.Dataset, inner: list[str]) -> dict[str, xr.DataArray]:
     """Return the shift of each output of every case.
 
-    All realisations of a case are shifted equally. The shifts of different cases have random signs and sizes. Equal
-    shifts would cancel if a fit uses differences between cases.
+    The shifts have random signs and sizes, because equal shifts would cancel if a fit uses differences between cases.
     """
     generator, shape = np.random.Generator(np.random.Philox(0)), [data.sizes[dim] for dim in inner]
     found = {}

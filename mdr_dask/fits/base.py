@@ -1,11 +1,7 @@
 """The class `Fit`: a law, with a function that fits its constants to the series of a store and tests the law.
 
-Every result has a variable ``law_holds``: a sentence that begins with *yes*, *approximately*, *no* or *not tested*.
-This sentence is about the law with the constants that its source states. If constants are fitted, ``fitted_law_holds``
-is the corresponding sentence about the law with the fitted constants.
-
-If scatter and errors do not explain the departures of the data from the fitted law, the intervals of the constants
-become wider (see `fitted`). A constant that the data do not determine is NaN (see `undetermined`).
+Every result has a sentence ``law_holds`` about the law with the constants that its source states; it begins with *yes*,
+*approximately*, *no* or *not tested*. If constants are fitted, ``fitted_law_holds`` is about the law with these.
 """
 
 from __future__ import annotations
@@ -23,7 +19,7 @@ from mdr_dask.errors import FitError, distinguishable
 
 #: A law holds if the rms relative departure is at most this value, and the largest departure at most twice this value.
 WITHIN = 0.05
-#: A law holds approximately if the rms relative departure is at most this value, and the largest at most twice as much.
+#: The same, for a law that holds approximately.
 APPROXIMATE = 0.15
 #: Departures count against a law if scatter and errors alone would cause such departures with a probability below this.
 DOUBTFUL = 0.05
@@ -31,26 +27,13 @@ DOUBTFUL = 0.05
 
 @dataclass(frozen=True)
 class Fit:
-    """A law that can be fitted to a store.
+    """A law that can be fitted to the stores of some models (empty: all), by ``mdr-dask fit STORE NAME``.
 
-    Parameters
-    ----------
-    name : str
-        Name on the command line: ``mdr-dask fit STORE NAME``.
-    models : tuple of str
-        Models to whose stores the law can be fitted; an empty tuple means all models.
-    summary : str
-        The law, in one line.
-    compute : callable, mapping of str to Dataset -> Dataset
-        Takes the groups of a store, indexed by the name of the series (``""`` for a store without series). Each group
-        has the dimensions (axes..., realisation, ...). The coordinates of a group are all scalar parameters, varied or
-        fixed. Returns three kinds of variables: every constant with the ends of its 95 % interval (``<name>_low`` and
-        ``<name>_high``), measures of the goodness of fit, and ``law_holds``. Units are in the attrs.
-    apart : bool
-        Whether each series of a store is fitted separately. ``compute`` then gets a mapping with one series.
-    constants : tuple of str, or callable, Campaign -> tuple of str
-        Constants for which the fit gives an interval. A campaign can request realisations until such an interval is
-        narrow enough (``until: {name.constant: 1 %}``).
+    `compute` takes the groups of a store, indexed by the name of the series. A group has the dimensions (axes...,
+    realisation, ...), and all scalar parameters as coordinates. `compute` returns constants with the ends of their 95 %
+    intervals (``<name>_low`` and ``<name>_high``), measures of the goodness of fit, and ``law_holds``, with units in
+    the attrs. If `apart`, each series is fitted separately, and the mapping has one series. `constants` names the
+    constants with an interval, which a campaign may name in ``until``; it may depend on the campaign.
     """
 
     name: str
@@ -65,15 +48,9 @@ class Fit:
         return self.constants(campaign) if callable(self.constants) else self.constants
 
     def results(self, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
-        """Fit a store, and return the results, indexed by the name of the series.
+        """Fit a store, and return the results, indexed by the name of the series (``""`` for all series together).
 
-        With the option `apart`, there is one result for each series that has the necessary data. Otherwise there is one
-        result for all series together, with the name ``""``.
-
-        Raises
-        ------
-        FitError
-            If no series has the necessary data. The message gives the reason for each series.
+        FitError is raised only if no series has the necessary data.
         """
         if not self.apart:
             return {"": _judged(self.compute(groups))}
@@ -110,20 +87,10 @@ def _judged(result: xr.Dataset) -> xr.Dataset:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A law fitted to a stack of data.
+    """A law fitted to a stack of data (see `mdr_dask.bootstrap`).
 
-    A stack is an array whose first row holds the data. Its further rows hold the data for resampled realisations, and
-    the data shifted by their errors (see `mdr_dask.bootstrap`).
-
-    Attributes
-    ----------
-    constants : array, shape (rows, p)
-        Stack of the constants; NaN for constants that the data do not determine. `mdr_dask.bootstrap.interval` computes
-        intervals from this stack.
-    residuals : array, shape (rows, cases)
-        Stack of the differences between data and law (data minus law).
-    count : int
-        Number of realisations that were resampled.
+    `constants`, shape (rows, p), and `residuals` (data minus law), shape (rows, cases), are stacks. Constants that the
+    data do not determine are NaN. `count` is the number of realisations that were resampled.
     """
 
     constants: FloatArray
@@ -149,26 +116,12 @@ def fitted(
     count: int,
     stated: FloatArray | None = None,
 ) -> Fitted:
-    """Fit a law to a stack of data.
+    """Fit a law to a stack of data, shape (rows, cases).
 
-    If scatter and errors do not explain the residuals, the law is also fitted to data that are shifted by the
-    residuals. These additional fits widen the intervals of the constants.
-
-    Parameters
-    ----------
-    fit : callable
-        Takes data, shape (rows, cases), and returns constants, shape (rows, p). A constant is an exponent, or the
-        logarithm of a factor.
-    left : callable
-        Takes data and constants, and returns data minus law, shape (rows, cases).
-    data : array, shape (rows, cases)
-        Stack of the data.
-    count : int
-        Number of realisations that were resampled.
-    stated : array, shape (p,), optional
-        Constants that the source of the law states. The fit tests whether the data determine each constant. The test is
-        made at the fitted constants and, if given, at the stated constants. A constant that fails one of these tests is
-        NaN.
+    `fit` returns the constants, shape (rows, p), which are exponents or logarithms of factors; `left` returns data
+    minus law. If scatter and errors do not explain the residuals, the law is also fitted to data that are shifted by
+    the residuals, which widens the intervals. A constant is NaN if it is `undetermined` at the fitted or at the
+    `stated` constants.
     """
     constants = fit(data)
     residuals = left(data, constants)
@@ -184,17 +137,10 @@ def fitted(
 
 
 def undetermined(effects: FloatArray) -> BoolArray:
-    """Return which constants of a law the data do not determine.
+    """Return which constants of a law the data do not determine, from the derivatives of the law, shape (cases, p).
 
-    One constant is changed by 1, and the other constants are fitted again. The constant is undetermined if both changes
-    together alter the law by less than `WITHIN` in every case. Departures below `WITHIN` do not count against a law.
-    Therefore very different values of such a constant fit the data equally well.
-
-    Parameters
-    ----------
-    effects : array, shape (cases, p)
-        Derivatives of the logarithm of the law with respect to its constants, which are exponents or logarithms of
-        factors.
+    A constant is changed by 1, and the other constants are fitted again. If the law then changes by less than `WITHIN`
+    in every case, which does not count against a law, very different values of the constant fit equally well.
     """
     largest = np.empty(effects.shape[1])
     for k in range(largest.size):
@@ -213,21 +159,10 @@ def verdict(
     *,
     excluded: bool = False,
 ) -> str:
-    """Return a sentence on whether a law holds, from a stack of the departures of the data from the law.
+    """Return a sentence on whether a law holds, from a stack of the relative departures of the data from the law.
 
-    Parameters
-    ----------
-    residuals : array, shape (rows, cases)
-        Stack of the relative departures of the data from the law.
-    count : int
-        Number of realisations that were resampled.
-    constants : int
-        Number of constants fitted to these data.
-    where : callable, int -> str, optional
-        Describes a case in words. The sentence contains this description of the case with the largest departure.
-    excluded : bool
-        Whether the interval of a fitted constant excludes the stated value. If so, scatter does not explain the
-        departures.
+    `constants` is the number of constants fitted to these data. `where` describes a case in words. `excluded` says that
+    the interval of a fitted constant excludes the stated value, so that scatter does not explain the departures.
     """
     if residuals.shape[1] <= constants:
         return law_holds(residuals[0], np.nan, constants)
@@ -251,26 +186,12 @@ def short(number: float) -> str:
 def law_holds(
     departures: FloatArray, chance: float | None, constants: int = 0, where: str = "", scatter: float = 0.0
 ) -> str:
-    """Return a sentence on whether a law holds.
+    """Return a sentence on whether a law holds, from the relative departures of the data.
 
-    If scatter may hide departures larger than `WITHIN`, the verdict is at best *approximately*. If scatter may hide
-    departures larger than `APPROXIMATE`, the verdict is *not tested*, because small departures then do not confirm the
-    law.
-
-    Parameters
-    ----------
-    departures : array
-        Relative departures of the data from the law.
-    chance : float or None
-        Probability that scatter and errors alone cause departures of this size. NaN if the probability is unknown; None
-        if scatter and errors cannot cause such departures.
-    constants : int
-        Number of constants fitted to these data.
-    where : str
-        Description of the case with the largest departure.
-    scatter : float
-        Rms departure that scatter and errors alone would exceed with a probability of 5 %; NaN if the scatter is
-        unknown.
+    `chance` is the probability that scatter and errors alone cause such departures: NaN if unknown, None if they
+    cannot. `scatter` is the rms departure that scatter and errors alone would exceed with a probability of 5 %. If
+    scatter may hide departures above `WITHIN`, the verdict is at best *approximately*; above `APPROXIMATE`, it is *not
+    tested*.
     """
     if departures.size <= constants:
         return f"not tested: {departures.size} cases for {constants} constants leave nothing to compare"

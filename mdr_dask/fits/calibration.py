@@ -1,7 +1,6 @@
 """Calibration: estimate unknown parameters of a study from measured points.
 
-The unknowns are the axes of the study that are not columns of the table of measured points. The ranges of these axes
-are divided into cells. The posterior density of the unknowns is computed in each cell (see `mdr_dask.fits.posterior`).
+The unknowns are the axes of the study that are not columns of the table of measured points.
 """
 
 from __future__ import annotations
@@ -38,22 +37,9 @@ _ROUNDING = 1e-9
 class Calibration:
     """The result of a calibration.
 
-    Parameters
-    ----------
-    measured : Measured
-        The measured points.
-    prediction : Prediction
-        Prediction of the study at the measured points.
-    posterior : Posterior
-        Posterior density of the unknowns.
-    noises : list of Noise
-        Possible errors of measurement.
-    units : dict of str to str
-        Units of the unknowns, the conditions and the output.
-    contradicted : Residuals or None
-        None if the errors of measurement in the table explain the residuals. Otherwise the residuals. The posterior is
-        then computed with errors of measurement that are large enough to explain these residuals. Therefore the
-        intervals include the misfit.
+    `noises` are the possible errors of measurement, and `units` the units of unknowns, conditions and output.
+    `contradicted` contains the residuals if the errors of measurement in the table do not explain them. The posterior
+    then uses errors that are large enough, so that the intervals include the misfit.
     """
 
     measured: Measured
@@ -65,7 +51,7 @@ class Calibration:
 
     @property
     def unknowns(self) -> list[str]:
-        """Names of the unknowns: the axes of the study that are not columns of the table."""
+        """Names of the unknowns."""
         return [*self.prediction.unknowns]
 
     @cached_property
@@ -85,7 +71,7 @@ class Calibration:
 
     @cached_property
     def products(self) -> list[identifiability.Product]:
-        """Products of powers of undetermined unknowns. The data determine the products, but not their factors."""
+        """Products of powers of undetermined unknowns that the data determine."""
         return identifiability.products(self.posterior, self.values, self.free)
 
     def name_and_unit(self, product: identifiability.Product) -> tuple[str, str]:
@@ -136,31 +122,14 @@ class Calibration:
 
 
 def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
-    """Estimate the unknowns of a study from measured points.
+    """Estimate the one to four unknowns of a grid study from measured points.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        A group of a study that is a grid, with one to four unknowns. The prior of an unknown is uniform over its axis,
-        or uniform in the logarithm if the axis is spaced logarithmically.
-    measured : Measured
-        The measured points.
+    The prior of an unknown is uniform over its axis, or over the logarithm if the axis is spaced logarithmically. The
+    covariance of the points, which are normally distributed, has three parts: errors of measurement; scatter of the
+    rough lines, common to all points; and errors of grid and interpolation, one half of which is common to all points.
 
-    Raises
-    ------
-    FitError, DataError
-        If the study cannot be compared with the table.
-
-    Notes
-    -----
-    The likelihood is a normal distribution. The covariance of the measured points has three parts: the
-    errors of measurement; the scatter of the rough lines, which is common to all points; and the estimated errors of
-    grid and interpolation. One half of the errors of grid and interpolation is treated as common to all points. The
-    other half is treated as independent for each point.
-
-    If the table gives no errors of measurement, two kinds of errors are considered: errors that are equal for all
-    points, and errors that are proportional to the values. The size of these errors is unknown. The logarithm of the
-    size has a uniform prior.
+    Without errors of measurement in the table, their size is unknown, and its logarithm has a uniform prior. The errors
+    are then either equal for all points, or proportional to the values.
     """
     predicted = prediction(dataset, measured)
     named = (*predicted.unknowns, *measured.conditions, measured.output)
@@ -215,8 +184,7 @@ def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
 def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
     """Return possible sizes of the error of measurement, from the rms residual of the best prediction.
 
-    The smallest size is `LEAST` times the rms residual. The true error exceeds the largest size with a probability of
-    0.1 %, given these residuals.
+    Given these residuals, the true error exceeds the largest size with a probability of 0.1 %.
     """
     spare = max(1, count - unknowns)
     most = min(100.0, float(np.sqrt(count / (2 * gammaincinv(spare / 2, 0.001)))))
@@ -224,13 +192,7 @@ def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
 
 
 def measured_of(dataset: xr.Dataset) -> Measured:
-    """Return the measured points that are stored with a study.
-
-    Raises
-    ------
-    FitError, DataError
-        If the study has no table of measured points, or the table has no column for an output of the study.
-    """
+    """Return the measured points that are stored with a study."""
     table = dataset.attrs.get("measured")
     if not table:
         raise FitError(
@@ -323,10 +285,7 @@ def _intervals(values: FloatArray, weights: FloatArray) -> dict[str, float]:
 
 
 def _bound(found: Calibration, k: int) -> dict[str, float]:
-    """Return the one-sided interval of the unknown number `k`.
-
-    The result is empty unless this unknown is the only undetermined one and has exactly one open end.
-    """
+    """Return the one-sided interval of unknown `k`, if it is the only undetermined one and has exactly one open end."""
     low, high = found.ends[k]
     if found.free != [k] or low == high:
         return {}

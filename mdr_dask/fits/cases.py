@@ -1,7 +1,6 @@
 """Functions that many fits use: arrays of the cases of a series, fits of laws to such arrays, and variables of results.
 
-A *stack* is an array from which intervals are computed. The first row of a stack holds the means. The further rows hold
-the means of resampled realisations, and the means shifted by their errors (see `mdr_dask.bootstrap`).
+For stacks, see `mdr_dask.bootstrap`.
 """
 
 from __future__ import annotations
@@ -28,26 +27,10 @@ def each(
     fit: Callable[[xr.Dataset], Variables],
     *outputs: str,
 ) -> xr.Dataset:
-    """Fit a law to the cases along some dimensions.
+    """Fit a law to the cases along some dimensions, for each combination of values along the other dimensions.
 
-    The fit is repeated for each combination of values along the other dimensions.
-
-    Parameters
-    ----------
-    series : mapping of str to Dataset
-        One series.
-    inner : callable
-        Returns the dimensions along which one fit combines the cases, such as the dimensions of load and velocity.
-    fit : callable
-        Returns the results of the fit for one combination of values along the other dimensions.
-    *outputs : str
-        Outputs that the fit needs. The dimensions of the first output must be axes of the study or the dimension of
-        realisations.
-
-    Raises
-    ------
-    FitError
-        If the store lacks an output.
+    The function `inner` returns the dimensions along which one fit combines the cases. The first of `outputs`, which
+    the fit needs, must have no dimensions but axes of the study and realisations.
     """
     data = next(iter(series.values()))
     missing = [name for name in outputs if name not in data]
@@ -84,14 +67,9 @@ def one_value(data: xr.Dataset, name: str) -> float:
 
 
 class Table(NamedTuple):
-    """The values of an output in all cases, divided by a scale such as the rms slope.
+    """The values of an output in all cases and their errors, shape (cases, realisations), divided by a scale.
 
-    Attributes
-    ----------
-    values, error : array, shape (cases, realisations)
-        The output divided by the scale, and the discretisation error divided by the scale.
-    columns : tuple of array, shape (cases,)
-        Other numbers of the cases, such as load and velocity.
+    `columns` are other numbers of the cases, such as load and velocity.
     """
 
     values: FloatArray
@@ -129,10 +107,7 @@ class Table(NamedTuple):
 
 
 def table_of(data: xr.Dataset, scale: Any, *columns: xr.DataArray, output: str = "friction_coefficient") -> Table:
-    """Return the values of an output in all cases, divided by a scale.
-
-    The arrays `columns` hold other numbers of the cases, such as load and velocity.
-    """
+    """Return the values of an output in all cases, divided by a scale such as the rms slope."""
     values = data[output]
     error = companion(data, output)
     arrays = xr.broadcast(values / scale, (0 * values if error is None else error) / scale, *columns)
@@ -149,9 +124,9 @@ def table_of(data: xr.Dataset, scale: Any, *columns: xr.DataArray, output: str =
 
 
 def linear(design: FloatArray, logs: FloatArray, count: int) -> Fitted:
-    """Fit a law to a stack of logarithms. The law must be linear in its constants.
+    """Fit a law that is linear in its constants to a stack of logarithms.
 
-    `design` are the derivatives of the law with respect to its constants, shape (constants, cases).
+    `design` contains the derivatives of the law with respect to its constants, shape (constants, cases).
     """
     solve = np.linalg.pinv(design)
     return fitted(lambda rows: rows @ solve, lambda rows, constants: rows - constants @ design, logs, count)
@@ -165,7 +140,7 @@ def power_law(x: FloatArray, logs: FloatArray, count: int) -> Fitted:
 def stated_power(x: FloatArray, logs: FloatArray, power: float, count: int, where: Callable[[int], str]) -> str:
     """Return a sentence on whether data follow a power law with a stated exponent; the factor is fitted.
 
-    `x` are the logarithms of the abscissa, and `logs` is the stack of the logarithms of the data.
+    `x` and `logs` are logarithms of the abscissa and of the data (a stack).
     """
     rest = logs - power * x
     free = power_law(x, logs, count).constants[:, 0]
@@ -182,26 +157,10 @@ def nonlinear(
     count: int,
     where: Callable[[int], str],
 ) -> tuple[Fitted, Variables]:
-    """Fit a law to a stack of logarithms. Compare the data with the law for the stated and for the fitted constants.
+    """Fit a law to a stack of logarithms, and test the law with the stated and with the fitted constants.
 
-    Parameters
-    ----------
-    model : callable
-        Takes constants, shape (rows, p), and returns the logarithms of the law, shape (rows or 1, cases).
-    stated : array, shape (p,)
-        Constants that the source of the law states: exponents, or logarithms of factors.
-    logs : array, shape (rows, cases)
-        Stack of the data.
-    count : int
-        Number of realisations that were resampled.
-    where : callable, int -> str
-        Describes a case in words.
-
-    Returns
-    -------
-    Fitted, Variables
-        The fit, and result variables: rms and largest departure and a verdict, each for the stated and for the fitted
-        constants.
+    The function `model` takes constants, shape (rows, p), and returns the logarithms of the law, shape (rows or 1,
+    cases). The constants `stated` are exponents or logarithms of factors.
     """
     found = fitted(
         lambda rows: _least_squares(model, stated, rows), lambda rows, best: rows - model(best), logs, count, stated
@@ -224,10 +183,9 @@ def rms(left: FloatArray) -> float:
 
 
 def _least_squares(model: Callable[[FloatArray], FloatArray], start: FloatArray, data: FloatArray) -> FloatArray:
-    """Fit every row of the data, shape (rows, cases), by Levenberg-Marquardt steps.
+    """Fit every row of the data, shape (rows, cases), by Levenberg-Marquardt steps; return the constants of each row.
 
-    Return the constants, shape (rows, constants). Each call of the model evaluates all rows. This evaluation is a
-    hundred times faster than one scipy fit for each row.
+    Each call of the model evaluates all rows, which is a hundred times faster than one scipy fit for each row.
     """
     size = np.eye(start.size)
     constants = np.tile(start, (data.shape[0], 1))

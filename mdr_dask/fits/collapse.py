@@ -24,17 +24,10 @@ LOG = float(np.log(10.0))  # factor that converts a small departure in decades i
 def laws_of(
     result: Superposition, over: str, unit: str, reference: float, *, is_temperature: bool
 ) -> tuple[list[ShiftLaw], dict[str, str]]:
-    """Fit the laws that suit the groups: a power law for velocities, Arrhenius and WLF for temperatures.
+    """Fit the laws that suit the groups, and return with each law a sentence on whether it holds.
 
-    The laws are fitted relative to the middle group. Therefore the fit does not depend on the reference. The fitted
-    constants are then converted to the reference.
-
-    Returns
-    -------
-    laws : list of ShiftLaw
-        For temperatures, laws of log10 a_T; for velocities, laws of the shift factor in decades.
-    verdicts : dict of str to str
-        For each law, a sentence on whether the law holds.
+    These are a power law of the shift factors for velocities, and Arrhenius' law and the WLF law of log10 a_T for
+    temperatures. They are fitted relative to the middle group, so that the fit does not depend on the reference.
     """
     size, anchor = result.groups.size, result.groups.size // 2
     groups, factors = result.groups, result.horizontal - result.horizontal[anchor]
@@ -62,25 +55,15 @@ def laws_of(
 
 
 def sign_of(over: str) -> int:
-    """Return -1 if the abscissa is a time; otherwise, as for a frequency, return 1.
-
-    A shift factor in decades is log10 a_T times this sign.
-    """
+    """Return -1 if the abscissa is a time, otherwise 1: a shift factor is log10 a_T times this sign."""
     return -1 if over == "t" or over.lower().startswith("time") else 1
 
 
 def kelvins(temperatures: FloatArray, unit: str, groups: FloatArray | None = None) -> FloatArray:
     """Return temperatures in K.
 
-    If the unit is unknown, the temperatures count as K if their median exceeds 250, and otherwise as degC.
-
-    Parameters
-    ----------
-    temperatures : array
-    unit : str
-        Unit as written in the table; empty if the table has no unit.
-    groups : array, optional
-        The temperatures from which the median is computed: all temperatures of the table. By default `temperatures`.
+    Without a unit, temperatures count as K if the median of `groups` (or of these temperatures) exceeds 250, else as
+    degC.
     """
     if unit in ("", "1", "-"):
         unit = "K" if np.median(temperatures if groups is None else groups) > 250 else "degC"
@@ -107,8 +90,8 @@ def _constants(law: shift_laws.ShiftLaw) -> dict[str, xr.Variable]:
 def with_verdict(curve: xr.Dataset, verdicts: dict[str, str]) -> xr.Dataset:
     """Add ``law_holds`` to a master curve: whether the curves collapse, and which law the shift factors follow.
 
-    If the curves do not determine all shift factors, neither the collapse nor a law is tested. For example, two
-    plateaus of the same height coincide for any shift.
+    If the curves do not determine all shift factors, nothing is tested: for example, two plateaus of the same height
+    coincide for any shift.
     """
     open_steps = curve.attrs.get("undetermined", "")
     collapse = f"not tested: shift factors are {open_steps.partition(':')[0]}" if open_steps else _collapse(curve)
@@ -126,10 +109,10 @@ def with_verdict(curve: xr.Dataset, verdicts: dict[str, str]) -> xr.Dataset:
 
 
 def _collapse(curve: xr.Dataset) -> str:
-    """Return a sentence on whether the curves collapse.
+    """Return a sentence on whether the curves collapse; for two ordinates, about the one that collapses less well.
 
     The scatter of all points about the merged curve is compared with the scatter of each curve about its own
-    polynomial. If two ordinates were shifted together, the sentence is about the ordinate that collapses less well.
+    polynomial.
     """
     names = [name for name in ("ordinate", "companion") if f"point_{name}" in curve]
     answers = [_collapse_of(curve, name) for name in names]
@@ -161,16 +144,13 @@ def _collapse_of(curve: xr.Dataset, name: str) -> str:
 
 
 class _Within(NamedTuple):
-    """The scatter of curves: squared residuals of each curve from its own polynomial, summed over all curves.
-
-    `freedom` is the number of degrees of freedom of this sum.
-    """
+    """The sum of squared residuals of each curve from its own polynomial, and the degrees of freedom of this sum."""
 
     squares: float
     freedom: int
 
     def criterion(self, points: int) -> float:
-        """Return Schwarz's criterion. The degree of the polynomials with the smallest criterion is chosen."""
+        """Return Schwarz's criterion, whose smallest value selects the degree of the polynomials."""
         mean = max(self.squares, 1e-300) / points
         return float(points * np.log(mean) + (points - self.freedom) * np.log(points))
 

@@ -25,18 +25,7 @@ LEAST_JUMP = 3.0
 
 
 def read_table(path: str | Path) -> pd.DataFrame:
-    """Read a table of numbers with a row of names and an optional row of units; comments are skipped.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Floating-point columns with the names in the table; ``attrs["units"]`` holds the units found.
-
-    Raises
-    ------
-    DataError
-        If the table has no row of names, or an entry is not a number.
-    """
+    """Read a table of numbers with a row of names and an optional row of units, which become ``attrs["units"]``."""
     sheet = read_sheet(decoded(Path(path).read_bytes(), str(path)), str(path))
     if not sheet.names:
         raise DataError(f"{path}: expected names of columns, got numbers")
@@ -76,10 +65,9 @@ def finite_rows(frame: pd.DataFrame, columns: list[str]) -> tuple[pd.DataFrame, 
 
 
 def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
-    """Return the column with the wanted name, or else the first column whose name is a synonym.
+    """Return the column with the wanted name, or else the first column whose name is a synonym, or None.
 
-    The result is None if there is no such column. It is also None if the names of several columns are synonyms, and the
-    values of these columns differ.
+    The result is also None if several columns have synonyms as names and their values differ.
     """
     columns = [str(name) for name in frame.columns]
     if wanted in columns:
@@ -152,10 +140,9 @@ def columns_to_use(
 
 
 def kind_of(over: str, ordinates: Sequence[str], by: str, units: Mapping[str, str]) -> Vertical:
-    """Return the kind of vertical factors that suit these columns: ``modulus``, ``compliance`` or ``none``.
+    """Return the kind of vertical factors that suit these columns, recognised by name or unit.
 
-    The kinds ``modulus`` and ``compliance`` need a time or frequency as abscissa, and a temperature as group. Columns
-    are recognised by their name or by their unit.
+    ``modulus`` and ``compliance`` need a time or frequency as abscissa, and a temperature as group; otherwise ``none``.
     """
 
     def is_one(column: str, *names: str, unit: str) -> bool:
@@ -182,10 +169,7 @@ def _has_unit(unit: str, wanted: str) -> bool:
 
 
 def second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
-    """Return a second parameter in which the curves differ, velocity or temperature; None if only one parameter varies.
-
-    Raise DataError if the curves differ in the normal force, or in more than one other parameter.
-    """
+    """Return a second parameter in which the curves differ, velocity or temperature, or None."""
     found = None
     for name in ("normal_force", "velocity", "temperature"):
         column = column_of(frame, name)
@@ -199,10 +183,7 @@ def second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
 def curves_of(
     frame: pd.DataFrame, over: str, ordinates: Sequence[str], by: str
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
-    """Return the value of the group of each curve, and the logarithms (log10) of its abscissas and ordinates.
-
-    Ordinates have the shape (channels, points).
-    """
+    """Return the group of each curve, and log10 of its abscissae and of its ordinates, shape (channels, points)."""
     rows = frame[[over, *ordinates]].to_numpy(dtype=np.float64)
     if rows.size == 0 or np.any(rows <= 0):
         names = " and ".join(repr(name) for name in (over, *ordinates))
@@ -236,12 +217,11 @@ def pairs_of(
 
 
 def clusters(values: FloatArray, abscissa: FloatArray | None = None) -> NDArray[np.intp]:
-    """Return the index of the group of each value.
+    """Return the index of the group of each value: measured values scatter about a few set values.
 
-    Measured values scatter about a few set values. The sorted values are divided into groups at the wide gaps. If the
-    gaps between distinct values are nearly equal, or if most values occur several times, each distinct value is a group
-    of its own. One exception: values that alternate within one sweep of the abscissa are rounded readings of one set
-    value. Such values form one group.
+    The sorted values are divided at the wide gaps. If gaps are nearly equal, or if most values occur several times,
+    each distinct value is a group of its own. One exception: values that alternate within one sweep of the abscissa are
+    rounded readings of one set value.
     """
     distinct, place, times = np.unique(values, return_inverse=True, return_counts=True)
     if distinct.size < 3:

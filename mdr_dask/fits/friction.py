@@ -47,10 +47,7 @@ NEEDS_SLOPE = "not tested: the study has no output contact_slope"
 
 
 def spectral_slope(data: xr.Dataset) -> xr.DataArray:
-    """Return the rms slope of the line. If the store does not have the slope, compute the slope from the spectrum.
-
-    The slope is NaN for a smooth line, for which friction divided by the slope has no meaning.
-    """
+    """Return the rms slope of the line, from the store or from the spectrum; NaN for a smooth line."""
     if "rms_slope" in data:
         stored = data["rms_slope"].mean("realisation")
         return stored.where(stored > 0)
@@ -100,7 +97,6 @@ def at_load(force: FloatArray) -> Callable[[int], str]:
 def _first_linear(friction: FloatArray, velocity: FloatArray) -> int | None:
     """Return the index of the lowest velocity at which friction is proportional to the velocity, or None.
 
-    Friction at two neighbouring velocities is compared. Only realisations that succeeded at both velocities are used.
     The index may exceed 0, because with the time stepping of the original papers, friction at low velocities does not
     fall below a spurious limit.
     """
@@ -183,7 +179,7 @@ def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], coun
     """Test mu = sqrt 2 times the rms slope, with the slope in contact (eq. 3.15) and with the slope of the line.
 
     `height` is the stack of the largest mu divided by the rms slope. `flat` are the indices of the cases on the
-    plateau. `reached` is the sentence on whether friction reaches its maximum.
+    plateau.
     """
     meaning = "largest mu divided by the rms slope in contact"
     if "contact_slope" in data:
@@ -204,10 +200,7 @@ def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], coun
 
 
 def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str]:
-    """Return the dimensionless velocities, and a text format that describes one dimensionless velocity.
-
-    If the study has no rms height, the velocities are v tau in m instead.
-    """
+    """Return the velocities, dimensionless or, without rms height, v tau in m; and a text format that describes one."""
     if "rms_roughness" in data:
         return loads_and_velocities(data)[1], "v tau slope / (sqrt 2 h) = {:.2g}"
     return data["velocity"] * data["relaxation_time"], "v tau = {:.2g} m"
@@ -216,8 +209,7 @@ def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str]:
 def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: str) -> str:
     """Return a sentence on whether friction reaches a maximum or a constant value within the range of velocities.
 
-    `x` are the logarithms of the velocities. `ends` is the interval of the slope `found.rise`. The text format `place`
-    describes the velocity of the maximum.
+    `x` are the logarithms of the velocities, and `ends` is the interval of the slope `found.rise`.
     """
     at, rise = float(found.place[0]), float(found.rise[0])
     change = f"d ln mu / d ln v = {rise:.2g}"
@@ -236,10 +228,7 @@ def _reached(x: FloatArray, found: top.Top, ends: tuple[float, float], place: st
 
 
 def rising(force: FloatArray, velocity: FloatArray, mean: FloatArray, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which of the `known` cases are in regions I to III.
-
-    At each load, regions I to III extend up to the velocity of the largest friction.
-    """
+    """Return which of the `known` cases are in regions I to III, that is up to the largest friction at each load."""
     used = known & (mean > 0)
     for load in np.unique(force[used]):
         same = np.flatnonzero(used & (force == load))

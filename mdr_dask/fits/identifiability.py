@@ -1,8 +1,4 @@
-"""Find the unknowns of a calibration that the data determine.
-
-The data may determine a product of powers of several unknowns, such as ``relaxation_time x rms_roughness^2``, even if
-the data do not determine each unknown.
-"""
+"""Find which unknowns of a calibration the data determine, and which products of powers of the others."""
 
 from __future__ import annotations
 
@@ -15,23 +11,19 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.posterior import Posterior
 
-#: An end of the axis of an unknown is *open* if the data hardly exclude this end. The criterion: at the end, the
-#: logarithm of the posterior density is less than `OPEN` below its maximum. If the density is normal, an open end is
-#: within two standard errors of the maximum.
+#: An end of the axis of an unknown is *open* if the logarithm of the posterior density there is less than `OPEN` below
+#: its maximum: for a normal density, within two standard errors.
 OPEN = 2.0
-#: An unknown is also undetermined if other unknowns, whose interval has no finite end, explain more than this share of
-#: the variance of the unknown.
+#: An unknown is also undetermined if unknowns with an open end explain more than this share of its variance.
 LINKED = 0.25
 #: The data determine a product if the spread of its logarithm is less than this fraction of the spread without data.
 NARROW = 0.25
 #: Exponents of a product are rounded to integers, halves or thirds if rounding increases the spread of the product by
 #: at most this factor.
 ROUNDED = 1.15
-#: Probability of each interval. The keys are endings of names: ``x_low`` and ``x_high`` are the ends of the 95 %
-#: interval of an unknown ``x``, and ``x_low_68`` and ``x_high_68`` are the ends of the 68 % interval.
+#: Probability of each interval, by the ending of its name: ``x_low``, ``x_high`` and ``x_low_68``, ``x_high_68``.
 LEVELS = {"": 0.95, "_68": 0.6827}
-#: `ENDS`: suffixes of the names of the median and of the ends of the intervals. `SHARES`: the cumulative probability at
-#: the median and at each of these ends.
+#: Suffixes of the names of the median and of the ends of the intervals, and the cumulative probability at each.
 ENDS = ("", *(f"_{end}{kind}" for kind in LEVELS for end in ("low", "high")))
 SHARES = (0.5, *(0.5 + sign * level / 2 for level in LEVELS.values() for sign in (-1, 1)))
 
@@ -54,11 +46,7 @@ def open_ends(found: Posterior) -> list[Ends]:
 
 
 def undetermined(found: Posterior, ends: Sequence[Ends]) -> list[int]:
-    """Return the indices of the unknowns that the data do not determine.
-
-    An unknown with an open end is undetermined (see `OPEN`). An unknown that depends strongly on such unknowns is also
-    undetermined (see `LINKED`).
-    """
+    """Return the indices of unknowns that have an open end or depend strongly on such unknowns (see `LINKED`)."""
     free = [k for k, end in enumerate(ends) if any(end)]
     if not free:
         return []
@@ -79,14 +67,9 @@ def _explained(centred: FloatArray, weights: FloatArray, k: int, by: list[int]) 
 
 
 class Product(NamedTuple):
-    """A product of powers of unknowns. The data determine the value of the product.
+    """A product of powers of unknowns that the data determine, such as ``relaxation_time x rms_roughness^2``.
 
-    Attributes
-    ----------
-    exponents : array, shape (unknowns,)
-        Exponent of each unknown; zero for unknowns that are not part of the product.
-    values : array, shape (cells,)
-        Value of the product in each cell of the posterior.
+    `values` contains the product in each cell of the posterior.
     """
 
     exponents: FloatArray
@@ -94,10 +77,9 @@ class Product(NamedTuple):
 
 
 def products(found: Posterior, values: FloatArray, free: Sequence[int]) -> list[Product]:
-    """Return products of powers of undetermined unknowns; the data determine each product.
+    """Return products of powers of the undetermined unknowns `free` that the data determine.
 
-    `values` are the unknowns in SI units at the centre of each cell, shape (cells, unknowns). `free` are the indices of
-    the undetermined unknowns.
+    `values` are the unknowns in SI units at the centre of each cell, shape (cells, unknowns).
     """
     if len(free) < 2 or np.any(values[:, free] <= 0):
         return []

@@ -1,8 +1,7 @@
 """Fit the law of friction for rough indenters (thesis eqs. 3.34 to 3.40).
 
-The law is mu / (sqrt 2 s) = (1 + xi^-n)^(-1/n) with the exponent n = 1.5. Here mu is the coefficient of friction, and s
-is the rms slope of the roughness. The argument is xi = mu_low / (sqrt 2 s), where mu_low is the coefficient of friction
-at low velocities by eqs. 3.34 and 3.38.
+The law is mu / (sqrt 2 s) = (1 + xi^-n)^(-1/n) with n = 1.5 and the rms slope s of the roughness. The argument is xi =
+mu_low / (sqrt 2 s), where mu_low is the friction at low velocities by eqs. 3.34 and 3.38.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ def _half_width(data: xr.Dataset) -> Any:
 
 
 def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
-    """Return the argument xi of the law of rough indenters (see the docstring of the module)."""
+    """Return the argument xi of the law of rough indenters."""
     require(data, *KELVIN)
     low = laws.indenter_low(
         _half_width(data),
@@ -61,8 +60,8 @@ def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
 def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
     """Return whether the law of rough indenters applies to each case.
 
-    The slope of the indenter must be small compared with the slope of the roughness. The indenter must be pressed in by
-    at least the rms height. The velocity must not exceed the velocity of the largest friction.
+    The indenter must be flat compared with the roughness, and be pressed in by at least the rms height. The velocity
+    must not exceed that of the largest friction.
     """
     coefficient, exponent = _body(data)
     width = _half_width(data)

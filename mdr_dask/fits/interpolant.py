@@ -1,7 +1,4 @@
-"""Convert an output of a study to a law.
-
-A law is a dense table of the output and its error, for linear interpolation.
-"""
+"""Convert an output of a study to a law: a dense table of the output and its error, for linear interpolation."""
 
 from __future__ import annotations
 
@@ -26,37 +23,11 @@ LARGEST, PIECES = 2_000_000, 16
 
 
 def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
-    """Return a dense table of an output and its error over the axes of a study.
+    """Return a dense table of an output and its error over the axes of a grid study, for ``Dataset.interp``.
 
-    The mean over realisations is interpolated by monotone cubics (PCHIP), axis by axis. An axis is interpolated on a
-    logarithmic scale if its logarithms are more evenly spaced than its values. The output is interpolated on a
-    logarithmic scale if all its values are positive and differ by more than a factor of ten. The table is dense enough
-    for linear interpolation (``Dataset.interp``).
-
-    Parameters
-    ----------
-    dataset : Dataset
-        A group of a study that is a grid. An axis with a single value becomes a fixed parameter. Along an axis of
-        words, or an axis with fewer than four numbers, the output is not interpolated; the table keeps this axis
-        unchanged.
-    output : str
-        One of the outputs of the study.
-
-    Returns
-    -------
-    Dataset
-        ``<output>`` and ``<output>_error``. The error is a sum of two terms: the half width of the 95 % interval of the
-        mean, and the error of interpolation. The interval includes scatter and discretisation errors.
-
-    Raises
-    ------
-    FitError
-        If the study is not a grid, has no axis of at least four numbers, or has cases without a value.
-
-    Notes
-    -----
-    To estimate the error of interpolation, the values with odd indices along an axis are left out and predicted from
-    the other values; then the same is done for the values with even indices.
+    The mean over realisations is interpolated by monotone cubics (PCHIP), axis by axis, each on the scale `Scale.of`
+    its values. An axis of words, or with fewer than `FEWEST` numbers, is kept as it is. The error is the half width of
+    the 95 % interval of the mean plus the error of interpolation, which is estimated by leaving out every second value.
     """
     if "case" in dataset.dims:
         raise FitError("expected a grid, got a sampled study, whose cases have no axes")
@@ -89,10 +60,7 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
 
 
 def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray]:
-    """Return the mean of an output, and the half width of its interval.
-
-    If there is no interval, the discretisation error is returned instead of the half width.
-    """
+    """Return the mean of an output, and the half width of its interval, or else its discretisation error."""
     if "realisation" not in dataset[output].dims:
         return dataset[output], xr.zeros_like(dataset[output])
     kept = [name for name in (output, dataset[output].attrs.get("ancillary_variables")) if name in dataset]
@@ -112,10 +80,7 @@ def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray
 
 
 def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.DataArray, xr.DataArray]:
-    """Interpolate the cases that an adaptive axis left out.
-
-    The half widths of these cases include the error of interpolation.
-    """
+    """Interpolate the cases that an adaptive axis left out; their half widths include the error of interpolation."""
     axes = [k for k, dim in enumerate(mean.dims) if _is_numeric(mean, str(dim))]
     table, error = scale.of_values(mean.to_numpy()).copy(), half.to_numpy().copy()
     for axis in axes * 2:  # twice, because values filled along one axis are used along the other axes
@@ -183,17 +148,9 @@ class Law:
         self._interpolate = RegularGridInterpolator(tuple(self.axes.values()), both)
 
     def __call__(self, **places: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return values and errors (half widths of 95 % intervals) at given values of the axes.
+        """Return values and errors (half widths of 95 % intervals) at given values of all axes, in SI units.
 
-        Parameters
-        ----------
-        **places : array_like
-            A number or an array for every axis, in SI units; the arrays are broadcast against each other.
-
-        Raises
-        ------
-        DataError
-            If an axis is missing or unknown, or if a value lies outside the range of its axis.
+        Arrays are broadcast against each other. DataError is raised outside the range of an axis.
         """
         points = np.stack(np.broadcast_arrays(*self._checked(places).values()), axis=-1)
         found = self._interpolate(points).reshape(*points.shape[:-1], 2)

@@ -8,10 +8,10 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 
-#: Smallest number of values along an axis. If every second value is left out, enough values must remain for a curve.
+#: Smallest number of values along an axis; half of them must determine a curve.
 FEWEST = 4
-#: A ratio of two errors of interpolation: the error if all values are used, divided by the error if only every second
-#: value is used. The ratio is 1/4 for an error of second order. At a kink, the ratio would be 1/2.
+#: Error of interpolation with all values, divided by that with every second value: 1/4 for an error of second order.
+#: At a kink, the ratio would be 1/2.
 LEFT = 0.25
 
 
@@ -23,11 +23,10 @@ class Scale:
 
     @classmethod
     def of(cls, numbers: FloatArray, spread: bool = False) -> Scale:
-        """Return the scale for some numbers. If a number is zero or negative, the scale is linear.
+        """Return the scale for some numbers; it is linear if a number is not positive.
 
-        If all numbers are positive, the option `spread` decides. Without `spread`, the numbers must ascend. The scale
-        is then the one, linear or logarithmic, on which the numbers are more evenly spaced. With `spread`, the scale is
-        logarithmic if the numbers span more than a decade.
+        With `spread`, the scale is logarithmic if the numbers span more than a decade. Otherwise the numbers must
+        ascend, and the scale is the one on which they are more evenly spaced.
         """
         if numbers.min() <= 0:
             return cls(False)
@@ -61,10 +60,7 @@ def dense(places: FloatArray, pieces: int) -> FloatArray:
 def cubic(
     places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int, scale: Scale | None = None
 ) -> FloatArray:
-    """Interpolate values along an axis by monotone cubics, and return the values at the places `wanted`.
-
-    Without `scale`, the places are on the scale that `Scale.of` returns for the array `places`.
-    """
+    """Interpolate values along an axis by monotone cubics; the default scale is `Scale.of` the places."""
     from scipy.interpolate import PchipInterpolator
 
     scale = scale or Scale.of(places)
@@ -75,10 +71,7 @@ def cubic(
 def linear(
     places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int, scale: Scale | None = None
 ) -> FloatArray:
-    """Interpolate values linearly along an axis, and return the values at the places `wanted`.
-
-    Without `scale`, the places are on the scale that `Scale.of` returns for the array `places`.
-    """
+    """Interpolate values linearly along an axis; the default scale is `Scale.of` the places."""
     from scipy.interpolate import make_interp_spline
 
     scale = scale or Scale.of(places)
@@ -88,8 +81,8 @@ def linear(
 def left_out_error(scale: Scale, table: FloatArray, places: FloatArray, axis: int) -> FloatArray:
     """Estimate the error of interpolation at every place of an axis by leaving out every second value.
 
-    `table` contains positions of the numbers on `scale`. The returned error is the error of the numbers themselves. The
-    error of a place is the largest of the estimates at this place and at its two neighbours.
+    `table` contains positions of numbers on `scale`; the error is that of the numbers. The largest of the estimates at
+    a place and at its two neighbours is returned.
     """
     values, truth = np.moveaxis(table, axis, -1), np.moveaxis(scale.back(table), axis, -1)
     most = np.zeros_like(truth)

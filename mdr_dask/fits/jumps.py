@@ -67,15 +67,7 @@ def is_jump(data: xr.Dataset) -> bool:
 def each_jump(
     series: Series, inner: Callable[[xr.Dataset], list[str]], fit: Callable[[xr.Dataset], Variables], *outputs: str
 ) -> xr.Dataset:
-    """Check that a series has jumps of the velocity; then fit a law as `mdr_dask.fits.cases.each` does.
-
-    The series needs the outputs `LEVELS`, the output ``rms_slope``, and the given `outputs`.
-
-    Raises
-    ------
-    FitError
-        If an output is missing, if the loading history is not a jump, or if there is only one realisation.
-    """
+    """Check that a series has jumps of the velocity; then fit a law as `mdr_dask.fits.cases.each` does."""
     (data,) = series.values()
     if "realisation" in data.sizes and data.sizes["realisation"] < LEAST:
         raise FitError(f"expected at least {LEAST} realisations, got {data.sizes['realisation']}")
@@ -85,16 +77,9 @@ def each_jump(
 
 
 class Jumps(NamedTuple):
-    """Friction before the jump, its change at the jump, and friction long after the jump, in some cases.
+    """Stacks of mu_1, d_mu_0 and mu_2, shape (rows, cases), and dv / v_1 (`change`) of some cases.
 
-    Attributes
-    ----------
-    before, jump, after : array, shape (rows, cases)
-        Stacks of mu_1, d_mu_0 and mu_2 (see `mdr_dask.bootstrap`).
-    change, slope : array, shape (cases,)
-        dv / v_1 and the rms slope. The slope is NaN for smooth lines.
-    counts : int array, shape (cases,)
-        Number of successful realisations.
+    The rms slope is NaN for smooth lines. `counts` are the numbers of successful realisations.
     """
 
     before: FloatArray
@@ -209,10 +194,7 @@ def _constant(before: FloatArray, jump: FloatArray, count: int) -> Variables:
 def _limit(
     name: str, verdict_name: str, stated: float, stack: FloatArray, count: int, meaning: str, question: str
 ) -> Variables:
-    """Return the mean of a number over some cases, and a sentence on whether the number equals the `stated` value.
-
-    In the result, `meaning` describes the mean, and `question` describes the sentence.
-    """
+    """Return the mean of a number over some cases, and a sentence on whether the number equals the `stated` value."""
     if not stack.shape[1]:
         nothing = constant(name, np.full(1 + bootstrap.RESAMPLES, np.nan), count, meaning)
         return nothing | text(verdict_name, "not tested: no case in this region", question)

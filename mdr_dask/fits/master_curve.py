@@ -38,52 +38,13 @@ def master_curve(
     vertical: Vertical | None = None,
     reference: float | None = None,
 ) -> xr.Dataset:
-    """Shift the curves of a table so that they merge into one curve.
+    """Shift the curves of a table, or of a series of a store (means over realisations), onto one curve.
 
-    If the curves differ in velocity v and in temperature T, the shift of the abscissa x has two parts: log x becomes
-    log x + a(v) + b(T).
-
-    Parameters
-    ----------
-    table : Dataset or DataFrame
-        A series of a store (realisations are averaged) or columns of numbers.
-    abscissa, ordinate, group : str, optional
-        Columns of the abscissa, of the values, and of the parameter in which the curves differ. By default, the columns
-        are found by their names: the coefficient of friction against force at different velocities or temperatures, or
-        a modulus or compliance against frequency or time at different temperatures. Storage and loss modulus of one
-        test are two ordinates and are shifted together.
-    vertical : {'none', 'modulus', 'compliance', 'free'}, optional
-        Kind of the factors along the ordinate, see `superpose`. For moduli or compliances against time or frequency at
-        different temperatures, the default is ``modulus`` or ``compliance``; otherwise it is ``none``.
-    reference : float, optional
-        Value of the group at which the factors are zero; by default the value of the middle group. If the reference
-        lies between two groups, the factor at the reference is a sum of two terms: the factor that the best law gives,
-        and the interpolated difference between the shift factors and this law. The intervals include the error of this
-        interpolation. If the curves differ in two parameters, the nearest value of the first parameter becomes the
-        reference.
-
-    Returns
-    -------
-    Dataset
-        ``shift_factor`` and ``vertical_factor`` contain, for each group, the decades that are added to the logarithms
-        of abscissa and ordinate. Both factors come with ``_error`` (half width of the 68 % interval), and with ``_low``
-        and ``_high`` (ends of the 95 % interval). ``covariance`` and ``draws`` are the covariance and random samples of
-        the shift factors; ``vertical_covariance`` and ``vertical_draws`` are those of the vertical factors.
-        ``point_abscissa``, ``point_ordinate`` and ``point_group`` are all points after shifting. ``curve_abscissa``,
-        ``curve_ordinate`` and ``curve_error`` are the merged curve and its error in decades. The attrs of
-        ``curve_abscissa`` contain the range that was measured at the reference. A second ordinate has
-        ``point_companion``, ``curve_companion`` and ``curve_companion_error``. The constants of the laws that apply are
-        also included. If the curves differ in two parameters, the result also contains ``second_factor``, the shift
-        factor of the second parameter, and the constants of its laws. The attrs then contain the name ``second`` of
-        this parameter and its reference ``second_reference``. The attrs ``chi_squared`` and ``probability`` are the
-        result of a test: whether each shift is a sum of two factors, one for each parameter. The attr ``vertical``
-        describes the vertical factors that were used.
-
-    Raises
-    ------
-    DataError
-        If a column is missing or not positive, if the curves do not overlap, or if vertical factors are requested for
-        curves that differ in two parameters, because such curves do not determine vertical factors.
+    For the arguments see ``mdr-dask master-curve --help``. ``shift_factor`` and ``vertical_factor`` are the decades
+    added to log10 of abscissa and ordinate, with ``_error`` (half width of the 68 % interval), ``_low`` and ``_high``
+    (ends of the 95 % interval). If the curves differ in two parameters, log x becomes log x + a(v) + b(T), and
+    ``second_factor`` is b. If the reference lies between two groups, the factor there is that of the best law plus the
+    interpolated difference between the shift factors and this law.
     """
     frame = frame_of(table)
     over, ordinates, by = columns_to_use(frame, abscissa, ordinate, group)
@@ -178,10 +139,9 @@ def _of_two_groups(
 
 
 def _inside(groups: FloatArray, reference: float) -> float:
-    """Return the reference, or the nearest group if the reference lies just outside the range of the groups.
+    """Return the reference, or the nearest group if the reference lies just outside the groups.
 
-    The reference may lie outside this range by a tenth of the mean distance between groups, because measured set points
-    scatter.
+    Measured set points scatter; therefore a tenth of the mean distance between groups is allowed.
     """
     margin = 0.1 * np.ptp(groups) / max(groups.size - 1, 1)
     if not groups.min() - margin <= reference <= groups.max() + margin:
@@ -260,13 +220,7 @@ def _dataset(
 
 
 def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
-    """Convert a master curve, as returned by `master_curve` or read from a file, to another reference.
-
-    Raises
-    ------
-    DataError
-        If the reference lies outside the groups.
-    """
+    """Convert a master curve, as returned by `master_curve` or read from a file, to another reference."""
     by, over = str(curve.attrs["group"]), str(curve.attrs["abscissa"])
     ordinates = [str(curve.attrs[name]) for name in ("ordinate", "companion") if curve.attrs.get(name)]
     names, errors = ("ordinate", "companion")[: len(ordinates)], ("curve_error", "curve_companion_error")
@@ -301,16 +255,9 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
 
 
 def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    """Return the friction that is due to roughness, as a function of force and velocity.
+    """Return mean friction as a function of force and velocity, of the first series with roughness that varies both.
 
-    The result is the coefficient of friction, averaged over realisations, of the first series that has roughness and
-    varies force and velocity. If another series has the same forces and velocities but no roughness, the friction of
-    that series is due to the bulk alone and is subtracted.
-
-    Raises
-    ------
-    DataError
-        If no series varies ``normal_force`` and ``velocity``.
+    If another series has the same forces and velocities but no roughness, its friction is subtracted.
     """
     wanted = {"normal_force", "velocity"}
     means = [
@@ -332,10 +279,7 @@ def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
 
 
 def _of_store(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    """Return the shift factors and the constants of their laws, but not the merged curve.
-
-    The command ``mdr-dask master-curve`` also gives the merged curve.
-    """
+    """Return the shift factors and the constants of their laws, but not the merged curve."""
     curve = master_curve(friction_of_roughness(series))
     groups = curve.attrs["group"], curve.attrs.get("second", curve.attrs["group"])
     return curve[

@@ -1,8 +1,4 @@
-"""Test a model against measured points.
-
-If the errors of measurement are known, the test uses chi squared. If the errors are unknown, the model fails the test
-if the residuals have a trend.
-"""
+"""Test a model against measured points, by chi squared or, if errors are unknown, by a trend of the residuals."""
 
 from __future__ import annotations
 
@@ -24,20 +20,10 @@ FEWEST = 6
 class Residuals(NamedTuple):
     """Residuals of the best prediction.
 
-    Attributes
-    ----------
-    scaled : array, shape (points,)
-        Measured minus predicted value, divided by the standard deviation of this difference.
-    relative : float
-        Rms difference between measured and predicted values, divided by the rms measured value.
-    chi_squared : float
-        Chi squared, including correlations of the errors; NaN if the errors of measurement are unknown.
-    freedom : int
-        Degrees of freedom: number of points minus number of determined constants. A determined constant is an unknown,
-        or a product of unknowns, that the data determine.
-    errors : float
-        Rms of the standard deviations of the differences between measured and predicted values, divided by the rms
-        measured value.
+    `scaled` are measured minus predicted values, divided by the standard deviation of this difference. `relative` and
+    `errors` are the rms of these differences and of their standard deviations, divided by the rms measured value.
+    `chi_squared` includes correlations; NaN if the errors of measurement are unknown. `freedom` is the number of points
+    minus the number of unknowns, or products of unknowns, that the data determine.
     """
 
     scaled: FloatArray
@@ -53,10 +39,9 @@ class Residuals(NamedTuple):
 
 
 def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str:
-    """Return a sentence on whether the model explains the measured points.
+    """Return a sentence on whether the model explains the measured points; it begins with *yes*, *no* or *not tested*.
 
-    The sentence begins with *yes*, *no* or *not tested*. A model is *not tested* if the errors are so large that they
-    would hide any misfit, or if there are too few points.
+    The model is *not tested* if the errors would hide any misfit, or if there are too few points.
     """
     size = f"residuals are {100 * residuals.relative:.2g} % of the measured values, rms"
     hidden = (
@@ -83,9 +68,8 @@ def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str
 def trend(scaled: FloatArray, conditions: Mapping[str, FloatArray]) -> tuple[float, str]:
     """Return the probability that a trend of the residuals is due to chance, and the condition with the trend.
 
-    A parabola is fitted to the residuals against the rank of each condition. The condition with the smallest
-    probability is returned. This probability is multiplied by the number of conditions, because every condition is
-    another chance to find a trend.
+    A parabola is fitted to the residuals against the rank of each condition. The smallest probability is multiplied by
+    the number of conditions, because every condition is another chance to find a trend.
     """
     worst, along = 1.0, ""
     for name, values in conditions.items():

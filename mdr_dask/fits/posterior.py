@@ -1,7 +1,6 @@
-"""The posterior density of a few unknowns.
+"""The posterior density of a few unknowns, on cells that are divided further where the density is high.
 
-The range of each unknown is mapped to the interval from 0 to 1, on the linear or logarithmic scale of its axis. The
-resulting unit cube is divided into cells. Cells are divided further where the density is high.
+The range of each unknown, on the scale of its axis, is mapped to the interval from 0 to 1.
 """
 
 from __future__ import annotations
@@ -20,8 +19,7 @@ START = {1: 64, 2: 24, 3: 12, 4: 8}
 #: `BEST`: smallest number of cells that are divided in a refinement; the keys are the numbers of unknowns. `MOST`:
 #: largest number of cells after a refinement.
 BEST, MOST = {1: 32, 2: 256, 3: 768, 4: 1536}, 160_000
-#: Cells are left out if ln(density) of a cell is smaller than the maximum by more than this value. All cells that are
-#: left out have a total probability below 1e-5.
+#: Cells are left out if ln(density) is below its maximum by more than this; their total probability is below 1e-5.
 REACH = 14.0
 #: Refinement ends when ln(density) varies by less than this value within a divided cell, on average over all cells.
 SMOOTH = 0.6
@@ -29,20 +27,14 @@ SMOOTH = 0.6
 LEVELS = 16
 #: Number of sizes of the error of measurement that are considered if the table states no error.
 DEVIATIONS = 14
-#: The likelihood is evaluated for a part of the cells at a time, so that no array has more elements than this.
+#: Largest number of elements of an array in the likelihood.
 _STEP = 2**21
 
 
 class Noise(NamedTuple):
-    """Errors of measurement: a pattern of standard deviations, and a factor of this pattern, which may be unknown.
+    """Errors of measurement: a pattern of standard deviations, and the possible factors (`sizes`) of this pattern.
 
-    Attributes
-    ----------
-    sizes : array, shape (sizes,)
-        Possible factors by which the pattern is multiplied. If the errors are known, the only factor is 1.
-    pattern : array, shape (points,), or None
-        Standard deviation of each point for the factor 1. None means: the standard deviation of a point is the absolute
-        value of its prediction.
+    Without a pattern, the standard deviation of a point is the factor times the absolute value of its prediction.
     """
 
     sizes: FloatArray
@@ -56,23 +48,10 @@ class Noise(NamedTuple):
 
 
 def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) -> Callable[[FloatArray], FloatArray]:
-    """Return the likelihood of measured values as a function of the unknowns.
+    """Return a function that takes places in the unit cube and returns logarithms of the likelihood of measured values.
 
-    Parameters
-    ----------
-    prediction : Prediction
-        Prediction of the measured values. The likelihood includes the errors of the prediction.
-    values : array, shape (points,)
-        Measured values.
-    noises : list of Noise
-        Possible errors of measurement. All items of this list have the same prior probability. Within one item, all
-        sizes have the same prior probability.
-
-    Returns
-    -------
-    callable
-        Takes places in the unit cube, shape (sets, unknowns), and returns logarithms of the likelihood, shape (sets,
-        sizes of all noises).
+    The shapes are (sets, unknowns) and (sets, sizes of all noises). All items of `noises`, and all sizes within one
+    item, have the same prior probability.
     """
 
     def of(places: FloatArray) -> FloatArray:
@@ -90,10 +69,10 @@ def likelihood(prediction: Prediction, values: FloatArray, noises: list[Noise]) 
 
 
 def distance(values: FloatArray, predicted: Predicted, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return two arrays of shape (sets,): chi squared, and the logarithm of the determinant of the covariance.
+    """Return chi squared and the logarithm of the determinant of the covariance, both of shape (sets,).
 
     `noise` are the variances of the errors of measurement. The covariance is a diagonal matrix plus a few terms for
-    errors that are common to all points. For such a matrix, Woodbury's identity avoids the inversion of a large matrix.
+    errors common to all points; Woodbury's identity avoids the inversion of a large matrix.
     """
     variance = np.maximum(predicted.alone + noise, np.finfo(float).tiny)
     residual = values - predicted.mean
@@ -109,18 +88,8 @@ def distance(values: FloatArray, predicted: Predicted, noise: FloatArray) -> tup
 class Posterior(NamedTuple):
     """A posterior density on cells of the unit cube.
 
-    Attributes
-    ----------
-    places : array, shape (cells, unknowns)
-        Centres of the cells.
-    weights : array, shape (cells,)
-        Probability of each cell; the sum is 1.
-    density : array, shape (cells,)
-        Logarithm of the density, apart from an additive constant.
-    noise : array, shape (cells, sizes)
-        Probability of each size of the error of measurement in each cell.
-    width : float
-        Width of a cell.
+    `places` are the centres of the cells, `weights` their probabilities, and `density` the logarithm of the density up
+    to a constant. `noise` is the probability of each size of the error of measurement in each cell.
     """
 
     places: FloatArray
@@ -136,15 +105,7 @@ class Posterior(NamedTuple):
 
 
 def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> Posterior:
-    """Return the posterior density on cells of the unit cube, for a uniform prior.
-
-    Parameters
-    ----------
-    likelihood : callable
-        Takes places, shape (sets, unknowns), and returns logarithms of the likelihood, shape (sets, sizes of errors).
-    unknowns : int
-        Number of dimensions of the cube.
-    """
+    """Return the posterior density on cells of the unit cube for a uniform prior, from the function of `likelihood`."""
     width = 1.0 / START[unknowns]
     axis = (np.arange(START[unknowns]) + 0.5) * width
     places = np.stack([each.ravel() for each in np.meshgrid(*[axis] * unknowns, indexing="ij")], axis=1)
@@ -166,7 +127,7 @@ def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> 
 def _kept(density: FloatArray, fewest: int, most: int) -> NDArray[np.intp]:
     """Return the indices of the cells that are divided next: all cells of high density, but at least `fewest` cells.
 
-    If the number of these cells exceeds `most`, only `most` randomly selected cells are divided.
+    If there are more than `most`, a random selection of them is divided.
     """
     order = np.argsort(density)[::-1]
     number = max(int((density > density.max() - REACH).sum()), min(fewest, density.size))

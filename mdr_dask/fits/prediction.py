@@ -22,28 +22,22 @@ if TYPE_CHECKING:
 
 #: Largest number of unknowns.
 MOST = 4
-#: Means are interpolated linearly in a dense table. `LARGEST`: largest number of values of this table. `PIECES`:
-#: largest number of pieces into which an interval between two computed values is divided.
+#: `LARGEST`: largest number of values of the dense table of means. `PIECES`: largest number of pieces into which an
+#: interval between two computed values is divided.
 LARGEST, PIECES = 4e6, 16
 #: Relative difference up to which a measured and a computed value of a parameter count as equal.
 SAME = 1e-6
-#: All cases use the same rough lines. Therefore the scatter of different cases is correlated, and a few modes represent
-#: this scatter. `MODES`: largest number of modes. `SHARE`: share of the variance that the modes must represent.
+#: All cases use the same rough lines, so that few modes represent their scatter. `MODES`: largest number of modes.
+#: `SHARE`: share of the variance that the modes must represent.
 MODES, SHARE = 6, 0.999
 
 
 class Predicted(NamedTuple):
     """Predicted values of the output at the measured points, for several sets of unknowns.
 
-    Attributes
-    ----------
-    mean : array, shape (sets, points)
-        Mean over the realisations.
-    together : array, shape (sets, points, modes)
-        Errors that are common to all points: modes of the scatter of the rough lines, and one mode for grid and
-        interpolation. A mode contains one standard deviation for each point. The errors of one mode vary together.
-    alone : array, shape (sets, points)
-        Variance of the errors that are independent for each point.
+    `mean` is the mean over the realisations, shape (sets, points). `together`, shape (sets, points, modes), contains
+    one standard deviation of errors that are common to all points: modes of the scatter of the rough lines, and one
+    mode for grid and interpolation. `alone` is the variance of the errors that are independent for each point.
     """
 
     mean: FloatArray
@@ -53,16 +47,10 @@ class Predicted(NamedTuple):
 
 @dataclass(frozen=True)
 class Prediction:
-    """The output at the measured points and the errors of the output, interpolated over the unknowns of a study.
+    """The output at the measured points and its errors, interpolated over the unknowns of a study.
 
-    Parameters
-    ----------
-    unknowns : dict of str to array
-        Values of each unknown in the study, ascending.
-    realisations : int
-        Number of realisations in the study.
-    logarithmic : bool
-        Whether the logarithm of the output is interpolated.
+    `unknowns` contains the ascending values of each unknown. If `logarithmic`, the logarithm of the output is
+    interpolated.
     """
 
     unknowns: Mapping[str, FloatArray]
@@ -95,16 +83,7 @@ class Prediction:
 
 
 def prediction(dataset: xr.Dataset, measured: Measured) -> Prediction:
-    """Return the prediction of a study at the measured points, as a function of the unknowns.
-
-    Raises
-    ------
-    FitError
-        If the study is not a grid, has no unknown or too many unknowns, has an axis with too few values, or has cases
-        without a value.
-    DataError
-        If a measured point lies outside the study.
-    """
+    """Return the prediction of a study at the measured points, as a function of the unknowns."""
     output = dataset[measured.output]
     if "case" in output.dims:
         raise FitError("expected a grid, got a sampled study, whose cases have no axes")
@@ -181,9 +160,8 @@ def _fields(
 ) -> tuple[FloatArray, bool]:
     """Return the numbers of every case that are interpolated, and whether logarithms replace the means.
 
-    The shape is (conditions ..., unknowns ..., numbers). The numbers of a case are: the mean; a flag, which is 1 if the
-    mean is missing; the part of the scatter that is independent of other cases; the error of grid and interpolation;
-    and the modes of the scatter that is common to all cases.
+    Along the last axis are: the mean; 1 if the mean is missing; the scatter that is independent of other cases; the
+    error of grid and interpolation; and the modes of the scatter that is common to all cases.
     """
     order = [*along, *unknowns]
     array = dataset[output]
@@ -215,10 +193,7 @@ def _fields(
 
 
 def _and_neighbours(absent: NDArray[np.bool_], axis: int) -> NDArray[np.bool_]:
-    """Return the missing cases and their neighbours.
-
-    A cubic at a point depends on the two nearest cases on each side of this point.
-    """
+    """Return the missing cases and their neighbours; a cubic depends on two cases on each side of a point."""
     along = np.moveaxis(absent, axis, 0).copy()
     before = along.copy()
     along[1:] |= before[:-1]
@@ -239,8 +214,7 @@ def _long_enough(dataset: xr.Dataset, axis: str) -> FloatArray:
 def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the part of the standard error that is independent for each case, and the modes of the common scatter.
 
-    The scatter is multiplied by a factor from Student's t distribution, because a few realisations do not determine the
-    scatter well.
+    A factor from Student's t distribution accounts for few realisations.
     """
     count = deviations.shape[-1]
     if count < 2:
@@ -280,10 +254,7 @@ def _at_point(fields: FloatArray, axes: Sequence[FloatArray], place: Sequence[fl
 def _interpolators(
     at_points: FloatArray, unknowns: Mapping[str, FloatArray], count: int, logarithmic: bool
 ) -> Prediction:
-    """Return a prediction that is interpolated linearly.
-
-    Means are interpolated in a dense table. Errors are interpolated between the computed values.
-    """
+    """Return a prediction that is interpolated linearly: means in a dense table, errors between the computed values."""
     from scipy.interpolate import RegularGridInterpolator
 
     scales = [Scale.of(values) for values in unknowns.values()]

@@ -1,12 +1,10 @@
 """Relaxation of friction after a jump of the velocity: one exponential, and laws of its rate (thesis eqs. 4.5 to 4.15).
 
-Symbols: The velocity jumps at the time t_0 from v_1 to v_2 = v_1 + dv. The coefficient of friction mu is mu_1 before
-the jump and mu_2 long after the jump. At t_0, mu changes by d_mu_0. The rms slope is s. The body has the relaxation
-time tau, and t' = (t - t_0) / tau. The largest wave number of the roughness is q_max.
+For the symbols v_1, v_2, dv, mu_1, mu_2, d_mu_0 and s see `mdr_dask.fits.jumps`; tau is the relaxation time of the
+body, t' = (t - t_0) / tau, and q_max the largest wave number of the roughness.
 
-By eqs. 4.13 to 4.15, mu - mu_2 is proportional to exp(-b t'). At t_0, mu - mu_2 begins at mu_1 + d_mu_0 - mu_2, where
-d_mu_0 follows from eq. 4.11. By eq. 4.12, the rate b is a power of v_1 tau q_max. The exponent of this power is 1 if
-v_1 tau q_max is below 1. Otherwise the exponent is 1 - H, with the Hurst exponent H.
+By eqs. 4.13 to 4.15, mu - mu_2 begins at mu_1 + d_mu_0 - mu_2, with d_mu_0 by eq. 4.11, and is proportional to exp(-b
+t'). By eq. 4.12, the rate b is (v_1 tau q_max)^p with p = 1 below v_1 tau q_max = 1, and p = 1 - H above it.
 """
 
 from __future__ import annotations
@@ -56,17 +54,12 @@ FIELDS = {
 
 
 class Relaxation(NamedTuple):
-    """One exponential fitted to a trace. A trace is the mean of mu - mu_2 over realisations, as a function of time.
+    """One exponential fitted to a trace, which is the mean of mu - mu_2 over realisations as a function of time.
 
-    Attributes
-    ----------
-    rate, integral_rate : array, shape (rows,)
-        Stacks (see `mdr_dask.bootstrap`) of the fitted rate, and of the rate that follows from the integral of the
-        trace. If scatter and errors do not explain the departures of the trace from one exponential, additional rows at
-        the end of `rate` widen the interval of the rate. These rows contain the integral rate, and the rates that are
-        fitted to the trace after a shift by the departures.
-    holds : str
-        Sentence on whether one exponential fits the trace. Departures are divided by the largest value of the trace.
+    `rate` and `integral_rate` are stacks of the fitted rate, and of the rate that follows from the integral of the
+    trace. If scatter and errors do not explain the departures, further rows of `rate` widen its interval: the integral
+    rate, and rates fitted to the trace after a shift by the departures. `holds` is the verdict; departures are divided
+    by the largest value of the trace.
     """
 
     rate: FloatArray
@@ -82,30 +75,16 @@ def widths(time: FloatArray) -> FloatArray:
 
 
 def tried_rates(time: FloatArray) -> FloatArray:
-    """Return the rates that are tried for a trace. The times of the trace do not resolve slower or faster rates."""
+    """Return the rates that are tried for a trace; its times do not resolve slower or faster rates."""
     rates: FloatArray = np.geomspace(0.02 / time[-1], 2 / time[time > 0][0], GRID)
     return rates
 
 
 def exponential(time: FloatArray, traces: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Fit one exponential to each of many traces by weighted least squares.
+    """Fit one exponential to each trace, shape (n, m), by weighted least squares; return rates and amplitudes.
 
-    The constant `GRID` is the number of rates that are tried, each with the amplitude that fits best. A parabola
-    through the quality of fit at the best rate and its two neighbours refines this rate. The relative error of the
-    refined rate is about 1e-4.
-
-    Parameters
-    ----------
-    time : array, shape (m,)
-        Times, beginning with 0.
-    traces : array, shape (n, m)
-        Traces that relax to zero.
-    weights : array, shape (m,)
-        Weights of the squared residuals.
-
-    Returns
-    -------
-    rate, amplitude : array, shape (n,)
+    `GRID` rates are tried, each with its best amplitude. A parabola through the quality of fit at the best rate and its
+    two neighbours refines the rate to a relative error of about 1e-4.
     """
     logs = np.log(tried_rates(time))
     shapes = np.exp(-np.exp(logs)[:, None] * time)
@@ -120,20 +99,9 @@ def exponential(time: FloatArray, traces: FloatArray, weights: FloatArray) -> tu
 
 
 def relaxation_of(time: FloatArray, traces: FloatArray, error: FloatArray, count: int, expected: float) -> Relaxation:
-    """Fit one exponential to the relaxation of friction from t' = 0 to t' = `WINDOW` / `expected`.
+    """Fit one exponential to the relaxation of friction up to t' = `WINDOW` / `expected`, the rate by eq. 4.12.
 
-    Parameters
-    ----------
-    time : array, shape (m,)
-        t', beginning with 0.
-    traces : array, shape (rows, m)
-        Stack of mu - mu_2 over the realisations.
-    error : array, shape (m,)
-        Standard error of the mean.
-    count : int
-        Number of realisations.
-    expected : float
-        Rate by eq. 4.12.
+    `traces` is a stack of mu - mu_2 at the times t', which begin with 0; `error` is the standard error of the mean.
     """
     inside = time <= max(WINDOW / expected, time[min(8, time.size - 1)])  # the fit uses at least nine points in time
     t, y = time[inside], traces[:, inside]
@@ -167,19 +135,15 @@ def law_rate(number: float, hurst: float) -> float:
 
 
 def _passing_number(case: xr.Dataset) -> float:
-    """Return v_1 tau q_max.
-
-    This number is the relaxation time divided by the time in which the body slides by 1 / q_max.
-    """
+    """Return v_1 tau q_max: the relaxation time over the time in which the body slides by 1 / q_max."""
     wavenumber = np.pi * one_value(case, "points") / one_value(case, "length")
     return one_value(case, "velocity") * one_value(case, "relaxation_time") * wavenumber
 
 
 def _outputs(case: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return three arrays of a case: times t', values, and grid errors of the mean values.
+    """Return times t', which begin with 0, values, shape (realisations, values), and grid errors of the mean values.
 
-    The first time is 0. The values have the shape (realisations, values): mu_1, d_mu_0, mu_2, and mu at all times
-    except the first.
+    The values are mu_1, d_mu_0, mu_2, and mu at all times except the first.
     """
     tables = [table_of(case, 1.0, output=name) for name in (*LEVELS, TRACE)]
     values = np.concatenate([table.values for table in tables]).T
@@ -188,10 +152,9 @@ def _outputs(case: xr.Dataset) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _fit_case(case: xr.Dataset) -> Relaxation | None:
-    """Fit one exponential to a case; return None if the case has too few realisations, or if friction does not relax.
+    """Fit one exponential to a case; return None if it has too few realisations, or if friction does not relax.
 
-    The discretisation error of mu includes the discretisation error of mu_2. Therefore the error of mu - mu_2 is the
-    difference between these two errors.
+    The error of mu includes the error of mu_2. Therefore the error of mu - mu_2 is the difference of both.
     """
     time, values, error = _outputs(case)
     before, jump, after = values[:, :3].T
@@ -283,10 +246,7 @@ def _rate_power(data: xr.Dataset) -> Variables:
 
 
 def _side_by_side(found: list[Relaxation | None]) -> FloatArray:
-    """Return an array with one column for each case: the stack of the rates of this case.
-
-    If a stack is shorter than the array, its first value is repeated.
-    """
+    """Return an array whose columns are the stacks of the rates of all cases, extended by their first values."""
     most = 1 + bootstrap.RESAMPLES + 2 * bootstrap.GROUPS
     stacks = [one.rate[:most] if one else np.full(1, np.nan) for one in found]
     columns = np.empty((max(1 + bootstrap.RESAMPLES, *(stack.size for stack in stacks)), len(stacks)))
@@ -297,10 +257,9 @@ def _side_by_side(found: list[Relaxation | None]) -> FloatArray:
 
 
 def _power(x: FloatArray, rates: FloatArray, error: FloatArray, stated: float, count: int) -> Variables:
-    """Fit a power law of v_1 tau q_max to rates for which v_1 tau q_max is either always below 1 or always above 1.
+    """Fit a power law to rates on one side of v_1 tau q_max = 1; `x` is ln(v_1 tau q_max).
 
-    `x` is ln(v_1 tau q_max). `rates` is the stack of the rates. `error` are the standard errors of the logarithms of
-    the rates. `stated` is the exponent by eq. 4.12.
+    `rates` is a stack, `error` the standard error of its logarithms, and `stated` the exponent by eq. 4.12.
     """
     power, factor, error_of_fit = np.full(1 + bootstrap.RESAMPLES, np.nan), np.nan, np.nan
     of_fitted = of_stated = f"not tested: {x.size} rates are known to a factor of 1.6, three are needed"

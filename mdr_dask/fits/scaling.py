@@ -71,10 +71,7 @@ def _contact_growth(data: xr.Dataset) -> Variables:
 
 
 def _balance(data: xr.Dataset, used: list[int]) -> Variables:
-    """Return the slope in contact divided by the slope of the line, and mu divided by mu of eq. 3.12.
-
-    The result is empty if the store lacks an output.
-    """
+    """Return slope in contact over slope of the line, and mu over mu of eq. 3.12, if the store has the outputs."""
     if not {"contact_slope", "friction_coefficient"} <= set(data.data_vars):
         return {}
     slope = spectral_slope(data)
@@ -99,15 +96,8 @@ def _balance(data: xr.Dataset, used: list[int]) -> Variables:
 def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> FloatArray:
     """Return the slope in contact divided by the slope of the line, according to eq. 3.21.
 
-    Eq. 3.21 includes only waves that are shorter than the length in contact. The result is NaN if there are no such
-    waves.
-
-    Parameters
-    ----------
-    fraction : array
-        Length in contact divided by the length of the line.
-    hurst, points : float
-        Hurst exponent, and number of points of the line. The shortest wave is two points long.
+    `fraction` is the length in contact divided by that of the line. Only waves that are shorter than the length in
+    contact count, and without such waves the result is NaN. The shortest wave is two of the `points` of the line long.
     """
     power = 2 * (1 - hurst)
     # wave numbers 2 pi / L_cont and q_max, both divided by 2 pi / L
@@ -175,17 +165,9 @@ def _friction_of_slope(data: xr.Dataset) -> Variables:
 class Collapse(NamedTuple):
     """The shifts of several curves onto a common curve.
 
-    Attributes
-    ----------
-    shifts : array, shape (rows, 2, curves)
-        Stack (see `mdr_dask.bootstrap`) of the shifts along ln(velocity) and along ln(friction). The shifts of the
-        reference curve are 0.
-    residuals : array, shape (rows, points)
-        Stack of the distances of the points from the common curve.
-    constants : int
-        Number of fitted constants: the heights of the common curve at its knots, and the shifts.
-    vague : array, shape (curves,)
-        For each curve, whether the data leave a shift of this curve undetermined, as for straight curves.
+    `shifts` is a stack, shape (rows, 2, curves), of the shifts along ln(velocity) and ln(friction). `residuals` is the
+    stack of the distances of the points from the common curve. `constants` is the number of fitted constants. `vague`
+    marks curves with an undetermined shift, such as straight curves.
     """
 
     shifts: FloatArray
@@ -197,24 +179,11 @@ class Collapse(NamedTuple):
 def collapse(
     x: FloatArray, rows: FloatArray, curve: NDArray[np.intp], start: FloatArray, reference: int, vertical: bool = True
 ) -> Collapse:
-    """Shift curves onto a common curve by least squares. The common curve is a natural cubic spline.
+    """Shift curves of ln(friction) against ln(velocity) onto a common natural cubic spline by least squares.
 
-    The problem is solved for the first row of the stack. The shifts of the other rows follow by linearisation.
-
-    Parameters
-    ----------
-    x : array, shape (points,)
-        Logarithms of velocity.
-    rows : array, shape (rows, points)
-        Stack of logarithms of friction.
-    curve : int array, shape (points,)
-        Index of the curve to which each point belongs.
-    start : array, shape (curves,)
-        Shifts along `x` from which a first search starts. A second search starts from 0. The better result is used.
-    reference : int
-        Index of the curve that is not shifted.
-    vertical : bool
-        Whether curves are also shifted along the logarithm of friction.
+    The problem is solved for the first row of the stack; the shifts of the other rows follow by linearisation. `curve`
+    is the index of the curve of each point. Of two searches, from the shifts `start` and from 0, the better result is
+    used. Without `vertical`, curves are shifted along ln(velocity) only.
     """
     from scipy.optimize import OptimizeResult, least_squares
 
@@ -255,9 +224,9 @@ def collapse(
 
 
 def _natural(knots: FloatArray, place: FloatArray) -> FloatArray:
-    """Return the matrix that converts heights at the knots to values of a natural cubic spline at the places `place`.
+    """Return the matrix, shape (places, knots), from heights at the knots to values of a natural cubic spline.
 
-    The shape is (places, knots). Outside the range of the knots, the spline continues as a straight line.
+    Outside the range of the knots, the spline continues as a straight line.
     """
     from scipy.interpolate import CubicSpline
 
@@ -268,10 +237,7 @@ def _natural(knots: FloatArray, place: FloatArray) -> FloatArray:
 
 
 def _collapse(data: xr.Dataset) -> Variables:
-    """Shift the curves of friction against velocity at all loads onto one common curve.
-
-    Each curve is used up to its largest friction.
-    """
+    """Shift the curves of friction against velocity, up to the largest friction, of all loads onto one common curve."""
     table = table_of(data, spectral_slope(data), *loads_and_velocities(data))
     force, velocity = table.columns
     known = rising(force, velocity, np.nan_to_num(table.mean()), np.ones(force.size, dtype=bool))

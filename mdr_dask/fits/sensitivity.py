@@ -1,7 +1,7 @@
 """Sobol indices: the share of the variance of an output that each input of a study explains.
 
-The output is the mean over realisations. Variances are computed from products of the outputs of two cases. If both
-outputs belong to the same realisation, the product contains the variance of the scatter. Such products are left out.
+The output is the mean over realisations. Its variance is computed from products of different realisations, because
+products within one realisation contain the variance of the scatter.
 """
 
 from __future__ import annotations
@@ -26,45 +26,16 @@ GROUPS = 20
 
 
 def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
-    """Return the Sobol indices of an output for every varied input of a sampled study.
+    """Return the Sobol indices of an output for every varied input of a sampled study, with 95 % intervals.
 
-    For Saltelli's design, first-order indices are computed by the formula of Saltelli et al. (2010), and total indices
-    by the formula of Jansen (1999). Any other sampled design gives first-order indices only. For such a design, the
-    cases are sorted by an input, and the outputs of neighbouring cases are multiplied (Gamboa et al., 2022, here with
-    several neighbours).
+    For Saltelli's design, first-order indices follow Saltelli et al., Comput. Phys. Commun. 181, 259 (2010), and total
+    indices Jansen (1999). Any other design gives first-order indices only: the cases are sorted by an input, and the
+    outputs of neighbouring cases are multiplied (Gamboa et al., Bernoulli 28, 2345 (2022), here with several
+    neighbours).
 
-    Parameters
-    ----------
-    dataset : Dataset
-        A group of a study with the dimension ``case``.
-    output : str
-        An output with one number for each case and realisation.
-
-    Returns
-    -------
-    Dataset
-        The indices ``first`` and ``total`` of each input, along the dimension ``parameter``. ``<index>_low`` and
-        ``<index>_high`` are the ends of the 95 % intervals. An index that the design does not give is NaN. The
-        attributes are the name ``output``, the number of ``cases``, the number ``left_out`` of cases without a value,
-        the number of ``realisations``, and ``advice``, a sentence on whether the study has enough points.
-
-    Raises
-    ------
-    FitError
-        If the study is a grid or has too few points, if the output does not vary, or if the output has further
-        dimensions such as time.
-
-    Notes
-    -----
-    Failed cases are left out. In Saltelli's design, the index of an input needs three cases for each base
-    point. If one of these three cases failed, the base point is left out. The intervals follow from a jackknife over
-    groups of points and over realisations. Points of a Sobol sequence fill space more evenly than random points.
-    Therefore the intervals tend to be too wide.
-
-    References
-    ----------
-    Saltelli et al., Comput. Phys. Commun. 181, 259 (2010), doi:10.1016/j.cpc.2009.09.018.
-    Gamboa et al., Bernoulli 28, 2345 (2022), doi:10.3150/21-BEJ1421.
+    The intervals follow from a jackknife over groups of points and over realisations. They tend to be too wide, because
+    points of a Sobol sequence fill space more evenly than random points. Failed cases are left out, in Saltelli's
+    design with their base point.
     """
     inputs = _inputs(dataset)
     values, left_out = _values(dataset, output)
@@ -130,8 +101,7 @@ def _values(dataset: xr.Dataset, output: str) -> tuple[FloatArray, int]:
 def _is_saltelli(columns: FloatArray) -> bool:
     """Return whether the cases are those of Saltelli's design.
 
-    In this design, each group of cases has a point a, a point b, and one further point for each input: point a in which
-    this input is replaced by its value at point b.
+    Each group of cases then has a point a, a point b, and for each input the point a with this input of point b.
     """
     inputs, cases = columns.shape
     if cases % (inputs + 2):
@@ -145,7 +115,7 @@ def _is_saltelli(columns: FloatArray) -> bool:
 def _product(left: FloatArray, right: FloatArray) -> FloatArray:
     """Return for each point the mean product of `left` and `right` over all pairs of different realisations.
 
-    If the study has only one realisation, this realisation is paired with itself.
+    A single realisation is paired with itself.
     """
     count = len(left)
     if count == 1:
@@ -171,10 +141,9 @@ def _exchanged(values: FloatArray) -> FloatArray:
 def _of_neighbours(values: FloatArray) -> FloatArray:
     """Return the value and the ends of the interval of both indices, shape (3, 2); the total index is NaN.
 
-    There are two estimates. The first estimate uses products of neighbours only. This estimate is right for random
-    points. The second estimate also uses the product of each point with itself. This estimate is right for points that
-    fill space evenly, such as a Sobol sequence, because neighbouring points then differ systematically in their other
-    inputs. The index is the mean of both estimates, and its interval contains both.
+    The index is the mean of two estimates, and its interval contains both. Products of neighbours only are right for
+    random points. With the product of each point with itself, the estimate is right for points that fill space evenly,
+    such as a Sobol sequence, whose neighbours differ systematically in their other inputs.
     """
     (without, with_itself), (low, _), (_, high) = _with_interval(values, _neighbours)
     first = [(without + with_itself) / 2, low, high]
@@ -192,9 +161,9 @@ def _neighbours(values: FloatArray) -> FloatArray:
 
 
 def _with_interval(values: FloatArray, indices: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    """Return indices and the ends of their intervals, shape (3, indices). The intervals follow from a jackknife.
+    """Return indices and the ends of their jackknife intervals, shape (3, indices).
 
-    `indices` computes the indices from outputs of shape (realisations, points, ...).
+    `indices` takes outputs of shape (realisations, points, ...).
     """
     middle, lines = indices(values), len(values)
     group = np.random.Generator(np.random.Philox(0)).permutation(values.shape[1]) % GROUPS
@@ -205,7 +174,7 @@ def _with_interval(values: FloatArray, indices: Callable[[FloatArray], FloatArra
 
 
 def _jackknife(parts: list[FloatArray]) -> FloatArray:
-    """Return the half widths of the intervals. Each item of `parts` is the indices without one part of the data."""
+    """Return the half widths of the intervals, from the indices without one part of the data each."""
     count = len(parts)
     error = np.sqrt((count - 1) / count * np.sum((np.array(parts) - np.mean(parts, axis=0)) ** 2, axis=0))
     half: FloatArray = t.ppf(bootstrap.TAILS[1], count - 1) * error

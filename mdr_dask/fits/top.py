@@ -10,14 +10,14 @@ from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import DOUBTFUL
 
-#: A parabola is fitted to the points that are below the maximum by at most a certain fraction. These fractions are
-#: tried one after the other until a parabola fits.
+#: A parabola is fitted to the points that are below the maximum by at most the first of these fractions for which a
+#: parabola fits.
 TOPS = (0.3, 0.2, 0.1, 0.05)
 FLAT = 0.05  # points that are below the maximum by at most this fraction belong to the plateau
 
 
 def smoothed(mean: FloatArray) -> FloatArray:
-    """Return a smoothed curve. The smoothed curve is used only to select points, not for the fit of a parabola."""
+    """Return a smoothed curve, which is used only to select points."""
     smooth = mean.copy()
     for _ in range(2):
         smooth[1:-1] = (smooth[:-2] + 2 * smooth[1:-1] + smooth[2:]) / 4
@@ -25,16 +25,10 @@ def smoothed(mean: FloatArray) -> FloatArray:
 
 
 class Top(NamedTuple):
-    """The maximum of a parabola that is fitted to the points near the largest friction.
+    """Stacks that describe the maximum of a parabola through the points near the largest friction.
 
-    Attributes
-    ----------
-    height : array, shape (rows,)
-        Stack of the maximum, corrected for its bias (see `mdr_dask.bootstrap`). The interval of the maximum includes
-        the residuals of the parabola.
-    place, rise : array, shape (rows,)
-        Stacks of the logarithm of the velocity at the maximum, and of the slope d ln(friction) / d ln(velocity) at the
-        maximum. This slope is 0 unless the maximum is at an end of the range of velocities.
+    `height` is the maximum, corrected for its bias; its interval includes the residuals of the parabola. `place` is
+    ln(velocity) at the maximum. `rise` is d ln(friction) / d ln(velocity) there, 0 unless it is at an end of the range.
     """
 
     height: FloatArray
@@ -43,19 +37,10 @@ class Top(NamedTuple):
 
 
 def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
-    """Fit a parabola to as many points near the largest friction as possible.
+    """Fit a parabola to a stack of friction against x = ln(velocity), ascending, near the largest friction.
 
     Points far from the maximum are left out until scatter and errors explain the residuals, or until the last of `TOPS`
     is reached.
-
-    Parameters
-    ----------
-    x : array, shape (velocities,)
-        Logarithms of velocity, ascending.
-    stack : array, shape (rows, velocities)
-        Stack of friction.
-    count : int
-        Number of realisations.
     """
     for drop in TOPS:
         near = _about_the_top(stack[0], drop)
@@ -74,10 +59,7 @@ def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
 
 
 def _about_the_top(mean: FloatArray, drop: float) -> slice:
-    """Return the points near the maximum that are below the maximum by at most the fraction `drop`.
-
-    At least three points are returned.
-    """
+    """Return the points, at least three, near the maximum that are below it by at most the fraction `drop`."""
     smooth = smoothed(mean)
     at = int(np.argmax(smooth))
     low = np.flatnonzero(smooth[at:] <= (1 - drop) * smooth[at])

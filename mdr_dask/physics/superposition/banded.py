@@ -1,17 +1,14 @@
 """Fit several splines with common offsets by least squares, with banded Cholesky factors.
 
-The unknowns are the spline coefficients m_c of each channel c, followed by the offsets v. The precision matrix of the
-unknowns is
+The unknowns are the spline coefficients m_c of each channel c, followed by the offsets v. Their precision matrix is
 
     [ A_c   B_c ]
     [ B_c^T  D  ],
 
-where A_c is banded (half bandwidth 3). The blocks between two different channels are zero, so that channels are coupled
-only by the offsets. The Cholesky factor consists of the banded factors L_c of A_c, the borders W_c = L_c^-1 B_c, and
-the factor of the corner S = D - sum_c W_c^T W_c. A lower or symmetric matrix M is stored by diagonals: ``band[i, d]``
-is M[i, i - d]. The corner is a full matrix, but all its diagonals are stored in the same way, so that the same
-functions work for band and corner. A row of parameters contains shifts and scales. For each row, the solution takes
-O(splines (4 + offsets)^2) operations.
+where A_c is banded (half bandwidth 3); the blocks between two different channels are zero. Its Cholesky factor consists
+of the banded factors L_c of A_c, the borders W_c = L_c^-1 B_c, and the factor of the corner S = D - sum_c W_c^T W_c.
+Lower and symmetric matrices are stored by diagonals: ``band[i, d]`` is M[i, i - d]. There is one such matrix for each
+row of parameters (shifts and scales).
 """
 
 from __future__ import annotations
@@ -24,23 +21,13 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit
 
 ORDER = 4
-"""Number of cubic B-splines that overlap at a point, which is also the number of diagonals that a band stores."""
+"""Number of cubic B-splines that overlap at a point, and of stored diagonals of a band."""
 
 EPS = float(np.finfo(np.float64).eps)
 
 
 class Factors(NamedTuple):
-    """Cholesky factors of the precision matrix for each row of parameters.
-
-    Parameters
-    ----------
-    band : array, shape (rows, channels, splines, 4)
-        Factors L_c, stored by diagonals.
-    border : array, shape (rows, channels, splines, offsets)
-        Borders W_c.
-    corner : array, shape (rows, offsets, offsets)
-        Factor of the corner, stored by diagonals.
-    """
+    """Cholesky factors L_c, W_c and that of the corner, for each row of parameters; L_c and the corner by diagonals."""
 
     band: FloatArray
     border: FloatArray
@@ -50,21 +37,10 @@ class Factors(NamedTuple):
 class Linear(NamedTuple):
     """Means and covariances of the unknowns for each row of parameters.
 
-    Parameters
-    ----------
-    mean : array, shape (rows, unknowns)
-        Spline coefficients, channel by channel, then the offsets.
-    log_determinant : array, shape (rows,)
-        Logarithm of the determinant of the precision matrix.
-    fitted, slope : array, shape (rows, channels, points)
-        At each point: the mean of the curve minus the mean of the offset; and the mean slope of the curve, for an
-        abscissa in cells of the spline.
-    variance, tilt : array, shape (rows, channels, points)
-        Variance of `fitted`, and covariance of `fitted` and `slope`.
-    rough : array, shape (rows, channels, splines - 2)
-        For each second difference of the coefficients: the mean of its square.
-    offsets : array, shape (rows, offsets, offsets)
-        Covariance of the offsets.
+    `mean` contains the spline coefficients, channel by channel, then the offsets. `fitted` is the mean of the curve
+    minus the mean of the offset at each point, and `slope` the mean slope of the curve per cell of the spline.
+    `variance` is the variance of `fitted`, and `tilt` the covariance of `fitted` and `slope`. `rough` is the mean
+    square of each second difference of the coefficients. `offsets` is the covariance of the offsets.
     """
 
     mean: FloatArray
@@ -89,22 +65,10 @@ def solve_rows(
 ) -> tuple[Factors, Linear]:
     """Return the Cholesky factors of the precision matrix, and the means and covariances that the density requires.
 
-    Parameters
-    ----------
-    first : array of int, shape (rows, points)
-        Index of the first of the four splines that overlap at each point.
-    value, slope : array, shape (rows, points, 4)
-        Values and derivatives of these four splines.
-    member : array of int, shape (points,)
-        Index of the offset of each point.
-    y : array, shape (channels, points)
-        Ordinates.
-    weight : array, shape (rows, channels)
-        Precision of y, which is one divided by the variance of y.
-    stiffness : array, shape (rows, channels, splines - 2)
-        Prior precision of the second differences.
-    tied : array, shape (rows, offsets, offsets)
-        Prior precision of the offsets; shape (rows, 0, 0) for curves without offsets.
+    At each point, `first` is the index of the first of the four splines that overlap there; `value` and `slope` are the
+    values and derivatives of these four. `member` is the index of the offset of each point. `weight` is the precision
+    of the ordinates y. `stiffness` and `tied` are the prior precisions of the second differences and of the offsets;
+    without offsets, `tied` has the shape (rows, 0, 0).
     """
     (rows, points), (channels, splines), offsets = first.shape, stiffness.shape[1:], tied.shape[1]
     splines += 2
@@ -129,11 +93,7 @@ def solve_rows(
 
 
 def drawn(factors: Factors, normal: FloatArray) -> FloatArray:
-    """Transform standard normal numbers into random departures of the unknowns from the mean of the unknowns.
-
-    The departures have the precision matrix L L^T. The argument `normal` and the result have the shape (rows,
-    unknowns).
-    """
+    """Transform standard normal numbers, shape (rows, unknowns), into random departures from the means."""
     found = normal.copy()
     _back_substitute(*factors, found)
     return found
@@ -217,7 +177,7 @@ def _add_ties(
 ) -> None:
     """Add the contributions of the points of a channel to the border, the corner and the right side of the offsets.
 
-    The offsets are subtracted from the spline; therefore the border and the right side get negative contributions.
+    The contributions to border and right side are negative, because offsets are subtracted from the spline.
     """
     for p in range(first.size):
         k = member[p]
@@ -306,11 +266,7 @@ def _at_points(
     variance: FloatArray,
     tilt: FloatArray,
 ) -> None:
-    """Add the results at each point.
-
-    The results are the mean of the curve, the mean of its slope, the variance of the curve, and the covariance of curve
-    and slope.
-    """
+    """Add the results at each point (see `Linear`)."""
     for p in range(first.size):
         at = first[p]
         for a in range(ORDER):

@@ -26,22 +26,11 @@ STRAIGHTEST = 1e-5
 class ShiftLaw:
     """A law fitted to shift factors.
 
-    Parameters
-    ----------
-    name : str
-        ``power``, ``arrhenius`` or ``wlf``.
-    constants : dict of str to (value, low, high)
-        For each constant: its value and the two ends of its 95 % confidence interval. A power law has the constant
-        ``exponent``, Arrhenius' law ``activation_energy`` (J/mol), and the WLF law ``c1`` (dimensionless) and ``c2``
-        (K), both at the reference temperature.
-    factors : callable, array -> array
-        Function that returns the factors according to the law, decades. At the anchor, which is the group whose
-        measured factor is zero by definition, this function is zero.
-    departures : array, shape (groups,)
-        Measured factors minus factors according to the law, decades.
-    chance : float
-        Probability that the errors of the factors would cause departures at least as large as the measured departures
-        if the law were exact.
+    `name` is ``power``, ``arrhenius`` or ``wlf``. `constants` contains the value and the ends of the 95 % interval of
+    ``exponent``, of ``activation_energy`` (J/mol), or of ``c1`` and ``c2`` (K) at the reference temperature. `factors`
+    returns the factors by the law, decades; they are zero at the anchor, the group whose measured factor is zero by
+    definition. `departures` are the measured factors minus those of the law, decades. `chance` is the probability that
+    the errors of the factors would cause departures at least as large if the law were exact.
     """
 
     name: str
@@ -59,23 +48,9 @@ class ShiftLaw:
 def fit_power(
     groups: FloatArray, factors: FloatArray, covariance: FloatArray, anchor: int, reference: float = 1.0
 ) -> ShiftLaw:
-    """Fit ``factor = exponent log10(group / anchor)``.
+    """Fit ``factor = exponent log10(group / anchor)``; `anchor` is the index of the group whose factor is zero.
 
-    Parameters
-    ----------
-    groups : array, shape (groups,)
-        Positive numbers, such as velocities.
-    factors, covariance : arrays, shapes (groups,) and (groups, groups)
-        Shift factors, decades, which are zero at the anchor; and the covariance of the factors.
-    anchor : int
-        Index of the group at which the factors are zero by definition.
-    reference : float
-        Not used. The argument exists because all three fits have the same arguments, and `fit_wlf` requires it.
-
-    Raises
-    ------
-    FitError
-        If there are too few factors, or if a group is not positive.
+    The argument `reference` is not used; it exists because all three fits have the same arguments.
     """
     if np.any(groups <= 0):
         raise FitError("a power law needs positive groups, such as velocities")
@@ -98,12 +73,10 @@ def fit_arrhenius(
 def fit_wlf(
     temperature: FloatArray, log_factors: FloatArray, covariance: FloatArray, anchor: int, reference: float
 ) -> ShiftLaw:
-    """Fit ``log10 a_T = -c1 (T - T_ref) / (c2 + T - T_ref)``; arguments as in `fit_power`, temperatures in K.
+    """Fit ``log10 a_T = -c1 (T - T_ref) / (c2 + T - T_ref)`` to temperatures in K.
 
-    The law is first fitted with the anchor as reference. The fitted constants are the slope c1 / c2 and the bend 1 /
-    c2, which both remain finite if the factors are linear in temperature. From the fitted constants, c1 and c2 at the
-    required reference are computed, because c1 c2 and T_ref - c2 are the same for every reference. For a reference that
-    is higher by dT: ``c2' = c2 + dT``, ``c1' = c1 c2 / c2'``.
+    The fitted constants are c1 / c2 and 1 / c2 at the anchor, which remain finite if the factors are linear in
+    temperature. For a reference that is higher than the anchor by dT, ``c2' = c2 + dT`` and ``c1' = c1 c2 / c2'``.
     """
     lowest, moved = float(temperature[anchor] - temperature.min()), reference - float(temperature[anchor])
     straight = STRAIGHTEST / float(np.ptp(temperature))
@@ -182,8 +155,8 @@ def _fit(
 ) -> _Fitted:
     """Fit by generalised least squares.
 
-    The departures from the law may be larger than the errors of the factors can explain. In this case an additional
-    scatter is fitted, and its square is added to the variances of the factors.
+    If departures from the law exceed the errors of the factors, an additional scatter is fitted, whose square is added
+    to the variances of the factors.
     """
     known = np.diag(covariance) > 0
     freedom = int(known.sum()) - guess.size

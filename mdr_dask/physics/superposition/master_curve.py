@@ -22,19 +22,13 @@ EXPANSION = 6e-4
 """Coefficient of volume expansion of melts and rubbers, 1/K, used in b_T; typical values are 5e-4 to 7e-4."""
 
 OFFSET = (0.02 / np.log(10), np.log(2))
-"""Prior of the standard deviation of the vertical offset common to all channels of a curve.
+"""Prior of the vertical offset of a curve: median, decades, and standard deviation of the natural logarithm.
 
-The numbers are the median, in decades, and the standard deviation of the natural logarithm. They describe an offset of
-about 2 %, uncertain by a factor of two. Specimens are clamped again for each temperature, and their dimensions are
-known to about one per cent.
+Specimens are clamped again for each temperature, and their dimensions are known to about one per cent.
 """
 
 FREE = (0.03, 1.5)
-"""Prior of the standard deviation of the steps of free vertical factors about their mean.
-
-The numbers are the median, in decades, and the standard deviation of the natural logarithm. They describe a step of
-about 0.03 decades, uncertain by a factor of about five.
-"""
+"""The same for the steps of free vertical factors about their mean."""
 
 DETERMINED = 0.5
 """The curves do not determine a step if its standard deviation exceeds this fraction of its prior value."""
@@ -184,9 +178,9 @@ def superpose(
 
 
 def known_rise(kelvin: FloatArray, vertical: Vertical) -> FloatArray:
-    """Return log10 of b_T for a modulus, or of 1 / b_T for a compliance, shape (groups,).
+    """Return log10 of b_T for a modulus, of 1 / b_T for a compliance, and otherwise 0.
 
-    For any other value of `vertical`, the result is zero. The reference temperature T0 is the first temperature.
+    The reference temperature T0 of b_T is the first temperature.
     """
     if vertical not in ("modulus", "compliance"):
         return np.zeros(kelvin.size)
@@ -354,8 +348,7 @@ def rereference(
 def interpolation_error(places: FloatArray, factors: FloatArray, place: float) -> float:
     """Return the error ``d^2 |h''| / 8`` of the linear interpolation between two neighbours at the distance d.
 
-    The second derivative h'' of the factors is computed at both neighbours; the larger absolute value is used. If the
-    position `place` is one of the positions `places`, the error is zero.
+    The larger of the second derivatives h'' at both neighbours is used. At a neighbour the error is zero.
     """
     if place in places:
         return 0.0

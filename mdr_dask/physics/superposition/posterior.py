@@ -5,9 +5,9 @@ Each channel c of a curve k (such as storage and loss modulus of one temperature
     y_c(x) = Q_c(x + h_k) - v_k + noise_c,
 
 with a horizontal shift h_k and a vertical offset v_k common to all channels. Q_c is a cubic B-spline whose second
-differences are normally distributed (P. H. C. Eilers, B. D. Marx, Stat. Sci. 11 (1996) 89). The offsets are normally
-distributed as well. The model is linear in the spline coefficients and the offsets, so that the integral of the density
-over these unknowns has a closed form. The remaining density depends only on the shifts and on a few scales.
+differences are normally distributed (P. H. C. Eilers, B. D. Marx, Stat. Sci. 11 (1996) 89), and so are the offsets. The
+density is integrated over spline coefficients and offsets in closed form; it depends only on the shifts and a few
+scales.
 """
 
 from __future__ import annotations
@@ -24,10 +24,7 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.superposition.banded import Factors, drawn, solve_rows
 
 CELLS = 8
-"""Number of spline cells along a curve of median width.
-
-With ten cells the shift factors are the same; five cells do not resolve sharp bends.
-"""
+"""Number of spline cells along a curve of median width; five cells do not resolve sharp bends."""
 
 MARGIN = 0.5
 """Distance by which the spline extends on each side beyond the curves after the first shift, in widths of a curve."""
@@ -36,18 +33,13 @@ ROUNDING = 1e-5
 """Smallest scatter of a curve, decades: the rounding of a table with five digits."""
 
 STEP_MEAN, STEP_SCATTER = 1.0, 0.5
-"""Prior of the steps between the shifts of neighbouring curves, in widths of a curve.
-
-The first number is the standard deviation of the mean step, the second the standard deviation of each step about the
-mean step.
-"""
+"""Prior standard deviations of the mean step between neighbouring curves, and of each step about it, in widths."""
 
 BEND, BEND_SCATTER, BEND_DRIFT = 0.02, 3.0, 1.0
-"""Prior of the bend near each curve; the bend is the standard deviation of the second differences of the spline.
+"""Prior of the bend near each curve: the standard deviation of the second differences of the spline.
 
-The numbers are the median of the bend, in heights of a curve; the standard deviation of the logarithm of the bend; and
-the standard deviation of the change of this logarithm from one curve to the next. The bend varies, because a master
-curve is bent in some places only.
+The numbers are its median, in heights of a curve, and the standard deviations of its logarithm and of the change of
+this logarithm from one curve to the next. The bend varies, because a master curve is bent in some places only.
 """
 
 REACH = 0.3
@@ -65,29 +57,13 @@ FARTHEST = 8.0
 
 @dataclass(frozen=True)
 class Curves:
-    """Points of all curves; abscissae are in units of the width of a curve.
+    """Points of all curves; abscissae are in widths of a curve, ordinates in decades.
 
-    Parameters
-    ----------
-    x : array, shape (points,)
-        Abscissae, with an origin such that the smallest ``x + shift`` is near zero.
-    y : array, shape (channels, points)
-        Ordinates, decades.
-    member : array of int, shape (points,)
-        Index of the curve of each point.
-    count : int
-        Number of curves.
-    height : array, shape (channels,)
-        Median height of a curve, decades.
-    splines : int
-        Number of coefficients of the spline of each channel.
-    offset : tuple of float or None
-        Prior of the standard deviation of the vertical offsets. The two numbers are the median, in decades, and the
-        standard deviation of the natural logarithm. None for curves without vertical offsets.
-    drifting : bool
-        If True, the offset changes from curve to curve by steps. Each step is the sum of a mean step and an independent
-        scatter; the prior standard deviation of the mean step is `TREND` times that of the scatter. If False, the
-        offsets are independent of each other.
+    The origin of `x` is such that the smallest ``x + shift`` is near zero. `member` is the index of the curve of each
+    point, and `height` the median height of a curve in each channel. `splines` is the number of spline coefficients of
+    each channel. `offset` is the prior of the standard deviation of the vertical offsets: its median, decades, and the
+    standard deviation of its natural logarithm; None for curves without offsets. If `drifting`, the offsets change from
+    curve to curve by steps: a mean step plus a scatter, whose prior standard deviations have the ratio `TREND`.
     """
 
     x: FloatArray
@@ -107,17 +83,11 @@ class Curves:
         )
 
     def begin(self, moved: FloatArray) -> FloatArray:
-        """Return the abscissa at which the spline of each row begins, shape (rows,).
-
-        The spline is centred on the shifted points.
-        """
+        """Return the abscissa at which the spline of each row begins; the spline is centred on the shifted points."""
         return np.asarray((moved.min(axis=1) + moved.max(axis=1) - (self.splines - 3) / CELLS) / 2, dtype=np.float64)
 
     def spline(self, channel: int, unknowns: FloatArray, shifts: FloatArray, grid: FloatArray) -> FloatArray:
-        """Return the spline of a channel at the abscissae `grid`, shape (rows, grid).
-
-        Row k of the result belongs to row k of the unknowns and of the shifts.
-        """
+        """Return the spline of a channel at the abscissae `grid`, shape (rows, grid)."""
         low = self.begin(self.x + shifts[:, self.member])[:, None]
         first, value, _ = _basis((grid - low) * CELLS, self.splines)
         places = channel * self.splines + first[..., None] + np.arange(4)
@@ -138,8 +108,8 @@ class Curves:
         """Prior mean and precision of all parameters.
 
         The parameters are: the shifts of all curves except the first, in widths of a curve; for each channel, the
-        logarithms of the bend near each curve (see `BEND`); the logarithm of the noise of each channel; and the
-        logarithm of the standard deviation of the offsets, if there are offsets.
+        logarithms of the bend near each curve (see `BEND`); the logarithm of the noise of each channel; and, if there
+        are offsets, the logarithm of their standard deviation.
         """
         channels = self.y.shape[0]
         drift = np.diff(np.eye(self.count), axis=0) / BEND_DRIFT
@@ -152,7 +122,7 @@ class Curves:
 
 
 def _pieces() -> tuple[BSpline, BSpline]:
-    """Return the four cubic B-splines that overlap on a cell of width 1, and the derivatives of these splines."""
+    """Return the four cubic B-splines that overlap on a cell of width 1, and their derivatives."""
     knots = np.arange(-3.0, 5.0)
     pieces = BSpline(knots, np.eye(4), 3)
     return pieces, pieces.derivative()
@@ -165,16 +135,8 @@ _VALUES, _SLOPES = _pieces()
 class Solved:
     """For each row of parameters: the density, and the distribution of the spline coefficients and offsets.
 
-    Parameters
-    ----------
-    energy : array, shape (rows,)
-        Negative logarithm of the probability density, up to a constant.
-    gradient : array, shape (rows, parameters)
-        Gradient of the energy.
-    mean : array, shape (rows, unknowns)
-        Mean coefficients of the splines, channel by channel, then the offsets.
-    factors : Factors
-        Cholesky factors of the precision of the coefficients and offsets.
+    `energy` is the negative logarithm of the density, up to a constant. `mean` contains the mean coefficients of the
+    splines, channel by channel, then the offsets; `factors` are the Cholesky factors of their precision.
     """
 
     energy: FloatArray
@@ -188,10 +150,9 @@ class Solved:
 
 
 def solve(curves: Curves, rows: FloatArray) -> Solved:
-    """Return density, gradient and spline coefficients for each row of parameters, shape (rows, parameters).
+    """Return density, gradient and spline coefficients for each row of parameters (see `Curves.prior`).
 
-    The parameters are described at `Curves.prior`. The knots of the splines move with the shifted curves. The gradient
-    neglects this movement, because the density hardly depends on the position of the knots.
+    The gradient neglects that the knots of the splines move with the curves, which hardly changes the density.
     """
     many, channels, points = rows.shape[0], curves.y.shape[0], curves.x.size
     count, splines, offsets = curves.count, curves.splines, 0 if curves.offset is None else curves.count
@@ -237,9 +198,9 @@ def solve(curves: Curves, rows: FloatArray) -> Solved:
 
 
 def _basis(place: FloatArray, splines: int) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return the first of the four splines that overlap at each place, and the values and slopes of all four.
+    """Return the index of the first of the four splines that overlap at each place, and values and slopes of all four.
 
-    The first spline is returned as an index. Places are in cells.
+    Places are in cells.
     """
     # in a diverged row, places may be NaN or infinite; such values must not become indices
     first = np.clip(np.nan_to_num(np.floor(place)), 0, splines - 4).astype(np.intp)

@@ -18,14 +18,11 @@ HOPS = 2
 CHAINS, WARM, KEPT = 24, 16, 20
 """Number of chains, and numbers of moves of each chain that are discarded and kept.
 
-The resulting 480 draws determine the ends of a 95 % interval to about 5 %.
+480 draws determine the ends of a 95 % interval to about 5 %.
 """
 
 CONVERGED = 1.1
-"""Potential scale reduction factor below which chains count as converged.
-
-Otherwise sampling is repeated with two, four and eight moves for each kept move.
-"""
+"""Potential scale reduction factor below which chains count as converged."""
 
 PATH, STEPS = 1.5, 3
 """Length of a move in standard deviations (about a quarter of a period, pi/2), and number of steps of a move."""
@@ -34,24 +31,17 @@ DIFFERENCE = 1e-3
 """Step of the finite differences of the gradient, in standard deviations of the prior."""
 
 STIFFNESSES = (0.0, 3.0, 6.0)
-"""Natural logarithms of the factors by which the prior bend is divided.
-
-A first guess tries one spline for each of these factors.
-"""
+"""Natural logarithms of the factors by which the prior bend is divided in a first guess."""
 
 SCAN = 81
-"""Number of steps tried for each pair of neighbouring curves.
-
-With the extreme steps, the gap between the two curves is as wide as a curve.
-"""
+"""Number of steps tried for each pair of neighbouring curves."""
 
 
 def first_guess(curves: Curves) -> FloatArray:
     """Return a first guess of the shifts, shape (curves - 1,).
 
-    A step is the difference between the shifts of two neighbouring curves. For each pair of neighbours separately, many
-    steps are tried. The mean and the variance of the step are computed with the density of the pair as weight. The
-    means and variances of all steps are then combined with the prior of the shifts.
+    For each pair of neighbouring curves separately, many steps between their shifts are tried. Mean and variance of the
+    step, weighted with the density of the pair, are then combined with the prior of the shifts.
     """
     steps = np.linspace(-2.0, 2.0, SCAN)
     means, variances = [], []
@@ -118,11 +108,7 @@ def draws(curves: Curves, generator: np.random.Generator) -> tuple[Curves, Float
 def _moved(
     curves: Curves, place: FloatArray, here: Solved, scale: FloatArray, generator: np.random.Generator
 ) -> tuple[FloatArray, Solved, float]:
-    """Move all chains by one Hamiltonian move and `HOPS` jumps.
-
-    The new parameters, the density at these parameters, and the mean acceptance probability of the Hamiltonian move are
-    returned.
-    """
+    """Move all chains by one Hamiltonian move and `HOPS` jumps; also return the acceptance probability of the move."""
     length = PATH / STEPS * generator.uniform(0.7, 1.3, (CHAINS, 1))
     momentum = generator.standard_normal(place.shape)
     speed, new, there = momentum, place, here
@@ -146,11 +132,10 @@ def _moved(
 
 
 def _reduction(kept: FloatArray) -> float:
-    """Return the potential scale reduction factor of the parameter for which this factor is largest.
+    """Return the largest potential scale reduction factor of any parameter, close to 1 if all chains have converged.
 
-    The array `kept` has the shape (moves, chains, parameters). The factor compares the variance of the means of the
-    chains with the variance within the chains (A. Gelman, D. B. Rubin, Stat. Sci. 7 (1992) 457). The factor is close to
-    1 if all chains represent the same distribution.
+    It compares the variance of the means of the chains with the variance within the chains (A. Gelman, D. B. Rubin,
+    Stat. Sci. 7 (1992) 457). The shape of `kept` is (moves, chains, parameters).
     """
     within = kept.var(axis=0, ddof=1).mean(axis=0)
     between = kept.mean(axis=0).var(axis=0, ddof=1)
@@ -168,8 +153,8 @@ def _chosen(taken: NDArray[np.bool_], new: Solved, old: Solved) -> Solved:
 def _hop(curves: Curves, place: FloatArray, generator: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """In each row, draw one step again from its prior; return the new rows and the rise of the prior energy.
 
-    A step is the difference between the shifts of two neighbouring curves. Its prior is conditional on the other steps.
-    On a plateau the density has many small maxima; by such jumps a chain can pass from one maximum to another.
+    A step is the difference between the shifts of two neighbouring curves. On a plateau the density has many small
+    maxima; by such jumps a chain can pass from one maximum to another.
     """
     lines, rows = curves.count - 1, np.arange(place.shape[0])
     known = step_precision(curves.count)

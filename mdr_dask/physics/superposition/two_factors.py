@@ -16,20 +16,11 @@ from mdr_dask.physics.superposition.master_curve import Superposition, superpose
 
 @dataclass(frozen=True)
 class TwoShifts:
-    """Factors ``h(v, T) = a(v) + b(T)``, and the merged curve.
+    """Factors ``h(v, T) = a(v) + b(T)``, a in `first` and b in `second`, and the merged curve, the same in both.
 
-    Parameters
-    ----------
-    first, second : Superposition
-        `first` contains the factors a and the groups v, and `second` contains the factors b and the groups T. The
-        merged points and the merged curve are the same in both. The array `member` contains the index of v in `first`,
-        and the index of T in `second`.
-    chi_squared : float
-        Reduced chi-squared of the differences between the factor of each curve and the sum a + b. If the reduced
-        chi-squared is above one, the errors of the factors are multiplied by its square root.
-    probability : float
-        Probability of a chi-squared at least as large if every factor is really a sum a + b. If no degree of freedom is
-        left for a test, the probability is 1.
+    `chi_squared` is the reduced chi-squared of the differences between the factor of each curve and the sum a + b; if
+    it is above one, the errors of the factors are multiplied by its square root. `probability` is that of a chi-squared
+    at least as large if every factor is really a sum; 1 if no degree of freedom is left.
     """
 
     first: Superposition
@@ -47,29 +38,9 @@ def superpose_twice(
 ) -> TwoShifts:
     """Shift curves that differ in two quantities into one curve, and split each factor into a sum of two.
 
-    First all curves are superposed with independent factors. Then a and b are fitted to these factors by least squares,
-    weighted by the covariance of the factors. To first order, the result is the same as if a and b were fitted to the
-    curves directly. The chi-squared of the least-squares fit is a test of the assumption that every factor is a sum a +
-    b.
-
-    Parameters
-    ----------
-    first, second : array_like, shape (curves,)
-        Values of the two quantities for each curve. Each quantity must have at least two different values. Pairs of
-        values without a curve are allowed.
-    curves : sequence of (x, y)
-        log10 of abscissa and ordinate.
-    references : pair of float, optional
-        Values of the two quantities at which the factors are zero. The measured values nearest to these references are
-        used. By default, the middle one of the measured values of each quantity is used.
-    seed : int
-        Seed of the draws of `superpose`.
-
-    Raises
-    ------
-    DataError
-        If a quantity has only one value, or if the curves fall into sets that have no value of either quantity in
-        common.
+    First all curves are superposed with independent factors. Then a and b are fitted to these factors, weighted by
+    their covariance; to first order, the result is as if a and b were fitted to the curves directly. The factors are
+    zero at the measured values nearest to `references`, by default at the middle values.
     """
     values = [np.asarray(a, dtype=np.float64).reshape(-1) for a in (first, second)]
     groups, places = zip(*(np.unique(a, return_inverse=True) for a in values), strict=True)
@@ -96,11 +67,10 @@ def _split(
     design: FloatArray,
     columns: NDArray[np.intp],
 ) -> TwoShifts:
-    """Fit the sums a + b to the factors of all curves by least squares.
+    """Fit the sums a + b to the factors of all curves by least squares, weighted with their inverse covariance.
 
-    The weight is the inverse of the covariance of the factors of the curves. The product of the matrix `design` and the
-    vector of all factors a and b contains the sums a + b of all curves. The array `columns` contains the indices of the
-    factors a and b that are not zero by definition.
+    `design` times the vector of all factors a and b gives the sums a + b of all curves. `columns` are the indices of
+    the factors a and b that are not zero by definition.
     """
     curves, both = free.groups.size, design.shape[1]
     rows, moved = (design - design[0])[1:, columns], np.arange(1, curves)

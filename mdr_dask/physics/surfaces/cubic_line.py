@@ -16,29 +16,17 @@ from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.surfaces import shapes
 
 NONE = 2.0  # result of `summit` if the cell has no maximum
-# largest rise of a cubic cell above its ends, divided by the sum of its upward slope at the start and its downward
-# slope at the end
+# largest rise of a cubic cell above its ends, over the sum of upward slope at the start and downward slope at the end
 STEEPEST_RISE = 4 / 27
 UNRESOLVED = 0.5  # a line is unresolved if its mean squared slopes at nodes and over cells differ by this fraction
 
 
 class CubicLine(NamedTuple):
-    """A line of n cubic cells between n + 1 equidistant nodes.
+    """A line of n cubic cells between n + 1 equidistant nodes, in the order in which an elastomer element passes them.
 
-    The nodes are numbered in the order in which an elastomer element passes them.
-
-    Parameters
-    ----------
-    height : array, shape (n + 1,)
-        Heights at the nodes; in a periodic line, the last height equals the first.
-    enter, leave : array, shape (n,)
-        Slopes at the start and the end of each cell. At a kink of the line, the end slope of a cell differs from the
-        start slope of the next cell.
-    periodic : bool
-        Whether the line is periodic; if it is not, every element is undeformed at the first node.
-    smooth : bool
-        Whether the line is periodic with continuous slopes. For such a line, the Euler-Maclaurin formula can compute
-        the integrals of the squared slope. The integral over the whole line is exact if the nodes resolve the line.
+    `enter` and `leave` are the slopes at the start and the end of each cell. If the line is not periodic, every element
+    is undeformed at the first node. A `smooth` line is periodic and has no kinks; the Euler-Maclaurin formula can then
+    compute the integrals of the squared slope.
     """
 
     height: FloatArray
@@ -97,25 +85,10 @@ def without_kinks(line: CubicLine) -> CubicLine:
 class Cells(NamedTuple):
     """The n cells of a line, and one more cell that repeats the first cell.
 
-    A periodic line starts in the cell of its highest point.
-
-    Parameters
-    ----------
-    height : array, shape (n + 2,)
-        Heights at the nodes minus the height of the highest point, never positive. Under light loads, only small
-        distances from the highest point matter. In this form, these distances have no rounding error.
-    enter, leave : array, shape (n + 1,)
-        Slopes at the start and the end of each cell.
-    peak : array, shape (n + 1,)
-        Largest height in each cell.
-    mean, stretch : array, shape (n + 1,)
-        Integrals of the height and of the squared slope over each cell.
-    start : float
-        Position of the highest point in cell 0 (and in its copy, cell n). A period begins and ends at this point.
-    top : float
-        Height of the highest point.
-    periodic : bool
-        Whether the line is periodic; if it is not, every element is undeformed at the start of cell 0.
+    A periodic line starts in the cell of its highest point. Heights are relative to this point, because only small
+    distances from it matter under light loads, and these must have no rounding error. `peak` is the largest height in
+    each cell; `mean` and `stretch` are the integrals of the height and of the squared slope over each cell. `start` is
+    the position of the highest point in cell 0, where a period begins, and `top` is its height.
     """
 
     height: FloatArray
@@ -184,10 +157,7 @@ def _highest(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[
 def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float]:
     """Return the cell of the highest point of a periodic cubic line, and the position in the cell (0 to 1).
 
-    Parameters
-    ----------
-    height, slope : array, shape (n,)
-        Heights, and slopes for the length of the line as the unit of length.
+    For the slopes, the length of the line is 1.
     """
     line = periodic_line(height, slope)
     return _highest(line.height, line.enter, line.leave)[:2]
@@ -250,8 +220,7 @@ def _turned(
 def _is_resolved(slope: FloatArray, stretch: FloatArray) -> bool:
     """Return whether the line has more than two nodes per shortest wave.
 
-    With more than two nodes per wave, the sum of the squared slopes at the nodes is close to the integral of the
-    squared slope over the cells.
+    The sum of the squared slopes at the nodes is then close to the integral of the squared slope over the cells.
     """
     by_nodes, by_cells = np.dot(slope, slope), np.sum(stretch)
     return bool(abs(by_nodes - by_cells) < UNRESOLVED * by_cells)
@@ -261,9 +230,8 @@ def _is_resolved(slope: FloatArray, stretch: FloatArray) -> bool:
 def _resum(slope: FloatArray, stretch: FloatArray) -> None:
     """Compute the integrals of the squared slope over cells by the Euler-Maclaurin formula.
 
-    In the first cell, the integral of its polynomial is kept, because a period begins and ends inside this cell. The
-    difference between the formula and this integral is distributed over the other cells, so that the total remains
-    exact.
+    The first cell keeps the integral of its polynomial, because a period begins and ends inside this cell. The
+    difference is distributed over the other cells, so that the total remains exact.
     """
     n, kept = slope.size - 1, stretch[0]
     before, here, after = slope[n - 1] ** 2, slope[0] ** 2, slope[1] ** 2

@@ -28,14 +28,9 @@ HANN_MODES = 0.3  # fraction of the waves of the Fourier transform that are inde
 
 
 class SurfaceMap(NamedTuple):
-    """Heights on a regular grid.
+    """Heights on a regular grid, m, positive towards the elastomer; NaN for missing points.
 
-    Parameters
-    ----------
-    height : array, shape (points along x, points along y)
-        Heights, m, positive towards the elastomer; NaN for missing points.
-    size : tuple of float
-        Lengths along x and y, m: number of points times spacing.
+    `size` contains the lengths along x and y, m: number of points times spacing.
     """
 
     height: FloatArray
@@ -43,10 +38,9 @@ class SurfaceMap(NamedTuple):
 
 
 def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
-    """Return the outliers: points that deviate from their neighbours by more than `FAR` standard deviations.
+    """Return the points that deviate from their neighbours by more than `FAR` standard deviations, along x and along y.
 
-    An outlier deviates by so much along x as well as along y. The standard deviation is estimated from the median of
-    the deviations.
+    The standard deviation is estimated from the median of the deviations.
     """
     height = surface.height
     away = np.empty((max(height.shape[0] - 2, 0), max(height.shape[1] - 2, 0)))
@@ -68,10 +62,9 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
 
 
 def _off_neighbours(height: FloatArray) -> FloatArray:
-    """Return the deviation of each inner point: its distance from the mean of its two neighbours along x or along y.
+    """Return the distance of each inner point from the mean of its two neighbours, along x or along y.
 
-    The smaller of the two distances is used. A point on a crest is close to its neighbours along the crest, but far
-    from its neighbours across the crest.
+    The smaller of both distances is used, because a point on a crest is far from its neighbours across the crest.
     """
     middle = height[1:-1, 1:-1]
     along = np.abs(middle - 0.5 * (height[2:, 1:-1] + height[:-2, 1:-1]))
@@ -96,13 +89,7 @@ def require_few_missing(missing: NDArray[np.bool_]) -> None:
 
 
 def filled(surface: SurfaceMap) -> SurfaceMap:
-    """Return a map in which each missing point is the mean of its four neighbours (Laplace's equation).
-
-    Raises
-    ------
-    DataError
-        If an axis has too few points, or if the fraction of missing points exceeds `MOST_MISSING`.
-    """
+    """Return a map in which each missing point is the mean of its four neighbours (Laplace's equation)."""
     require_points(surface)
     missing = ~np.isfinite(surface.height)
     return SurfaceMap(_harmonic(surface.height, missing), surface.size) if missing.any() else surface
@@ -169,33 +156,16 @@ def hann_disc(points: tuple[int, int], size: tuple[float, float]) -> FloatArray:
 
 @dataclass(frozen=True)
 class MapSpectrum:
-    """The spectrum of a map, in rings of the wave vector of width dq.
+    """The spectrum of a map, in rings of the wave vector of width dq; dq is 2 pi divided by the shorter side.
 
-    Parameters
-    ----------
-    wavenumber : array, shape (rings,)
-        q = k dq, k = 1, 2, ..., up to the Nyquist wave number of the wider spacing; dq is 2 pi divided by the shorter
-        side.
-    density : array, shape (rings,)
-        C2D, m^4: the power of the waves in a ring, divided by the area of the ring in the plane of wave vectors. This
-        preserves rms height and rms gradient.
-    count : array, shape (rings,)
-        Number of waves in each ring; a wave vector and its negative count as two waves.
-    independent : float
-        Fraction of the waves of the Fourier transform that are statistically independent: 1 without a window, less than
-        1 with a window.
-    rms_height : float
-        rms height of the windowed map, m.
-    slopes : tuple of float
-        Mean square of the slope along x, mean square of the slope along y, and mean product of both slopes.
-    angular : complex array, shape (2, rings)
-        Mean of exp(2 i angle) and of exp(4 i angle) in each ring, weighted by power; 0 for an isotropic surface.
-    cuts : tuple of (array, array)
-        Wave numbers and C_cut, m^3, of straight profiles along x and along y.
-    axes : tuple of float
-        One number for the x axis and one for the y axis. In each ring, the power of the wave along this axis is divided
-        by the mean power of the waves in the ring. The number is the median of these ratios, divided by ln(2). It is 1
-        for an isotropic surface. The lowest rings and rings of insignificant power are left out.
+    `density` is C2D, m^4: the power in a ring divided by the area of the ring, which preserves rms height and rms
+    gradient. `count` is the number of waves in each ring; a wave vector and its negative count as two waves.
+    `independent` is the fraction of the waves that are statistically independent, less than 1 with a window.
+    `rms_height`, m, is that of the windowed map. `slopes` are the mean squares of the slopes along x and along y, and
+    their mean product. `angular` is the mean of exp(2 i angle) and of exp(4 i angle) in each ring, weighted by power; 0
+    for an isotropic surface. `cuts` are wave numbers and C_cut, m^3, of straight profiles along x and along y. `axes`
+    compares, for each axis, the power of the wave along this axis with the mean power in the ring: the median ratio
+    over the rings, divided by ln(2), which is 1 for an isotropic surface.
     """
 
     wavenumber: FloatArray
@@ -226,9 +196,9 @@ class MapSpectrum:
         return averaged(*rings)
 
     def along(self, axis: int) -> Spectrum:
-        """Return the isotropic C2D whose MDR line has the spectrum of straight profiles along one axis of the map.
+        """Return the isotropic C2D whose MDR line has the spectrum of profiles along one axis (0 for x, 1 for y).
 
-        The number `axis` is 0 for x and 1 for y. Use the result for a grooved surface that slides along this axis.
+        Use the result for a grooved surface that slides along this axis.
         """
         q, cut = self.cuts[axis]
         there = cut > ROUNDING * cut.max()
@@ -256,14 +226,9 @@ class MapSpectrum:
 
 
 def spectrum_of_map(surface: SurfaceMap, hann: bool = True) -> MapSpectrum:
-    """Return the spectrum of a map without missing points.
+    """Return the spectrum of a map without missing points and without trend.
 
-    Parameters
-    ----------
-    surface : SurfaceMap
-        Map without its trend.
-    hann : bool
-        Whether to apply the window `hann_disc`; a periodic map needs no window.
+    By default the window `hann_disc` is applied; a periodic map needs no window.
     """
     points, size = surface.height.shape, surface.size
     height = surface.height - surface.height.mean()
@@ -329,10 +294,10 @@ def _rings(
 
 
 def significant(wavenumber: FloatArray, density: FloatArray) -> NDArray[np.bool_]:
-    """Return the significant rings, whose power cannot be due to the rounding of heights in a file.
+    """Return the rings whose power cannot be due to the rounding of heights in a file.
 
-    Every ring contributes to the mean square of the height and to the mean square of the gradient. A ring is
-    significant if one of these contributions exceeds the fraction `SIGNIFICANT` of the largest contribution of a ring.
+    The contribution of such a ring to the mean square of the height, or to that of the gradient, exceeds the fraction
+    `SIGNIFICANT` of the largest contribution of a ring.
     """
     height, gradient = density * wavenumber, density * wavenumber**3
     return np.asarray((height > SIGNIFICANT * height.max()) | (gradient > SIGNIFICANT * gradient.max()))

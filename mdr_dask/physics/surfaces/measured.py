@@ -23,15 +23,7 @@ LEAST_POINTS = 8
 
 @dataclass(frozen=True)
 class MeasuredLine:
-    """A periodic line at equidistant points.
-
-    Parameters
-    ----------
-    height : array, shape (points,)
-        Heights, m, positive towards the elastomer.
-    length : float
-        Period L = points * spacing, m.
-    """
+    """One period of a line at equidistant points: heights, positive towards the elastomer, and length, m."""
 
     height: FloatArray
     length: float
@@ -50,25 +42,11 @@ def measured_line(
     shortest: float = 0.0,
     longest: float = 0.0,
 ) -> MeasuredLine:
-    """Turn a recorded line into one period of a line with uniform spacing.
+    """Turn positions and heights of a recorded line, m, into one period of a line with uniform spacing.
 
-    Parameters
-    ----------
-    position, height : array_like, shape (points,)
-        Positions x and heights z, m. The positions ascend or descend; their spacing may vary. The points are taken as
-        one period, whose length is the number of points times the mean spacing.
-    detrend : {"none", "mean", "line", "parabola"}
-        Least-squares polynomial that is subtracted.
-    taper : float
-        Fraction of the line (0 to 1) over which a cosine window reduces the heights towards their mean: one half at
-        each end of the line. The periodic line then has no step at its ends.
-    shortest, longest : float
-        Shortest and longest wavelength that are kept, m; 0 for no limit.
-
-    Raises
-    ------
-    DataError
-        If there are fewer than eight points, a number is not finite, or positions are not monotonic.
+    The length of the period is the number of points times the mean spacing. `taper` is the fraction of the line over
+    which a cosine window reduces the heights towards their mean, one half at each end. Waves shorter than `shortest` or
+    longer than `longest` are removed; 0 means no limit.
     """
     x, z = _ordered(position, height)
     steps = np.diff(x)
@@ -104,7 +82,7 @@ def _window(points: int, taper: float) -> FloatArray:
 
 
 def detrended(height: FloatArray, order: Detrend) -> FloatArray:
-    """Return heights minus their least-squares polynomial; `order` is a value of `detrend` in `measured_line`."""
+    """Return heights minus their least-squares polynomial."""
     if order == "none":
         return height.copy()
     place = np.linspace(-1, 1, height.size)
@@ -124,9 +102,9 @@ def band_limited(height: FloatArray, length: float, shortest: float = 0.0, longe
 
 
 def resampled(height: FloatArray, points: int) -> FloatArray:
-    """Return a periodic line at another number of points, computed from the Fourier series of the line.
+    """Return a periodic line at another number of points, computed from the Fourier series; the first point is kept.
 
-    The first point keeps its position. With fewer points, waves shorter than the new Nyquist wavelength are omitted.
+    With fewer points, waves shorter than the new Nyquist wavelength are omitted.
     """
     waves, mean = waves_of(height), height.mean()
     return np.asarray(series(waves.coefficients[: points // 2], points) + mean, dtype=np.float64)

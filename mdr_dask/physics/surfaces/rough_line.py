@@ -15,17 +15,7 @@ SEEN = 8  # the highest point of a line is searched on a grid with this many nod
 
 @dataclass(frozen=True)
 class RoughLine:
-    """A rough line on a plane or an indenter.
-
-    The unit of length is the length of the line. Roughness and indenter have the same unit of height.
-
-    Parameters
-    ----------
-    roughness : Waves
-        The roughness.
-    body : Shape or None
-        The shape under the roughness; None for a plane, which gives a periodic line.
-    """
+    """A rough line on an indenter, or a periodic line on a plane if there is no `body`; the length of the line is 1."""
 
     roughness: Waves
     body: Shape | None = None

@@ -1,8 +1,7 @@
 """The spectrum of an isotropic surface from straight profiles through the surface: the inverse Abel transform.
 
 A straight profile (cut) has the spectrum C_cut(q) = 2 int_q^inf C2D(k) k / sqrt(k^2 - q^2) dk, where C2D is the
-spectrum of the surface. The line of the MDR has a larger spectrum, pi q C2D: its rms slope is the rms gradient of the
-surface, while the rms slope of the cut is smaller by the factor sqrt(2).
+spectrum of the surface. The line of the MDR has a larger spectrum, pi q C2D.
 """
 
 from __future__ import annotations
@@ -27,16 +26,9 @@ STEEPEST = 30.0  # the spectrum ends where -d log C / d log q exceeds this value
 
 
 class Cut(NamedTuple):
-    """The spectrum of straight profiles, averaged over profiles and over waves of similar length.
+    """The spectrum of straight profiles in logarithmic bins of the wave number q, rad/m.
 
-    Parameters
-    ----------
-    wavenumber : array, shape (bins,)
-        q, rad/m.
-    density : array, shape (bins,)
-        C_cut, m^3, two-sided: <h^2> = 2 int C_cut dq.
-    error : array, shape (bins,)
-        Relative standard error of the density.
+    `density` is C_cut, m^3, two-sided: <h^2> = 2 int C_cut dq. `error` is its relative standard error.
     """
 
     wavenumber: FloatArray
@@ -50,19 +42,9 @@ class Cut(NamedTuple):
 
 
 def cut_of_lines(lines: Sequence[MeasuredLine], hann: bool = True) -> Cut:
-    """Return the spectrum of scans: squared Fourier amplitudes, averaged in logarithmic bins.
+    """Return the spectrum of detrended scans of equal length and spacing, averaged in logarithmic bins.
 
-    Parameters
-    ----------
-    lines : sequence of MeasuredLine
-        Detrended scans of equal length and spacing.
-    hann : bool
-        Whether to apply Hann's window, normalised so that <h^2> is preserved.
-
-    Raises
-    ------
-    DataError
-        If lengths or numbers of points are different.
+    Hann's window, if used, is normalised so that <h^2> is preserved.
     """
     points, length = lines[0].height.size, lines[0].length
     if any(line.height.size != points or not math.isclose(line.length, length, rel_tol=1e-3) for line in lines):
@@ -81,14 +63,8 @@ def cut_of_lines(lines: Sequence[MeasuredLine], hann: bool = True) -> Cut:
 def averaged(wavenumber: FloatArray, density: FloatArray, independent: float, count: FloatArray | None = None) -> Cut:
     """Average a spectrum in logarithmic bins; the power in each bin is preserved.
 
-    Parameters
-    ----------
-    wavenumber, density : array, shape (waves,)
-        Ascending wave numbers, and the spectrum at these wave numbers.
-    independent : float
-        Number of statistically independent squared amplitudes per wave; it determines the standard error.
-    count : array, shape (waves,), optional
-        Number of waves at each wave number; 1 by default.
+    `independent` is the number of statistically independent squared amplitudes per wave; it determines the standard
+    error. `count` is the number of waves at each wave number, 1 by default.
     """
     count = np.ones(wavenumber.size) if count is None else count
     bins = np.floor(np.log10(wavenumber / wavenumber[0] + 0.5) * BINS).astype(int)
@@ -115,15 +91,9 @@ def _until_the_end(cut: Cut) -> slice:
 def of_cut(cut: Cut) -> Spectrum:
     """Return the isotropic spectrum of a surface with the given cut (inverse Abel transform).
 
-    Between adjacent wave numbers of the cut, the computed C2D is a power law, and therefore positive. A least-squares
-    fit finds the logarithms of C2D at these wave numbers; the residuals are divided by the relative errors of the cut.
-    The change of the slope d log C2D / d log q from bin to bin has a normal prior with the standard deviation `BEND`.
-    The explicit inverse -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk would amplify noise.
-
-    Raises
-    ------
-    DataError
-        If there are fewer than three wave numbers with a positive density.
+    A least-squares fit finds C2D, a power law between adjacent wave numbers of the cut. The explicit inverse -1/pi int
+    C_cut'(k) / sqrt(k^2 - q^2) dk would amplify noise. Therefore the change of the slope d log C2D / d log q from bin
+    to bin has a normal prior with the standard deviation `BEND`.
     """
     q, density, error = (np.asarray(column, dtype=np.float64)[_until_the_end(cut)] for column in cut)
     if q.size < 3:

@@ -39,14 +39,8 @@ class SelfAffine(NamedTuple):
 def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> float:
     """Return the wave number beyond which the spectrum is noise, or infinity if the spectrum has no flat tail.
 
-    Parameters
-    ----------
-    bins : Cut
-        C2D, or the spectrum of straight profiles, in logarithmic bins.
-    flattest : float
-        The tail is noise if its slope d log C / d log q is above this value: -1 for C2D, -0.5 for a straight profile.
-    decades : float
-        Length of the tail in decades of the wave number.
+    The tail comprises the last `decades` decades of the wave number. It is noise if its slope d log C / d log q is
+    above `flattest`: -1 for C2D, -0.5 for a straight profile.
     """
     wavenumber, density = bins.wavenumber, bins.density
     tail = wavenumber > wavenumber[-1] / 10**decades * (1 - 1e-9)
@@ -72,21 +66,10 @@ def steep_limit(bins: Cut) -> float:
 
 
 def fit_self_affine(bins: Cut) -> SelfAffine | None:
-    """Fit a power law to a spectrum, with cut-offs if the data show them.
+    """Fit a power law to C2D; return None if the spectrum is not a power law or has too few bins.
 
-    If the spectrum is not a power law or has too few bins, return None.
-
-    Parameters
-    ----------
-    bins : Cut
-        C2D in logarithmic bins, with relative standard errors.
-
-    Returns
-    -------
-    SelfAffine or None
-        Schwarz's information criterion decides whether there are cut-offs, and at which bins. The confidence intervals
-        follow from the likelihood. The intervals are widened if the spectrum deviates from the fitted law by more than
-        the errors of the spectrum.
+    Schwarz's information criterion decides whether there are cut-offs, and at which bins. The intervals follow from the
+    likelihood, and are wider if the spectrum deviates from the law by more than its errors.
     """
     wavenumber, density, error = bins
     if wavenumber.size < LEAST_BINS:

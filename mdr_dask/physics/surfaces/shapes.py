@@ -15,13 +15,7 @@ ROUNDING = 1e-14  # relative step at which Newton's method ends
 
 
 def mapped(exponent: float) -> float:
-    """Return kappa_n of the MDR rule: a body c r^n acts like the line kappa_n c |x|^n (cone: pi/2, parabola: 2).
-
-    Parameters
-    ----------
-    exponent : float
-        n > 0.
-    """
+    """Return kappa_n of the MDR rule: a body c r^n acts like the line kappa_n c |x|^n (cone: pi/2, parabola: 2)."""
     return 0.5 * math.sqrt(math.pi) * exponent * math.gamma(exponent / 2) / math.gamma((exponent + 1) / 2)
 
 
@@ -82,18 +76,11 @@ class PowerLaw:
 
 @dataclass(frozen=True)
 class RoundedCone:
-    """The line of a cone with a rounded tip.
+    """The line of a cone with the slope s (`steepness`), whose tip is rounded up to the radius b (`blend`).
 
-    The body is f = s r^2 / (2 b) up to r = b, and f = s (r - b/2) beyond b. The line of the cone is g = s x^2 / b up to
-    x = b, and g = s x (x / b (1 - sqrt(1 - b^2 / x^2)) + arccos(b / x)) beyond b (Popov, Hess and Willert, Handbook of
-    Contact Mechanics, 2.5.8).
-
-    Parameters
-    ----------
-    steepness : float
-        s, the slope of the cone.
-    blend : float
-        b, the radius at which the rounded tip ends and the cone begins; the slope is continuous.
+    The body is f = s r^2 / (2 b) up to r = b, and f = s (r - b/2) beyond b. The line is g = s x^2 / b up to x = b, and
+    g = s x (x / b (1 - sqrt(1 - b^2 / x^2)) + arccos(b / x)) beyond b (Popov, Hess and Willert, Handbook of Contact
+    Mechanics, 2.5.8).
     """
 
     steepness: float
@@ -127,34 +114,19 @@ class RoundedCone:
 
 
 def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatArray:
-    """Return the static half-width a of the contact with a smooth line c |x|^n.
+    """Return the static half-width a of the contact with a smooth line c |x|^n, for loads F_N / (4 G).
 
-    Parameters
-    ----------
-    load : array
-        F_N / (4 G), so that ``load = 2 n c a^(n+1) / (n + 1)`` (thesis 3.3.2).
-    coefficient, exponent : float
-        Coefficient c > 0 and exponent n of the line (not of the body).
+    By thesis 3.3.2, ``load = 2 n c a^(n+1) / (n + 1)``.
     """
     width: FloatArray = ((exponent + 1) * load / (2 * exponent * coefficient)) ** (1 / (exponent + 1))
     return width
 
 
 class Smooth(NamedTuple):
-    """Steady states of a smooth line, one entry per case.
+    """Steady states of a smooth line, one entry per case; if Newton's method fails, depth and drag are NaN.
 
-    If Newton's method fails for a case, depth and drag of this case are NaN.
-
-    Parameters
-    ----------
-    depth : array
-        Penetration depth d of the tip.
-    drag : array
-        F_x / (4 G).
-    leading, trailing : array
-        Distances a and b from the tip to the leading and the trailing edge of the contact.
-    stretch : array
-        Integral of the squared slope over the contact.
+    `drag` is F_x / (4 G). `leading` and `trailing` are the distances from the tip to the two edges of the contact.
+    `stretch` is the integral of the squared slope over the contact.
     """
 
     depth: FloatArray
@@ -165,18 +137,11 @@ class Smooth(NamedTuple):
 
 
 def smooth(loads: FloatArray, deborah: FloatArray, coefficient: float, exponent: float) -> Smooth:
-    """Return the steady states of a smooth line c |x|^n that slides towards -x over a Kelvin foundation.
+    """Return the steady states of a smooth line c |x|^n, n >= 1, that slides towards -x over a Kelvin foundation.
 
-    At the depth d the contact lies between -a and b, with d = c a^n and d = c (b^n + n v tau b^(n-1)). If the second
-    equation has no positive solution, b is 0. Newton's method converges, because the load is a convex function of d
-    with the derivative a + b + v tau.
-
-    Parameters
-    ----------
-    loads, deborah : array, shape (cases,)
-        F_N / (4 G) and v tau, positive and finite.
-    coefficient, exponent : float
-        Coefficient c > 0 and exponent n >= 1 of the line (not of the body).
+    The loads are F_N / (4 G), and `deborah` is v tau. At the depth d the contact lies between -a and b, with d = c a^n
+    and d = c (b^n + n v tau b^(n-1)). If the second equation has no positive solution, b is 0. Newton's method
+    converges, because the load is a convex function of d with the derivative a + b + v tau.
     """
     c, n = coefficient, exponent
     depth, active = c * half_width(loads, c, n) ** n, np.ones(loads.size, np.bool_)

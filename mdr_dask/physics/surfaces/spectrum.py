@@ -1,7 +1,7 @@
 """The spectrum C2D(q) of an isotropic surface: spectra of its MDR line and of a straight profile, and its moments.
 
-Between adjacent points the spectrum is a power law. Angular wave numbers q are in rad/m. Spectra are two-sided: both
-signs of the wave vector carry the same power (thesis 2.12 and 2.13).
+Angular wave numbers q are in rad/m. Spectra are two-sided: both signs of the wave vector carry the same power (thesis
+2.12 and 2.13).
 """
 
 from __future__ import annotations
@@ -24,20 +24,7 @@ STEP = 0.1  # longest interval of the quadrature, in log q
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """The spectrum C2D(q) of an isotropic surface: a power law between adjacent points; 0 outside the outermost points.
-
-    Parameters
-    ----------
-    wavenumber : array, shape (points,)
-        Angular wave numbers q, rad/m, ascending; at least two points.
-    density : array, shape (points,)
-        C2D, m^4, positive.
-
-    Raises
-    ------
-    DataError
-        If there are fewer than two points, if wave numbers do not ascend, or if a number is not positive and finite.
-    """
+    """The spectrum C2D(q), m^4: a power law between adjacent points with ascending q, and 0 outside."""
 
     wavenumber: FloatArray
     density: FloatArray
@@ -70,33 +57,17 @@ class Spectrum:
         return density
 
     def line(self, length: float, modes: int) -> FloatArray:
-        """Return the amplitudes of the MDR line of the surface.
+        """Return the amplitudes A_k, m, of the harmonics q_k = 2 pi k / L of the MDR line of the length L.
 
-        Parameters
-        ----------
-        length : float
-            Length L of the line, m.
-        modes : int
-            Number of harmonics q_k = 2 pi k / L.
-
-        Returns
-        -------
-        array, shape (modes,)
-            A_k = 2 sqrt(C1D(q_k) 2 pi / L), m, with C1D = pi q C2D (thesis 2.19, 2.20). The line has the rms height
-            and the full rms gradient of the surface.
+        A_k = 2 sqrt(C1D(q_k) 2 pi / L), with C1D = pi q C2D (thesis 2.19, 2.20). The line has the rms height and the
+        full rms gradient of the surface.
         """
         q = 2 * np.pi / length * np.arange(1, modes + 1)
         amplitude: FloatArray = 2 * np.sqrt(np.pi * q * self.at(q) * (2 * np.pi / length))
         return amplitude
 
     def between(self, longest: float = 0.0, shortest: float = 0.0) -> Spectrum:
-        """Return the spectrum of the waves between two wavelengths, m; a wavelength of 0 means no limit.
-
-        Raises
-        ------
-        DataError
-            If no waves are left.
-        """
+        """Return the spectrum of the waves between two wavelengths, m; a wavelength of 0 means no limit."""
         low = max(2 * np.pi / longest if longest else 0.0, float(self.wavenumber[0]))
         high = min(2 * np.pi / shortest if shortest else math.inf, float(self.wavenumber[-1]))
         if not low < high:
@@ -109,8 +80,7 @@ class Spectrum:
     def continued(self, longest: float = 0.0, shortest: float = 0.0, decades: float = 1.0) -> Spectrum:
         """Return the spectrum, continued by power laws up to the wavelength `longest` and down to `shortest`, m.
 
-        An end whose wavelength is given as 0 is not continued. Each power law starts at the outermost point. The
-        exponent is fitted to the points that lie within `decades` decades of the outermost point.
+        A wavelength of 0 means no change. The exponent is fitted to the points within `decades` decades of the end.
         """
         q, density = [self.wavenumber], [self.density]
         for index, end in (
@@ -153,19 +123,7 @@ class Spectrum:
 
 
 def self_affine(hurst: float, longest: float, shortest: float, rms: float = 1.0, rolloff: float = 0.0) -> Spectrum:
-    """Return C2D ~ q^(-2 - 2 H) between two wavelengths, constant above the wavelength `rolloff` (thesis 2.14).
-
-    Parameters
-    ----------
-    hurst : float
-        Hurst exponent H.
-    longest, shortest : float
-        Limits of the wavelengths, m.
-    rms : float
-        Rms height of the surface, m.
-    rolloff : float
-        Roll-off wavelength, m; 0 for no roll-off.
-    """
+    """Return C2D ~ q^(-2 - 2 H) between two wavelengths, constant above the wavelength `rolloff` (thesis 2.14)."""
     corners = sorted({2 * np.pi / end for end in (longest, shortest, rolloff) if end and shortest <= end <= longest})
     q = np.array(corners)
     bend = 2 * np.pi / rolloff if rolloff else 0.0
@@ -174,20 +132,10 @@ def self_affine(hurst: float, longest: float, shortest: float, rms: float = 1.0,
 
 
 def quadrature(wavenumber: FloatArray, edges: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return nodes k and weights of the integral that gives the spectrum of a straight profile.
+    """Return nodes k and weights, shape (n, nodes), of the integral that gives the spectrum of a straight profile.
 
-    For every wave number q, sum(weight * C2D(k)) is 2 int C2D(k) k / sqrt(k^2 - q^2) dk from k = q to infinity.
-
-    Parameters
-    ----------
-    wavenumber : array, shape (n,)
-        Wave numbers q of the profile.
-    edges : array, shape (m,)
-        Ascending wave numbers between which C2D is smooth; C2D is 0 outside.
-
-    Returns
-    -------
-    k, weight : array, shape (n, nodes)
+    For each of n wave numbers q, sum(weight * C2D(k)) is 2 int C2D(k) k / sqrt(k^2 - q^2) dk from k = q to infinity.
+    C2D is smooth between the ascending `edges`, and 0 outside.
     """
     parts = [np.geomspace(low, high, 1 + math.ceil(math.log(high / low) / STEP))[:-1] for low, high in pairwise(edges)]
     bounds = np.append(np.concatenate(parts), edges[-1])

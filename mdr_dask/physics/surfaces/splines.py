@@ -1,8 +1,7 @@
-"""A closed line as a cubic spline with one coefficient per node.
+"""A closed line as a cubic spline with one coefficient for each of its equidistant nodes.
 
-The nodes are equidistant. Between two nodes the line is ``a0 + a1 t + a2 t^2 + a3 t^3``, with t from 0 to 1; `piece`
-computes a0 to a3 from four coefficients of the spline. The values of the line in this piece lie between the smallest
-and the largest of these four coefficients (de Boor, *A Practical Guide to Splines*, 1978, chapter IX).
+Between two nodes, with t from 0 to 1, the line is ``a0 + a1 t + a2 t^2 + a3 t^3``. It lies there between the smallest
+and the largest of four coefficients (de Boor, *A Practical Guide to Splines*, 1978, chapter IX).
 """
 
 from __future__ import annotations
@@ -21,21 +20,11 @@ Piece = tuple[float, float, float, float]
 
 
 def closest(waves: NDArray[np.complex128], nodes: int) -> FloatArray:
-    """Return the least-squares spline of a sum of waves.
+    """Return the coefficients of the least-squares spline of a sum of waves with at least two nodes per shortest wave.
 
-    Parameters
-    ----------
-    waves : complex array, shape (modes,)
-        Half the complex amplitude of each wave, as in `waves.Waves`.
-    nodes : int
-        Number of nodes, at least two per shortest wave.
-
-    Returns
-    -------
-    array, shape (nodes,)
-        Coefficients in the unit of the waves. Every wave is multiplied by a factor: the Fourier transform of the
-        B-spline, divided by the sum of the squares of this transform over all aliases of the wave (Unser, IEEE Signal
-        Process. Mag. 16 (1999) 22).
+    Every wave, given by half its complex amplitude, is multiplied by a factor: the Fourier transform of the B-spline,
+    divided by the sum of the squares of this transform over all aliases of the wave (Unser, IEEE Signal Process. Mag.
+    16 (1999) 22).
     """
     return series(waves * _closest(waves.size, nodes), nodes)
 
@@ -113,8 +102,7 @@ def shares(t: float) -> Piece:
 def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
     """Append to `found` the positions, between k and k + 1, at which piece k changes sign; return the new count.
 
-    There are at most three sign changes. There is no sign change if all four coefficients are positive, or if none of
-    the four is positive.
+    There are at most three. There is none if all four coefficients are positive, or if none of the four is positive.
     """
     of = piece(spline, k)
     # the same formula as in `piece`, so that adjacent pieces agree
@@ -168,6 +156,6 @@ def _zero(of: Piece, low: float, at_low: float, high: float, at_high: float) -> 
     return t
 
 
-#: Newton's method ends with a step of at most `CLOSE`; the error is then about the square of this step. If Newton's
-#: method does not converge, `STEPS` halvings make the interval as short as the rounding error.
+#: Newton's method ends with a step of at most `CLOSE`; the error is about its square. `STEPS` halvings make the
+#: interval as short as the rounding error.
 CLOSE, STEPS = 1e-7, 60

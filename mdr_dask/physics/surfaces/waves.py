@@ -13,14 +13,9 @@ from mdr_dask.arrays import FloatArray
 
 @dataclass(frozen=True)
 class Waves:
-    """A line h(x) = 2 Re sum_k c_k exp(2 pi i k x) of unit length and mean 0.
+    """A line h(x) = 2 Re sum_k c_k exp(2 pi i k x) of unit length and mean 0; `coefficients` are c_k for k = 1..modes.
 
-    Parameters
-    ----------
-    coefficients : array, shape (modes,)
-        c_k for k = 1..modes, half the complex amplitude of each wave.
-    points : int
-        Number of Nyquist points, the equidistant samples that determine the line: 2 modes or 2 modes + 1.
+    `points` is the number of equidistant samples that determine the line (Nyquist points): 2 modes or 2 modes + 1.
     """
 
     coefficients: NDArray[np.complex128]
@@ -49,13 +44,7 @@ class Waves:
 
 
 def series(coefficients: NDArray[np.complex128], nodes: int) -> FloatArray:
-    """Return 2 Re sum_k c_k exp(2 pi i k x) at x = 0, 1/nodes, ... by FFT.
-
-    Raises
-    ------
-    ValueError
-        If the grid does not resolve the shortest wave.
-    """
+    """Return 2 Re sum_k c_k exp(2 pi i k x) at x = 0, 1/nodes, ... by FFT."""
     modes = coefficients.size
     if nodes < 2 * modes:
         raise ValueError(f"expected at least {2 * modes} nodes for {modes} harmonics, got {nodes}")
@@ -70,8 +59,7 @@ def series(coefficients: NDArray[np.complex128], nodes: int) -> FloatArray:
 def waves_of(height: FloatArray) -> Waves:
     """Return the waves of the periodic line through equidistant samples, without the mean.
 
-    For an even number of samples, the shortest wave is two samples long. The sine part of this wave is zero at all
-    samples. The sine part cannot be computed from the samples and is set to 0.
+    For an even number of samples, the sine part of the shortest wave is zero at all samples and is set to 0.
     """
     coefficients = np.fft.rfft(height)[1:] / height.size
     if height.size % 2 == 0:
