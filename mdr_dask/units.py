@@ -210,7 +210,8 @@ def shown(value: float, unit: str, digits: int = 4, written: str = "") -> str:
     if value == 0 or not math.isfinite(value) or not _LEADING.match(unit):
         return f"{value:.{digits}g} {unit}"
     rounded = float(f"{value:.{digits}g}")
-    power = min(max(3 * math.floor(math.log10(abs(rounded)) / 3 + 1e-12), -12), 12)
+    power = 3 * math.floor(math.log10(abs(rounded)) / 3 + 1e-12)
+    power = power if power in _PREFIXES else 0
     return f"{float(Decimal(repr(rounded)).scaleb(-power)):.{digits}g} {_PREFIXES[power]}{unit}"
 
 

@@ -14,7 +14,7 @@ from mdr_dask import models
 from mdr_dask.campaign.reference import output_rows, parameter_rows
 from mdr_dask.errors import did_you_mean, distinguishable
 from mdr_dask.questions.selection import written_apart
-from mdr_dask.units import expected, is_doubtful, likely, seconds, shown_apart, to_si
+from mdr_dask.units import expected, is_doubtful, likely, seconds, shown, shown_apart, to_si
 
 
 @pytest.mark.parametrize(
@@ -187,3 +187,10 @@ def test_a_number_and_its_limits_have_the_fewest_digits_that_distinguish_them():
     assert shown_apart("m", 1e-3 * (1 + 1e-9), 1e-3) == ("1.000000001 mm", "1 mm")
     assert shown_apart("K", 293.15, 293.1501) == ("20 degC", "20.0001 degC")
     assert written_apart("m/s", 0.1 * (1 + 1e-9), 0.1, 2.0) == ("0.1000000001 m/s", "0.1 m/s", "2 m/s")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(5e-4, "500 um"), (1e3, "1 km"), (1.701e32, "1.701e+32 m"), (3e-30, "3e-30 m")]
+)
+def test_sizes_beyond_the_prefixes_have_none(value, text):
+    assert shown(value, "m") == text

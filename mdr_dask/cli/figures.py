@@ -139,7 +139,8 @@ def _with_notes(figure: Plot, where: str, warnings: list[str]) -> Plot:
     """Return a figure that states the condition `where` and `warnings`."""
 
     def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
-        drawn = replace(figure.draw(groups), warnings=warnings)
+        drawn = figure.draw(groups)
+        drawn.warnings += warnings
         drawn.leave_out([f"cases other than {where}"] * bool(where))
         return drawn
 

@@ -37,7 +37,7 @@ class Plot:
     def describe(self, groups: Mapping[str, xr.Dataset]) -> Figure:
         """Return the figure as data, with the numbers of results that failed or are missing."""
         try:
-            with page.with_units(labels.chosen_units(groups)):
+            with page.with_labels(labels.chosen_units(groups), labels.symbols(groups)):
                 figure = self.draw({name: _squeezed(data) for name, data in groups.items()})
         except MdrDaskError:
             raise

@@ -31,7 +31,7 @@ def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
     A density is grey if the data do not determine the unknown. Each product of unknowns that the data determine has a
     panel.
     """
-    found, series, data = _first(groups)
+    found, series, data, left_out = _first(groups)
     varied = found.measured.conditions
     main = max(varied, key=lambda name: np.unique(varied[name]).size, default="")
     curves = _curves(found, main, data)
@@ -46,18 +46,24 @@ def calibration(groups: Mapping[str, xr.Dataset]) -> Figure:
         panels.append(_density(found, name, product.values, labels.Quantity(name, unit), False))
     points = f"{found.measured.source}, {found.measured.values.size} points{f', series {series}' if series else ''}"
     subject = f"calibration: {fit.sentence(found)}"
-    return Figure(panels, subject, points, f"{found.law_holds}; bars, bands and shades: 95 % (dark: 68 %)", ratio=0.8)
+    figure = Figure(panels, subject, points, "bars, bands and shades: 95 % (dark: 68 %)", ratio=0.8)
+    figure.judge(found.law_holds)
+    figure.leave_out(left_out)
+    return figure
 
 
-def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.Dataset]:
-    """Return the calibration of the first series that can be compared with its table of measurements."""
-    reasons = []
+def _first(groups: Mapping[str, xr.Dataset]) -> tuple[fit.Calibration, str, xr.Dataset, list[str]]:
+    """Calibrate the first series that can be compared with its table; also return why other series are not drawn."""
+    reasons = {}
     for name, dataset in groups.items():
         try:
-            return fit.calibrate(dataset, fit.measured_of(dataset)), name, dataset
+            found = fit.calibrate(dataset, fit.measured_of(dataset))
         except FitError as error:
-            reasons.append(str(error))
-    raise FitError("; ".join(dict.fromkeys(reasons)))
+            reasons[name] = str(error)
+            continue
+        later = [f"series {other} (--series draws it)" for other in [*groups][[*groups].index(name) + 1 :]]
+        return found, name, dataset, [f"series {other}: {reason}" for other, reason in reasons.items()] + later
+    raise FitError("; ".join(dict.fromkeys(reasons.values())))
 
 
 def _curves(found: fit.Calibration, main: str, data: xr.Dataset) -> dict[str, Points]:

@@ -12,11 +12,9 @@ import xarray as xr
 from mdr_dask import aggregation, models
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Status
-from mdr_dask.plots import colours, labels
+from mdr_dask.plots import colours, labels, page
 from mdr_dask.plots.figure import Bar, Key, Mean
 
-#: Dimensions that belong to an output and are not axes of a study. These names are used for data without ``status``.
-OWN = {"relaxation_times", "radius", "position", "angle", "block", "regime"}
 #: Largest number of parameters in a title; the table beside the figure lists all of them.
 MOST_FIXED = 8
 
@@ -73,7 +71,7 @@ def axes_of(data: xr.Dataset, output: str) -> list[str]:
     if "status" in data:
         cases = {str(dim) for dim in data["status"].dims}
     else:
-        cases = {str(axis["dim"]) for axis in data.attrs.get("axes", [])} or {str(d) for d in data[output].dims} - OWN
+        cases = {str(axis["dim"]) for axis in data.attrs.get("axes", [])} or {str(dim) for dim in data[output].dims}
     return [str(dim) for dim in data[output].dims if dim in cases and dim != "realisation"]
 
 
@@ -263,7 +261,7 @@ def fixed_text(held: Mapping[str, xr.DataArray], data: xr.Dataset) -> str:
     """Return the fixed parameters for a title: first axes of the study, then parameters that have a symbol."""
     axes = [str(axis["name"]) for axis in data.attrs.get("axes", [])]
     names = [name for name in axes if name in held]
-    names += [name for name in labels.SYMBOLS if name in held and name not in names and _is_known(held[name])]
+    names += [name for name in page.current().symbols if name in held and name not in names and _is_known(held[name])]
     return ", ".join(labels.named(name, held[name]) for name in names[: max(MOST_FIXED, len(axes))])
 
 

@@ -146,6 +146,13 @@ class Figure:
         """Add texts about results that are not drawn, without empty texts and duplicates."""
         self.left_out = [*dict.fromkeys([*self.left_out, *(sentence for sentence in sentences if sentence)])]
 
+    def judge(self, law_holds: str) -> None:
+        """State whether a fitted law holds, as a warning unless the answer is yes."""
+        if law_holds.startswith("yes"):
+            self.bars = f"{self.bars}; {law_holds}"
+        else:
+            self.warnings = [*self.warnings, law_holds]
+
     def table(self) -> pd.DataFrame:
         """Return a table with a row for every point. ``x``, ``y`` and ``value`` are in the units of the axes,
         parameters in SI.

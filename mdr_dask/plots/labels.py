@@ -9,12 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from mdr_dask import models
 from mdr_dask.campaign.written import written_units
 from mdr_dask.errors import DataError
 from mdr_dask.plots import page
 from mdr_dask.units import conversion
 
-#: Labels of the parameters that have a symbol. The label of any other parameter is its name.
+#: Labels of the parameters of this package that have a symbol. The label of any other parameter is its name.
 SYMBOLS: Mapping[str, str] = {
     "normal_force": "normal force $F_N$",
     "line_load": "line load $w$",
@@ -40,7 +41,6 @@ SYMBOLS: Mapping[str, str] = {
     "amplitude": "amplitude $U_0$",
     "depth": "depth $d_0$",
     "xi": r"$\xi$",
-    "relaxation_times": r"$(t - t_0)/\tau$",
 }
 #: Units that are shown instead of an SI unit if the campaign states no unit.
 USUAL = {"rad/s": "rpm", "rad": "deg"}
@@ -83,6 +83,15 @@ def chosen_units(groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
     return found
 
 
+def symbols(groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
+    """Return the labels of the coordinates of some series that are not labelled by their name."""
+    found = dict(SYMBOLS) if all(data.attrs.get("model") in models.NAMES for data in groups.values()) else {}
+    for data in groups.values():
+        own = set(data.dims) - set(data["status"].dims) if "status" in data else set()
+        found |= {str(name): meaning(data[name], str(name)) for name in own}
+    return found
+
+
 def _readable(name: str, unit: str, arrays: list[xr.DataArray]) -> str:
     if unit == "K" and name.endswith("temperature"):
         return "degC"
@@ -95,14 +104,15 @@ def _readable(name: str, unit: str, arrays: list[xr.DataArray]) -> str:
     if not (np.isfinite(largest) and largest > 0):
         return unit
     power = int(match[2] or 1)
-    step = int(np.clip(np.floor(np.log10(largest) / (3 * power) + 1e-9), min(PREFIXES), max(PREFIXES)))
-    return f"{PREFIXES[step]}{unit}"
+    step = int(np.floor(np.log10(largest) / (3 * power) + 1e-9))
+    return f"{PREFIXES.get(step, '')}{unit}"
 
 
 def quantity(name: str, values: xr.DataArray) -> Quantity:
     """Return the symbol and the shown unit of a parameter or an output."""
     unit = str(values.attrs.get("units", "1"))
-    symbol = SYMBOLS.get(name) or (name.replace("_", " ") if name in values.coords else meaning(values, name))
+    is_coordinate = name in values.coords
+    symbol = page.current().symbols.get(name, name.replace("_", " ")) if is_coordinate else meaning(values, name)
     wanted = page.current().unit(name)
     if wanted is None or wanted == unit:
         return Quantity(symbol, "" if unit == "1" else unit)

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask.fits.curve_tables import is_temperature
-from mdr_dask.plots import colours, curves, labels
+from mdr_dask.plots import colours, curves, labels, page
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 
@@ -30,8 +30,9 @@ def draw_master_curve(curve: xr.Dataset) -> Figure:
         shifts.append((str(attrs["second"]), "second_factor", attrs["second_reference"]))
     panels = [*_curves(curve), *(_factors(curve, *shift) for shift in shifts)]
     fixed = ", ".join(dict.fromkeys(f"{_words(by)} = {_text(value, curve[by])}" for by, _, value in shifts))
-    about = f"bars and band: 68 %; {curve['law_holds'].item()}"
-    return Figure(panels, "master curve", f"reference: {fixed}", about, ratio=0.85)
+    figure = Figure(panels, "master curve", f"reference: {fixed}", "bars and band: 68 %", ratio=0.85)
+    figure.judge(curve["law_holds"].item())
+    return figure
 
 
 def _in_shown_units(curve: xr.Dataset) -> xr.Dataset:
@@ -63,7 +64,7 @@ def _words(name: Any) -> str:
 
 
 def _label(name: str, values: xr.DataArray) -> str:
-    return labels.with_unit(labels.SYMBOLS.get(name, _words(name)), str(values.attrs["units"]))
+    return labels.with_unit(page.current().symbols.get(name, _words(name)), str(values.attrs["units"]))
 
 
 def _text(value: float, values: xr.DataArray) -> str:

@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
+from mdr_dask.arrays import FloatArray
 from mdr_dask.campaign.measured import Measured
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.calibration import measured_of, with_table
 from mdr_dask.plots import labels
 from mdr_dask.plots.base import Plot
-from mdr_dask.plots.figure import Figure, Key, Mean, Panel, Trace, columns
+from mdr_dask.plots.figure import Axis, Figure, Key, Mean, Panel, Trace, columns
 from mdr_dask.units import shown
 
 #: Largest relative difference between a measured condition and the parameter of a curve to which the point belongs.
@@ -59,15 +60,13 @@ def add_points(figure: Figure, groups: Mapping[str, xr.Dataset]) -> None:
     drawn = sum(_add(panel, measured, data) for panel in panels)
     if drawn < measured.values.size:
         rest = measured.values.size - drawn
-        figure.leave_out([f"{rest} of {measured.values.size} measured points, whose conditions are not drawn"])
+        counted = f"{rest} of {measured.values.size} measured points"
+        figure.leave_out([f"{counted}, whose conditions or values are far from those of the curves"])
 
 
 def _apart(measured: Measured, data: xr.Dataset) -> list[str]:
     """Return a warning if all measured values are above, or all are below, all results of a study."""
-    study = data[measured.output].to_numpy()
-    low, high = (
-        find(study[np.isfinite(study)], initial=start) for find, start in ((np.min, np.inf), (np.max, -np.inf))
-    )
+    low, high = float(data[measured.output].min()), float(data[measured.output].max())
     if measured.values.min() <= high and measured.values.max() >= low:
         return []
     unit = str(data[measured.output].attrs.get("units", "1"))
@@ -84,18 +83,23 @@ def _add(panel: Panel, measured: Measured, data: xr.Dataset) -> int:
     A point has the colour of its curve. Points are black if there is only one curve, or if the table lacks a parameter
     in which the curves differ.
     """
-    found, keys = 0, panel.entries()
-    left = np.ones(measured.values.size, dtype=bool)
     curves = [trace for trace in panel.traces if trace.kind == "curve" and trace.what == "data"]
+    if not curves:
+        return 0
+    keys, points = panel.entries(), _points(panel, measured, data)
     differing = _differing([trace.data for trace in curves])
     of_curves = len(curves) > 1 and differing <= {*measured.conditions, panel.x.quantity}
+    drawn = {name: np.concatenate([trace.column(name) for trace in curves]) for name in "xy"}
+    near = _near(panel.x, drawn["x"], points["x"].to_numpy()) & _near(panel.y, drawn["y"], points["y"].to_numpy())
+    left = near.copy()
     for trace in curves:
         here = left & _at(trace.data, measured, panel.x.quantity)
         if here.any():
-            colour, label = (trace.colour, trace.label) if of_curves else ("#000000", "")
-            panel.traces.append(_points(panel, measured, data, here, colour, label))
+            colour, name = (trace.colour, f"{NAME}, {trace.label}") if of_curves else ("#000000", NAME)
+            own = points.isel(point=np.flatnonzero(here))
+            panel.traces.append(Trace("curve", own, NAME, name, colour, "", "D", bars=True))
             left &= ~here
-            found += int(here.sum())
+    found = int((near & ~left).sum())
     if found:
         label = NAME if measured.errors is None else f"{NAME}, 95 %"
         if len(curves) == 1 and not curves[0].label:
@@ -120,15 +124,28 @@ def _at(curve: xr.Dataset, measured: Measured, along: str) -> np.ndarray:
     return here
 
 
-def _points(panel: Panel, measured: Measured, data: xr.Dataset, here: np.ndarray, colour: str, label: str) -> Trace:
-    x = labels.quantity(panel.x.quantity, data[panel.x.quantity]).of(measured.conditions[panel.x.quantity][here])
-    how, values = labels.quantity(measured.output, data[measured.output]), measured.values[here]
-    half = np.full(values.size, np.nan) if measured.errors is None else HALF * measured.errors[here]
-    points = columns(
-        conditions(measured, data, here), x=x, y=Mean(*map(how.of, (values, values - half, values + half)))
-    )
-    name = ", ".join(part for part in (NAME, label) if part)
-    return Trace("curve", points, NAME, name, colour, "", "D", bars=True)
+def _near(axis: Axis, drawn: FloatArray, places: FloatArray) -> np.ndarray:
+    """Return a mask of the places that are no farther from the drawn values than these values are spread.
+
+    Farther points would squeeze the curves. Values that are all equal cannot be squeezed.
+    """
+    with np.errstate(
+        divide="ignore", invalid="ignore"
+    ):  # zero and negative numbers have no place on a logarithmic axis
+        drawn, places = (np.log(each) if axis.log else each for each in (drawn, places))
+    low, high = drawn[np.isfinite(drawn)].min(), drawn[np.isfinite(drawn)].max()
+    spread = (high - low) or np.inf
+    near: np.ndarray = np.isfinite(places) & (places >= low - spread) & (places <= high + spread)
+    return near
+
+
+def _points(panel: Panel, measured: Measured, data: xr.Dataset) -> xr.Dataset:
+    """Return all measured points, with their 95 % intervals, in the units of a panel."""
+    x = labels.quantity(panel.x.quantity, data[panel.x.quantity]).of(measured.conditions[panel.x.quantity])
+    how, values = labels.quantity(measured.output, data[measured.output]), measured.values
+    half = np.full(values.size, np.nan) if measured.errors is None else HALF * measured.errors
+    y = Mean(*map(how.of, (values, values - half, values + half)))
+    return columns(conditions(measured, data, np.arange(values.size)), x=x, y=y)
 
 
 def conditions(measured: Measured, data: xr.Dataset, here: np.ndarray) -> xr.Dataset:

@@ -40,8 +40,8 @@ class Page:
 
     `width` and `height` are in inches; without a height, the height follows from the content. `title` None means a
     description of the figure, but no title if a width is requested. `style` is a style or style file of matplotlib, and
-    `cycle` holds the colours, lines and markers of this style. `units` are requested units by quantity, and `used`
-    collects the quantities that figures have shown.
+    `cycle` holds the colours, lines and markers of this style. `units` are requested units by quantity, `used`
+    collects the quantities that figures have shown, and `symbols` are labels of coordinates with a symbol.
     """
 
     width: float | None = None
@@ -49,6 +49,7 @@ class Page:
     title: str | None = None
     style: str | None = None
     units: Mapping[str, str] = field(default_factory=dict)
+    symbols: Mapping[str, str] = field(default_factory=dict)
     used: set[str] = field(default_factory=set)
     cycle: tuple[Mapping[str, str], ...] = ()
 
@@ -93,9 +94,9 @@ def drawing_for(page: Page) -> Iterator[None]:
 
 
 @contextmanager
-def with_units(units: Mapping[str, str]) -> Iterator[None]:
-    """Within a ``with`` statement, show quantities in these units unless the user requested others."""
-    token = _PAGE.set(replace(current(), units={**units, **current().units}))
+def with_labels(units: Mapping[str, str], symbols: Mapping[str, str]) -> Iterator[None]:
+    """Within a ``with`` statement, label quantities with these symbols and units unless the user requested others."""
+    token = _PAGE.set(replace(current(), units={**units, **current().units}, symbols=symbols))
     try:
         yield
     finally:

@@ -273,11 +273,10 @@ def _title(figure: Drawn, description: Figure) -> None:
     asked = page.current()
     if asked.title is not None:
         lines = [asked.title] if asked.title else []
-    elif asked.width is not None:
-        lines = []
     else:
         left_out = f"not drawn: {'; '.join(description.left_out)}" if description.left_out else ""
-        lines = [part for part in (description.subject, description.fixed, description.bars, left_out) if part]
+        about = (description.subject, description.fixed, description.bars, left_out) if asked.width is None else ()
+        lines = [part for part in about if part]
         lines += [f"warning: {warning}" for warning in description.warnings]
     if not lines:
         return

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from mdr_dask.plots import colours, labels
+from mdr_dask.plots import colours
 from mdr_dask.plots.figure import Axis, Figure, Mean, Panel, Trace, columns
 
 NAMES = {"first": "first order: alone", "total": "total: with interactions"}
@@ -16,7 +16,7 @@ APART = 0.25
 def sensitivity(indices: xr.Dataset) -> Figure:
     """Draw the Sobol indices of every input, as `mdr_dask.fits.sensitivity` returns them."""
     inputs = [str(name) for name in indices["parameter"].to_numpy()]
-    ticks = [(float(k), labels.SYMBOLS.get(name, name.replace("_", " "))) for k, name in enumerate(inputs)]
+    ticks = [(float(k), name.replace("_", " ")) for k, name in enumerate(inputs)]
     y = Axis("", ticks=ticks, low=-0.6, high=len(inputs) - 0.4, reverse=True)
     panel = Panel(Axis("share of the variance"), y)
     kinds = [kind for kind in NAMES if indices[kind].notnull().any()]
@@ -30,4 +30,7 @@ def sensitivity(indices: xr.Dataset) -> Figure:
     cases, realisations = indices.attrs["cases"], indices.attrs["realisations"]
     subject = f"{str(indices.attrs['output']).replace('_', ' ')}: Sobol indices"
     about = f"{cases} cases, {realisations} realisations; bars: 95 % intervals"
-    return Figure([panel], subject, bars=about, ratio=min(1.5, 0.2 + 0.1 * len(inputs)))
+    figure = Figure([panel], subject, bars=about, ratio=min(1.5, 0.2 + 0.1 * len(inputs)))
+    if indices.attrs["left_out"]:
+        figure.leave_out([f"{indices.attrs['left_out']} cases without a value"])
+    return figure

@@ -40,12 +40,11 @@ def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...])
         line.traces.append(Trace("law", method, METHOD, METHOD, colour, "-"))
         name = f"{file['file'].item()}: measured (points) and used by a campaign (line)"
         areal.keys.append(Key(name, colour, "-", "o"))
-    for report in reports[:1]:
+    for report in reports:
         if report.law is not None:
             hurst = report.law.hurst
-            areal.keys.append(
-                Key(f"power law, H = {hurst.value:.2f} ({hurst.low:.2f}, {hurst.high:.2f})", "#000000", "--")
-            )
+            law = f"power law, H = {hurst.value:.2f} ({hurst.low:.2f}, {hurst.high:.2f})"
+            areal.keys.append(Key(law, "#000000", "--"))
     line.keys = [key for key in line.entries() if key.label != METHOD or key.colour == colours.colour(0)]
     line.keys = [Key(METHOD, "#000000", "-") if key.label == METHOD else key for key in line.keys]
     rms, gradient = (
@@ -53,7 +52,8 @@ def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...])
         for values in zip(*((used.rms_height(), used.rms_gradient()) for used in spectra), strict=True)
     )
     fixed = f"used by a campaign: rms height {rms:.4g} m, rms gradient {gradient:.4g}"
-    return Figure([areal, line], "spectrum of a measured surface", fixed, ratio=0.85)
+    unfitted = [f"{Path(each.file.name).name}: no power law fits the spectrum" for each in reports if each.law is None]
+    return Figure([areal, line], "spectrum of a measured surface", fixed, warnings=unfitted, ratio=0.85)
 
 
 def _areal(report: FileReport, used: Spectrum, colour: str, file: xr.Dataset) -> list[Trace]:

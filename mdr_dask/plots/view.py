@@ -208,8 +208,6 @@ def _axis(name: str, arrays: list[xr.DataArray], view: View, which: str) -> Axis
     """Return the axis of a parameter: a linear axis, a logarithmic axis, or an axis with words at the ticks."""
     first = arrays[0]
     label = labels.label(name, first)
-    if name in curves.OWN:
-        label = labels.with_unit(labels.meaning(first, name), labels.quantity(name, first).unit)
     if first.dtype.kind not in "fiu":
         words = [textwrap.fill(str(word), LONGEST_WORD) for word in np.atleast_1d(first.values)]
         return Axis(label, ticks=[*enumerate(words)])

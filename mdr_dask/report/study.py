@@ -89,7 +89,7 @@ def _read(url: str) -> Study:
         {name: data for name, (data, _) in read.items()},
         {name: texts for name, (_, texts) in read.items()},
     )
-    with page.with_units(labels.chosen_units(groups)):
+    with page.with_labels(labels.chosen_units(groups), labels.symbols(groups)):
         return _study(url, held, whole, groups, left_out)
 
 

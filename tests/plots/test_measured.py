@@ -6,8 +6,9 @@ import pytest
 
 from mdr_dask.errors import DataError
 from mdr_dask.fits.calibration import calibrate, measured_of, sentence, with_table
-from mdr_dask.plots import available
+from mdr_dask.plots import available, page
 from mdr_dask.plots.measured import with_points
+from mdr_dask.plots.render import render
 
 CAMPAIGN = planted.SLIDING + "  normal_force: [100 mN, 1 N]\n  velocity: {geometric: [0.01 mm/s, 10 m/s, 9]}\n"
 
@@ -50,7 +51,15 @@ def test_points_without_the_parameter_of_the_curves_are_black(groups, tmp_path):
 def test_points_at_other_conditions_are_counted(groups, tmp_path):
     table = "velocity [m/s],normal_force [N],friction_coefficient\n0.01,0.1,2e-3\n0.01,7,5e-3\n"
     figure = drawn(groups, tmp_path, table)
-    assert "1 of 2 measured points, whose conditions are not drawn" in figure.left_out
+    assert "1 of 2 measured points, whose conditions or values are far from those of the curves" in figure.left_out
+
+
+@pytest.mark.parametrize("far", ["1e9,4e-3", "0.01,4e6", "0,4e-3", "-0.01,4e-3"])
+def test_far_points_do_not_squeeze_the_curves(groups, tmp_path, far):
+    figure = drawn(groups, tmp_path, f"velocity [m/s],friction_coefficient\n0.01,2e-3\n{far}\n")
+    (points,) = (trace for trace in figure.panels[0].traces if trace.what == "measured")
+    assert points.column("y").tolist() == [2e-3]
+    assert any(text.startswith("1 of 2 measured points") for text in figure.left_out)
 
 
 def test_figures_of_other_quantities_are_refused(groups, tmp_path):
@@ -69,7 +78,9 @@ def test_calibration_shows_what_the_fit_found(tmp_path):
     found = calibrate(given[""], measured_of(given[""]))
     figure = available("sliding_friction")["calibration"].describe(given)
     assert figure.subject == f"calibration: {sentence(found)}"
-    assert found.law_holds in figure.bars
+    assert found.law_holds.startswith("no")
+    with page.drawing_for(page.requested("85mm")):
+        assert "the errors do not explain the residuals" in render(figure).get_suptitle().replace("\n", " ")
     data = [trace for trace in figure.panels[0].traces if trace.kind == "curve"]
     np.testing.assert_allclose(np.sort(np.concatenate([t.column("y") for t in data])), np.sort(found.measured.values))
     residuals = [trace for trace in figure.panels[1].traces if trace.kind == "curve"]

@@ -16,7 +16,8 @@ from mdr_dask.campaign import loads
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Status
 from mdr_dask.plots import curves, page
-from mdr_dask.plots.labels import short
+from mdr_dask.plots.labels import chosen_units, short, symbols
+from mdr_dask.plots.labels import label as axis_label
 from mdr_dask.plots.render import render
 from mdr_dask.plots.view import View, draw, figure_of
 from mdr_dask.store import datasets
@@ -87,6 +88,26 @@ def test_units_have_readable_prefixes(tmp_path):
 )
 def test_numbers_in_legends_are_short(number, text):
     assert short(number) == text
+
+
+@pytest.mark.parametrize(
+    ("length", "label"), [(4e13, "distance [m]"), (4e-7, "distance [nm]"), (4e-20, "distance [m]")]
+)
+def test_a_size_beyond_common_prefixes_has_none(length, label):
+    data = xr.Dataset({"distance": ("case", [length], {"units": "m"})})
+    with page.with_labels(chosen_units({"": data}), {}):
+        assert axis_label("distance", data["distance"]) == label
+
+
+@pytest.mark.parametrize(
+    ("model", "label"), [("fretting_wear", "amplitude $U_0$ [m]"), ("mine:MODEL", "amplitude [m]")]
+)
+def test_symbols_belong_to_the_models_of_this_package(model, label):
+    data = xr.Dataset(coords={"amplitude": ("amplitude", [1.0], {"units": "m"})}, attrs={"model": model})
+    with page.with_labels({}, symbols({"": data})):
+        assert axis_label("amplitude", data["amplitude"]) == label
+    output = xr.DataArray([1.0], attrs={"units": "V", "long_name": "amplitude of the signal"})
+    assert axis_label("amplitude", output) == "amplitude of the signal [V]"
 
 
 def test_many_curves_have_a_colour_bar(groups):

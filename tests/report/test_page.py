@@ -15,7 +15,7 @@ from report_stores import HOSTILE, friction, hostile
 from mdr_dask import aggregation, fits, plots, store
 from mdr_dask.cli import main
 from mdr_dask.execute import Resources, run
-from mdr_dask.plots.page import with_units
+from mdr_dask.plots.page import with_labels
 from mdr_dask.report import cases, figures, page, read_study, words
 from mdr_dask.report import study as study_room
 
@@ -223,7 +223,7 @@ def test_errors_of_a_case_are_in_the_unit_of_its_value(url):
     pressure = (1e9 * data["friction_coefficient"]).assign_attrs(units="Pa", ancillary_variables="pressure_error")
     data = data.assign(pressure=pressure, pressure_error=0.01 * pressure)
     shape = data["pressure"].isel(realisation=0, drop=True)
-    with with_units({"pressure": "GPa"}):
+    with with_labels({"pressure": "GPa"}, {}):
         found = {name: np.array(values) for name, values in cases._measured(data, "pressure", shape).items()}
     mean, lines = 1e-9 * pressure.mean("realisation"), 1e-9 * aggregation.standard_error(pressure)
     for name, expected in (("value", mean), ("lines", lines), ("grid", 0.01 * mean)):
