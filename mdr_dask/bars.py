@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 #: `PAUSE`: seconds between two plain lines. `LIVE_PAUSE`: seconds between two updates of the live line.
 PAUSE, LIVE_PAUSE = 5.0, 0.5
 
-Draw = Callable[["Progress | None", float], None]
+#: Function that draws the latest progress, the elapsed time, and the time since the progress changed, in s.
+Draw = Callable[["Progress | None", float, float], None]
 
 
 @contextmanager
@@ -42,7 +43,7 @@ def reporter(quiet: bool) -> Iterator[Callable[[Progress], None]]:
 def at_work(what: str) -> Iterator[None]:
     """Every few seconds, print the text `what` and the elapsed time, if stderr is a terminal."""
 
-    def draw(_: Progress | None, elapsed: float) -> None:
+    def draw(_: Progress | None, elapsed: float, _unchanged: float) -> None:
         _write(", ".join([what, seconds(round(elapsed)), *(["compiling ..."] if _compiles() else [])]))
 
     if sys.stderr is None or not sys.stderr.isatty():
@@ -54,16 +55,18 @@ def at_work(what: str) -> Iterator[None]:
 
 @contextmanager
 def _beating(draw: Draw, pause: float) -> Iterator[Callable[[Progress], None]]:
-    """Draw the latest progress and the elapsed time every `pause` seconds."""
+    """Draw the latest progress every `pause` seconds."""
     started, ended = time.monotonic(), threading.Event()
-    latest: list[Progress] = []
+    latest: tuple[Progress | None, float] = None, started
 
     def beat() -> None:
         while not ended.wait(pause):
-            draw(latest[-1] if latest else None, time.monotonic() - started)
+            (progress, changed), now = latest, time.monotonic()
+            draw(progress, now - started, now - changed)
 
     def show(progress: Progress) -> None:
-        latest[:] = [progress]
+        nonlocal latest
+        latest = progress, time.monotonic()
 
     thread = threading.Thread(target=beat, daemon=True)
     thread.start()
@@ -84,10 +87,10 @@ def _live() -> Iterator[Draw]:
     with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(describe(None, 0.0), total=None)
 
-        def draw(progress: Progress | None, elapsed: float) -> None:
+        def draw(progress: Progress | None, elapsed: float, unchanged: float) -> None:
             total = max(progress.total, 1) if progress else None
             settled = progress.total - progress.to_do if progress else 0
-            bar.update(task, total=total, completed=settled, description=describe(progress, elapsed))
+            bar.update(task, total=total, completed=settled, description=describe(progress, elapsed, unchanged))
 
         yield draw
 
@@ -99,18 +102,18 @@ def _in_notebook() -> Iterator[Draw]:
 
     handle = display(HTML(_html(None, 0.0)), display_id=True)
     try:
-        yield lambda progress, elapsed: handle.update(HTML(_html(progress, elapsed)))
+        yield lambda *state: handle.update(HTML(_html(*state)))
     finally:
         handle.update(HTML(""))
 
 
-def _html(progress: Progress | None, elapsed: float) -> str:
+def _html(progress: Progress | None, elapsed: float, unchanged: float = 0.0) -> str:
     done = f'value="{progress.total - progress.to_do}" max="{max(progress.total, 1)}"' if progress else ""
-    return f"<progress {done}></progress> {describe(progress, elapsed)}"
+    return f"<progress {done}></progress> {describe(progress, elapsed, unchanged)}"
 
 
-def _print_line(progress: Progress | None, elapsed: float) -> None:
-    _write(describe(progress, elapsed))
+def _print_line(progress: Progress | None, elapsed: float, unchanged: float) -> None:
+    _write(describe(progress, elapsed, unchanged))
 
 
 def _write(line: str) -> None:
@@ -118,16 +121,20 @@ def _write(line: str) -> None:
     sys.stderr.flush()
 
 
-def describe(progress: Progress | None, elapsed: float) -> str:
-    """Return one line with the fraction of results done, the elapsed and remaining time, and the number of results."""
+def describe(progress: Progress | None, elapsed: float, unchanged: float = 0.0) -> str:
+    """Return one line with the fraction of results done, the elapsed and remaining time, and the number of results.
+
+    The remaining time counts down while no block ends; once it has run out, the blocks are slower than the last ones,
+    and no time is stated.
+    """
     if progress is None:
         return f"preparing, {seconds(round(elapsed))}"
     settled = progress.total - progress.to_do
     parts = [f"{100 * settled // max(progress.total, 1)} %", seconds(round(elapsed))]
     if _compiles():
         parts.append("compiling ...")
-    elif progress.to_do and progress.seconds_left is not None:
-        parts.append(f"about {seconds(progress.seconds_left)} left")
+    elif progress.to_do and (left := (progress.seconds_left or 0.0) - unchanged) > 0:
+        parts.append(f"about {seconds(left)} left")
     return ", ".join([*parts, f"{settled} of {progress.total} results", f"{progress.failed} failed"])
 
 

@@ -229,13 +229,12 @@ def test_a_zip_of_a_stranger_is_refused_before_it_is_unpacked(tmp_path, capsys, 
 
 
 def test_a_store_of_another_version_of_its_model_says_how_to_extend_it(toy, url, monkeypatch):
+    """The remedy must hold for a model of the user too, which no version of mdr_dask brings back."""
     from dataclasses import replace
 
     campaign = toy.campaign(toy.axis("position", [1.0]))
     execute.run(campaign, url, Resources(threads=1), lambda _: None)
     monkeypatch.setattr(sys.modules["mdr_dask.models.toy"], "MODEL", replace(toy.MODEL, version=2))
-    with pytest.raises(
-        StoreError, match=r"can be read, plotted and verified, but not extended.*pip install mdr_dask=="
-    ):
+    with pytest.raises(StoreError, match=r"made with version 1 of the model toy .*not extended: use the version that"):
         execute.run(campaign, url, Resources(threads=1), lambda _: None)
     assert store.verify(url).findings == []

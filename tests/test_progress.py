@@ -48,6 +48,8 @@ def test_a_line_tells_share_time_and_time_left_first(monkeypatch):
     progress = Progress(total=1000)
     assert describe(progress, 3.0) == "0 %, 3 s, 0 of 1000 results, 0 failed"
     assert describe(after_blocks(20), 25.0) == "20 %, 25 s, about 20 s left, 200 of 1000 results, 0 failed"
+    assert "about 5 s left" in describe(after_blocks(20), 40.0, unchanged=15.0)
+    assert "left" not in describe(after_blocks(20), 50.0, unchanged=25.0), "a slow block contradicts the estimate"
     import numba  # noqa: F401  (without it nothing compiles)
 
     clock = clocks.CompileClock()

@@ -78,9 +78,9 @@ def _require_version(url: str, campaign: Campaign) -> None:
     if held["model"] == campaign.model and held["model_version"] != version:
         program = held.get("versions", {}).get("mdr_dask", "another version")
         raise StoreError(
-            f"{url}: made by mdr_dask {program} with version {held['model_version']} of the model {campaign.model}, "
-            f"this is version {version}. The store can be read, plotted and verified, but not extended. To extend it: "
-            f"pip install mdr_dask=={program}; to compute the study again: --store with another name"
+            f"{url}: made with version {held['model_version']} of the model {campaign.model} (mdr_dask {program}), "
+            f"this is version {version}. The store can be read, plotted and verified, but not extended: use the "
+            f"version that made it, or compute the study again (--store with another name)"
         )
     source = models.source_digest(campaign.model)
     if source is not None and held.get("model_source") not in (None, source):
