@@ -1,7 +1,7 @@
 """Compute blocks in child processes of this machine, because a block may crash its process or take too long.
 
-A server process imports all modules and forks one keeper process for each child. The keeper forks the child, which
-reads blocks from a pipe and writes outcomes to it. If the child dies, the keeper reports this and forks a new one.
+A server process imports all modules and forks the children, which read blocks from pipes and write outcomes to them.
+If a child dies, the server reports this through the pipe of the child, and forks a new child for this pipe.
 """
 
 from __future__ import annotations
@@ -133,39 +133,34 @@ def compute_apart(child: Child, work: Work, limit: float | None = None) -> Itera
 
 
 def serve(model: str, numbers: list[int]) -> None:
-    """Import the modules that blocks need, fork a keeper for each pipe, and wait until all keepers have ended."""
+    """Import the modules that blocks need, and keep a child for each pipe until the driver closes the pipe."""
     # the terminal sends Ctrl-C to all processes, but only the driver reacts to it
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with suppress(Exception):  # ignore an error here, because the first block will raise it again
         models.load(model)
     pipes = [Connection(number) for number in numbers]
-    keepers = []
-    for pipe in pipes:
-        keeper = os.fork()
-        if keeper == 0:
-            for other in pipes:
-                if other is not pipe:
-                    other.close()
-            _keep(pipe)
-            os._exit(0)
-        keepers.append(keeper)
-    for pipe in pipes:
-        pipe.close()
-    for keeper in keepers:
-        os.waitpid(keeper, 0)
-
-
-def _keep(pipe: Connection) -> None:
-    """Fork a child that computes blocks, and a new child whenever the last one dies; return when the pipe is closed."""
-    while True:
-        child = os.fork()
-        if child == 0:
-            _compute_blocks(pipe)
-            os._exit(0)
-        status = os.waitpid(child, 0)[1]
+    served = {_fork(pipe, pipes): pipe for pipe in pipes}
+    while served:
+        child, status = os.wait()
+        pipe = served.pop(child)
         if status == 0:
-            return
-        _reply(pipe, Crash(_describe(status)))
+            pipe.close()
+            continue
+        with suppress(OSError):  # the driver has died, and the next child ends at once
+            pipe.send(Crash(_describe(status)))
+        served[_fork(pipe, pipes)] = pipe
+
+
+def _fork(pipe: Connection, pipes: list[Connection]) -> int:
+    """Fork a child that computes the blocks of a pipe, and return its process number."""
+    child = os.fork()
+    if child == 0:
+        for other in pipes:
+            if other is not pipe:
+                other.close()
+        _compute_blocks(pipe)
+        os._exit(0)
+    return child
 
 
 def _describe(status: int) -> str:
@@ -193,24 +188,21 @@ def _compute_blocks(pipe: Connection) -> None:
         _reply(pipe, reply)
 
 
-class _limited:  # noqa: N801
-    """Context that limits the time of a case of a plain Python model; a case that takes longer raises TimeoutError."""
+@contextmanager
+def _limited(limit: float | None) -> Iterator[None]:
+    """Limit the time of a case of a plain Python model; a case that takes longer raises TimeoutError."""
+    from mdr_dask.models import per_case
 
-    def __init__(self, limit: float | None) -> None:
-        self._limit = limit
+    def alarm(_number: int, _frame: FrameType | None) -> None:
+        raise TimeoutError(f"took longer than {limit:g} s")
 
-    def __enter__(self) -> None:
-        from mdr_dask.models import per_case
-
-        per_case.time_limit = self._limit
-        if self._limit:
-            signal.signal(signal.SIGALRM, self._alarm)
-
-    def __exit__(self, *_: object) -> None:
+    per_case.time_limit = limit
+    if limit:
+        signal.signal(signal.SIGALRM, alarm)
+    try:
+        yield
+    finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
-
-    def _alarm(self, _number: int, _frame: FrameType | None) -> None:
-        raise TimeoutError(f"took longer than {self._limit:g} s")
 
 
 def _reply(pipe: Connection, content: Any) -> None:
