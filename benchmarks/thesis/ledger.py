@@ -1,6 +1,6 @@
-"""Claims of the thesis, the studies by which they are tested, and the page that lists all claims.
+"""Studies by which claims of the thesis are tested, and verdicts that come from fits.
 
-A verdict is a sentence that begins with one of `WORDS`; the first four are also those of `law_holds` of the fits.
+A verdict is a sentence that begins with a word of the scale of `law_holds` of the fits.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import re
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -22,7 +22,6 @@ from mdr_dask.fits.base import law_holds
 from mdr_dask.store import datasets
 
 CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
-WORDS = ("yes", "approximately", "no", "not tested", "no data", "not modelled")
 
 
 @dataclass(frozen=True)
@@ -70,25 +69,6 @@ def _with_line(text: str, key: str, value: str) -> tuple[str, int]:
 Judge = Callable[[Studies], str]
 
 
-@dataclass(frozen=True)
-class Claim:
-    """A claim, law, figure or table of the thesis.
-
-    `item` is the number in the thesis, `command` gives our result, and `judge` is the verdict or a function that
-    returns it.
-    """
-
-    item: str
-    claim: str
-    command: str
-    judge: Judge | str
-    why: str = ""
-
-    def verdict(self, studies: Studies) -> str:
-        """Return the verdict as a sentence."""
-        return self.judge if isinstance(self.judge, str) else self.judge(studies)
-
-
 def word(sentence: str) -> str:
     """Return the word with which a verdict begins."""
     return sentence.partition(":")[0]
@@ -113,9 +93,9 @@ class FromFit:
     series: str = ""
     sentence: str = "law_holds"
     constants: tuple[str, ...] = ()
-    within: dict[str, object] = field(default_factory=dict)
-    shown: dict[str, object] = field(default_factory=dict)
-    replaced: dict[str, str] = field(default_factory=dict)
+    within: Mapping[str, object] = field(default_factory=dict)
+    shown: Mapping[str, object] = field(default_factory=dict)
+    replaced: Mapping[str, str] = field(default_factory=dict)
 
     def __call__(self, studies: Studies) -> str:
         """Return the sentence of the fit, followed by the constants."""
@@ -137,7 +117,7 @@ class FromFit:
 _RANK = {"not tested": 0, "yes": 1, "approximately": 2, "no": 3}
 
 
-def _present(selection: dict[str, object], found: xr.Dataset) -> dict[str, object]:
+def _present(selection: Mapping[str, object], found: xr.Dataset) -> dict[str, object]:
     return {dim: label for dim, label in selection.items() if dim in found.dims}
 
 
@@ -169,23 +149,3 @@ def _shown(part: xr.Dataset, name: str) -> str:
 def _interval(value: float, low: float, high: float) -> str:
     known = np.isfinite(low) and np.isfinite(high) and low < high
     return f"{value:.3g} ({low:.3g}, {high:.3g})" if known else f"{value:.3g}"
-
-
-def page(chapters: Iterable[tuple[str, Iterable[Claim]]], studies: Studies) -> str:
-    """Return the claims as Markdown."""
-    parts = []
-    for title, claims in chapters:
-        parts.append(f"## {title}\n\n| item | claim | holds? | why | command |\n|{'---|' * 5}")
-        for claim in claims:
-            sentence = claim.verdict(studies)
-            head = word(sentence)
-            command = f"`{claim.command}`" if claim.command else ""
-            cells = (claim.item, claim.claim, f"**{head}**{sentence[len(head) :]}", claim.why, command)
-            parts.append(row(cells))
-        parts.append("")
-    return "\n".join(parts)
-
-
-def row(cells: Iterable[str]) -> str:
-    """Return a row of a Markdown table."""
-    return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
