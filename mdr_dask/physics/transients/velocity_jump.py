@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit
@@ -98,7 +97,13 @@ def _limited_cubic(x: FloatArray, rows: FloatArray, slopes: FloatArray, places: 
     most = STEEPEST * np.minimum(beside[:, :-1], beside[:, 1:])
     tangents = np.clip(slopes, -most, most)
     tangents[:, 0] = np.where(np.isnan(slopes[:, 0]), 2 * secants[:, 0] - tangents[:, 1], tangents[:, 0])
-    curve: FloatArray = CubicHermiteSpline(x, rows, tangents, axis=1)(places)
+    # importing scipy.interpolate would take longer than a small study
+    piece = np.clip(np.searchsorted(x, places, side="right") - 1, 0, x.size - 2)
+    length = np.diff(x)[piece]
+    t = (places - x[piece]) / length
+    rise = rows[:, piece + 1] - rows[:, piece]
+    begin, end = length * tangents[:, piece], length * tangents[:, piece + 1]
+    curve: FloatArray = rows[:, piece] + t * (begin + t * (3 * rise - 2 * begin - end + t * (begin + end - 2 * rise)))
     return curve
 
 
